@@ -1,0 +1,156 @@
+"""A calibrated camera and a rig of them (OpenCV convention: x right, y down, z forward)."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.errors import CalibrationError
+from markerless_tracker.geometry import FloatArray, inverse
+from markerless_tracker.records import locked
+
+
+@dataclass(frozen=True, eq=False)
+class CameraModel:
+    """Pinhole camera with radial-tangential distortion.
+
+    Attributes:
+        name: the camera's name; topics and files carry it.
+        size_px: (width, height) of its images.
+        matrix: (3, 3) K, px; the centre of the top left pixel is (0, 0).
+        distortion: (5,) k1 k2 p1 p2 k3 (four or five may be given).
+        T_cam_world: (4, 4) rigid, takes world points (m) to the camera's frame.
+
+    Raises:
+        CalibrationError: a value has the wrong shape, is not finite or not a rigid transform.
+    """
+
+    name: str
+    size_px: tuple[int, int]
+    matrix: FloatArray
+    distortion: FloatArray
+    T_cam_world: FloatArray
+
+    def __post_init__(self) -> None:
+        distortion = np.asarray(self.distortion, dtype=np.float64).ravel()
+        if distortion.size not in (4, 5):
+            raise CalibrationError(
+                f"{self.name}: {distortion.size} distortion coefficients, expected k1 k2 p1 p2 (k3)"
+            )
+        object.__setattr__(self, "distortion", locked(np.resize(np.append(distortion, 0.0), 5), float))
+        for field, shape in (("matrix", (3, 3)), ("T_cam_world", (4, 4))):
+            value = locked(getattr(self, field), float)
+            if value.shape != shape or not np.isfinite(value).all():
+                raise CalibrationError(
+                    f"{self.name}: {field} has shape {value.shape}, expected finite {shape}"
+                )
+            object.__setattr__(self, field, value)
+        if not np.isfinite(self.distortion).all():
+            raise CalibrationError(f"{self.name}: distortion coefficients must be finite")
+        if self.matrix[0, 0] <= 0 or self.matrix[1, 1] <= 0:
+            raise CalibrationError(f"{self.name}: focal lengths must be positive, K is {self.matrix.tolist()}")
+        rotation = self.T_cam_world[:3, :3]
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0:
+            raise CalibrationError(f"{self.name}: its rotation is not a rotation matrix")
+        width, height = self.size_px
+        if width < 1 or height < 1:
+            raise CalibrationError(f"{self.name}: image size {width}x{height}, expected positive")
+
+    @property
+    def T_world_cam(self) -> FloatArray:
+        """(4, 4), takes points of the camera's frame to the world."""
+        return inverse(self.T_cam_world)
+
+    @property
+    def is_distorted(self) -> bool:
+        """Whether the lens bends straight lines at all."""
+        return bool(np.any(self.distortion != 0.0))
+
+    def resized(self, size_px: tuple[int, int]) -> "CameraModel":
+        """The same camera with its images resized to (width, height), each axis by its own factor.
+
+        Pixel centres lie at integers, so u' + 1/2 = (u + 1/2) * factor.
+        """
+        factor = np.array(size_px, dtype=np.float64) / np.array(self.size_px, dtype=np.float64)
+        matrix = self.matrix.copy()
+        matrix[:2] *= factor[:, None]
+        matrix[:2, 2] += 0.5 * factor - 0.5
+        return CameraModel(self.name, size_px, matrix, self.distortion, self.T_cam_world)
+
+    def scaled(self, scale: float) -> "CameraModel":
+        """The camera of images scaled by one factor; see `scaled_size`."""
+        return self if scale == 1.0 else self.resized(scaled_size(self.size_px, scale))
+
+
+@dataclass(frozen=True)
+class CameraRig:
+    """Cameras in a fixed order, with distinct names.
+
+    Raises:
+        CalibrationError: no camera, or two of one name.
+    """
+
+    cameras: tuple[CameraModel, ...]
+
+    def __post_init__(self) -> None:
+        if not self.cameras:
+            raise CalibrationError("a rig needs at least one camera, none was given")
+        if len(set(self.names)) != len(self.cameras):
+            raise CalibrationError(f"camera names must be distinct, got {', '.join(self.names)}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names in the rig's order."""
+        return tuple(camera.name for camera in self.cameras)
+
+    def __len__(self) -> int:
+        return len(self.cameras)
+
+    def __iter__(self) -> Iterator[CameraModel]:
+        return iter(self.cameras)
+
+    def __getitem__(self, name: str) -> CameraModel:
+        for camera in self.cameras:
+            if camera.name == name:
+                return camera
+        raise CalibrationError(f"no camera {name!r}, the rig has {', '.join(self.names)}")
+
+    def scaled(self, scale: float) -> "CameraRig":
+        """The rig of images scaled by one factor."""
+        return CameraRig(tuple(camera.scaled(scale) for camera in self.cameras))
+
+    def selected(self, names: Sequence[str]) -> "CameraRig":
+        """The rig with those cameras only, in the order given."""
+        return CameraRig(tuple(self[name] for name in names))
+
+
+def scaled_size(size_px: tuple[int, int], scale: float) -> tuple[int, int]:
+    """(width, height) of an image scaled by a factor, each at least 1."""
+    return max(1, round(size_px[0] * scale)), max(1, round(size_px[1] * scale))
+
+
+def project(points_world: NDArray[np.floating], rig: CameraRig) -> FloatArray:
+    """Project points (n, 3) in m, world frame, through every lens of a rig.
+
+    Returns pixels (c, n, 2) as (u, v), NaN for points that do not lie in front of the camera.
+    """
+    points = np.asarray(points_world, dtype=np.float64).reshape(-1, 3)
+    return np.stack([project_camera(points, camera) for camera in rig])
+
+
+def project_camera(points_world: FloatArray, camera: CameraModel) -> FloatArray:
+    """Project points (n, 3) in m, world frame; returns pixels (n, 2), NaN behind the camera.
+
+    Radial-tangential model as OpenCV and the Bouguet toolbox define it.
+    """
+    local = points_world @ camera.T_cam_world[:3, :3].T + camera.T_cam_world[:3, 3]
+    depth = np.where(local[:, 2] > 1e-6, local[:, 2], np.nan)
+    a, b = local[:, 0] / depth, local[:, 1] / depth
+    k1, k2, p1, p2, k3 = camera.distortion
+    r2 = a * a + b * b
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    x = a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a)
+    y = b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * a * b
+    k = camera.matrix
+    return np.stack([k[0, 0] * x + k[0, 1] * y + k[0, 2], k[1, 1] * y + k[1, 2]], axis=1)

@@ -1,0 +1,203 @@
+"""Frozen values that cross rooms: evidence of one image, one stage of a search, one result."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.errors import ImageError, SearchError
+
+MaskWords = NDArray[np.uint64]
+
+
+def locked(array: Any, dtype: Any) -> NDArray[Any]:
+    """A C-contiguous read-only array of that type; copied only if the type or layout differs."""
+    result = np.ascontiguousarray(array, dtype=dtype)
+    if result is array and result.flags.writeable:
+        result = result.view()
+    result.flags.writeable = False
+    return result
+
+
+def pack_mask(mask: NDArray[Any]) -> MaskWords:
+    """Pack a mask (h, w), non-zero = body, into words (h, ceil(w / 64)).
+
+    Column u is bit ``u % 64`` (least significant first) of word ``u // 64``; padding bits are 0.
+    """
+    height, width = mask.shape
+    packed = np.zeros((height, (width + 63) // 64 * 8), dtype=np.uint8)
+    bits = np.packbits(mask != 0, axis=1, bitorder="little")
+    packed[:, : bits.shape[1]] = bits
+    return packed.view("<u8").astype(np.uint64, copy=False)
+
+
+def unpack_mask(words: MaskWords, width: int) -> NDArray[np.bool_]:
+    """The mask (h, width) that `pack_mask` packed."""
+    raw = np.ascontiguousarray(words, dtype="<u8").view(np.uint8)
+    return np.unpackbits(raw, axis=1, count=width, bitorder="little").astype(np.bool_)
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What one camera's image says about the body, in that camera's own (distorted) pixels.
+
+    Attributes:
+        camera: the camera's name.
+        stamp_ns: capture time.
+        size_px: (width, height) of the full frame.
+        offset_px: (u, v) of the region's top left pixel in the full frame.
+        mask_words: (h, ceil(w / 64)) uint64, the silhouette packed as `pack_mask` does.
+        edges: (h, w) uint8, edge strength M = value / 255, in the same region.
+    """
+
+    camera: str
+    stamp_ns: int
+    size_px: tuple[int, int]
+    offset_px: tuple[int, int]
+    mask_words: MaskWords
+    edges: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mask_words", locked(self.mask_words, np.uint64))
+        object.__setattr__(self, "edges", locked(self.edges, np.uint8))
+        if self.edges.ndim != 2 or self.mask_words.shape != (self.height, (self.width + 63) // 64):
+            raise ImageError(
+                f"{self.camera}: observation holds edges {self.edges.shape} and mask words "
+                f"{self.mask_words.shape}, expected (h, w) and (h, ceil(w / 64))"
+            )
+        (full_w, full_h), (u, v) = self.size_px, self.offset_px
+        if u < 0 or v < 0 or u + self.width > full_w or v + self.height > full_h:
+            raise ImageError(
+                f"{self.camera}: region {self.width}x{self.height} at ({u}, {v}) does not lie "
+                f"inside the frame of {full_w}x{full_h} px"
+            )
+
+    @property
+    def width(self) -> int:
+        """Width of the region in px."""
+        return int(self.edges.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Height of the region in px."""
+        return int(self.edges.shape[0])
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """The silhouette of the region, unpacked: (h, w)."""
+        return unpack_mask(self.mask_words, self.width)
+
+    @classmethod
+    def from_mask(
+        cls,
+        camera: str,
+        stamp_ns: int,
+        mask: NDArray[Any],
+        edges: NDArray[np.uint8],
+        *,
+        size_px: tuple[int, int] | None = None,
+        offset_px: tuple[int, int] = (0, 0),
+    ) -> "Observation":
+        """Build from a mask (h, w), non-zero = body; the region is the full frame unless given."""
+        size = size_px or (int(mask.shape[1]), int(mask.shape[0]))
+        return cls(camera, stamp_ns, size, offset_px, pack_mask(mask), edges)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One search over some parameters of a pose of p parameters, for a body of c cones.
+
+    Attributes:
+        name: distinct within a frame; keys the random draws.
+        algorithm: registered name of the optimiser.
+        active: (d,) indices of the parameters that vary.
+        centre: (p,) pose the search starts from; the others stay at it.
+        sigma: (p,) spread of the search in m or rad; only the active ones are read.
+        particles: particles per iteration.
+        iterations: iterations, the initial sample being the first.
+        silhouette_weight, edge_weight: weights of f_s and f_e.
+        silhouette_cones, edge_cones: (c,) cones that each term uses.
+    """
+
+    name: str
+    algorithm: str
+    active: NDArray[np.int64]
+    centre: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    particles: int
+    iterations: int
+    silhouette_weight: float
+    edge_weight: float
+    silhouette_cones: NDArray[np.bool_]
+    edge_cones: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        for name, dtype in (
+            ("active", np.int64),
+            ("centre", np.float64),
+            ("sigma", np.float64),
+            ("silhouette_cones", np.bool_),
+            ("edge_cones", np.bool_),
+        ):
+            object.__setattr__(self, name, locked(getattr(self, name), dtype))
+        if self.centre.ndim != 1 or self.sigma.shape != self.centre.shape:
+            raise SearchError(
+                f"stage {self.name}: centre {self.centre.shape} and sigma {self.sigma.shape} "
+                "must be (p,) both"
+            )
+        if self.active.size == 0 or self.active.min() < 0 or self.active.max() >= self.centre.size:
+            raise SearchError(f"stage {self.name}: active parameters must be 0..{self.centre.size - 1}")
+        if self.particles < 1 or self.iterations < 1:
+            raise SearchError(
+                f"stage {self.name}: {self.particles} particles x {self.iterations} iterations, "
+                "expected at least 1 of each"
+            )
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations this stage spends."""
+        return self.particles * self.iterations
+
+
+class TrackState(Enum):
+    """Where the tracker stands."""
+
+    SEARCHING = "SEARCHING"
+    TRACKING = "TRACKING"
+    LOST = "LOST"
+
+
+@dataclass(frozen=True, eq=False)
+class TrackResult:
+    """What `Tracker.step` found in one set of images.
+
+    Attributes:
+        stamp_ns: time of the images.
+        state: state after this frame.
+        pose: (p,) parameters in m and rad, or None when there is no estimate.
+        markers_m: (15, 3) marker positions, world frame, or None.
+        fitness: f = f_s + f_e in [0, 2] of the estimate (NaN without one).
+        agreement: per camera, overlap (IoU) of the silhouette and the projected body.
+        evaluations: evaluations of the objective that the swarms spent on this frame.
+        observations: the evidence each camera gave.
+        warnings: what the user should know about this frame, one line each.
+    """
+
+    stamp_ns: int
+    state: TrackState
+    pose: NDArray[np.float64] | None
+    markers_m: NDArray[np.float64] | None
+    fitness: float
+    agreement: Mapping[str, float]
+    evaluations: int
+    observations: Mapping[str, Observation] = field(default_factory=dict, repr=False)
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("pose", "markers_m"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, locked(value, np.float64))
