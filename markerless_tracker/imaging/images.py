@@ -1,0 +1,68 @@
+"""What counts as an image, and the one way to change its size."""
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.errors import ImageError
+
+Image = NDArray[np.uint8]
+
+
+def check_image(image: Any, what: str, *, size_px: tuple[int, int] | None = None) -> Image:
+    """The image itself if it is uint8 (h, w) or (h, w, 3), not empty, and of that size.
+
+    Args:
+        image: what came.
+        what: name for the error message (camera or file).
+        size_px: (width, height) it must have, any if None.
+
+    Raises:
+        ImageError: it is something else; says what.
+    """
+    if not isinstance(image, np.ndarray):
+        raise ImageError(f"{what}: got {type(image).__name__}, expected an image array")
+    if image.dtype != np.uint8 or not (
+        image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
+    ):
+        raise ImageError(
+            f"{what}: got an image of {image.dtype} {image.shape}, "
+            "expected uint8 (h, w) or (h, w, 3)"
+        )
+    if image.size == 0:
+        raise ImageError(f"{what}: got an empty image {image.shape}")
+    if size_px is not None and (image.shape[1], image.shape[0]) != tuple(size_px):
+        raise ImageError(
+            f"{what}: got an image of {image.shape[1]}x{image.shape[0]} px, "
+            f"expected {size_px[0]}x{size_px[1]} px"
+        )
+    return image
+
+
+def grey_of(image: Image) -> Image:
+    """The image as grey (h, w); three equal channels keep their value."""
+    if image.ndim == 2:
+        return image
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+
+def scale_image(image: Image, size_px: tuple[int, int]) -> Image:
+    """The image at ``size_px`` = (width, height); the same object if it already has that size.
+
+    Area averaging: a pixel's centre (u, v) goes to ((u + 0.5) s - 0.5, ...), as
+    `CameraModel.scaled` moves the principal point.
+
+    Raises:
+        ImageError: not an image, or a size below one pixel.
+    """
+    check_image(image, "image to scale")
+    width, height = size_px
+    if width < 1 or height < 1:
+        raise ImageError(f"image to scale: got a size of {width}x{height} px, expected at least 1x1")
+    if (image.shape[1], image.shape[0]) == (width, height):
+        return image
+    return np.asarray(
+        cv2.resize(image, (int(width), int(height)), interpolation=cv2.INTER_AREA), dtype=np.uint8
+    )
