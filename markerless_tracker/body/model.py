@@ -1,0 +1,118 @@
+"""A body as arrays: tree of one-parameter joints, cones, markers, limits, collision pairs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.errors import BodyModelError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import locked
+
+IntArray = NDArray[np.int64]
+
+MARKER_NAMES = (
+    "Pelvis", "Neck", "Head", "LShoulder", "LElbow", "LWrist", "RShoulder", "RElbow", "RWrist",
+    "LHip", "LKnee", "LAnkle", "RHip", "RKnee", "RAnkle",
+)  # fmt: skip
+"""The 15 markers, in the order of every marker array of this package."""
+
+LIMB_MARKERS = tuple(name for name in MARKER_NAMES if name not in ("Pelvis", "Neck", "Head"))
+"""The 12 limb joints."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyModel:
+    """A body of p parameters, m nodes, c cones, fitted with one subject's sizes. Metres, radians.
+
+    A node is a fixed transform from its parent followed by at most one elementary move.
+
+    Attributes:
+        name: name of the description.
+        parameter_names: (p,) names in order; joint states carry those that are not in the root.
+        node_parent: (m,) parent node, -1 for the world; parents come before children.
+        node_fixed: (m, 3, 4) fixed transform from the parent, before the move.
+        node_kind: (m,) 0..2 rotation about x, y, z; 3..5 translation along them; -1 no move.
+        node_sign: (m,) factor of the parameter.
+        node_parameter: (m,) index of the parameter that moves it, -1 for none.
+        frames: name of each frame to its last node.
+        root_frame: name of the frame that carries the body.
+        sigma: (p,) greatest change between frames at 60 fps (SPPSO Eq 1).
+        neutral: (p,) standing, arms hanging; the root at the origin.
+        limits: (2, p) anatomical lower and upper limits, infinite where free.
+        walking_limits: (2, p) published limits, learned from one walk.
+        marker_node, marker_offset: (15,) and (15, 3), markers in their nodes' frames.
+        cone_names: (c,) names.
+        cone_node, cone_fixed: (c,) and (c, 3, 4), where each cone's base frame hangs.
+        cone_length: (c,) length along the base frame's +z.
+        cone_shape: (c, 2, 4) start and end: radius x, radius y, offset x, offset y.
+        cone_edges: (c, 2) whether the sides, and whether the end's edge, count as edges.
+        collisions: (k, 2) pairs of cones that must not inter-penetrate.
+        subspaces: named groups of parameter indices.
+        lengths_m: the subject's named lengths.
+    """
+
+    name: str
+    parameter_names: tuple[str, ...]
+    node_parent: IntArray
+    node_fixed: FloatArray
+    node_kind: IntArray
+    node_sign: FloatArray
+    node_parameter: IntArray
+    frames: Mapping[str, int]
+    root_frame: str
+    sigma: FloatArray
+    neutral: FloatArray
+    limits: FloatArray
+    walking_limits: FloatArray
+    marker_node: IntArray
+    marker_offset: FloatArray
+    cone_names: tuple[str, ...]
+    cone_node: IntArray
+    cone_fixed: FloatArray
+    cone_length: FloatArray
+    cone_shape: FloatArray
+    cone_edges: NDArray[np.bool_]
+    collisions: IntArray
+    subspaces: Mapping[str, IntArray]
+    lengths_m: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        for name, value in list(vars(self).items()):
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, name, locked(value, value.dtype))
+        if np.any(self.cone_length <= 0) or np.any(self.cone_shape[:, :, :2] <= 0):
+            raise BodyModelError(f"body {self.name}: cone lengths and radii must be positive")
+
+    @property
+    def size(self) -> int:
+        """Number of parameters p."""
+        return len(self.parameter_names)
+
+    @property
+    def root(self) -> IntArray:
+        """(6,) indices of the parameters that place the root frame in the world."""
+        return self.subspaces["root"]
+
+    @cached_property
+    def joints(self) -> IntArray:
+        """Indices of the parameters that are joints, in order."""
+        return np.setdiff1d(np.arange(self.size), self.root)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints (all parameters but the root's), in order."""
+        return tuple(self.parameter_names[i] for i in self.joints)
+
+    def index(self, parameter: str) -> int:
+        """Index of a named parameter.
+
+        Raises:
+            BodyModelError: there is no such parameter.
+        """
+        try:
+            return self.parameter_names.index(parameter)
+        except ValueError:
+            raise BodyModelError(f"body {self.name} has no parameter {parameter!r}") from None

@@ -1,0 +1,102 @@
+"""A start pose: from one row of named markers, or from a YAML file of named parameters."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import yaml
+from scipy.optimize import least_squares
+
+from markerless_tracker.body import kinematics
+from markerless_tracker.body.model import MARKER_NAMES, BodyModel
+from markerless_tracker.body.subject import complete_markers
+from markerless_tracker.errors import BodyModelError
+from markerless_tracker.geometry import FloatArray
+
+# Keeps what the markers do not determine (the twist of a straight limb) at neutral: one radian
+# away costs as much as 4 mm at one marker.
+_NEUTRAL_WEIGHT_M_PER_RAD = 0.004
+
+
+def pose_from_markers(
+    body: BodyModel, markers_m: Mapping[str, FloatArray], *, limits: FloatArray | None = None
+) -> FloatArray:
+    """The pose (p,) whose markers lie nearest to the named markers (3,), world frame, m.
+
+    Bounded least squares within the limits (2, p), the body's anatomical ones unless given;
+    markers may be missing, but not the hips and the neck that give the position and heading.
+
+    Raises:
+        BodyModelError: LHip, RHip or Neck is missing, or they do not span a body.
+    """
+    known = complete_markers(markers_m)
+    for needed in ("LHip", "RHip", "Neck"):
+        if needed not in known:
+            raise BodyModelError(
+                f"start pose: marker {needed} is missing, expected at least LHip, RHip and Neck; "
+                f"got {', '.join(sorted(known)) or 'none'}"
+            )
+    names = [name for name in MARKER_NAMES if name in known]
+    rows = np.array([MARKER_NAMES.index(name) for name in names])
+    target = np.array([known[name] for name in names])
+    bounds = body.limits if limits is None else limits
+    angles = body.joints
+
+    start = np.clip(_upright(body, known), bounds[0], bounds[1])
+    # Bounds of joints are finite; a margin keeps the start strictly inside, as the solver wants.
+    low, high = bounds[0] - 1e-9, bounds[1] + 1e-9
+
+    def residuals(pose: FloatArray) -> FloatArray:
+        gap = (kinematics.markers(body, pose)[rows] - target).ravel()
+        neutral = _NEUTRAL_WEIGHT_M_PER_RAD * (pose - body.neutral)[angles]
+        return np.concatenate([gap, neutral])
+
+    fit = least_squares(residuals, start, bounds=(low, high), x_scale="jac", max_nfev=400)
+    return np.clip(fit.x, bounds[0], bounds[1])
+
+
+def read_pose(path: Path, body: BodyModel) -> FloatArray:
+    """Read a start pose (p,): a YAML mapping of parameter names to m or rad.
+
+    Parameters that are not named stay neutral; the root's six must be named.
+
+    Raises:
+        BodyModelError: the file cannot be read, names an unknown parameter or holds no number.
+    """
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise BodyModelError(f"{path}: cannot read the pose: {str(error).splitlines()[0]}") from error
+    if not isinstance(data, dict):
+        raise BodyModelError(f"{path}: expected a mapping of parameter names to m or rad")
+    pose = body.neutral.copy()
+    for name, value in data.items():
+        if str(name) not in body.parameter_names:
+            raise BodyModelError(f"{path}: body {body.name} has no parameter {name!r}")
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+            raise BodyModelError(f"{path}: parameter {name} is {value!r}, expected a finite number")
+        pose[body.index(str(name))] = float(value)
+    missing = [body.parameter_names[i] for i in body.root if body.parameter_names[i] not in data]
+    if missing:
+        raise BodyModelError(f"{path}: the root's {', '.join(missing)} must be given")
+    return pose
+
+
+def write_pose(path: Path, body: BodyModel, pose: FloatArray) -> None:
+    """Write a pose (p,) that `read_pose` reads back exactly."""
+    named = {name: float(value) for name, value in zip(body.parameter_names, pose, strict=True)}
+    path.write_text(yaml.safe_dump(named, sort_keys=False), encoding="utf-8")
+
+
+def _upright(body: BodyModel, known: Mapping[str, FloatArray]) -> FloatArray:
+    """The neutral pose put at the hips, turned to their heading and to the trunk's direction."""
+    across = known["LHip"] - known["RHip"]
+    trunk = known["Neck"] - known["Pelvis"]
+    if np.linalg.norm(np.cross(across, trunk)) < 1e-4:
+        raise BodyModelError("start pose: LHip, RHip and Neck lie on one line")
+    pose = body.neutral.copy()
+    left = across / np.linalg.norm(across)
+    names = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
+    pose[[body.index(n) for n in names]] = known["Pelvis"]
+    pose[body.index("pelvis_rz")] = np.arctan2(-left[0], left[1])
+    return pose

@@ -1,0 +1,137 @@
+"""One person's sizes: segment lengths and, where known, the sections of the cones."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from markerless_tracker.body.description import BodyDescription
+from markerless_tracker.errors import BodyModelError
+from markerless_tracker.geometry import FloatArray
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Sizes in metres.
+
+    Attributes:
+        name: shown in messages and results.
+        lengths_m: segment lengths by the names of the body description.
+        cones_m: (2, 4) per cone, start and end: radius x, radius y, offset x, offset y. Cones
+            that are not named get the description's ratios to their length.
+    """
+
+    name: str
+    lengths_m: Mapping[str, float]
+    cones_m: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for key, value in self.lengths_m.items():
+            if not (isinstance(value, (int, float)) and np.isfinite(value) and 0.0 < value < 3.0):
+                raise BodyModelError(
+                    f"subject {self.name}: length {key} is {value!r}, expected metres between 0 and 3"
+                )
+        for key, shape in self.cones_m.items():
+            if np.shape(shape) != (2, 4) or not np.isfinite(np.asarray(shape, dtype=float)).all():
+                raise BodyModelError(
+                    f"subject {self.name}: cone {key} needs two rows of "
+                    "[radius x, radius y, offset x, offset y] in metres"
+                )
+
+    def length(self, name: str) -> float:
+        """A named length in metres.
+
+        Raises:
+            BodyModelError: the subject does not have it.
+        """
+        if name not in self.lengths_m:
+            raise BodyModelError(f"subject {self.name}: length {name!r} is missing")
+        return float(self.lengths_m[name])
+
+
+def subject_from_stature(description: BodyDescription, stature_m: float) -> Subject:
+    """A generic person of that height (fractions of stature after Drillis and Contini).
+
+    Raises:
+        BodyModelError: the stature is not between 0.5 and 2.6 m.
+    """
+    if not 0.5 <= stature_m <= 2.6:
+        raise BodyModelError(f"stature is {stature_m} m, expected between 0.5 and 2.6")
+    lengths = {name: float(v["stature"]) * stature_m for name, v in description.lengths.items()}
+    return Subject(f"stature {stature_m:g} m", lengths)
+
+
+def subject_from_markers(description: BodyDescription, markers_m: Mapping[str, FloatArray]) -> Subject:
+    """Segment lengths from one row of named markers (3,), in m, any frame.
+
+    A missing Pelvis is the midpoint of the hips; a length whose markers are missing is taken from
+    the stature that the other lengths suggest.
+
+    Raises:
+        BodyModelError: fewer than half of the lengths can be measured.
+    """
+    known = complete_markers(markers_m)
+    measured: dict[str, float] = {}
+    for name, entry in description.lengths.items():
+        start, end = entry.get("markers", (None, None))
+        if start in known and end in known:
+            measured[name] = float(np.linalg.norm(known[start] - known[end]))
+    if 2 * len(measured) < len(description.lengths):
+        raise BodyModelError(
+            f"{len(measured)} of {len(description.lengths)} segment lengths can be measured from "
+            f"markers {', '.join(sorted(known)) or 'none'}, expected at least half"
+        )
+    fractions = {name: float(v["stature"]) for name, v in description.lengths.items()}
+    stature = float(np.median([measured[name] / fractions[name] for name in measured]))
+    return Subject(
+        "markers", {name: measured.get(name, f * stature) for name, f in fractions.items()}
+    )
+
+
+def complete_markers(markers_m: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """The finite markers, with a missing Pelvis put midway between the hips."""
+    known = {
+        name: np.asarray(p, dtype=float) for name, p in markers_m.items() if np.isfinite(p).all()
+    }
+    if "Pelvis" not in known and "LHip" in known and "RHip" in known:
+        known["Pelvis"] = 0.5 * (known["LHip"] + known["RHip"])
+    return known
+
+
+def read_subject(path: Path) -> Subject:
+    """Read a subject file (YAML: name, lengths_m, optional cones_m).
+
+    Raises:
+        BodyModelError: it cannot be read, or holds unknown or impossible entries.
+    """
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise BodyModelError(f"{path}: cannot read the subject: {str(error).splitlines()[0]}") from error
+    if not isinstance(data, dict) or not isinstance(data.get("lengths_m"), dict):
+        raise BodyModelError(f"{path}: expected name, lengths_m and optionally cones_m")
+    unknown = sorted(set(map(str, data)) - {"name", "lengths_m", "cones_m"})
+    if unknown:
+        raise BodyModelError(f"{path}: unknown entry {', '.join(unknown)}")
+    return Subject(str(data.get("name", path.stem)), data["lengths_m"], _shapes(data, path))
+
+
+def write_subject(path: Path, subject: Subject) -> None:
+    """Write a subject file that `read_subject` reads back exactly."""
+    data: dict[str, Any] = {
+        "name": subject.name,
+        "lengths_m": {name: float(v) for name, v in subject.lengths_m.items()},
+    }
+    if subject.cones_m:
+        data["cones_m"] = {name: np.asarray(v).tolist() for name, v in subject.cones_m.items()}
+    path.write_text(yaml.safe_dump(data, sort_keys=False, default_flow_style=None), encoding="utf-8")
+
+
+def _shapes(data: dict[str, Any], path: Path) -> dict[str, FloatArray]:
+    try:
+        return {name: np.array(v, dtype=float) for name, v in (data.get("cones_m") or {}).items()}
+    except (TypeError, ValueError, AttributeError) as error:
+        raise BodyModelError(f"{path}: cones_m must map cones to two rows of four numbers") from error
