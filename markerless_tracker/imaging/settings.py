@@ -46,21 +46,21 @@ class ImagingSettings:
     )
     shadow_removal: bool = _setting(True, "take pixels that look like a shadow for background")
     shadow_value_min: float = _setting(
-        0.4, "darkest shadow, as a ratio of its brightness to the background's", least=0.0, most=1.0
+        0.5, "darkest shadow, as a ratio of its brightness to the background's", least=0.0, most=1.0
     )
     shadow_value_max: float = _setting(
         1.0, "faintest shadow, as a ratio of its brightness to the background's", least=0.0, most=2.0
     )
     shadow_saturation_max: float = _setting(
-        0.15, "a shadow's saturation exceeds the background's by no more than this", least=-1.0, most=1.0
+        0.05, "a shadow's saturation exceeds the background's by no more than this", least=-1.0, most=1.0
     )
     shadow_hue_max_deg: float = _setting(
         40.0, "a shadow's hue differs from the background's by no more than this", least=0.0, most=180.0
     )
     shadow_chroma_min: float = _setting(
         12.0,
-        "hue is compared only where image and background both have this much colour (largest minus "
-        "smallest channel, grey levels); below it hue is noise",
+        "hue is compared only where the background, darkened as much as the pixel, would have this "
+        "much colour (largest minus smallest channel, grey levels); below it hue is noise",
         least=0.0,
         most=255.0,
     )

@@ -40,10 +40,11 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
     mean_saturation = mean_chroma / mean_value if mean_value > np.float32(0.0) else np.float32(0.0)
     if saturation - mean_saturation > rule[2]:
         return False
+    # In the dark hue is noise: it is compared where the shadowed background would have colour.
+    if mean_chroma * value < rule[4] * mean_value:
+        return True
     if chroma <= np.float32(0.0) or mean_chroma <= np.float32(0.0):
-        return True
-    if chroma < rule[4] or mean_chroma < rule[4]:
-        return True
+        return chroma == mean_chroma
     turn = abs(hue_deg(b, g, r, value, chroma) - hue_deg(mean_b, mean_g, mean_r, mean_value, mean_chroma))
     return min(turn, np.float32(360.0) - turn) <= rule[3]
 
