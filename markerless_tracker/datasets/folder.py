@@ -1,0 +1,162 @@
+"""Recordings as files: one video or folder of numbered images per camera, beside a calibration."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from markerless_tracker.camera import CameraRig, read_calibration
+from markerless_tracker.datasets.background import read_background
+from markerless_tracker.datasets.decode import read_together
+from markerless_tracker.datasets.markers import MarkerTrack
+from markerless_tracker.datasets.recording import FrameSet, Recording, stamp_of
+from markerless_tracker.datasets.trc import read_trc
+from markerless_tracker.datasets.video import find_stream, numbered_files, open_stream, read_image
+from markerless_tracker.errors import ConfigError, DatasetError, ImageError
+from markerless_tracker.imaging import Image, scale_image
+
+CALIBRATION = "calibration.toml"
+BACKGROUND = "background"
+
+
+class VideoRecording(Recording):
+    """Images from one source per camera; frame i of each belongs together.
+
+    The recording ends with its shortest camera.
+
+    Args:
+        path: folder of the recording, for messages and `background/`.
+        sources: camera name -> video or folder of numbered images.
+        rig: the cameras of the stored images.
+        scale: factor for all images.
+        input_fps: rate of numbered images (overrides that of videos), 1/s.
+
+    Raises:
+        DatasetError: a source cannot be read, rates differ or are unknown.
+        ImageError: a source's images do not have their calibration's size.
+        ConfigError: the scale or rate is impossible.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        sources: Mapping[str, Path],
+        rig: CameraRig,
+        *,
+        scale: float = 1.0,
+        input_fps: float | None = None,
+    ) -> None:
+        check_scale(scale)
+        if input_fps is not None and not 0.0 < input_fps < 1e5:
+            raise ConfigError(f"input fps {input_fps:g}: expected a rate above 0")
+        self.path = path
+        self._sources = dict(sources)
+        self._input_fps = input_fps
+        streams = {name: open_stream(source, input_fps=input_fps) for name, source in sources.items()}
+        for stream in streams.values():
+            stream.close()
+        for camera in rig:
+            came = streams[camera.name].size_px
+            if came != camera.size_px:
+                raise ImageError(
+                    f"{camera.name}: {streams[camera.name].path} has images of {came[0]}x{came[1]} px, "
+                    f"expected {camera.size_px[0]}x{camera.size_px[1]} px as calibrated"
+                )
+        self._stored_sizes_px = {camera.name: camera.size_px for camera in rig}
+        counts = {name: stream.frame_count for name, stream in streams.items()}
+        rates = {name: stream.fps for name, stream in streams.items()}
+        super().__init__(
+            path.name or str(path),
+            rig.scaled(scale),
+            scale=scale,
+            fps=_common_rate(path, rates),
+            frame_count=min(counts.values()),
+        )
+        if len(set(counts.values())) > 1:
+            self.warn(
+                f"{self.name}: cameras differ in length ("
+                + ", ".join(f"{name} {count}" for name, count in counts.items())
+                + f" frames), the recording ends after {self.frame_count}"
+            )
+
+    def _read(self, start: int, every: int) -> Iterator[FrameSet]:
+        streams = {
+            name: open_stream(source, input_fps=self._input_fps)
+            for name, source in self._sources.items()
+        }
+        sizes = {camera.name: camera.size_px for camera in self.rig}
+        for index, images in read_together(streams, sizes, start=start, every=every):
+            ended = [name for name, image in images.items() if image is None]
+            if ended:
+                if index < (self.frame_count or 0):
+                    self.warn(
+                        f"{self.name}: {', '.join(ended)} cannot be read beyond frame "
+                        f"{max(index - every, 0)} of {self.frame_count}, the recording ends there"
+                    )
+                return
+            if self.frame_count is not None and index >= self.frame_count:
+                return
+            yield FrameSet(
+                index,
+                stamp_of(index, self.fps),
+                {name: image for name, image in images.items() if image is not None},
+            )
+
+    def background_frames(self) -> dict[str, list[Image]]:
+        """Camera name -> empty-scene images (scaled) from `background/`, {} without that folder."""
+        folder = self.path / BACKGROUND
+        if not folder.is_dir():
+            return {}
+        return read_background(folder, self.rig, stored_sizes_px=self._stored_sizes_px)
+
+
+class FolderRecording(VideoRecording):
+    """The neutral layout: `calibration.toml` and one video or image folder per camera."""
+
+    def __init__(self, path: Path, *, scale: float = 1.0, input_fps: float | None = None) -> None:
+        rig = read_calibration(path / CALIBRATION)
+        sources = {camera.name: find_stream(path, camera.name) for camera in rig}
+        missing = [name for name, source in sources.items() if source is None]
+        if missing:
+            raise DatasetError(
+                f"{path}: no images of {', '.join(missing)}, expected {missing[0]}.mp4 "
+                "(or .mkv, .avi, .mov, or a folder of that name with numbered images)"
+            )
+        found = {name: source for name, source in sources.items() if source is not None}
+        super().__init__(path, found, rig, scale=scale, input_fps=input_fps)
+
+    def ground_truth(self) -> MarkerTrack | None:
+        """The markers of `ground_truth.trc`, None if there is no such file."""
+        path = self.path / "ground_truth.trc"
+        return read_trc(path) if path.is_file() else None
+
+    def masks(self, camera: str) -> dict[int, Image]:
+        """Frame index -> true silhouette (h, w) of a camera, 0 or 255, scaled, from `masks/NAME/`."""
+        folder = self.path / "masks" / camera
+        if not folder.is_dir():
+            return {}
+        size_px = self.rig[camera].size_px
+        masks = {}
+        for file in numbered_files(folder):
+            if not file.stem.isdecimal():
+                raise DatasetError(f"{file}: expected a frame number as its name, such as 000050.png")
+            mask = read_image(file)
+            mask = mask if mask.ndim == 2 else mask[..., 0]
+            masks[int(file.stem)] = np.where(scale_image(mask, size_px) >= 128, 255, 0).astype(np.uint8)
+        return masks
+
+
+def check_scale(scale: float) -> None:
+    """Raise ConfigError unless a scale of images lies in (0, 1]."""
+    if not 0.0 < scale <= 1.0:
+        raise ConfigError(f"scale {scale:g}: expected above 0 and at most 1")
+
+
+def _common_rate(path: Path, rates: Mapping[str, float | None]) -> float:
+    for name, rate in rates.items():
+        if rate is None:
+            raise DatasetError(f"{path}: {name} does not say its rate, expected --input-fps")
+    if len(set(rates.values())) > 1:
+        listed = ", ".join(f"{name} {rate:g}" for name, rate in rates.items())
+        raise DatasetError(f"{path}: cameras differ in rate ({listed} fps), expected one rate")
+    return next(rate for rate in rates.values() if rate is not None)
