@@ -1,0 +1,38 @@
+"""The middleware's settings without which camera images are lost between processes."""
+
+import os
+from collections.abc import MutableMapping
+from pathlib import Path
+
+from markerless_tracker.resources import config_dir
+
+VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+"""Where rmw_fastrtps of Jazzy looks for a profile."""
+
+USERS_OWN = (VARIABLE, "FASTDDS_DEFAULT_PROFILES_FILE")
+"""Variables by which users name a profile of their own."""
+
+
+def profile_file() -> Path:
+    """The shipped Fast DDS profile for images."""
+    return config_dir() / "fastdds" / "images.xml"
+
+
+def apply_profile(environment: MutableMapping[str, str] | None = None) -> bool:
+    """Let Fast DDS use the shipped profile, unless the user chose an own one.
+
+    Must run before ``rclpy.init``. Fast DDS' own default file in the working directory
+    (``DEFAULT_FASTRTPS_PROFILES.xml``) counts as a choice too.
+
+    Args:
+        environment: environment to change; this process's own if None.
+
+    Returns:
+        Whether the shipped profile is the one in use.
+    """
+    env = os.environ if environment is None else environment
+    chosen = any(env.get(name) for name in USERS_OWN)
+    if chosen or Path("DEFAULT_FASTRTPS_PROFILES.xml").is_file():
+        return env.get(VARIABLE) == str(profile_file())
+    env[VARIABLE] = str(profile_file())
+    return True

@@ -1,0 +1,94 @@
+"""Starting and stopping an executable of this package in a ROS graph."""
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from markerless_tracker.errors import ConfigError, TrackerError
+from markerless_tracker.node.profile import apply_profile
+
+NOT_INSTALLED = (
+    "ROS 2 is not installed: pip install 'markerless_tracker[ros]' or source a ROS 2 Jazzy setup"
+)
+
+
+class RosMissingError(TrackerError):
+    """A ROS node was asked for where ROS 2 cannot be imported."""
+
+
+def require_ros() -> None:
+    """Make sure that rclpy and the message packages can be imported.
+
+    Raises:
+        RosMissingError: they cannot; says how to install them.
+    """
+    try:
+        import diagnostic_msgs.msg
+        import geometry_msgs.msg
+        import rclpy
+        import sensor_msgs.msg
+        import std_srvs.srv
+        import visualization_msgs.msg  # noqa: F401
+    except ImportError as error:
+        missing = f" ({error.name} is missing)" if error.name else ""
+        raise RosMissingError(NOT_INSTALLED + missing) from error
+
+
+def run_executable(
+    name: str, body: Callable[[list[str]], int], argv: Sequence[str] | None = None
+) -> int:
+    """Run an executable: one line on standard error and 1 for an error, 0 for an interrupt.
+
+    Args:
+        name: the executable's, for its messages.
+        body: called with the arguments after ROS is known to be there; returns the exit code.
+        argv: arguments without the program's name; those of this process if None.
+    """
+    try:
+        # Until rclpy takes SIGTERM over it would end the process with code 143.
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        apply_profile()
+        require_ros()
+        return body(list(sys.argv[1:] if argv is None else argv))
+    except TrackerError as error:
+        print(f"{name}: {error}", file=sys.stderr, flush=True)
+        return 1
+    except KeyboardInterrupt:
+        return 0
+
+
+def init_context(arguments: Sequence[str]) -> Any:
+    """Initialise rclpy with a context of its own and ROS arguments.
+
+    Args:
+        arguments: e.g. ``["--ros-args", "-p", "seed:=1"]``.
+
+    Returns:
+        The ``rclpy.Context``; SIGINT and SIGTERM shut it down.
+
+    Raises:
+        ConfigError: an argument that ROS does not understand, or one outside ``--ros-args``.
+    """
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
+    try:
+        rest = remove_ros_args(args=["", *arguments])[1:]
+        if rest:
+            raise ConfigError(
+                f"argument {rest[0]!r} is not understood, expected "
+                "--ros-args -p NAME:=VALUE or --params-file FILE"
+            )
+        context = rclpy.Context()
+        rclpy.init(
+            args=list(arguments),
+            context=context,
+            signal_handler_options=SignalHandlerOptions.ALL,
+        )
+    except ConfigError:
+        raise
+    except Exception as error:  # rclpy has no common root for what it finds wrong in arguments
+        raise ConfigError(f"ROS arguments: {' '.join(str(error).split())}") from error
+    return context
