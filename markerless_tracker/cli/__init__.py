@@ -1,0 +1,1 @@
+"""The command ``markerless_tracker`` and its verbs, one module each."""

@@ -1,0 +1,114 @@
+"""The command ``markerless_tracker VERB``: finds the verb, parses, runs, turns errors into a line.
+
+A verb is a module of this folder with
+
+- ``HELP``: what it does, for its ``--help``;
+- ``EXAMPLE``: a command that a reader could type;
+- ``add_arguments(parser)``;
+- ``run(args) -> int``, the exit status.
+
+Verbs are imported when called, so that ``--help`` answers at once.
+"""
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import NoReturn
+
+from markerless_tracker import __version__
+from markerless_tracker.errors import TrackerError
+
+PROGRAM = "markerless_tracker"
+
+VERBS: Mapping[str, str] = MappingProxyType(
+    {
+        "convert": "a recording, dataset or videos to an MCAP bag",
+        "track": "a recording or bag to the pose of the person in it",
+        "evaluate": "the error of a result against reference markers, in mm",
+        "synthesize": "a made-up person as a recording with exact truth",
+        "benchmark": "measured tables of speed and accuracy",
+    }
+)
+"""The verbs and what each does, in one line."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Reports a wrong argument in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Args:
+        argv: the words after the program's name; those of this process unless given.
+
+    Returns:
+        Exit status: 0 done, 1 failed with one line on standard error, 2 wrong arguments,
+        130 interrupted, 141 nobody reads standard output any more.
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    if not words:
+        sys.stderr.write(_overview())
+        return 2
+    verb, rest = words[0], words[1:]
+    if verb in ("-h", "--help"):
+        sys.stdout.write(_overview())
+        return 0
+    if verb == "--version":
+        print(f"{PROGRAM} {__version__}")
+        return 0
+    if verb not in VERBS:
+        sys.stderr.write(
+            f"{PROGRAM}: error: unknown verb {verb!r}, expected one of {', '.join(VERBS)}\n"
+        )
+        return 2
+    try:
+        return _run(verb, rest)
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        # Python would complain once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except (TrackerError, OSError) as error:
+        sys.stderr.write(f"{PROGRAM}: error: {_line(error)}\n")
+        return 1
+
+
+def _run(verb: str, words: Sequence[str]) -> int:
+    module = importlib.import_module(f"markerless_tracker.cli.{verb}")
+    parser = _Parser(
+        prog=f"{PROGRAM} {verb}",
+        description=module.HELP,
+        epilog=f"example:\n  {module.EXAMPLE}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    module.add_arguments(parser)
+    status = int(module.run(parser.parse_args(words)))
+    sys.stdout.flush()
+    return status
+
+
+def _overview() -> str:
+    width = max(map(len, VERBS)) + 2
+    rows = "".join(f"  {verb:{width}}{text}\n" for verb, text in VERBS.items())
+    return (
+        f"usage: {PROGRAM} VERB ...\n\n"
+        "Full-body pose tracking from several calibrated cameras.\n\n"
+        f"verbs:\n{rows}\n"
+        f"{PROGRAM} VERB --help explains one, with an example; {PROGRAM} --version.\n"
+    )
+
+
+def _line(error: Exception) -> str:
+    """One line of what went wrong; the system's errors name their file first."""
+    if isinstance(error, OSError) and error.strerror:
+        names = [str(name) for name in (error.filename, error.filename2) if name is not None]
+        return ": ".join([*names, error.strerror])
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,0 +1,127 @@
+"""The package as colcon and pip see it: one version, all files, entry points that exist."""
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from markerless_tracker import __version__
+
+NAME = "markerless_tracker"
+EXECUTABLES = {
+    "markerless_tracker": "markerless_tracker.cli.main:main",
+    "player": "markerless_tracker.node.player_node:main",
+    "tracker": "markerless_tracker.node.tracker_node:main",
+}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
+    """The wheel that pip builds from a copy of the source tree, without the network."""
+    pytest.importorskip("setuptools", minversion="70.1", reason="needed to build the wheel")
+    root = Path(__file__).resolve().parent.parent
+    work = tmp_path_factory.mktemp("wheel")
+    for item in (NAME, "config", "resource"):
+        shutil.copytree(root / item, work / item, ignore=shutil.ignore_patterns("__pycache__"))
+    for item in ("setup.py", "setup.cfg", "pyproject.toml", "package.xml", "LICENSE"):
+        shutil.copy(root / item, work)
+    done = subprocess.run(
+        [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--no-index"]
+        + ["--quiet", "--disable-pip-version-check", "--wheel-dir", str(work / "out"), str(work)],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    (built,) = (work / "out").glob("*.whl")
+    return zipfile.ZipFile(built)
+
+
+def package_xml(root: Path) -> ElementTree.Element:
+    return ElementTree.parse(root / "package.xml").getroot()
+
+
+def test_one_version_everywhere(project_root: Path) -> None:
+    assert package_xml(project_root).findtext("version") == __version__
+    changelog = (project_root / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.search(rf"^## \[{re.escape(__version__)}\]", changelog, re.MULTILINE)
+
+
+def test_manifest(project_root: Path) -> None:
+    root = package_xml(project_root)
+    assert root.get("format") == "3"
+    assert root.findtext("name") == NAME
+    assert root.findtext("license") == "Apache-2.0"
+    assert root.findtext("export/build_type") == "ament_python"
+    assert (project_root / "resource" / NAME).is_file()
+    licence = (project_root / "LICENSE").read_text(encoding="utf-8")
+    assert "Apache License" in licence
+    assert "END OF TERMS AND CONDITIONS" in licence
+
+
+def test_ros_finds_its_executables_where_it_looks(project_root: Path) -> None:
+    text = (project_root / "setup.cfg").read_text(encoding="utf-8")
+    assert f"script_dir=$base/lib/{NAME}" in text
+    assert f"install_scripts=$base/lib/{NAME}" in text
+
+
+@pytest.mark.parametrize(("executable", "target"), EXECUTABLES.items())
+def test_entry_points_exist(project_root: Path, executable: str, target: str) -> None:
+    module, function = target.split(":")
+    path = project_root.joinpath(*module.split(".")).with_suffix(".py")
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def test_wheel_holds_every_module(wheel: zipfile.ZipFile, project_root: Path) -> None:
+    sources = {p.relative_to(project_root).as_posix() for p in (project_root / NAME).rglob("*.py")}
+    assert sources <= set(wheel.namelist())
+
+
+def test_wheel_holds_config_and_manifest(wheel: zipfile.ZipFile, project_root: Path) -> None:
+    data = f"{NAME}-{__version__}.data/data/share"
+    config = {
+        f"{data}/{NAME}/{p.relative_to(project_root).as_posix()}"
+        for p in (project_root / "config").rglob("*")
+        if p.is_file()
+    }
+    index = f"{data}/ament_index/resource_index/packages/{NAME}"
+    assert {*config, index, f"{data}/{NAME}/package.xml"} <= set(wheel.namelist())
+
+
+def test_wheel_has_the_executables(wheel: zipfile.ZipFile) -> None:
+    text = wheel.read(f"{NAME}-{__version__}.dist-info/entry_points.txt").decode()
+    found = dict(re.findall(r"^(\w+) = (\S+)$", text, re.MULTILINE))
+    assert found == EXECUTABLES
+
+
+def test_ros_is_an_extra_only(wheel: zipfile.ZipFile) -> None:
+    text = wheel.read(f"{NAME}-{__version__}.dist-info/METADATA").decode()
+    required = re.findall(r"^Requires-Dist: (.+)$", text, re.MULTILINE)
+    assert any(line.startswith("numpy") for line in required)
+    ros = [line for line in required if line.startswith("ros-")]
+    assert len(ros) == 2
+    assert all('extra == "ros"' in line.replace("'", '"') for line in ros)
+
+
+def test_lock_pins_everything_asked_for(project_root: Path) -> None:
+    lock = (project_root / "requirements" / "lock.txt").read_text(encoding="utf-8")
+    pinned = {
+        re.sub(r"[-_.]+", "-", line.split("==")[0]).lower()
+        for line in lock.splitlines()
+        if "==" in line
+    }
+    direct = (project_root / "requirements" / "direct.txt").read_text(encoding="utf-8")
+    names = re.findall(r"^([A-Za-z][\w.-]*)", direct, re.MULTILINE)
+    assert len(names) > 10
+    assert {re.sub(r"[-_.]+", "-", name).lower() for name in names} <= pinned
+    assert all(
+        re.match(r"^[\w.-]+==\S+( ; .+)?$", line)
+        for line in lock.splitlines()
+        if line and not line.startswith("#")
+    )
