@@ -1,0 +1,133 @@
+"""What the kernels read and write, as tuples of plain arrays."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraModel
+from markerless_tracker.errors import ImageError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation, pack_mask
+
+
+class BodyArrays(NamedTuple):
+    """The arrays of a `BodyModel` that kernels need; shapes as documented there."""
+
+    parent: NDArray[np.int64]
+    fixed: FloatArray
+    kind: NDArray[np.int64]
+    sign: FloatArray
+    parameter: NDArray[np.int64]
+    cone_node: NDArray[np.int64]
+    cone_fixed: FloatArray
+    cone_length: FloatArray
+    cone_shape: FloatArray
+
+
+class ViewArrays(NamedTuple):
+    """v views. Bit masks and edge maps cover the full frames and lie one after the other.
+
+    Attributes:
+        rotation, translation: (v, 3, 3) and (v, 3), world to camera.
+        intrinsics: (v, 5) fx, skew, cx, fy, cy.
+        distortion: (v, 5) k1 k2 p1 p2 k3.
+        size: (v, 2) width and height in px.
+        words: (v,) words per row.
+        mask: observed silhouettes, flat; view i starts at mask_start[i].
+        edges: edge maps, flat; view i starts at edge_start[i].
+        observed: (v,) silhouette pixels.
+    """
+
+    rotation: FloatArray
+    translation: FloatArray
+    intrinsics: FloatArray
+    distortion: FloatArray
+    size: NDArray[np.int64]
+    words: NDArray[np.int64]
+    mask: NDArray[np.uint64]
+    mask_start: NDArray[np.int64]
+    edges: NDArray[np.uint8]
+    edge_start: NDArray[np.int64]
+    observed: NDArray[np.int64]
+
+
+def body_arrays(body: BodyModel) -> BodyArrays:
+    """The kernels' arrays of a body."""
+    return BodyArrays(
+        body.node_parent,
+        body.node_fixed,
+        body.node_kind,
+        body.node_sign,
+        body.node_parameter,
+        body.cone_node,
+        body.cone_fixed,
+        body.cone_length,
+        body.cone_shape,
+    )
+
+
+def view_arrays(
+    cameras: Sequence[CameraModel], observations: Mapping[str, Observation]
+) -> ViewArrays:
+    """Lay out the views of the cameras that have an observation, in the cameras' order.
+
+    Raises:
+        ImageError: no camera has one, or a frame's size is not its calibration's.
+    """
+    seen = [camera for camera in cameras if camera.name in observations]
+    if not seen:
+        raise ImageError(
+            f"no view to compare with: observations of {', '.join(observations) or 'no camera'}, "
+            f"expected some of {', '.join(camera.name for camera in cameras)}"
+        )
+    masks, edges = [], []
+    for camera in seen:
+        observation = observations[camera.name]
+        if observation.size_px != camera.size_px:
+            raise ImageError(
+                f"{camera.name}: observation of a {_size(observation.size_px)} frame, "
+                f"its calibration says {_size(camera.size_px)}"
+            )
+        mask, edge = _full_frame(observation)
+        masks.append(mask)
+        edges.append(edge)
+    k = np.array([camera.matrix for camera in seen])
+    return ViewArrays(
+        rotation=np.ascontiguousarray([camera.T_cam_world[:3, :3] for camera in seen]),
+        translation=np.ascontiguousarray([camera.T_cam_world[:3, 3] for camera in seen]),
+        intrinsics=np.stack([k[:, 0, 0], k[:, 0, 1], k[:, 0, 2], k[:, 1, 1], k[:, 1, 2]], axis=1),
+        distortion=np.array([camera.distortion for camera in seen]),
+        size=np.array([camera.size_px for camera in seen], dtype=np.int64),
+        words=np.array([mask.shape[1] for mask in masks], dtype=np.int64),
+        mask=np.concatenate([mask.ravel() for mask in masks]),
+        mask_start=_starts(masks),
+        edges=np.concatenate([edge.ravel() for edge in edges]),
+        edge_start=_starts(edges),
+        observed=np.array([int(np.bitwise_count(mask).sum()) for mask in masks], dtype=np.int64)
+        if hasattr(np, "bitwise_count")
+        else np.array([np.unpackbits(m.view(np.uint8)).sum() for m in masks], dtype=np.int64),
+    )
+
+
+def _full_frame(observation: Observation) -> tuple[NDArray[np.uint64], NDArray[np.uint8]]:
+    width, height = observation.size_px
+    if observation.edges.shape == (height, width):
+        return observation.mask_words, observation.edges
+    u, v = observation.offset_px
+    window = np.s_[v : v + observation.height, u : u + observation.width]
+    mask = np.zeros((height, width), dtype=np.bool_)
+    edges = np.zeros((height, width), dtype=np.uint8)
+    mask[window] = observation.mask
+    edges[window] = observation.edges
+    return pack_mask(mask), edges
+
+
+def _starts(arrays: Sequence[NDArray[np.generic]]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum([a.size for a in arrays])[:-1]]).astype(np.int64)
+
+
+def _size(size_px: tuple[int, int]) -> str:
+    return f"{size_px[0]}x{size_px[1]} px"
