@@ -47,7 +47,7 @@ fi
 
 quiet=-q
 if [ -t 1 ]; then quiet=; fi
-echo "make: installing the pinned dependencies into $venv (a minute or two, 1.3 GB)"
+echo "make: installing the pinned dependencies into $venv (a minute or two, 1 GB)"
 "$venv/bin/python" -m pip install $quiet --disable-pip-version-check -r "$here/lock.txt"
 "$venv/bin/python" -m pip install -q --disable-pip-version-check \
     --no-deps --no-build-isolation --editable "$root"
