@@ -6,17 +6,16 @@ from pathlib import Path
 import numpy as np
 
 from markerless_tracker.camera import CameraRig, read_calibration
-from markerless_tracker.datasets.background import read_background
 from markerless_tracker.datasets.decode import read_together
 from markerless_tracker.datasets.markers import MarkerTrack
-from markerless_tracker.datasets.recording import FrameSet, Recording, stamp_of
+from markerless_tracker.datasets.rates import stamp_of
+from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.datasets.trc import read_trc
 from markerless_tracker.datasets.video import find_stream, numbered_files, open_stream, read_image
 from markerless_tracker.errors import ConfigError, DatasetError, ImageError
 from markerless_tracker.imaging import Image, scale_image
 
 CALIBRATION = "calibration.toml"
-BACKGROUND = "background"
 
 
 class VideoRecording(Recording):
@@ -46,10 +45,8 @@ class VideoRecording(Recording):
         scale: float = 1.0,
         input_fps: float | None = None,
     ) -> None:
-        check_scale(scale)
         if input_fps is not None and not 0.0 < input_fps < 1e5:
             raise ConfigError(f"input fps {input_fps:g}: expected a rate above 0")
-        self.path = path
         self._sources = dict(sources)
         self._input_fps = input_fps
         streams = {name: open_stream(source, input_fps=input_fps) for name, source in sources.items()}
@@ -62,12 +59,11 @@ class VideoRecording(Recording):
                     f"{camera.name}: {streams[camera.name].path} has images of {came[0]}x{came[1]} px, "
                     f"expected {camera.size_px[0]}x{camera.size_px[1]} px as calibrated"
                 )
-        self._stored_sizes_px = {camera.name: camera.size_px for camera in rig}
         counts = {name: stream.frame_count for name, stream in streams.items()}
         rates = {name: stream.fps for name, stream in streams.items()}
         super().__init__(
-            path.name or str(path),
-            rig.scaled(scale),
+            path,
+            rig,
             scale=scale,
             fps=_common_rate(path, rates),
             frame_count=min(counts.values()),
@@ -102,12 +98,10 @@ class VideoRecording(Recording):
                 {name: image for name, image in images.items() if image is not None},
             )
 
-    def background_frames(self) -> dict[str, list[Image]]:
-        """Camera name -> empty-scene images (scaled) from `background/`, {} without that folder."""
-        folder = self.path / BACKGROUND
-        if not folder.is_dir():
-            return {}
-        return read_background(folder, self.rig, stored_sizes_px=self._stored_sizes_px)
+    def _nearest(self, stamp_ns: int) -> tuple[int, int]:
+        last = (self.frame_count or 1) - 1
+        index = min(max(round(stamp_ns * self.fps / 1e9), 0), last)
+        return index, stamp_of(index, self.fps)
 
 
 class FolderRecording(VideoRecording):
@@ -144,12 +138,6 @@ class FolderRecording(VideoRecording):
             mask = mask if mask.ndim == 2 else mask[..., 0]
             masks[int(file.stem)] = np.where(scale_image(mask, size_px) >= 128, 255, 0).astype(np.uint8)
         return masks
-
-
-def check_scale(scale: float) -> None:
-    """Raise ConfigError unless a scale of images lies in (0, 1]."""
-    if not 0.0 < scale <= 1.0:
-        raise ConfigError(f"scale {scale:g}: expected above 0 and at most 1")
 
 
 def _common_rate(path: Path, rates: Mapping[str, float | None]) -> float:

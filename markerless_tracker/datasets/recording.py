@@ -3,11 +3,15 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.datasets.background import read_background
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.imaging import Image
+
+BACKGROUND = "background"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +36,8 @@ class Recording(ABC):
     """Images of a calibrated rig, read in order; a context manager is not needed.
 
     Attributes:
-        name: short name (of the folder or file).
+        path: the folder; `background/` lies in it.
+        name: its short name.
         rig: the cameras of the images that `frames` yields (scaled).
         scale: factor from the stored images to those.
         fps: rate of the source, 1/s.
@@ -40,10 +45,20 @@ class Recording(ABC):
     """
 
     def __init__(
-        self, name: str, rig: CameraRig, *, scale: float, fps: float, frame_count: int | None
+        self,
+        path: Path,
+        stored_rig: CameraRig,
+        *,
+        scale: float,
+        fps: float,
+        frame_count: int | None,
     ) -> None:
-        self.name = name
-        self.rig = rig
+        if not 0.0 < scale <= 1.0:
+            raise ConfigError(f"scale {scale:g}: expected above 0 and at most 1")
+        self.path = path
+        self.name = path.resolve().name
+        self.rig = stored_rig.scaled(scale)
+        self._stored_sizes_px = {camera.name: camera.size_px for camera in stored_rig}
         self.scale = scale
         self.fps = fps
         self.frame_count = frame_count
@@ -80,66 +95,32 @@ class Recording(ABC):
         Raises:
             DatasetError: there is none; says what the recording covers.
         """
-        index = self._nearest(stamp_ns)
-        if abs(self._stamp(index) - stamp_ns) > 0.5e9 / self.fps:
+        index, nearest_ns = self._nearest(stamp_ns)
+        if abs(nearest_ns - stamp_ns) > 0.5e9 / self.fps:
             raise DatasetError(
                 f"{self.name}: no frame within half a frame of {stamp_ns / 1e9:.6f} s, "
-                f"the nearest is at {self._stamp(index) / 1e9:.6f} s"
+                f"the nearest is at {nearest_ns / 1e9:.6f} s"
             )
         return index
 
     def background_frames(self) -> dict[str, list[Image]]:
-        """Camera name -> empty-scene images (scaled); a camera without any is not there."""
-        return {}
+        """Camera name -> empty-scene images (scaled) from `background/`.
+
+        Cameras without any are not there; {} without that folder. Raises as `read_background` does.
+        """
+        folder = self.path / BACKGROUND
+        if not folder.is_dir():
+            return {}
+        return read_background(folder, self.rig, stored_sizes_px=self._stored_sizes_px)
 
     def room_stills(self) -> dict[str, list[Image]]:
         """Camera name -> stills (scaled) of the room in which people may appear anywhere."""
         return {}
 
-    def _nearest(self, stamp_ns: int) -> int:
-        last = (self.frame_count or 1) - 1
-        return min(max(round(stamp_ns * self.fps / 1e9), 0), last)
-
-    def _stamp(self, index: int) -> int:
-        return stamp_of(index, self.fps)
+    @abstractmethod
+    def _nearest(self, stamp_ns: int) -> tuple[int, int]:
+        """Index and stamp (ns) of the set nearest to a stamp."""
 
     @abstractmethod
-    def _read(self, start: int, every: int) -> Iterator[FrameSet]: ...
-
-
-def stamp_of(index: int, fps: float) -> int:
-    """Stamp (ns) of frame `index` of a video at `fps` (1/s): round(index * 1e9 / fps)."""
-    return round(index * 1e9 / fps)
-
-
-def tidy_fps(fps: float) -> float:
-    """The rate (1/s) meant by a measured or stored one.
-
-    Within 1e-4 of a whole number it is that, or of a whole number * 1000/1001 (29.97 and its kin)
-    that; otherwise it is rounded to 1/1000, so that a rate measured from stamps in ns and the
-    container's own are the same float.
-    """
-    for whole in (float(round(fps)), round(fps * 1.001) * 1000.0 / 1001.0):
-        if whole > 0.0 and abs(fps - whole) < 1e-4 * whole:
-            return whole
-    return round(fps, 3)
-
-
-def every_for_fps(source_fps: float, fps: float | None) -> int:
-    """k such that every k-th frame of a source gives `fps`; 1 for None.
-
-    Raises:
-        ConfigError: no k does; names the nearest rates that exist.
-    """
-    if fps is None:
-        return 1
-    if not 0.0 < fps <= source_fps * 1.001:
-        raise ConfigError(f"fps {fps:g}: expected a rate above 0 and at most the source's {source_fps:g}")
-    every = max(1, round(source_fps / fps))
-    if abs(source_fps / every - fps) > 0.01 * fps:
-        below, above = int(source_fps // fps) + 1, max(1, int(source_fps // fps))
-        raise ConfigError(
-            f"fps {fps:g}: the source has {source_fps:g}, keeping every k-th frame gives "
-            f"{source_fps / above:.6g} or {source_fps / below:.6g}"
-        )
-    return every
+    def _read(self, start: int, every: int) -> Iterator[FrameSet]:
+        """The sets `frames` yields; its arguments are checked already."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import cv2
 
-from markerless_tracker.datasets.recording import tidy_fps
+from markerless_tracker.datasets.rates import tidy_fps
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image
 

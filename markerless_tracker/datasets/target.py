@@ -1,0 +1,44 @@
+"""Folders that appear whole or not at all."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from markerless_tracker.errors import DatasetError
+
+
+@contextmanager
+def new_folder(path: str | Path) -> Iterator[Path]:
+    """A folder to fill; it takes its place at `path` when the block ends without an exception.
+
+    Until then it lies in a hidden `.NAME.partial-*` beside it, which is removed on any exception,
+    Ctrl-C included. An empty folder at `path` is replaced.
+
+    Raises:
+        DatasetError: something is at `path` already, or it cannot be created.
+    """
+    path = Path(os.path.abspath(path))
+    if path.is_symlink() or (path.exists() and not path.is_dir()):
+        raise DatasetError(f"{path}: exists already, expected a new or an empty folder")
+    if path.is_dir() and any(path.iterdir()):
+        raise DatasetError(f"{path}: exists and is not empty, expected a new or an empty folder")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        holder = Path(tempfile.mkdtemp(prefix=f".{path.name}.partial-", dir=path.parent))
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be created: {error.strerror}") from error
+    try:
+        # Within the holder it has its final name: some formats name their files after the folder.
+        inner = holder / path.name
+        inner.mkdir()
+        yield inner
+        if path.is_dir():
+            path.rmdir()
+        inner.rename(path)
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(holder, ignore_errors=True)
