@@ -1,0 +1,50 @@
+"""Cameras around a subject."""
+
+import numpy as np
+
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.geometry import FloatArray, inverse, transform
+
+MILD_LENS = (-0.08, 0.03, 0.0008, -0.0006, 0.0)
+"""Distortion k1 k2 p1 p2 k3 of an ordinary wide lens: some px at the corners."""
+
+
+def look_at(eye_m: FloatArray, target_m: FloatArray) -> FloatArray:
+    """``T_cam_world`` (4, 4) of a camera at a point (3,) that looks at another, upright."""
+    forward = np.asarray(target_m, dtype=float) - np.asarray(eye_m, dtype=float)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    down = np.cross(forward, right)
+    return inverse(transform(np.column_stack([right, down, forward]), eye_m))
+
+
+def ring_rig(
+    cameras: int = 4,
+    size_px: tuple[int, int] = (656, 490),
+    *,
+    distance_m: float = 4.5,
+    height_m: float = 1.9,
+    target_m: tuple[float, float, float] = (0.0, 0.0, 0.85),
+    distortion: tuple[float, ...] = MILD_LENS,
+) -> CameraRig:
+    """Cameras cam01.. evenly around a target, which see about 4 m across their shorter side.
+
+    Heights alternate by 0.3 m, so that no two opposite cameras see the same outline.
+    """
+    focal = 1.12 * min(size_px)
+    matrix = np.array(
+        [
+            [focal, 0.0, 0.5 * (size_px[0] - 1)],
+            [0.0, focal, 0.5 * (size_px[1] - 1)],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    models = []
+    for i in range(cameras):
+        azimuth = 2.0 * np.pi * (i + 0.35) / cameras
+        eye = np.array(target_m) + distance_m * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        eye[2] = height_m + (0.15 if i // 2 % 2 else -0.15)
+        pose = look_at(eye, np.array(target_m))
+        models.append(CameraModel(f"cam{i + 1:02d}", size_px, matrix, np.array(distortion), pose))
+    return CameraRig(tuple(models))

@@ -1,0 +1,118 @@
+"""A made-up person in front of made-up cameras, frame by frame, with the exact truth.
+
+Images and truth come from the very model that a tracker fits: errors measured on them prove that
+the parts fit together, and say nothing about accuracy on people.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel, load_body, markers
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.synthesis.mesh import body_mesh
+from markerless_tracker.synthesis.motion import Motion
+from markerless_tracker.synthesis.render import Image, Look, Mask, Renderer, clothes
+from markerless_tracker.synthesis.rig import MILD_LENS, ring_rig
+from markerless_tracker.synthesis.room import room_picture
+
+_ROOM_M = 7.0
+# Keeps the noise of empty frames apart from that of frames with the person.
+_PERSON, _EMPTY = 3, 4
+
+
+class SyntheticScene:
+    """A person, a motion, a rig and a room; everything depends on the arguments alone.
+
+    Args:
+        body: a body's name or file, or a body that is already built.
+        stature_m: height of the person, unless the body is built.
+        motion: walk, balance, jog or stand.
+        cameras: number of cameras, cam01.. .
+        size_px: (width, height) of every image.
+        fps: frames per second; frame i has stamp round(i * 1e9 / fps).
+        seed: of motion, room, clothes and noise.
+        noise: standard deviation of the sensor's noise in grey levels.
+        shadow: part of the light that the person's shadow on the floor takes away.
+        samples: samples per pixel in each direction.
+        distortion: lens k1 k2 p1 p2 (k3), zeros for none.
+
+    Raises:
+        ConfigError: an argument is impossible; the message names it.
+        BodyModelError: no such body, or an impossible stature.
+    """
+
+    def __init__(
+        self,
+        *,
+        body: str | BodyModel = "balan31",
+        stature_m: float = 1.72,
+        motion: str = "walk",
+        cameras: int = 4,
+        size_px: tuple[int, int] = (656, 490),
+        fps: float = 60.0,
+        seed: int = 0,
+        noise: float = 3.0,
+        shadow: float = 0.35,
+        samples: int = 2,
+        distortion: Sequence[float] = MILD_LENS,
+    ) -> None:
+        _check("cameras", cameras, 1, 99)
+        _check("image width", size_px[0], 16, 8192)
+        _check("image height", size_px[1], 16, 8192)
+        _check("fps", fps, 0.1, 1000.0)
+        _check("noise", noise, 0.0, 100.0)
+        _check("shadow", shadow, 0.0, 1.0)
+        _check("samples", samples, 1, 8)
+        _check("seed", seed, 0, 2**63)
+        self.body = body if isinstance(body, BodyModel) else load_body(body, stature_m)
+        self.rig: CameraRig = ring_rig(cameras, size_px, distortion=tuple(distortion))
+        self.fps = float(fps)
+        self.seed = seed
+        self.motion = Motion(self.body, motion, seed)
+        look, mesh = Look(noise=noise, shadow=shadow, samples=samples), body_mesh(self.body)
+        palette = clothes(self.body, np.random.default_rng([seed, 0]))
+        self._renderers = {
+            camera.name: Renderer(
+                self.body, camera, room_picture(camera, _ROOM_M, seed), palette, look=look, mesh=mesh
+            )
+            for camera in self.rig
+        }
+
+    def stamp_ns(self, index: int) -> int:
+        """Stamp of a frame."""
+        return round(index * 1e9 / self.fps)
+
+    def pose(self, index: int) -> FloatArray:
+        """True pose (p,) of a frame."""
+        return self.motion.pose(index / self.fps)
+
+    def markers(self, index: int) -> FloatArray:
+        """True markers (15, 3) in m, world frame, of a frame."""
+        return markers(self.body, self.pose(index))
+
+    def frame(self, index: int) -> tuple[dict[str, Image], dict[str, Mask], FloatArray]:
+        """Images (h, w, 3) BGR and exact masks (h, w) by camera, and the true pose (p,)."""
+        pose = self.pose(index)
+        images, masks = {}, {}
+        for number, (name, renderer) in enumerate(self._renderers.items()):
+            rng = np.random.default_rng([self.seed, _PERSON, number, index])
+            images[name], masks[name] = renderer.render(pose, rng)
+        return images, masks, pose
+
+    def backgrounds(self, count: int) -> dict[str, list[Image]]:
+        """That many pictures of the empty room by camera."""
+        return {
+            name: [
+                renderer.empty(np.random.default_rng([self.seed, _EMPTY, number, i]))
+                for i in range(count)
+            ]
+            for number, (name, renderer) in enumerate(self._renderers.items())
+        }
+
+
+def _check(name: str, value: float, least: float, most: float) -> None:
+    if not least <= value <= most:
+        raise ConfigError(f"{name} is {value:g}, expected {least:g} to {most:g}")
