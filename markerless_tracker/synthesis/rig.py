@@ -28,11 +28,11 @@ def ring_rig(
     target_m: tuple[float, float, float] = (0.0, 0.0, 0.85),
     distortion: tuple[float, ...] = MILD_LENS,
 ) -> CameraRig:
-    """Cameras cam01.. evenly around a target, which see about 4 m across their shorter side.
+    """Cameras cam01.. evenly around a target, which see about 3 m across their shorter side.
 
     Heights alternate by 0.3 m, so that no two opposite cameras see the same outline.
     """
-    focal = 1.12 * min(size_px)
+    focal = 1.4 * min(size_px)
     matrix = np.array(
         [
             [focal, 0.0, 0.5 * (size_px[0] - 1)],
