@@ -1,6 +1,7 @@
 """What the kernels read and write, as tuples of plain arrays."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ImageError
+from markerless_tracker.fitness.bits import count_bits
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, pack_mask
 
@@ -54,6 +56,14 @@ class ViewArrays(NamedTuple):
     observed: NDArray[np.int64]
 
 
+@dataclass(frozen=True)
+class Views:
+    """The views of one frame: names of the cameras that see, and their arrays in that order."""
+
+    names: tuple[str, ...]
+    arrays: ViewArrays
+
+
 def body_arrays(body: BodyModel) -> BodyArrays:
     """The kernels' arrays of a body."""
     return BodyArrays(
@@ -69,9 +79,9 @@ def body_arrays(body: BodyModel) -> BodyArrays:
     )
 
 
-def view_arrays(
+def lay_out_views(
     cameras: Sequence[CameraModel], observations: Mapping[str, Observation]
-) -> ViewArrays:
+) -> Views:
     """Lay out the views of the cameras that have an observation, in the cameras' order.
 
     Raises:
@@ -95,7 +105,7 @@ def view_arrays(
         masks.append(mask)
         edges.append(edge)
     k = np.array([camera.matrix for camera in seen])
-    return ViewArrays(
+    arrays = ViewArrays(
         rotation=np.ascontiguousarray([camera.T_cam_world[:3, :3] for camera in seen]),
         translation=np.ascontiguousarray([camera.T_cam_world[:3, 3] for camera in seen]),
         intrinsics=np.stack([k[:, 0, 0], k[:, 0, 1], k[:, 0, 2], k[:, 1, 1], k[:, 1, 2]], axis=1),
@@ -106,10 +116,9 @@ def view_arrays(
         mask_start=_starts(masks),
         edges=np.concatenate([edge.ravel() for edge in edges]),
         edge_start=_starts(edges),
-        observed=np.array([int(np.bitwise_count(mask).sum()) for mask in masks], dtype=np.int64)
-        if hasattr(np, "bitwise_count")
-        else np.array([np.unpackbits(m.view(np.uint8)).sum() for m in masks], dtype=np.int64),
+        observed=np.array([count_bits(mask) for mask in masks], dtype=np.int64),
     )
+    return Views(tuple(camera.name for camera in seen), arrays)
 
 
 def _full_frame(observation: Observation) -> tuple[NDArray[np.uint64], NDArray[np.uint8]]:

@@ -43,3 +43,13 @@ def is_set(rows, u, v):  # type: ignore[no-untyped-def]
     return (word >> np.uint64(u & 63)) & np.uint64(1) != np.uint64(0)
 
 
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def count_bits(rows):  # type: ignore[no-untyped-def]
+    """Number of set bits of rows (h, w) of words."""
+    total = np.uint64(0)
+    for row in rows:
+        for word in row:
+            total += popcount(word)
+    return total

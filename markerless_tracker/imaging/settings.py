@@ -1,23 +1,9 @@
 """Every number that decides how an image becomes a silhouette and an edge map."""
 
-import math
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass
 
 from markerless_tracker.errors import ConfigError
-
-
-def _setting(
-    default: Any,
-    doc: str,
-    *,
-    least: float | None = None,
-    most: float | None = None,
-    choices: tuple[str, ...] | None = None,
-) -> Any:
-    """A dataclass field with its documentation and the range it must lie in."""
-    metadata = {"doc": doc, "min": least, "max": most, "choices": choices}
-    return field(default=default, metadata={k: v for k, v in metadata.items() if v is not None})
+from markerless_tracker.settings import check_settings, setting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,68 +17,82 @@ class ImagingSettings:
         ConfigError: a value of the wrong type, out of its range or not among its choices.
     """
 
-    background_risk: float = _setting(
+    background_risk: float = setting(
         8.0,
         "log10 of the risk factor of the foreground test for three channels: a pixel is foreground "
         "where its background density is below 1 / (256^3 * 10^risk); higher means less foreground",
         least=-6.0,
         most=200.0,
     )
-    background_sigma_min: float = _setting(
+    background_sigma_min: float = setting(
         2.0, "smallest noise believed of a background pixel, grey levels", least=0.1, most=50.0
     )
-    background_sigma_still: float = _setting(
-        4.0, "noise assumed where the background is a single still, grey levels", least=0.1, most=50.0
+    background_sigma_still: float = setting(
+        4.0,
+        "noise assumed where the background is a single still, grey levels",
+        least=0.1,
+        most=50.0,
     )
-    shadow_removal: bool = _setting(True, "take pixels that look like a shadow for background")
-    shadow_value_min: float = _setting(
+    shadow_removal: bool = setting(True, "take pixels that look like a shadow for background")
+    shadow_value_min: float = setting(
         0.5, "darkest shadow, as a ratio of its brightness to the background's", least=0.0, most=1.0
     )
-    shadow_value_max: float = _setting(
-        1.0, "faintest shadow, as a ratio of its brightness to the background's", least=0.0, most=2.0
+    shadow_value_max: float = setting(
+        1.0,
+        "faintest shadow, as a ratio of its brightness to the background's",
+        least=0.0,
+        most=2.0,
     )
-    shadow_saturation_max: float = _setting(
-        0.05, "a shadow's saturation exceeds the background's by no more than this", least=-1.0, most=1.0
+    shadow_saturation_max: float = setting(
+        0.05,
+        "a shadow's saturation exceeds the background's by no more than this",
+        least=-1.0,
+        most=1.0,
     )
-    shadow_hue_max_deg: float = _setting(
-        40.0, "a shadow's hue differs from the background's by no more than this", least=0.0, most=180.0
+    shadow_hue_max_deg: float = setting(
+        40.0,
+        "a shadow's hue differs from the background's by no more than this",
+        least=0.0,
+        most=180.0,
     )
-    shadow_chroma_min: float = _setting(
+    shadow_chroma_min: float = setting(
         12.0,
         "hue is compared only where the background, darkened as much as the pixel, would have this "
         "much colour (largest minus smallest channel, grey levels); below it hue is noise",
         least=0.0,
         most=255.0,
     )
-    mask_open_px: int = _setting(
+    mask_open_px: int = setting(
         3, "side of the opening that removes specks; 0 or 1 = none", least=0, most=101
     )
-    mask_close_px: int = _setting(
+    mask_close_px: int = setting(
         5, "side of the closing that mends cracks; 0 or 1 = none", least=0, most=101
     )
-    mask_hole_share: float = _setting(
+    mask_hole_share: float = setting(
         2e-4, "holes up to this share of the image are filled", least=0.0, most=1.0
     )
-    mask_blob_share: float = _setting(
+    mask_blob_share: float = setting(
         3e-4, "blobs below this share of the image are dropped", least=0.0, most=1.0
     )
-    edge_form: str = _setting(
+    edge_form: str = setting(
         "soft",
         "soft: gradient rising from 0 at half the threshold to 1 at twice it, then blurred; "
         "published: 1 at and above the threshold, else 0, then blurred",
         choices=("soft", "published"),
     )
-    edge_gradient: float = _setting(
-        4.0, "gradient (Sobel / 8, grey levels per pixel) that counts as an edge", least=0.01, most=255.0
+    edge_gradient: float = setting(
+        4.0,
+        "gradient (Sobel / 8, grey levels per pixel) that counts as an edge",
+        least=0.01,
+        most=255.0,
     )
-    edge_blur_px: int = _setting(7, "side of the edge map's blur, odd", least=1, most=101)
-    edge_margin_px: int = _setting(
+    edge_blur_px: int = setting(7, "side of the edge map's blur, odd", least=1, most=101)
+    edge_margin_px: int = setting(
         6, "edges count up to this far outside the silhouette", least=0, most=200
     )
 
     def __post_init__(self) -> None:
-        for entry in fields(self):
-            object.__setattr__(self, entry.name, _checked(entry, getattr(self, entry.name)))
+        check_settings(self)
         if self.shadow_value_min > self.shadow_value_max:
             raise ConfigError(
                 f"shadow_value_min: got {self.shadow_value_min}, expected at most shadow_value_max "
@@ -100,18 +100,3 @@ class ImagingSettings:
             )
         if self.edge_blur_px % 2 == 0:
             raise ConfigError(f"edge_blur_px: got {self.edge_blur_px}, expected an odd number")
-
-
-def _checked(entry: Any, value: Any) -> Any:
-    kind = type(entry.default)
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        value = float(value)
-    if type(value) is not kind:
-        raise ConfigError(f"{entry.name}: got {value!r}, expected {kind.__name__}")
-    least, most = entry.metadata.get("min"), entry.metadata.get("max")
-    if least is not None and not (math.isfinite(value) and least <= value <= most):
-        raise ConfigError(f"{entry.name}: got {value!r}, expected {least} to {most}")
-    choices = entry.metadata.get("choices")
-    if choices is not None and value not in choices:
-        raise ConfigError(f"{entry.name}: got {value!r}, expected one of {', '.join(choices)}")
-    return value

@@ -1,0 +1,92 @@
+"""What every optimiser shares: budget, best so far, bad costs, the loop."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.errors import SearchError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim.problem import Problem
+
+Evaluate = Callable[[FloatArray], FloatArray]
+"""Costs (n,) of a batch of points (n, d)."""
+
+
+class Optimizer(ABC):
+    """Minimises by turns of `ask` and `tell`.
+
+    A subclass writes `_ask` (the points to evaluate next, (n, d)) and `_tell` (what it makes of
+    their costs). This class counts evaluations, turns non-finite costs into infinity and counts
+    them, lets no point that is marked infeasible win, and keeps the best.
+
+    Attributes:
+        problem: bounds, centre, spread, feasibility, random source and budget.
+        best_x: (d,) best point so far; the centre until one is found.
+        best_cost: its cost; infinite until one is found.
+        evaluations: points evaluated so far.
+        bad_costs: how many of them had a cost that was not finite.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.best_x: FloatArray = problem.centre.copy()
+        self.best_cost = np.inf
+        self.evaluations = 0
+        self.bad_costs = 0
+        self._asked: FloatArray | None = None
+        self._barred: NDArray[np.bool_] | None = None
+
+    @property
+    def finished(self) -> bool:
+        """Whether the budget is spent."""
+        return self.evaluations >= self.problem.particles * self.problem.iterations
+
+    def ask(self) -> FloatArray:
+        """Points (n, d) to evaluate next.
+
+        Raises:
+            SearchError: called twice without `tell`, or after the budget is spent.
+        """
+        if self._asked is not None or self.finished:
+            raise SearchError("ask() was called out of turn: tell() the costs first, stop when finished")
+        self._asked, self._barred = self._ask()
+        return self._asked
+
+    def tell(self, costs: FloatArray) -> None:
+        """Take the costs (n,) of the points asked for.
+
+        Raises:
+            SearchError: called out of turn or with another number of costs.
+        """
+        if self._asked is None or self._barred is None or costs.shape != (len(self._asked),):
+            raise SearchError(
+                f"tell() got {costs.shape} costs for "
+                f"{'no' if self._asked is None else len(self._asked)} points asked for"
+            )
+        points, self._asked = self._asked, None
+        self.evaluations += len(points)
+        costs = np.array(costs, dtype=np.float64)
+        bad = ~np.isfinite(costs)
+        self.bad_costs += int(bad.sum())
+        costs[bad | self._barred] = np.inf
+        best = int(np.argmin(costs))
+        if costs[best] < self.best_cost:
+            self.best_cost = float(costs[best])
+            self.best_x = points[best].copy()
+        self._tell(points, costs)
+
+    def run(self, evaluate: Evaluate) -> FloatArray:
+        """Spend the budget; returns the best point (d,)."""
+        while not self.finished:
+            self.tell(evaluate(self.ask()))
+        return self.best_x
+
+    @abstractmethod
+    def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Points (n, d), and which of them (n,) may not win because they break a constraint."""
+
+    @abstractmethod
+    def _tell(self, points: FloatArray, costs: FloatArray) -> None:
+        """Use the costs (n,) of the points (n, d); infinite where a point cannot win."""

@@ -1,0 +1,15 @@
+"""Random draws keyed by what they are for, so that nothing shifts anybody else's stream."""
+
+import zlib
+
+import numpy as np
+
+
+def keyed_generator(seed: int, stamp_ns: int, stage: str) -> np.random.Generator:
+    """The generator of one stage of one frame: the same key gives the same draws.
+
+    Skipped frames, retries and thread counts do not matter, since no draw depends on an earlier
+    frame's.
+    """
+    key = [seed & 0xFFFFFFFFFFFFFFFF, stamp_ns & 0xFFFFFFFFFFFFFFFF, zlib.crc32(stage.encode())]
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(key)))

@@ -1,0 +1,27 @@
+"""First samples of a swarm, under constraints."""
+
+import numpy as np
+
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim.problem import Problem
+
+ATTEMPTS = 10
+"""How often a particle that breaks a constraint is drawn or moved anew (SPPSO, section 3)."""
+
+
+def gaussian_sample(problem: Problem) -> FloatArray:
+    """Positions (n, d) drawn from N(centre, diag(sigma²)) (SPPSO Eq 1).
+
+    A particle that breaks a constraint is drawn again, at most `ATTEMPTS` times in all, then put
+    at the centre.
+    """
+    n, d = problem.particles, problem.centre.size
+    x = np.empty((n, d))
+    todo = np.arange(n)
+    for _ in range(ATTEMPTS):
+        x[todo] = problem.centre + problem.sigma * problem.rng.standard_normal((todo.size, d))
+        todo = todo[~problem.feasible(x[todo])]
+        if todo.size == 0:
+            return x
+    x[todo] = problem.centre
+    return x

@@ -1,0 +1,128 @@
+"""One stage of SPPSO: particle swarm with constriction and growing acceleration.
+
+Fleischmann, Austvoll, Kwolek: "Particle Swarm Optimization with Soft Search Space Partitioning for
+Video-Based Markerless Pose Tracking", ACIVS 2012, Eqs 1-3 and the algorithm of section 3. The soft
+partition itself, two such stages with their parameters and spreads, is made in `tracking`.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.errors import SearchError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim.base import Optimizer
+from markerless_tracker.optim.problem import Problem
+from markerless_tracker.optim.sampling import ATTEMPTS, gaussian_sample
+
+UPDATES = ("iteration", "particle")
+
+
+def acceleration(k: int, iterations: int) -> float:
+    """c1(k) = c2(k) in iteration k = 2 .. iterations (Eq 2): from 2.05 to 2.15.
+
+    With two iterations the slope is undefined and 2.05 is used.
+    """
+    if iterations <= 2:
+        return 2.05
+    return 0.1 / (iterations - 2) * (k - 2) + 2.05
+
+
+def constriction(c: float) -> float:
+    """χ for c1 = c2 = c (Eq 3), φ = 2c > 4."""
+    phi = 2.0 * c
+    return 2.0 / abs(2.0 - phi - np.sqrt(phi * phi - 4.0 * phi))
+
+
+def constricted_step(
+    x: FloatArray,
+    v: FloatArray,
+    best: FloatArray,
+    leader: FloatArray,
+    r1: FloatArray,
+    r2: FloatArray,
+    c: float,
+    v_max: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Move particles once (the loop body of SPPSO's algorithm).
+
+    v' = χ (v + c r1 (best - x) + c r2 (leader - x)), clamped to |v'| <= v_max; x' = x + v'.
+
+    Args:
+        x, v, best: (n, d) positions, velocities and own best positions.
+        leader: (d,) best position of the swarm.
+        r1, r2: (n, d) uniform draws.
+        c: acceleration c1 = c2.
+        v_max: (d,) greatest speed.
+
+    Returns:
+        The new positions and velocities, (n, d) each.
+    """
+    moved = constriction(c) * (v + c * r1 * (best - x) + c * r2 * (leader - x))
+    np.clip(moved, -v_max, v_max, out=moved)
+    return x + moved, moved
+
+
+class Sppso(Optimizer):
+    """SPPSO's swarm.
+
+    Every attempt to satisfy the constraints restarts from the particle's saved position and
+    velocity with fresh draws. After the last failed one the particle moves all the same; it is
+    evaluated and counted, but cannot become anybody's best.
+
+    Args:
+        problem: the search.
+        update: 'iteration' updates the swarm's best once per iteration, so that a whole iteration
+            is evaluated in one batch; 'particle' updates it after every particle, as printed.
+
+    Raises:
+        SearchError: unknown `update`.
+    """
+
+    def __init__(self, problem: Problem, *, update: str = "iteration") -> None:
+        super().__init__(problem)
+        if update not in UPDATES:
+            raise SearchError(f"update is {update!r}, expected one of {', '.join(UPDATES)}")
+        self._batch = problem.particles if update == "iteration" else 1
+        n, d = problem.particles, problem.centre.size
+        self._v_max = 2.0 * problem.sigma
+        self._x = gaussian_sample(problem)
+        self._v = problem.rng.uniform(-1.0, 1.0, (n, d)) * problem.sigma
+        self._best = self._x.copy()
+        self._best_costs = np.full(n, np.inf)
+        self._iteration = 1
+        self._next = 0
+
+    def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:
+        rows = np.arange(self._next, self._next + self._batch)
+        if self._iteration == 1:
+            return self._x[rows].copy(), np.zeros(rows.size, dtype=np.bool_)
+        return self._move(rows)
+
+    def _move(self, rows: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.bool_]]:
+        problem = self.problem
+        c = acceleration(self._iteration, problem.iterations)
+        x, v, best = self._x[rows], self._v[rows], self._best[rows]
+        new_x, new_v = x.copy(), v.copy()
+        todo = np.arange(rows.size)
+        for _ in range(ATTEMPTS):
+            r1, r2 = problem.rng.random((2, todo.size, problem.centre.size))
+            new_x[todo], new_v[todo] = constricted_step(
+                x[todo], v[todo], best[todo], self.best_x, r1, r2, c, self._v_max
+            )
+            todo = todo[~problem.feasible(new_x[todo])]
+            if todo.size == 0:
+                break
+        self._x[rows], self._v[rows] = new_x, new_v
+        barred = np.zeros(rows.size, dtype=np.bool_)
+        barred[todo] = True
+        return new_x.copy(), barred
+
+    def _tell(self, points: FloatArray, costs: FloatArray) -> None:
+        rows = np.arange(self._next, self._next + len(points))
+        better = costs < self._best_costs[rows]
+        self._best[rows[better]] = points[better]
+        self._best_costs[rows[better]] = costs[better]
+        self._next += len(points)
+        if self._next == self.problem.particles:
+            self._next = 0
+            self._iteration += 1
