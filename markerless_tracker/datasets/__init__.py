@@ -7,7 +7,14 @@ from markerless_tracker.datasets.pose2sim import Pose2SimRecording
 from markerless_tracker.datasets.rates import every_for_fps, stamp_of, tidy_fps
 from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.datasets.source import FORMATS, detect_format, open_recording
+from markerless_tracker.datasets.target import new_folder
 from markerless_tracker.datasets.trc import format_trc, read_trc, write_trc
+from markerless_tracker.datasets.writer import (
+    RecordingWriter,
+    new_recording,
+    write_background,
+    write_image,
+)
 
 __all__ = [
     "FORMATS",
@@ -16,13 +23,18 @@ __all__ = [
     "MarkerTrack",
     "Pose2SimRecording",
     "Recording",
+    "RecordingWriter",
     "detect_format",
     "every_for_fps",
     "format_trc",
+    "new_folder",
+    "new_recording",
     "open_recording",
     "read_background",
     "read_trc",
     "stamp_of",
     "tidy_fps",
+    "write_background",
+    "write_image",
     "write_trc",
 ]

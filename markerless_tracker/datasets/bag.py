@@ -64,6 +64,7 @@ class BagRecording(Recording):
             rig = self._rig_from_topics(path, names)
         self._topics = {self._image_topic(path, name): name for name in names}
         self._incomplete: Counter[str] = Counter()
+        self._late: Counter[str] = Counter()
         stamps = [stamp for stamp, _ in islice(self._sets(path), RATE_SETS)]
         if not stamps:
             raise DatasetError(
@@ -82,14 +83,20 @@ class BagRecording(Recording):
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
         self._incomplete.clear()
+        self._late.clear()
         with ThreadPoolExecutor(len(self.rig), thread_name_prefix="decode") as pool:
             for index, (stamp, messages) in enumerate(self._sets(self._where)):
                 if index >= start and (index - start) % every == 0:
                     images = pool.map(self._image, messages.values())
                     yield FrameSet(index, stamp, dict(zip(self.rig.names, images, strict=True)))
         if self._incomplete:
-            listed = ", ".join(f"{name} {count}" for name, count in self._incomplete.items())
-            self.warn(f"{self.name}: sets without an image of some camera were skipped ({listed})")
+            self.warn(
+                f"{self.name}: sets lacking a camera were skipped (missing: {_counts(self._incomplete)})"
+            )
+        if self._late:
+            self.warn(
+                f"{self.name}: images that came after later ones were skipped ({_counts(self._late)})"
+            )
         if self._files.damage:
             self.warn(self._files.damage)
 
@@ -112,6 +119,7 @@ class BagRecording(Recording):
                 continue
             stamp = _stamp(message, path)
             if done is not None and stamp <= done:
+                self._late[name] += 1
                 continue
             pending.setdefault(stamp, {})[name] = message
             if len(pending[stamp]) == len(self._topics):
@@ -238,6 +246,10 @@ def _mcap_files(path: Path) -> list[Path]:
     if not files:
         raise DatasetError(f"{path}: no bag, expected a metadata.yaml or a .mcap file")
     return files
+
+
+def _counts(counter: Counter[str]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in sorted(counter.items()))
 
 
 def _line(error: Exception) -> str:

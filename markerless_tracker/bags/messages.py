@@ -1,0 +1,114 @@
+"""ROS messages of a bag, made from cameras and images (rosbags' types, no ROS needed)."""
+
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+from rosbags.typesys import Stores, get_typestore
+
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.geometry import quaternion_from_rotation
+from markerless_tracker.imaging import Image
+
+WORLD_FRAME = "map"
+JPEG_QUALITY = 90
+
+
+@cache
+def typestore() -> Any:
+    """The message types of Jazzy."""
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def _type(name: str) -> Any:
+    return typestore().types[name]
+
+
+def optical_frame(camera_name: str) -> str:
+    """The frame a camera's messages carry (REP-103: x right, y down, z forward)."""
+    return f"{camera_name}_optical_frame"
+
+
+def stamp_message(stamp_ns: int) -> Any:
+    """builtin_interfaces/Time of a stamp in ns."""
+    return _type("builtin_interfaces/msg/Time")(sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
+
+
+def header(stamp_ns: int, frame: str) -> Any:
+    """std_msgs/Header."""
+    return _type("std_msgs/msg/Header")(stamp=stamp_message(stamp_ns), frame_id=frame)
+
+
+def image_message(image: Image, stamp_ns: int, camera: CameraModel) -> Any:
+    """sensor_msgs/Image: bgr8 of (h, w, 3), mono8 of (h, w)."""
+    height, width = image.shape[:2]
+    return _type("sensor_msgs/msg/Image")(
+        header=header(stamp_ns, optical_frame(camera.name)),
+        height=height,
+        width=width,
+        encoding="mono8" if image.ndim == 2 else "bgr8",
+        is_bigendian=0,
+        step=width * (1 if image.ndim == 2 else 3),
+        data=np.ascontiguousarray(image).reshape(-1),
+    )
+
+
+def jpeg_message(image: Image, stamp_ns: int, camera: CameraModel) -> Any:
+    """sensor_msgs/CompressedImage, JPEG of quality `JPEG_QUALITY`.
+
+    Raises:
+        DatasetError: the image cannot be encoded.
+    """
+    done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    if not done:
+        raise DatasetError(f"{camera.name}: an image {image.shape} cannot be encoded as JPEG")
+    kind = "mono8; jpeg compressed" if image.ndim == 2 else "bgr8; jpeg compressed bgr8"
+    return _type("sensor_msgs/msg/CompressedImage")(
+        header=header(stamp_ns, optical_frame(camera.name)), format=kind, data=data.reshape(-1)
+    )
+
+
+def camera_info_message(camera: CameraModel, stamp_ns: int) -> Any:
+    """sensor_msgs/CameraInfo of an unrectified camera: R = 1, P = [K 0], plumb_bob."""
+    k = camera.matrix
+    return _type("sensor_msgs/msg/CameraInfo")(
+        header=header(stamp_ns, optical_frame(camera.name)),
+        height=camera.size_px[1],
+        width=camera.size_px[0],
+        distortion_model="plumb_bob",
+        d=camera.distortion.copy(),
+        k=k.reshape(-1).copy(),
+        r=np.eye(3).reshape(-1),
+        p=np.hstack([k, np.zeros((3, 1))]).reshape(-1),
+        binning_x=0,
+        binning_y=0,
+        roi=_type("sensor_msgs/msg/RegionOfInterest")(
+            x_offset=0, y_offset=0, height=0, width=0, do_rectify=False
+        ),
+    )
+
+
+def static_transforms_message(rig: CameraRig, stamp_ns: int) -> Any:
+    """tf2_msgs/TFMessage with `map` -> NAME_optical_frame of every camera."""
+    vector, quaternion = _type("geometry_msgs/msg/Vector3"), _type("geometry_msgs/msg/Quaternion")
+    stamped, inner = (
+        _type("geometry_msgs/msg/TransformStamped"),
+        _type("geometry_msgs/msg/Transform"),
+    )
+    transforms = []
+    for camera in rig:
+        pose = camera.T_world_cam
+        w, x, y, z = (float(value) for value in quaternion_from_rotation(pose[:3, :3]))
+        tx, ty, tz = (float(value) for value in pose[:3, 3])
+        transforms.append(
+            stamped(
+                header=header(stamp_ns, WORLD_FRAME),
+                child_frame_id=optical_frame(camera.name),
+                transform=inner(
+                    translation=vector(x=tx, y=ty, z=tz), rotation=quaternion(x=x, y=y, z=z, w=w)
+                ),
+            )
+        )
+    return _type("tf2_msgs/msg/TFMessage")(transforms=transforms)

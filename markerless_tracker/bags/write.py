@@ -1,0 +1,166 @@
+"""A recording as a bag: MCAP rosbag2 of version 9 (Jazzy), with calibration and background beside it."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+from markerless_tracker.bags.messages import (
+    camera_info_message,
+    image_message,
+    jpeg_message,
+    static_transforms_message,
+    typestore,
+)
+from markerless_tracker.camera import CameraRig, write_calibration
+from markerless_tracker.datasets.recording import BACKGROUND, FrameSet, Recording
+from markerless_tracker.datasets.target import new_folder
+from markerless_tracker.datasets.writer import write_background
+from markerless_tracker.errors import ConfigError, DatasetError
+from markerless_tracker.imaging import Image
+
+COMPRESSIONS = ("none", "zstd", "jpeg")
+# Stamps of ROS are int32 seconds; earlier or later ones cannot be written.
+LAST_SECOND = 2**31 - 1
+_FOREVER = QosTime(2147483647, 4294967295)
+
+
+@dataclass(frozen=True)
+class BagSummary:
+    """What was written.
+
+    Attributes:
+        path: the bag's folder.
+        sets: sets of images.
+        first_ns, last_ns: stamps of the first and last set.
+        bytes: size of the folder.
+    """
+
+    path: Path
+    sets: int
+    first_ns: int
+    last_ns: int
+    bytes: int
+
+
+def write_bag(
+    recording: Recording,
+    out: str | Path,
+    *,
+    every: int = 1,
+    compress: str = "none",
+    backgrounds: Mapping[str, Sequence[Image]] | None = None,
+    progress: Callable[[int, int | None], None] | None = None,
+) -> BagSummary:
+    """Write a recording, at its scale, as a bag folder.
+
+    Topics per camera: `/NAME/image_raw` (or `/NAME/image_raw/compressed` for jpeg) and
+    `/NAME/camera_info`; once `/tf_static` with `map` -> NAME_optical_frame. Beside the MCAP lie
+    `calibration.toml` and `background/`, scaled as the images and lossless whatever `compress` is.
+    The folder appears when it is complete; nothing is left of one that failed.
+
+    Args:
+        recording: what to write; its stamps are kept.
+        out: the new folder.
+        every: keep every k-th set, from the first.
+        compress: `none`, `zstd` (lossless chunks) or `jpeg` (lossy images).
+        backgrounds: camera -> empty-scene images in the rig's size, instead of the recording's own.
+        progress: called with the sets written and their number (None if unknown).
+
+    Raises:
+        ConfigError: an unknown compression.
+        DatasetError: `out` is taken, cannot be written, or the recording fails.
+    """
+    if compress not in COMPRESSIONS:
+        raise ConfigError(f"compress {compress!r}: expected one of {', '.join(COMPRESSIONS)}")
+    for name in recording.rig.names:
+        if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+            raise DatasetError(
+                f"{name}: this camera name cannot be a ROS topic, expected letters, digits and _ "
+                "after a letter"
+            )
+    total = None if recording.frame_count is None else -(-recording.frame_count // every)
+    with new_folder(out) as folder:
+        # The writer makes its own folder, and would not take ours with the other files in it.
+        folder.rmdir()
+        writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+        if compress == "zstd":
+            writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        stamps: list[int] = []
+        with writer:
+            topics = _Topics(writer, recording.rig, jpeg=compress == "jpeg")
+            for frame in recording.frames(every=every):
+                topics.write(frame, first=not stamps)
+                stamps.append(frame.stamp_ns)
+                if progress is not None:
+                    progress(len(stamps), total)
+            if not stamps:
+                raise DatasetError(f"{recording.name}: gave no set of images, nothing to write")
+        write_calibration(folder / "calibration.toml", recording.rig)
+        frames = recording.background_frames() if backgrounds is None else backgrounds
+        for name, images in frames.items():
+            write_background(folder / BACKGROUND, recording.rig[name], images)
+        size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+    return BagSummary(Path(out), len(stamps), stamps[0], stamps[-1], size)
+
+
+class _Topics:
+    """The connections of a bag being written."""
+
+    def __init__(self, writer: Writer, rig: CameraRig, *, jpeg: bool) -> None:
+        self._writer, self._rig, self._jpeg = writer, rig, jpeg
+        kind, suffix = ("CompressedImage", "/compressed") if jpeg else ("Image", "")
+        self._static = self._connect("/tf_static", "tf2_msgs/msg/TFMessage", latched=True)
+        self._images = {
+            name: self._connect(f"/{name}/image_raw{suffix}", f"sensor_msgs/msg/{kind}")
+            for name in rig.names
+        }
+        self._infos = {
+            name: self._connect(f"/{name}/camera_info", "sensor_msgs/msg/CameraInfo")
+            for name in rig.names
+        }
+
+    def write(self, frame: FrameSet, *, first: bool) -> None:
+        """Write one set; the static transforms go before the first."""
+        stamp = frame.stamp_ns
+        if not 0 <= stamp < LAST_SECOND * 10**9:
+            raise DatasetError(f"frame {frame.index}: its stamp {stamp} ns cannot stand in a ROS message")
+        if first:
+            self._put(self._static, stamp, static_transforms_message(self._rig, stamp))
+        for camera in self._rig:
+            make = jpeg_message if self._jpeg else image_message
+            self._put(self._infos[camera.name], stamp, camera_info_message(camera, stamp))
+            image = make(frame.images[camera.name], stamp, camera)
+            self._put(self._images[camera.name], stamp, image)
+
+    def _connect(self, topic: str, kind: str, *, latched: bool = False) -> Any:
+        durability = QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE
+        qos = Qos(
+            history=QosHistory.KEEP_LAST,
+            depth=1 if latched else 10,
+            reliability=QosReliability.RELIABLE,
+            durability=durability,
+            deadline=_FOREVER,
+            lifespan=_FOREVER,
+            liveliness=QosLiveliness.AUTOMATIC,
+            liveliness_lease_duration=_FOREVER,
+            avoid_ros_namespace_conventions=False,
+        )
+        return self._writer.add_connection(
+            topic, kind, typestore=typestore(), offered_qos_profiles=[qos]
+        )
+
+    def _put(self, connection: Any, stamp_ns: int, message: Any) -> None:
+        data = typestore().serialize_cdr(message, connection.msgtype)
+        self._writer.write(connection, stamp_ns, data)
