@@ -1,0 +1,111 @@
+"""Verb `convert`: a recording to a bag."""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from markerless_tracker.bags import COMPRESSIONS, BagSummary, write_bag
+from markerless_tracker.datasets import FORMATS, Recording, every_for_fps, open_recording
+from markerless_tracker.datasets.empty_scene import backgrounds_of
+
+HELP = (
+    "Turn a recording folder, a Pose2Sim project or another bag into an MCAP bag: images, camera "
+    "infos and static transforms as topics, calibration.toml and background/ beside them. Where a "
+    "camera has no empty-scene image, one is learned from the recording."
+)
+EXAMPLE = "markerless_tracker convert recordings/walk walk_bag --scale 0.5"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("source", type=Path, help="recording folder, Pose2Sim project or bag")
+    parser.add_argument("bag", type=Path, help="folder to make (new, or empty)")
+    parser.add_argument("--format", choices=FORMATS, help="what SOURCE is (default: find out)")
+    parser.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images")
+    parser.add_argument(
+        "--fps",
+        type=float,
+        metavar="N",
+        help="keep every k-th set, from the first, to get this rate",
+    )
+    parser.add_argument(
+        "--scale", type=float, default=1.0, metavar="S", help="factor for the images (default 1)"
+    )
+    parser.add_argument(
+        "--compress",
+        choices=COMPRESSIONS,
+        default="none",
+        help="none (default), zstd (lossless, smaller, slower) or jpeg (lossy, much smaller)",
+    )
+    parser.add_argument("--json", action="store_true", help="print what was written as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do it; returns the exit status."""
+    started = time.monotonic()
+    console = Console(stderr=True)
+    recording = open_recording(
+        args.source, scale=args.scale, format=args.format, input_fps=args.input_fps
+    )
+    every = every_for_fps(recording.fps, args.fps)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=console,
+    ) as bars:
+        task = bars.add_task("background", total=None)
+        backgrounds = backgrounds_of(recording)
+        bars.update(task, description=f"writing {args.bag.name}")
+        summary = write_bag(
+            recording,
+            args.bag,
+            every=every,
+            compress=args.compress,
+            backgrounds=backgrounds,
+            progress=lambda done, total: bars.update(task, completed=done, total=total),
+        )
+    for warning in recording.warnings:
+        console.print(f"warning: {warning}", markup=False, highlight=False, soft_wrap=True)
+    report = _report(recording, summary, args, every, time.monotonic() - started)
+    if args.json:
+        json.dump(report, sys.stdout, indent=2)
+        sys.stdout.write("\n")
+    else:
+        sizes = ", ".join(f"{name} {w}x{h}" for name, (w, h) in report["size_px"].items())
+        print(
+            f"{summary.path}: {summary.sets} sets at {report['fps']:g} fps, {sizes}, "
+            f"{summary.bytes / 1e6:.1f} MB"
+        )
+    return 0
+
+
+def _report(
+    recording: Recording,
+    summary: BagSummary,
+    args: argparse.Namespace,
+    every: int,
+    seconds: float,
+) -> dict[str, Any]:
+    return {
+        "source": str(args.source),
+        "bag": str(summary.path),
+        "cameras": list(recording.rig.names),
+        "size_px": {camera.name: list(camera.size_px) for camera in recording.rig},
+        "frames": summary.sets,
+        "fps": recording.fps / every,
+        "first_ns": summary.first_ns,
+        "last_ns": summary.last_ns,
+        "scale": args.scale,
+        "compress": args.compress,
+        "bytes": summary.bytes,
+        "seconds": round(seconds, 3),
+        "warnings": list(recording.warnings),
+    }

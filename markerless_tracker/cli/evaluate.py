@@ -1,0 +1,67 @@
+"""Verb `evaluate`: the error of a result against reference markers."""
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from markerless_tracker.datasets import read_trc
+from markerless_tracker.evaluation.score import Score, score
+
+HELP = (
+    "Compare two marker files, rows by their Time and markers by name, in mm. A missing Pelvis is the "
+    "midpoint of the hips; rows that are blank in either file are left out."
+)
+EXAMPLE = "markerless_tracker evaluate out/walk.trc recordings/walk/ground_truth.trc"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("result", type=Path, help="marker file to judge (.trc)")
+    parser.add_argument("reference", type=Path, help="marker file to judge by (.trc)")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do it; returns the exit status."""
+    figures = score(read_trc(args.result), read_trc(args.reference))
+    if args.json:
+        json.dump(figures.as_dict(), sys.stdout, indent=2, allow_nan=False)
+        sys.stdout.write("\n")
+        return 0
+    console = Console()
+    console.print(_table(figures))
+    console.print(
+        f"mean {figures.mean_mm:.1f} mm, worst frame {figures.max_mm:.1f} mm, worst joint in a frame "
+        f"{figures.worst_joint_mm:.1f} mm, limbs {_text(figures.limbs_mm)} mm; "
+        f"{figures.frames} of {figures.reference_frames} reference frames compared",
+        highlight=False,
+        soft_wrap=True,
+    )
+    return 0
+
+
+def _table(figures: Score) -> Table:
+    table = Table(title="Error per joint, mm")
+    table.add_column("joint")
+    for heading in ("mean", "worst", "last frame", "forward", "left", "up"):
+        table.add_column(heading, justify="right")
+    for column, (name, mean) in enumerate(figures.joints.items()):
+        errors = [value for value in figures.joint_mm[:, column].tolist() if math.isfinite(value)]
+        bias = figures.bias.get(name, (math.nan,) * 3)
+        table.add_row(
+            name,
+            _text(mean),
+            _text(max(errors, default=math.nan)),
+            _text(figures.joint_mm[-1, column]),
+            *(_text(value, sign="+") for value in bias),
+        )
+    return table
+
+
+def _text(value: float, *, sign: str = "") -> str:
+    return f"{value:{sign}.1f}" if math.isfinite(value) else "-"

@@ -1,0 +1,35 @@
+"""Backgrounds of a recording: its own, or learned from its images where it brings none."""
+
+from markerless_tracker.datasets.recording import Recording
+from markerless_tracker.imaging import Image
+from markerless_tracker.imaging.plate import background_plate
+
+# Frames that learning looks at, spread over the recording.
+FRAMES = 36
+
+
+def backgrounds_of(recording: Recording) -> dict[str, list[Image]]:
+    """Camera name -> empty-scene images (scaled) of every camera of a recording.
+
+    Cameras without images in `background/` get one learned from the recording's stills of the room and
+    its own frames; a warning of the recording says from what, and what that costs. The same frames
+    give the same image, whatever they are stored in.
+
+    Raises:
+        DatasetError, ImageError: the images cannot be read.
+    """
+    found = recording.background_frames()
+    missing = [name for name in recording.rig.names if name not in found]
+    if not missing:
+        return found
+    every = max(1, (recording.frame_count or FRAMES) // FRAMES)
+    clips: dict[str, list[Image]] = {name: [] for name in missing}
+    for frame in recording.frames(every=every):
+        for name in missing:
+            clips[name].append(frame.images[name])
+    stills = recording.room_stills()
+    for name in missing:
+        plate = background_plate([clips[name]], stills.get(name, []), camera=name)
+        recording.warn(f"{name}: no empty-scene image, background learned from {plate.note}")
+        found[name] = [plate.image]
+    return {name: found[name] for name in recording.rig.names}
