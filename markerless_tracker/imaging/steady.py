@@ -1,0 +1,152 @@
+"""What a pixel shows most steadily over time, and how often it shows something else."""
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.imaging.images import Image
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-def]
+    """Per pixel, the mean of the frames in the shortest brightness interval that holds ``share``.
+
+    Choosing whole frames by their brightness (and not each channel for itself) keeps colours that
+    the pixel really had. ``variance`` gets the mean square, per channel, of the deviations from
+    that value of all frames within three times the interval (at least 6 grey levels).
+    """
+    count, height, width, channels = stack.shape
+    need = max(1, int(np.ceil(share * count)))
+    keys = np.empty(count, dtype=np.int32)
+    for v in range(height):
+        for u in range(width):
+            for t in range(count):
+                total = 0
+                for c in range(channels):
+                    total += np.int32(stack[t, v, u, c])
+                key = total * 4096 + t
+                slot = t
+                while slot > 0 and keys[slot - 1] > key:
+                    keys[slot] = keys[slot - 1]
+                    slot -= 1
+                keys[slot] = key
+            best = 0
+            least = 1 << 30
+            for first in range(count - need + 1):
+                length = (keys[first + need - 1] >> 12) - (keys[first] >> 12)
+                if length < least:
+                    least = length
+                    best = first
+            reach = max(np.float32(6.0), np.float32(3.0) * least / channels)
+            for c in range(channels):
+                total = 0
+                for i in range(best, best + need):
+                    total += np.int32(stack[keys[i] & 4095, v, u, c])
+                value = np.float32(total) / np.float32(need)
+                steady[v, u, c] = value
+                square = np.float32(0.0)
+                inside = 0
+                for t in range(count):
+                    deviation = np.float32(stack[t, v, u, c]) - value
+                    if abs(deviation) <= reach:
+                        square += deviation * deviation
+                        inside += 1
+                variance[v, u, c] = square / np.float32(max(inside, 1))
+
+
+def steady_image(
+    stack: Image, *, share: float = 0.4
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """What each pixel shows most steadily, and how much that varies.
+
+    A pixel covered by something moving for up to 1 - ``share`` of the time still shows what is
+    behind; a median gives way at one half. What stands still longer than that is burnt in.
+
+    Args:
+        stack: (n, h, w, c) uint8 frames, n at most 4096.
+        share: part of the frames that must agree.
+
+    Returns:
+        Steady value and variance, (h, w, c) float32 each, grey levels and their square.
+    """
+    shape = stack.shape[1:]
+    steady = np.empty(shape, dtype=np.float32)
+    variance = np.empty(shape, dtype=np.float32)
+    steady_kernel(stack, share, steady, variance)
+    return steady, variance
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def match_kernel(stack, target, reach, matches, total):  # type: ignore[no-untyped-def]
+    """Count and add up the frames that lie within ``reach`` of ``target`` in every channel."""
+    count, height, width, channels = stack.shape
+    for v in range(height):
+        for u in range(width):
+            found = 0
+            for t in range(count):
+                near = True
+                for c in range(channels):
+                    if abs(np.float32(stack[t, v, u, c]) - target[v, u, c]) > reach:
+                        near = False
+                if near:
+                    found += 1
+                    for c in range(channels):
+                        total[v, u, c] += np.float32(stack[t, v, u, c])
+            matches[v, u] = found
+
+
+def matching_frames(
+    stack: Image, target: NDArray[np.float32], reach: float
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """How many frames show ``target`` (h, w, c) at each pixel, and the mean of those that do.
+
+    Returns:
+        Counts (h, w) int32, and the mean (h, w, c) float32, ``target`` where no frame agrees.
+    """
+    matches = np.empty(target.shape[:2], dtype=np.int32)
+    total = np.zeros_like(target)
+    match_kernel(stack, target, np.float32(reach), matches, total)
+    mean = total / np.maximum(matches, 1)[:, :, None].astype(np.float32)
+    return matches, np.where(matches[:, :, None] > 0, mean, target).astype(np.float32)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def motion_kernel(stack, steady, reach, share, jump):  # type: ignore[no-untyped-def]
+    """Share of the frames that differ from the steady value, and the largest change at once."""
+    count, height, width, channels = stack.shape
+    for v in range(height):
+        for u in range(width):
+            away = 0
+            largest = np.float32(0.0)
+            for t in range(count):
+                far = False
+                for c in range(channels):
+                    value = np.float32(stack[t, v, u, c])
+                    far = far or abs(value - steady[v, u, c]) > reach
+                    if t > 0:
+                        largest = max(largest, abs(value - np.float32(stack[t - 1, v, u, c])))
+                away += far
+            share[v, u] = np.float32(away) / np.float32(count)
+            jump[v, u] = largest
+
+
+def motion(
+    stack: Image, steady: NDArray[np.float32], reach: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """How often something covers each pixel, and how abruptly it comes.
+
+    Light (reflections, soft shadows) changes gradually, a body arrives at once.
+
+    Args:
+        stack: (n, h, w, c) uint8 frames in the order of time.
+        steady: (h, w, c) float32, of `steady_image`.
+        reach: grey levels within which two values are the same.
+
+    Returns:
+        Share of the frames that differ from the steady value, (h, w) float32 in 0..1, and the
+        largest change from one frame to the next, (h, w) float32, grey levels.
+    """
+    share = np.empty(steady.shape[:2], dtype=np.float32)
+    jump = np.empty_like(share)
+    motion_kernel(stack, steady, np.float32(reach), share, jump)
+    return share, jump
