@@ -1,7 +1,16 @@
 """Made-up people: motions, cameras, pictures. Errors on them are never accuracy."""
 
 from markerless_tracker.synthesis.motion import MOTIONS, Motion
-from markerless_tracker.synthesis.rig import look_at, ring_rig
+from markerless_tracker.synthesis.recording import write_recording
+from markerless_tracker.synthesis.rig import MILD_LENS, look_at, ring_rig
 from markerless_tracker.synthesis.scene import SyntheticScene
 
-__all__ = ["MOTIONS", "Motion", "SyntheticScene", "look_at", "ring_rig"]
+__all__ = [
+    "MILD_LENS",
+    "MOTIONS",
+    "Motion",
+    "SyntheticScene",
+    "look_at",
+    "ring_rig",
+    "write_recording",
+]

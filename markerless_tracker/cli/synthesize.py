@@ -1,0 +1,132 @@
+"""The verb ``synthesize``: a made-up person as a recording folder with exact truth."""
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+
+from markerless_tracker.body import MARKER_NAMES
+from markerless_tracker.datasets import MarkerTrack, write_trc
+from markerless_tracker.datasets.target import new_folder
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.synthesis import MILD_LENS, MOTIONS, SyntheticScene, write_recording
+
+HELP = (
+    "Write a made-up person (shaded cones in a textured room) as a recording folder: calibration, "
+    "videos, empty-scene videos, exact masks and markers, subject and start pose. What a tracker "
+    "scores on it proves that the parts fit together; it is no measure of accuracy."
+)
+EXAMPLE = "markerless_tracker synthesize made_up --seconds 2 --motion balance"
+_MOST_FRAMES = 100_000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("out", metavar="OUT", type=Path, help="folder to write: new, or empty")
+    parser.add_argument("--seconds", type=float, default=4.0, help="length (default 4)")
+    parser.add_argument("--fps", type=float, default=60.0, help="frames per second (default 60)")
+    parser.add_argument(
+        "--motion", choices=MOTIONS, default="walk", help="what the person does (default walk)"
+    )
+    parser.add_argument("--cameras", type=int, default=4, help="number of cameras (default 4)")
+    parser.add_argument(
+        "--size", metavar="WxH", default="656x490", help="size of the images (default 656x490)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of motion, room, clothes and noise (default 0)"
+    )
+    parser.add_argument(
+        "--stature", metavar="M", type=float, default=1.72, help="height in metres (default 1.72)"
+    )
+    parser.add_argument(
+        "--body", default="balan31", help="body by name or .yaml file (default balan31)"
+    )
+    parser.add_argument(
+        "--noise", metavar="SIGMA", type=float, default=3.0,
+        help="standard deviation of the sensor noise in grey levels (default 3)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--shadow", type=float, default=0.35,
+        help="part of the light that the shadow on the floor takes away (default 0.35)",
+    )  # fmt: skip
+    parser.add_argument("--undistorted", action="store_true", help="lenses without distortion")
+    parser.add_argument(
+        "--lossless", action="store_true", help="videos that keep every grey level (large)"
+    )
+    parser.add_argument("--json", action="store_true", help="a summary for machines on stdout")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the recording."""
+    frames = _frames(args.seconds, args.fps)
+    scene = SyntheticScene(
+        body=args.body,
+        stature_m=args.stature,
+        motion=args.motion,
+        cameras=args.cameras,
+        size_px=_size(args.size),
+        fps=args.fps,
+        seed=args.seed,
+        noise=args.noise,
+        shadow=args.shadow,
+        distortion=(0.0,) * 5 if args.undistorted else MILD_LENS,
+    )
+    with Progress(console=Console(file=sys.stderr)) as bar:
+        task = bar.add_task("frames", total=frames)
+        synthesize(
+            args.out,
+            scene,
+            frames=frames,
+            lossless=args.lossless,
+            progress=lambda done: bar.update(task, completed=done),
+        )
+    if args.json:
+        print(json.dumps({
+            "path": str(args.out), "frames": frames, "fps": args.fps, "motion": args.motion,
+            "cameras": list(scene.rig.names), "seed": args.seed, "body": scene.body.name,
+        }))  # fmt: skip
+    else:
+        print(f"{args.out}: {frames} frames of {len(scene.rig)} cameras, with exact truth")
+    return 0
+
+
+def synthesize(
+    out: str | Path,
+    scene: SyntheticScene,
+    *,
+    frames: int,
+    lossless: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> None:
+    """Write a scene's first frames as a recording folder, which appears when it is whole.
+
+    Beside what `write_recording` writes: `ground_truth.trc`, the 15 markers of every frame.
+
+    Raises:
+        DatasetError: something is at `out` already, or it cannot be written.
+    """
+    with new_folder(out) as folder:
+        write_recording(scene, folder, frames=frames, lossless=lossless, progress=progress)
+        stamps = np.array([scene.stamp_ns(i) for i in range(frames)], dtype=np.int64)
+        truth = np.array([scene.markers(i) for i in range(frames)])
+        write_trc(folder / "ground_truth.trc", MarkerTrack(MARKER_NAMES, stamps, truth), scene.fps)
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
+    if match is None:
+        raise ConfigError(f"size is {text!r}, expected WxH such as 656x490")
+    return int(match[1]), int(match[2])
+
+
+def _frames(seconds: float, fps: float) -> int:
+    count = seconds * fps
+    if not 0.5 <= count <= _MOST_FRAMES:
+        raise ConfigError(f"{seconds:g} s at {fps:g} fps, expected 1 to {_MOST_FRAMES} frames")
+    return round(count)
