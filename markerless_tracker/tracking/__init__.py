@@ -1,0 +1,7 @@
+"""The tracker: configuration, stages of a frame, state, `Tracker.step`."""
+
+from markerless_tracker.tracking.config import PRESETS, Setting, TrackerConfig
+from markerless_tracker.tracking.setup import TrackerSetup, build_tracker
+from markerless_tracker.tracking.tracker import Tracker
+
+__all__ = ["PRESETS", "Setting", "Tracker", "TrackerConfig", "TrackerSetup", "build_tracker"]

@@ -1,0 +1,138 @@
+"""All settings of a tracker, in one flat frozen record; and the presets."""
+
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from typing import Any, Self
+
+from markerless_tracker.body import RULES
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.fitness import EDGE_RULES, EDGE_TERMS
+from markerless_tracker.imaging import ImagingSettings
+from markerless_tracker.optim import UPDATES
+from markerless_tracker.settings import setting
+
+PRESETS: Mapping[str, Mapping[str, Any]] = {
+    "tuned": {},
+    "paper": {
+        "edge_form": "published",
+        "edge_rule": "visible",
+        "edge_weight": 1.0,
+        "sigma_scale": 1.0,
+    },
+}
+"""What each preset sets; everything else keeps its default."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One setting as users meet it: key of `--config`, and parameter of the node."""
+
+    name: str
+    type: type
+    default: Any
+    doc: str
+    choices: tuple[str, ...] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackerConfig(ImagingSettings):
+    """Every setting that a result depends on, those of the imaging included.
+
+    Raises:
+        ConfigError: a value of the wrong type, out of its range or not among its choices.
+    """
+
+    preset: str = setting(
+        "tuned",
+        "tuned: what measures best; paper: every setting as published",
+        choices=tuple(PRESETS),
+    )
+    optimizer: str = setting("sppso", "search algorithm", choices=("sppso",))
+    body: str = setting("balan31", "body: a shipped one's name, or a YAML file")
+    evaluations: int = setting(
+        1000, "evaluations of the fitness per frame, shared out as published", least=1, most=10**7
+    )
+    seed: int = setting(0, "seed of all random draws", least=0, most=2**63 - 1)
+    threads: int = setting(
+        0, "threads of the fitness, 0 = as many as the machine has cores", least=0, most=256
+    )
+    limits: str = setting(
+        "anatomical",
+        "joint limits: anatomical; bt_walking: the published ones, learned from one walk",
+        choices=("anatomical", "bt_walking"),
+    )
+    collision: str = setting(
+        "elliptic",
+        "inter-penetration rule: elliptic sections with a margin; published: round, no margin; none",
+        choices=RULES,
+    )
+    update: str = setting(
+        "iteration", "when a swarm's best is updated; particle: as printed in SPPSO", choices=UPDATES
+    )
+    sigma_scale: float = setting(
+        0.5, "factor of the published spreads of the search", least=0.01, most=100.0
+    )
+    sigma_rate_max: float = setting(
+        6.0, "spreads grow with the time between frames up to this many 60ths of a second", least=1.0,
+        most=1000.0,
+    )
+    edge_weight: float = setting(0.5, "weight of f_e beside f_s", least=0.0, most=100.0)
+    edge_rule: str = setting(
+        "outline",
+        "model edges that are sampled: sides: all; visible: those no nearer part hides; outline: those "
+        "on the outline of the whole body",
+        choices=tuple(EDGE_RULES),
+    )
+    edge_term: str = setting("ssd", "f_e from edge strengths M: 1 - mean (1 - M)², or mean M", choices=EDGE_TERMS)
+    edge_spacing_px: float = setting(5.0, "distance of edge samples along a side", least=0.5, most=100.0)
+    edge_step_px: float = setting(
+        2.0, "outline: how far outside a sample must be free of the body", least=0.5, most=50.0
+    )
+    component_margin_px: int = setting(
+        0,
+        "silhouette components that come no nearer to the predicted body than this are left out",
+        least=0,
+        most=10000,
+    )
+
+    @classmethod
+    def settings(cls) -> tuple[Setting, ...]:
+        """All settings, in order."""
+        return tuple(
+            Setting(
+                f.name,
+                type(f.default),
+                f.default if f.default is not MISSING else None,
+                f.metadata.get("doc", ""),
+                f.metadata.get("choices"),
+            )
+            for f in fields(cls)
+        )
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any], preset: str | None = None) -> Self:
+        """A configuration of a preset (named in the values or given) and the values given.
+
+        Raises:
+            ConfigError: an unknown key, naming the nearest known one, or an impossible value.
+        """
+        known = {f.name for f in fields(cls)}
+        for key in values:
+            if key not in known:
+                raise ConfigError(f"unknown setting {key!r}{nearest(str(key), known)}")
+        name = values.get("preset", preset or "tuned")
+        if name not in PRESETS:
+            raise ConfigError(f"preset is {name!r}, expected one of {', '.join(PRESETS)}")
+        return cls(**{**PRESETS[name], **values, "preset": name})
+
+    def as_mapping(self) -> dict[str, Any]:
+        """All settings by name, as `from_mapping` takes them."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+def nearest(name: str, known: "set[str] | frozenset[str]") -> str:
+    """', did you mean ...?' if a known name is near enough, else nothing."""
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, sorted(known), n=1)
+    return f", did you mean {close[0]!r}?" if close else ""

@@ -1,0 +1,118 @@
+"""From files and settings to a tracker: what the node and the offline verbs share."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from markerless_tracker.body import (
+    BodyModel,
+    load_description,
+    pose_from_markers,
+    read_pose,
+    read_subject,
+    subject_from_markers,
+    subject_from_stature,
+)
+from markerless_tracker.body.build import build_body
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.datasets import read_trc
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.imaging import BackgroundModel
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.tracker import Tracker
+
+
+@dataclass(frozen=True)
+class TrackerSetup:
+    """A tracker and the time its start pose is meant for; None = the first frame that comes."""
+
+    tracker: Tracker
+    start_stamp_ns: int | None
+
+
+@dataclass(frozen=True)
+class _MarkerRow:
+    """The first row of a marker file that holds anything."""
+
+    stamp_ns: int
+    markers_m: Mapping[str, FloatArray]
+
+
+def build_tracker(
+    rig: CameraRig,
+    config: TrackerConfig,
+    *,
+    backgrounds: Mapping[str, BackgroundModel] | None = None,
+    start_file: Path | None = None,
+    subject_file: Path | None = None,
+    subject_from: Path | None = None,
+    stature: float | None = None,
+) -> TrackerSetup:
+    """Build a tracker from a start (TRC or YAML) and a subject.
+
+    The subject is the file's, or measured on the first row of a TRC (`subject_from`), or a generic
+    person of a stature, or, when none is named, measured on the start's first row.
+
+    Raises:
+        ConfigError: no start, more than one subject, or none and the start is no TRC.
+        TrackerError: a file cannot be read or does not fit.
+    """
+    if start_file is None:
+        raise ConfigError("no start pose: name a TRC or a pose YAML (--start, start_file)")
+    named = [
+        name
+        for name, value in (
+            ("subject_file", subject_file),
+            ("subject_from", subject_from),
+            ("stature", stature),
+        )
+        if value is not None
+    ]
+    if len(named) > 1:
+        raise ConfigError(f"{' and '.join(named)} both name a subject, expected one")
+    description = load_description(config.body)
+    start = first_row(start_file) if start_file.suffix.lower() == ".trc" else None
+    if subject_file is not None:
+        subject = read_subject(subject_file)
+    elif stature is not None:
+        subject = subject_from_stature(description, stature)
+    elif subject_from is not None:
+        subject = subject_from_markers(description, first_row(subject_from).markers_m)
+    elif start is not None:
+        subject = subject_from_markers(description, start.markers_m)
+    else:
+        raise ConfigError(
+            f"{start_file} gives a pose but no subject: name one (--subject, --subject-from or --stature)"
+        )
+    body = build_body(description, subject)
+    if start is not None:
+        pose = pose_from_markers(body, start.markers_m, limits=_limits(body, config))
+    else:
+        pose = read_pose(start_file, body)
+    tracker = Tracker(rig, body, config, start_pose=pose, backgrounds=backgrounds)
+    return TrackerSetup(tracker, None if start is None else start.stamp_ns)
+
+
+def first_row(path: Path) -> _MarkerRow:
+    """Named markers (3,) of the first row of a TRC that holds any.
+
+    Raises:
+        DatasetError: the file cannot be read.
+        ConfigError: it holds no marker at all.
+    """
+    track = read_trc(path)
+    rows = np.flatnonzero(track.tracked)
+    if rows.size == 0:
+        raise ConfigError(f"{path}: holds no marker in any row")
+    row = int(rows[0])
+    named = dict(zip(track.names, track.positions_m[row], strict=True))
+    return _MarkerRow(int(track.stamps_ns[row]), named)
+
+
+def _limits(body: BodyModel, config: TrackerConfig) -> FloatArray:
+    return body.walking_limits if config.limits == "bt_walking" else body.limits
+
+
