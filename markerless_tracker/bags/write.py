@@ -1,4 +1,4 @@
-"""A recording as a bag: MCAP rosbag2 of version 9 (Jazzy), with calibration and background beside it."""
+"""A recording as a bag: MCAP rosbag2 of version 9 (Jazzy), with what the tracker needs beside it."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -135,7 +135,9 @@ class _Topics:
         """Write one set; the static transforms go before the first."""
         stamp = frame.stamp_ns
         if not 0 <= stamp < LAST_SECOND * 10**9:
-            raise DatasetError(f"frame {frame.index}: its stamp {stamp} ns cannot stand in a ROS message")
+            raise DatasetError(
+                f"frame {frame.index}: its stamp {stamp} ns cannot stand in a ROS message"
+            )
         if first:
             self._put(self._static, stamp, static_transforms_message(self._rig, stamp))
         for camera in self._rig:

@@ -1,8 +1,8 @@
-"""Calibration files: the neutral `calibration.toml` (as Pose2Sim and Anipose write it) and Qualisys.
+"""Calibration files: `calibration.toml` (as Pose2Sim and Anipose write it) and Qualisys.
 
-A `calibration.toml` holds one table per camera: `name`, `size` [w, h] px (floats allowed), `matrix` K,
-`distortions` [k1 k2 p1 p2 (k3)], `rotation` (Rodrigues vector, world to camera), `translation` (m)
-and `fisheye`. Tables without `matrix` (`[metadata]`) describe no camera.
+A `calibration.toml` holds one table per camera: `name`, `size` [w, h] px (floats allowed),
+`matrix` K, `distortions` [k1 k2 p1 p2 (k3)], `rotation` (Rodrigues vector, world to camera),
+`translation` (m) and `fisheye`. Tables without `matrix` (`[metadata]`) describe no camera.
 """
 
 import math
@@ -50,8 +50,8 @@ def read_calibration(path: str | Path) -> CameraRig:
 def write_calibration(path: str | Path, rig: CameraRig) -> None:
     """Write a rig as `calibration.toml`.
 
-    Numbers are written with all their digits, Rodrigues vectors with 12 decimals: a rig that came from
-    such a file is read back bit for bit.
+    Numbers are written with all their digits, Rodrigues vectors with 12 decimals: a rig that came
+    from such a file is read back bit for bit.
 
     Raises:
         CalibrationError: the file cannot be written.
@@ -67,11 +67,12 @@ def write_calibration(path: str | Path, rig: CameraRig) -> None:
 def read_qca(path: str | Path) -> CameraRig:
     """Read a Qualisys `*.qca.txt` (XML).
 
-    Its camera looks along -z with y up: R = diag(1, -1, -1) r, t = -R C, with C the camera's position
-    in mm. Distortion coefficients are taken as they stand in the file.
+    Its camera looks along -z with y up: R = diag(1, -1, -1) r, t = -R C, with C the camera's
+    position in mm. Distortion coefficients are taken as they stand in the file.
 
     Raises:
-        CalibrationError: the file cannot be read, is not XML, holds no camera or lacks an attribute.
+        CalibrationError: the file cannot be read, is not XML, holds no camera or lacks an
+            attribute.
     """
     path = Path(path)
     try:
@@ -105,7 +106,9 @@ def _camera_from_table(path: Path, key: str, table: Mapping[str, Any]) -> Camera
         raise CalibrationError(f"{path}: {key}: name is {name!r}, expected a string")
     where = f"{path}: {name}"
     if table.get("fisheye", False):
-        raise CalibrationError(f"{where}: fisheye lenses are not supported, expected fisheye = false")
+        raise CalibrationError(
+            f"{where}: fisheye lenses are not supported, expected fisheye = false"
+        )
     rotation = rotation_from_rodrigues(_canonical(_numbers(where, table, "rotation", (3,))))
     try:
         return CameraModel(
@@ -135,14 +138,18 @@ def _numbers(
     except (TypeError, ValueError):
         value = np.empty(0)
     if value.shape not in shapes or not np.isfinite(value).all():
-        raise CalibrationError(f"{where}: {key} is {table[key]!r}, expected {expected} finite numbers")
+        raise CalibrationError(
+            f"{where}: {key} is {table[key]!r}, expected {expected} finite numbers"
+        )
     return value
 
 
 def _size(where: str, size: FloatArray) -> tuple[int, int]:
     width, height = (round(float(value)) for value in size)
     if width < 1 or height < 1:
-        raise CalibrationError(f"{where}: size is {size.tolist()}, expected positive [width, height]")
+        raise CalibrationError(
+            f"{where}: size is {size.tolist()}, expected positive [width, height]"
+        )
     return width, height
 
 

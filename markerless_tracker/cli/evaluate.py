@@ -13,8 +13,8 @@ from markerless_tracker.datasets import read_trc
 from markerless_tracker.evaluation.score import Score, score
 
 HELP = (
-    "Compare two marker files, rows by their Time and markers by name, in mm. A missing Pelvis is the "
-    "midpoint of the hips; rows that are blank in either file are left out."
+    "Compare two marker files, rows by their Time and markers by name, in mm. A missing Pelvis is "
+    "the midpoint of the hips; rows that are blank in either file are left out."
 )
 EXAMPLE = "markerless_tracker evaluate out/walk.trc recordings/walk/ground_truth.trc"
 
@@ -36,8 +36,8 @@ def run(args: argparse.Namespace) -> int:
     console = Console()
     console.print(_table(figures))
     console.print(
-        f"mean {figures.mean_mm:.1f} mm, worst frame {figures.max_mm:.1f} mm, worst joint in a frame "
-        f"{figures.worst_joint_mm:.1f} mm, limbs {_text(figures.limbs_mm)} mm; "
+        f"mean {figures.mean_mm:.1f} mm, worst frame {figures.max_mm:.1f} mm, worst joint in a "
+        f"frame {figures.worst_joint_mm:.1f} mm, limbs {_text(figures.limbs_mm)} mm; "
         f"{figures.frames} of {figures.reference_frames} reference frames compared",
         highlight=False,
         soft_wrap=True,

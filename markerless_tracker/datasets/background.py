@@ -1,4 +1,4 @@
-"""Images of the empty scene beside a recording: `background/NAME.{png,jpg,mp4}` or a folder NAME."""
+"""Images of the empty scene: `background/NAME.{png,jpg,mp4}`, or a folder NAME of such images."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -67,7 +67,9 @@ def _load(path: Path, size_px: tuple[int, int], stored_px: tuple[int, int] | Non
     for image in _images(path):
         came = (int(image.shape[1]), int(image.shape[0]))
         if came not in (size_px, stored_px or size_px):
-            expected = " or ".join(f"{w}x{h}" for w, h in dict.fromkeys((stored_px or size_px, size_px)))
+            expected = " or ".join(
+                f"{w}x{h}" for w, h in dict.fromkeys((stored_px or size_px, size_px))
+            )
             raise ImageError(
                 f"{path}: background of {came[0]}x{came[1]} px, expected {expected} px"
             )
@@ -83,7 +85,8 @@ def _images(path: Path) -> list[Image]:
         if not files:
             raise DatasetError(f"{path}: holds no image, expected {', '.join(IMAGE_SUFFIXES)}")
         return [read_image(file) for file in files]
-    stream, images = open_stream(path), []
+    stream = open_stream(path)
+    images: list[Image] = []
     while len(images) < MAX_FRAMES and (image := stream.read()) is not None:
         images.append(image)
     stream.close()

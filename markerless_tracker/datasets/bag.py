@@ -1,4 +1,4 @@
-"""Bags (rosbag2, MCAP): images of a rig as ROS topics, `calibration.toml` and `background/` beside."""
+"""Bags (rosbag2, MCAP): a rig's images as topics, `calibration.toml` and `background/` beside."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -35,8 +35,8 @@ class BagRecording(Recording):
     """A bag with the images of a rig on `NAME/image_raw` or `NAME/image_raw/compressed`.
 
     Images of one stamp (of their headers) make a set; incomplete sets are skipped and counted in
-    `warnings`. Of a cut or damaged file everything before the damage is read. `frame_count` is an upper
-    bound unless the file is damaged. Without a `calibration.toml` beside it, the rig comes from
+    `warnings`. Of a cut or damaged file everything before the damage is read. `frame_count` is an
+    upper bound unless the file is damaged. Without a `calibration.toml` beside it, the rig comes from
     `NAME/camera_info` and `/tf_static`.
 
     Args:
@@ -91,11 +91,13 @@ class BagRecording(Recording):
                     yield FrameSet(index, stamp, dict(zip(self.rig.names, images, strict=True)))
         if self._incomplete:
             self.warn(
-                f"{self.name}: sets lacking a camera were skipped (missing: {_counts(self._incomplete)})"
+                f"{self.name}: sets lacking a camera were skipped "
+                f"(missing: {_counts(self._incomplete)})"
             )
         if self._late:
             self.warn(
-                f"{self.name}: images that came after later ones were skipped ({_counts(self._late)})"
+                f"{self.name}: images that came after later ones were skipped "
+                f"({_counts(self._late)})"
             )
         if self._files.damage:
             self.warn(self._files.damage)
@@ -110,7 +112,7 @@ class BagRecording(Recording):
         return best
 
     def _sets(self, path: Path) -> Iterator[tuple[int, dict[str, RawMessage]]]:
-        """Complete sets by increasing stamp; counts in `_incomplete` who was missing in the others."""
+        """Complete sets by increasing stamp; `_incomplete` counts who was missing in others."""
         pending: dict[int, dict[str, RawMessage]] = {}
         done = None
         for message in self._files:
@@ -165,7 +167,8 @@ class BagRecording(Recording):
             return self._store.deserialize_cdr(message.data, message.type)
         except Exception as error:  # hostile bytes raise whatever they like
             raise DatasetError(
-                f"{self._files.paths[0]}: {message.topic}: a message cannot be decoded as {message.type}"
+                f"{self._files.paths[0]}: {message.topic}: a message cannot be decoded as "
+                f"{message.type}"
             ) from error
 
     def _image_topic(self, path: Path, name: str) -> str:
@@ -204,12 +207,10 @@ class BagRecording(Recording):
         missing = [name for name in names if name not in infos]
         if missing:
             raise DatasetError(
-                f"{path}: no calibration of {', '.join(missing)}, expected calibration.toml beside the "
-                f"bag or the topic /{missing[0]}/camera_info; the bag has {self._listed()}"
+                f"{path}: no calibration of {', '.join(missing)}, expected calibration.toml beside "
+                f"the bag or the topic /{missing[0]}/camera_info; the bag has {self._listed()}"
             )
-        return rig_from_messages(
-            {name: infos[name] for name in names}, transforms, where=str(path)
-        )
+        return rig_from_messages({name: infos[name] for name in names}, transforms, where=str(path))
 
     def _listed(self) -> str:
         return ", ".join(f"{topic} ({kind})" for topic, kind in self._files.types.items()) or "none"
@@ -234,7 +235,9 @@ def _mcap_files(path: Path) -> list[Path]:
         except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
             raise DatasetError(f"{metadata}: not a rosbag2 description: {_line(error)}") from error
         if storage != "mcap":
-            raise DatasetError(f"{path}: stored as {storage}, expected mcap (`ros2 bag convert` makes one)")
+            raise DatasetError(
+                f"{path}: stored as {storage}, expected mcap (`ros2 bag convert` makes one)"
+            )
         if str(packed).lower() in ("file", "message"):
             raise DatasetError(
                 f"{path}: compressed by {packed}, expected none or compression inside the MCAP"
@@ -259,7 +262,9 @@ def _line(error: Exception) -> str:
 def _stamp(message: RawMessage, path: Path) -> int:
     """Stamp (ns) of a message that begins with a std_msgs/Header, without decoding the rest."""
     if len(message.data) < 12:
-        raise DatasetError(f"{path}: {message.topic}: a message of {len(message.data)} bytes has no header")
+        raise DatasetError(
+            f"{path}: {message.topic}: a message of {len(message.data)} bytes has no header"
+        )
     # Second byte of the encapsulation: 1 = little endian.
     order: Any = "little" if message.data[1] & 1 else "big"
     seconds = int.from_bytes(message.data[4:8], order, signed=True)

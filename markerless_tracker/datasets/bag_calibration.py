@@ -10,7 +10,9 @@ from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import FloatArray, inverse, rotation_from_quaternion, transform
 
 
-def rig_from_messages(infos: Mapping[str, Any], transforms: Iterable[Any], *, where: str) -> CameraRig:
+def rig_from_messages(
+    infos: Mapping[str, Any], transforms: Iterable[Any], *, where: str
+) -> CameraRig:
     """The rig that messages describe; the root of the transforms is the world.
 
     Args:
@@ -26,7 +28,9 @@ def rig_from_messages(infos: Mapping[str, Any], transforms: Iterable[Any], *, wh
     for stamped in transforms:
         q, t = stamped.transform.rotation, stamped.transform.translation
         if q.x == q.y == q.z == q.w == 0.0:
-            raise CalibrationError(f"{where}: the transform to {stamped.child_frame_id} has no rotation")
+            raise CalibrationError(
+                f"{where}: the transform to {stamped.child_frame_id} has no rotation"
+            )
         T_parent_child = transform(rotation_from_quaternion((q.w, q.x, q.y, q.z)), (t.x, t.y, t.z))
         parents[stamped.child_frame_id] = (stamped.header.frame_id, T_parent_child)
     cameras, roots = [], {}
@@ -56,7 +60,9 @@ def rig_from_messages(infos: Mapping[str, Any], transforms: Iterable[Any], *, wh
         )
     if len(set(roots.values())) > 1:
         listed = ", ".join(f"{name} in {root}" for name, root in roots.items())
-        raise CalibrationError(f"{where}: cameras hang from different frames ({listed}), expected one")
+        raise CalibrationError(
+            f"{where}: cameras hang from different frames ({listed}), expected one"
+        )
     return CameraRig(tuple(cameras))
 
 
@@ -66,7 +72,7 @@ def _distortion(info: Any, where: str) -> FloatArray:
         return np.zeros(5)
     if info.distortion_model != "plumb_bob" or coefficients.size not in (4, 5):
         raise CalibrationError(
-            f"{where}: distortion model {info.distortion_model!r} with {coefficients.size} coefficients, "
-            "expected plumb_bob with 4 or 5"
+            f"{where}: distortion model {info.distortion_model!r} with {coefficients.size} "
+            "coefficients, expected plumb_bob with 4 or 5"
         )
     return coefficients

@@ -11,9 +11,9 @@ FRAMES = 36
 def backgrounds_of(recording: Recording) -> dict[str, list[Image]]:
     """Camera name -> empty-scene images (scaled) of every camera of a recording.
 
-    Cameras without images in `background/` get one learned from the recording's stills of the room and
-    its own frames; a warning of the recording says from what, and what that costs. The same frames
-    give the same image, whatever they are stored in.
+    Cameras without images in `background/` get one learned from the recording's stills of the room
+    and its own frames; a warning of the recording says from what, and what that costs. The same
+    frames give the same image, whatever they are stored in.
 
     Raises:
         DatasetError, ImageError: the images cannot be read.

@@ -39,14 +39,15 @@ def decode_raw(
     """
     if encoding not in ENCODINGS:
         raise ImageError(
-            f"{where}: image encoding {encoding!r} is not known, expected one of {', '.join(ENCODINGS)}"
+            f"{where}: image encoding {encoding!r} is not known, expected one of "
+            f"{', '.join(ENCODINGS)}"
         )
     channels, conversion = ENCODINGS[encoding]
     raw = np.frombuffer(data, dtype=np.uint8)
     if width < 1 or height < 1 or step < width * channels or raw.size < step * height:
         raise ImageError(
-            f"{where}: {raw.size} bytes for {width}x{height} px of {encoding} with {step} bytes a row, "
-            f"expected at least {max(step, width * channels) * height} bytes"
+            f"{where}: {raw.size} bytes for {width}x{height} px of {encoding} with {step} bytes a "
+            f"row, expected at least {max(step, width * channels) * height} bytes"
         )
     rows = raw[: step * height].reshape(height, step)[:, : width * channels]
     if channels == 1:

@@ -49,15 +49,17 @@ class VideoRecording(Recording):
             raise ConfigError(f"input fps {input_fps:g}: expected a rate above 0")
         self._sources = dict(sources)
         self._input_fps = input_fps
-        streams = {name: open_stream(source, input_fps=input_fps) for name, source in sources.items()}
+        streams = {
+            name: open_stream(source, input_fps=input_fps) for name, source in sources.items()
+        }
         for stream in streams.values():
             stream.close()
         for camera in rig:
             came = streams[camera.name].size_px
             if came != camera.size_px:
                 raise ImageError(
-                    f"{camera.name}: {streams[camera.name].path} has images of {came[0]}x{came[1]} px, "
-                    f"expected {camera.size_px[0]}x{camera.size_px[1]} px as calibrated"
+                    f"{camera.name}: {streams[camera.name].path} has images of "
+                    f"{came[0]}x{came[1]} px, expected {camera.size_px[0]}x{camera.size_px[1]} px as calibrated"
                 )
         counts = {name: stream.frame_count for name, stream in streams.items()}
         rates = {name: stream.fps for name, stream in streams.items()}
@@ -125,7 +127,7 @@ class FolderRecording(VideoRecording):
         return read_trc(path) if path.is_file() else None
 
     def masks(self, camera: str) -> dict[int, Image]:
-        """Frame index -> true silhouette (h, w) of a camera, 0 or 255, scaled, from `masks/NAME/`."""
+        """Frame index -> true silhouette (h, w) of a camera, 0 or 255, scaled: `masks/NAME/`."""
         folder = self.path / "masks" / camera
         if not folder.is_dir():
             return {}
@@ -133,10 +135,14 @@ class FolderRecording(VideoRecording):
         masks = {}
         for file in numbered_files(folder):
             if not file.stem.isdecimal():
-                raise DatasetError(f"{file}: expected a frame number as its name, such as 000050.png")
+                raise DatasetError(
+                    f"{file}: expected a frame number as its name, such as 000050.png"
+                )
             mask = read_image(file)
             mask = mask if mask.ndim == 2 else mask[..., 0]
-            masks[int(file.stem)] = np.where(scale_image(mask, size_px) >= 128, 255, 0).astype(np.uint8)
+            masks[int(file.stem)] = np.where(scale_image(mask, size_px) >= 128, 255, 0).astype(
+                np.uint8
+            )
         return masks
 
 

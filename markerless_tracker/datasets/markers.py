@@ -37,7 +37,9 @@ class MarkerTrack:
         positions = np.array(self.positions_m, dtype=np.float64)
         expected = (self.stamps_ns.size, len(self.names), 3)
         if self.stamps_ns.ndim != 1 or positions.shape != expected:
-            raise DatasetError(f"marker positions have shape {positions.shape}, expected {expected}")
+            raise DatasetError(
+                f"marker positions have shape {positions.shape}, expected {expected}"
+            )
         positions[~np.isfinite(positions).all(axis=2)] = np.nan
         object.__setattr__(self, "positions_m", locked(positions, np.float64))
         if len(set(self.names)) != len(self.names):
@@ -74,7 +76,7 @@ class MarkerTrack:
         return MarkerTrack(self.names, self.stamps_ns[rows], self.positions_m[rows])
 
     def with_pelvis(self) -> "MarkerTrack":
-        """The track with a Pelvis: its own, or the midpoint of the hips where it names only those."""
+        """The track with a Pelvis: its own, or the midpoint of the hips if it names only those."""
         if PELVIS in self.names or not set(HIPS) <= set(self.names):
             return self
         middle = self.positions_m[:, [self.names.index(name) for name in HIPS]].mean(axis=1)

@@ -81,7 +81,9 @@ class McapFiles:
                 try:
                     record = next(records, None)
                 except Exception as error:  # hostile bytes raise whatever they like
-                    self.damage = f"{path}: cut or damaged, read up to there ({type(error).__name__})"
+                    self.damage = (
+                        f"{path}: cut or damaged, read up to there ({type(error).__name__})"
+                    )
                     return
                 if record is None:
                     return

@@ -79,7 +79,8 @@ def _read_rig(folder: Path) -> CameraRig:
         files = sorted(folder.glob(pattern))
         if len(files) > 1:
             raise DatasetError(
-                f"{folder}: several calibrations ({', '.join(file.name for file in files)}), expected one"
+                f"{folder}: several calibrations ({', '.join(file.name for file in files)}), "
+                "expected one"
             )
         if files:
             return read(files[0])
@@ -97,12 +98,15 @@ def _match(folder: Path, rig: CameraRig) -> tuple[Mapping[str, Path], list[str]]
         return {name: by_stem[name] for name in rig.names}, []
     if len(videos) != len(rig):
         raise DatasetError(
-            f"{folder}: {len(videos)} videos ({', '.join(video.name for video in videos) or 'none'}), "
+            f"{folder}: {len(videos)} videos "
+            f"({', '.join(video.name for video in videos) or 'none'}), "
             f"expected one for each of {', '.join(rig.names)}"
         )
     pairs = dict(zip(rig.names, videos, strict=True))
     listed = ", ".join(f"{name} = {video.name}" for name, video in pairs.items())
-    return pairs, [f"{folder}: videos are named otherwise than the cameras, taken in order: {listed}"]
+    return pairs, [
+        f"{folder}: videos are named otherwise than the cameras, taken in order: {listed}"
+    ]
 
 
 def _stretched(camera: CameraModel, size_px: tuple[int, int]) -> CameraModel:

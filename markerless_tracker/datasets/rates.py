@@ -30,7 +30,9 @@ def every_for_fps(source_fps: float, fps: float | None) -> int:
     if fps is None:
         return 1
     if not 0.0 < fps <= source_fps * 1.001:
-        raise ConfigError(f"fps {fps:g}: expected a rate above 0 and at most the source's {source_fps:g}")
+        raise ConfigError(
+            f"fps {fps:g}: expected a rate above 0 and at most the source's {source_fps:g}"
+        )
     every = max(1, round(source_fps / fps))
     if abs(source_fps / every - fps) > 0.01 * fps:
         below, above = int(source_fps // fps) + 1, max(1, int(source_fps // fps))

@@ -45,8 +45,8 @@ def open_recording(
     if format is not None:
         raise DatasetError(f"format {format!r}: expected one of {', '.join(FORMATS)}")
     raise DatasetError(
-        f"{path}: no recording; expected a folder with {CALIBRATION} and videos, a Pose2Sim project "
-        "(videos/ and calibration/), or a bag (folder or .mcap)"
+        f"{path}: no recording; expected a folder with {CALIBRATION} and videos, a Pose2Sim "
+        "project (videos/ and calibration/), or a bag (folder or .mcap)"
     )
 
 

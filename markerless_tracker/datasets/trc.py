@@ -10,7 +10,7 @@ from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-# Stamps beyond this (29000 years) would not fit 64 bits; it also bounds what hostile files can ask for.
+# Stamps beyond this would not fit 64 bits.
 LARGEST_TIME_S = Decimal(9_000_000_000)
 # The first line names a file; a constant keeps the content independent of where it is written.
 TITLE = "markerless_tracker.trc"
@@ -35,7 +35,8 @@ def read_trc(path: str | Path) -> MarkerTrack:
         raise DatasetError(f"{path}: ends after line {len(lines)}, expected 5 lines of header")
     names = _names(path, lines[3])
     factor = METRES[_units(path, lines[1], lines[2])]
-    stamps, rows, number = [], [], 0
+    stamps: list[int] = []
+    rows: list[list[float]] = []
     for number, line in enumerate(lines[5:], start=6):
         if line.strip():
             stamp, row = _row(path, number, line, len(names))
@@ -83,7 +84,9 @@ def format_trc(track: MarkerTrack, fps: float) -> str:
         "Frame#\tTime\t" + "".join(f"{name}\t\t\t" for name in track.names),
         "\t\t" + "".join(f"X{i}\tY{i}\tZ{i}\t" for i in range(1, count + 1)),
     ]
-    for index, (stamp, row) in enumerate(zip(track.stamps_ns, track.positions_m, strict=True), start=1):
+    for index, (stamp, row) in enumerate(
+        zip(track.stamps_ns, track.positions_m, strict=True), start=1
+    ):
         cells = "\t".join(_cells(point) for point in row)
         lines.append(f"{index}\t{_seconds(int(stamp))}\t{cells}")
     return "\n".join(lines) + "\n"
@@ -106,7 +109,9 @@ def _units(path: Path, keys: str, values: str) -> str:
     header = dict(zip(keys.split("\t"), values.split("\t"), strict=False))
     units = header.get("Units", "").strip()
     if units not in METRES:
-        raise DatasetError(f"{path}: line 3: Units is {units!r}, expected one of {', '.join(METRES)}")
+        raise DatasetError(
+            f"{path}: line 3: Units is {units!r}, expected one of {', '.join(METRES)}"
+        )
     return units
 
 
@@ -119,7 +124,9 @@ def _names(path: Path, line: str) -> tuple[str, ...]:
         raise DatasetError(f"{path}: line 4: expected marker names three columns apart")
     if len(set(names)) != len(names):
         twice = sorted({name for name in names if names.count(name) > 1})
-        raise DatasetError(f"{path}: line 4: marker names must be distinct, {', '.join(twice)} repeats")
+        raise DatasetError(
+            f"{path}: line 4: marker names must be distinct, {', '.join(twice)} repeats"
+        )
     return names
 
 

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from markerless_tracker.datasets.rates import tidy_fps
 from markerless_tracker.errors import DatasetError
@@ -57,7 +58,7 @@ class VideoStream(ImageStream):
         if not got or first is None:
             self._capture.release()
             raise DatasetError(f"{path}: cannot be read as a video, or holds no image")
-        self._first: Image | None = first
+        self._first: Image | None = np.asarray(first, dtype=np.uint8)
         self.size_px = (int(first.shape[1]), int(first.shape[0]))
         rate = float(self._capture.get(cv2.CAP_PROP_FPS))
         self.fps = tidy_fps(rate) if 0.0 < rate < 1e5 else None
@@ -68,8 +69,8 @@ class VideoStream(ImageStream):
         image, self._first = self._first, None
         if image is not None:
             return image
-        got, image = self._capture.read()
-        return image if got else None
+        got, decoded = self._capture.read()
+        return np.asarray(decoded, dtype=np.uint8) if got and decoded is not None else None
 
     def skip(self) -> bool:
         """Pass over the next image; False at the end."""
@@ -134,7 +135,7 @@ def read_image(path: Path) -> Image:
     image = cv2.imread(str(path), cv2.IMREAD_ANYCOLOR)
     if image is None:
         raise DatasetError(f"{path}: cannot be read as an image")
-    return image
+    return np.asarray(image, dtype=np.uint8)
 
 
 def find_stream(folder: Path, name: str) -> Path | None:

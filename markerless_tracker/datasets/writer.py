@@ -44,14 +44,16 @@ class RecordingWriter:
         for camera in rig:
             if camera.size_px[0] % 2 or camera.size_px[1] % 2:
                 raise DatasetError(
-                    f"{camera.name}: a video of {camera.size_px[0]}x{camera.size_px[1]} px cannot be "
-                    "written, expected even numbers"
+                    f"{camera.name}: a video of {camera.size_px[0]}x{camera.size_px[1]} px cannot "
+                    "be written, expected even numbers"
                 )
             path = folder / f"{camera.name}{suffix}"
             fourcc = cv2.VideoWriter.fourcc(*codec)
             self._videos[camera.name] = cv2.VideoWriter(str(path), fourcc, fps, camera.size_px)
             if not self._videos[camera.name].isOpened():
-                raise DatasetError(f"{path}: cannot be written, this OpenCV lacks the codec {codec}")
+                raise DatasetError(
+                    f"{path}: cannot be written, this OpenCV lacks the codec {codec}"
+                )
         write_calibration(folder / CALIBRATION, rig)
 
     def write(

@@ -94,7 +94,8 @@ def score(result: MarkerTrack, reference: MarkerTrack) -> Score:
     compared = np.isfinite(joint_mm).any(axis=1)
     if not compared.any():
         raise DatasetError(
-            f"no common frame: the result covers {_range(result)}, the reference {_range(reference)}"
+            f"no common frame: the result covers {_range(result)}, the reference "
+            f"{_range(reference)}"
         )
     joint_mm, offset_m = joint_mm[compared], offset_m[compared]
     reference_rows = reference_rows[compared]
@@ -138,7 +139,9 @@ def match_rows(
     tolerance = min(_half_frame_ns(result), _half_frame_ns(reference))
     if len(result) == 1 and len(reference) == 1:
         tolerance = LONE_ROW_TOLERANCE_NS
-    after = np.searchsorted(reference.stamps_ns, result.stamps_ns).clip(1, max(len(reference) - 1, 1))
+    after = np.searchsorted(reference.stamps_ns, result.stamps_ns).clip(
+        1, max(len(reference) - 1, 1)
+    )
     before = after - 1
     after = after.clip(max=len(reference) - 1)
     gaps = np.abs(reference.stamps_ns[np.stack([before, after])] - result.stamps_ns)
@@ -157,7 +160,8 @@ def body_frames(track: MarkerTrack) -> FloatArray:
     """Rotations (n, 3, 3) from the world to the body's frame; rows are forward, left, up.
 
     up: from the middle of the hips to Neck (the middle of the shoulders where there is no Neck).
-    left: from RHip to LHip, made orthogonal to up. forward: left x up. NaN where a marker is missing.
+    left: from RHip to LHip, made orthogonal to up. forward: left x up.
+    NaN where a marker is missing.
     """
     count = len(track)
     right, left = (_column(track, name, count) for name in reversed(HIPS))
