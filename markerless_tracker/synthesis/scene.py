@@ -56,7 +56,7 @@ class SyntheticScene:
         seed: int = 0,
         noise: float = 3.0,
         shadow: float = 0.35,
-        samples: int = 2,
+        samples: int = 3,
         distortion: Sequence[float] = MILD_LENS,
     ) -> None:
         _check("cameras", cameras, 1, 99)

@@ -1,0 +1,48 @@
+"""What a camera gave and what was made of it: input, mask, edges, body, side by side."""
+
+import cv2
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraModel
+from markerless_tracker.drawing.overlay import Image, as_colour, draw_overlay
+from markerless_tracker.errors import ImageError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation
+
+
+def draw_evidence(
+    image: Image,
+    observation: Observation,
+    camera: CameraModel,
+    body: BodyModel | None = None,
+    pose: FloatArray | None = None,
+) -> Image:
+    """A picture (h, 4 w, 3) BGR: the input, the mask, the edges, the body over the input.
+
+    Evidence outside the observation's region is dark grey; without a body or pose the last panel
+    shows the input alone.
+
+    Raises:
+        ImageError: image or observation does not fit the camera.
+    """
+    plain = as_colour(image, camera)
+    if observation.size_px != camera.size_px:
+        raise ImageError(
+            f"{camera.name}: observation of a frame of {observation.size_px[0]}x"
+            f"{observation.size_px[1]} px, expected {camera.size_px[0]}x{camera.size_px[1]}"
+        )
+    height, width = plain.shape[:2]
+    u, v = observation.offset_px
+    region = np.s_[v : v + observation.height, u : u + observation.width]
+    mask = np.full((height, width), 64, dtype=np.uint8)
+    edges = mask.copy()
+    mask[region] = np.where(observation.mask, 255, 0)
+    edges[region] = observation.edges
+    over = plain
+    if body is not None and pose is not None:
+        inside = np.zeros((height, width), dtype=np.bool_)
+        inside[region] = observation.mask
+        over = draw_overlay(image, camera, body, pose, mask=inside)
+    panels = [plain, cv2.cvtColor(mask, cv2.COLOR_GRAY2BGR), cv2.cvtColor(edges, cv2.COLOR_GRAY2BGR), over]
+    return np.ascontiguousarray(np.hstack(panels), dtype=np.uint8)

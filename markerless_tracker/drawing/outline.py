@@ -1,0 +1,107 @@
+"""Where a body lies in an image: outline polygons, silhouette. Slow, obvious, exact."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.body import BodyModel, cone_transforms
+from markerless_tracker.camera import CameraModel, project_camera
+from markerless_tracker.geometry import FloatArray
+
+END_POINTS = 72
+"""Points that sample an end's ellipse."""
+SIDE_SECTIONS = 9
+"""Sections between the ends, which matter only where a lens bends the sides."""
+
+# cv2.fillPoly takes integers with this many fractional bits.
+_SHIFT = 8
+
+
+def outlines(body: BodyModel, pose: FloatArray, camera: CameraModel) -> list[FloatArray]:
+    """Outline (n, 2) in px of each cone at a pose (p,), through the lens.
+
+    The convex hull of the projected cone; empty (0, 2) if part of it is not in front of the camera.
+    """
+    result = []
+    for T, length, shape in zip(
+        cone_transforms(body, pose), body.cone_length, body.cone_shape, strict=True
+    ):
+        surface = _surface(float(length), shape) @ T[:, :3].T + T[:, 3]
+        pixels = project_camera(surface, camera)
+        if not np.isfinite(pixels).all():
+            result.append(np.empty((0, 2)))
+            continue
+        hull = cv2.convexHull(pixels.astype(np.float32))[:, 0]
+        result.append(hull.astype(np.float64))
+    return result
+
+
+def silhouette(
+    body: BodyModel,
+    pose: FloatArray,
+    camera: CameraModel,
+    *,
+    samples: int = 1,
+    cones: NDArray[np.bool_] | None = None,
+) -> NDArray[np.bool_]:
+    """Mask (h, w) of the pixels that the body covers at a pose (p,).
+
+    Args:
+        body: the body.
+        pose: (p,) pose.
+        camera: the camera.
+        samples: with 1 a pixel belongs to the mask if its centre lies inside an outline; with more,
+            if at least half of samples x samples points within it do.
+        cones: (c,) the cones to draw, all unless given.
+    """
+    width, height = camera.size_px
+    u, v = np.meshgrid(np.arange(width * samples), np.arange(height * samples))
+    u, v = (u + 0.5) / samples - 0.5, (v + 0.5) / samples - 0.5
+    covered = np.zeros(u.shape, dtype=np.bool_)
+    for i, polygon in enumerate(outlines(body, pose, camera)):
+        if len(polygon) < 3 or (cones is not None and not cones[i]):
+            continue
+        low, high = polygon.min(axis=0), polygon.max(axis=0)
+        first = np.clip(np.floor((low + 0.5) * samples - 0.5), 0, covered.shape[::-1]).astype(int)
+        last = np.clip(np.ceil((high + 0.5) * samples + 0.5), 0, covered.shape[::-1]).astype(int)
+        region = np.s_[first[1] : last[1], first[0] : last[0]]
+        inside = np.ones(u[region].shape, dtype=np.bool_)
+        # A convex polygon is where one side of every edge meets; hulls may turn either way.
+        turn = np.sign(_area(polygon))
+        for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+            cross = (b[0] - a[0]) * (v[region] - a[1]) - (b[1] - a[1]) * (u[region] - a[0])
+            inside &= turn * cross >= 0.0
+        covered[region] |= inside
+    share = covered.reshape(height, samples, width, samples).mean(axis=(1, 3))
+    return np.asarray(share >= 0.5)
+
+
+def fixed_point(points_px: FloatArray) -> tuple[NDArray[np.int32], int]:
+    """Points (n, 2) as OpenCV's drawing functions take them with sub-pixels, and the shift."""
+    limited = np.clip(points_px, -4.0e6, 4.0e6)
+    return np.rint(limited * (1 << _SHIFT)).astype(np.int32), _SHIFT
+
+
+def _surface(length: float, shape: FloatArray) -> FloatArray:
+    """Points (n, 3) on a cone in its base frame.
+
+    The point of an end's ellipse with normal n is r² n / |r n|; points of both ends with the same
+    normal span the side.
+    """
+    angle = 2.0 * np.pi * np.arange(END_POINTS) / END_POINTS
+    normal = np.column_stack([np.cos(angle), np.sin(angle)])
+    start, end = (
+        row[2:] + row[:2] ** 2 * normal / np.linalg.norm(row[:2] * normal, axis=1)[:, None]
+        for row in shape
+    )
+    return np.concatenate(
+        [
+            np.column_stack([(1.0 - t) * start + t * end, np.full(END_POINTS, t * length)])
+            for t in np.linspace(0.0, 1.0, SIDE_SECTIONS + 2)
+        ]
+    )
+
+
+def _area(polygon: FloatArray) -> float:
+    x, y = polygon.T
+    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
