@@ -1,5 +1,7 @@
 """Backgrounds of a recording: its own, or learned from its images where it brings none."""
 
+from pathlib import Path
+
 from markerless_tracker.datasets.recording import Recording
 from markerless_tracker.imaging import Image
 from markerless_tracker.imaging.plate import background_plate
@@ -8,17 +10,17 @@ from markerless_tracker.imaging.plate import background_plate
 FRAMES = 36
 
 
-def backgrounds_of(recording: Recording) -> dict[str, list[Image]]:
+def backgrounds_of(recording: Recording, folder: Path | None = None) -> dict[str, list[Image]]:
     """Camera name -> empty-scene images (scaled) of every camera of a recording.
 
-    Cameras without images in `background/` get one learned from the recording's stills of the room
+    Images come from `folder`, the recording's own `background/` if None. Cameras without any get one learned from the recording's stills of the room
     and its own frames; a warning of the recording says from what, and what that costs. The same
     frames give the same image, whatever they are stored in.
 
     Raises:
         DatasetError, ImageError: the images cannot be read.
     """
-    found = recording.background_frames()
+    found = recording.background_frames(folder)
     missing = [name for name in recording.rig.names if name not in found]
     if not missing:
         return found

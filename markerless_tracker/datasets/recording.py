@@ -103,14 +103,15 @@ class Recording(ABC):
             )
         return index
 
-    def background_frames(self) -> dict[str, list[Image]]:
-        """Camera name -> empty-scene images (scaled) from `background/`.
+    def background_frames(self, folder: Path | None = None) -> dict[str, list[Image]]:
+        """Camera name -> empty-scene images (scaled) from a folder, its own `background/` if None.
 
         Cameras without any are not there; {} without that folder. Raises as `read_background` does.
         """
-        folder = self.path / BACKGROUND
-        if not folder.is_dir():
-            return {}
+        if folder is None:
+            folder = self.path / BACKGROUND
+            if not folder.is_dir():
+                return {}
         return read_background(folder, self.rig, stored_sizes_px=self._stored_sizes_px)
 
     def room_stills(self) -> dict[str, list[Image]]:

@@ -1,0 +1,49 @@
+"""Runs a tracker over a recording, through the same `Tracker.step` as the live node."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from markerless_tracker.datasets import FrameSet, Recording, every_for_fps
+from markerless_tracker.datasets.empty_scene import backgrounds_of
+from markerless_tracker.imaging import BackgroundModel, ImagingSettings, learn_background
+from markerless_tracker.records import TrackResult
+from markerless_tracker.tracking import TrackerSetup
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedFrame:
+    """A set of images and what the tracker made of it."""
+
+    images: FrameSet
+    result: TrackResult
+
+
+def recording_backgrounds(
+    recording: Recording, settings: ImagingSettings, folder: Path | None = None
+) -> dict[str, BackgroundModel]:
+    """Background models of all cameras: from a folder, or as the recording's own images allow."""
+    return {
+        name: learn_background(frames, settings)
+        for name, frames in backgrounds_of(recording, folder).items()
+    }
+
+
+def track_recording(
+    recording: Recording, setup: TrackerSetup, *, fps: float | None = None
+) -> Iterator[TrackedFrame]:
+    """Track from the start's frame (the first, if the start names no time) to the end.
+
+    Args:
+        recording: images, at the scale of the tracker's rig.
+        setup: the tracker and the time of its start pose.
+        fps: keep every k-th frame from the start frame on; None = all.
+
+    Raises:
+        ConfigError: the recording's rate is no multiple of `fps`.
+        DatasetError: no frame at the start's time, or the source is unreadable.
+    """
+    every = every_for_fps(recording.fps, fps)
+    start = 0 if setup.start_stamp_ns is None else recording.start_index(setup.start_stamp_ns)
+    for images in recording.frames(start=start, every=every):
+        yield TrackedFrame(images, setup.tracker.step(images.images, images.stamp_ns))

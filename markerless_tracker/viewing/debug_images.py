@@ -1,0 +1,40 @@
+"""One picture per frame and camera: the input, the evidence, the body over it."""
+
+from pathlib import Path
+
+import cv2
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.datasets import FrameSet
+from markerless_tracker.drawing import draw_evidence
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.records import TrackResult
+
+
+class DebugImages:
+    """Writes ``FOLDER/CAMERA/FFFFFF.jpg``, FFFFFF being the frame's number in its source.
+
+    Raises:
+        DatasetError: the folder cannot be made or a picture not written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DatasetError(f"{folder}: cannot be made: {error.strerror}") from error
+
+    def write(
+        self, images: FrameSet, result: TrackResult, rig: CameraRig, body: BodyModel
+    ) -> None:
+        """Write the pictures of one frame."""
+        for name, observation in result.observations.items():
+            picture = draw_evidence(
+                images.images[name], observation, rig[name], body, result.pose
+            )
+            path = self.folder / name / f"{images.index:06d}.jpg"
+            path.parent.mkdir(exist_ok=True)
+            if not cv2.imwrite(str(path), picture):
+                raise DatasetError(f"{path}: cannot be written")
