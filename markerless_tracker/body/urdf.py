@@ -29,7 +29,9 @@ def urdf(body: BodyModel) -> str:
     root = body.frames[body.root_frame]
     links = _link_names(body, root)
     if len(set(links.values()) | set(MARKER_NAMES)) != len(links) + len(MARKER_NAMES):
-        raise BodyModelError(f"body {body.name}: frames, parameters and markers must differ in name")
+        raise BodyModelError(
+            f"body {body.name}: frames, parameters and markers must differ in name"
+        )
     for node, name in links.items():
         link = SubElement(robot, "link", name=name)
         for cone in np.flatnonzero(body.cone_node == node):
@@ -61,7 +63,8 @@ def _link_names(body: BodyModel, root: int) -> dict[int, str]:
         if int(body.node_parent[node]) not in names:
             frame = frames.get(node, f"node {node}")
             raise BodyModelError(
-                f"body {body.name}: frame {frame} does not hang from the root frame {body.root_frame}"
+                f"body {body.name}: frame {frame} does not hang from the root frame "
+                f"{body.root_frame}"
             )
         parameter = int(body.node_parameter[node])
         inner = f"{body.parameter_names[parameter]}_link" if parameter >= 0 else f"node_{node}"

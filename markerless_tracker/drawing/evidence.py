@@ -44,5 +44,10 @@ def draw_evidence(
         inside = np.zeros((height, width), dtype=np.bool_)
         inside[region] = observation.mask
         over = draw_overlay(image, camera, body, pose, mask=inside)
-    panels = [plain, cv2.cvtColor(mask, cv2.COLOR_GRAY2BGR), cv2.cvtColor(edges, cv2.COLOR_GRAY2BGR), over]
+    panels = [
+        plain,
+        cv2.cvtColor(mask, cv2.COLOR_GRAY2BGR),
+        cv2.cvtColor(edges, cv2.COLOR_GRAY2BGR),
+        over,
+    ]
     return np.ascontiguousarray(np.hstack(panels), dtype=np.uint8)

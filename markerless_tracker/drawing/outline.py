@@ -55,8 +55,8 @@ def silhouette(
         cones: (c,) the cones to draw, all unless given.
     """
     width, height = camera.size_px
-    u, v = np.meshgrid(np.arange(width * samples), np.arange(height * samples))
-    u, v = (u + 0.5) / samples - 0.5, (v + 0.5) / samples - 0.5
+    columns, rows = np.meshgrid(np.arange(width * samples), np.arange(height * samples))
+    u, v = (columns + 0.5) / samples - 0.5, (rows + 0.5) / samples - 0.5
     covered = np.zeros(u.shape, dtype=np.bool_)
     for i, polygon in enumerate(outlines(body, pose, camera)):
         if len(polygon) < 3 or (cones is not None and not cones[i]):

@@ -15,6 +15,7 @@ Image = NDArray[np.uint8]
 LEFT_BGR, RIGHT_BGR, CENTRE_BGR = (60, 200, 60), (50, 80, 255), (255, 190, 40)
 """Colours of the left side (green), the right side (red) and the middle (blue), BGR."""
 _MASK_BGR = (255, 0, 255)
+_PLANES: tuple[tuple[int, ...], ...] = ((), (1,), (3,))
 
 
 def side_colour(name: str) -> tuple[int, int, int]:
@@ -33,16 +34,15 @@ def as_colour(image: Image, camera: CameraModel) -> Image:
         ImageError: its size is not the camera's, or it is no 8-bit grey or BGR image.
     """
     width, height = camera.size_px
-    if image.shape[:2] != (height, width):
-        raise ImageError(
-            f"{camera.name}: image of {image.shape[1]}x{image.shape[0]} px, expected {width}x{height}"
-            if image.ndim >= 2
-            else f"{camera.name}: image of shape {image.shape}, expected (h, w) or (h, w, 3)"
-        )
-    if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in ((), (1,), (3,)):
+    if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in _PLANES:
         raise ImageError(
             f"{camera.name}: image of shape {image.shape} and type {image.dtype}, "
             "expected 8-bit grey or BGR"
+        )
+    if image.shape[:2] != (height, width):
+        raise ImageError(
+            f"{camera.name}: image of {image.shape[1]}x{image.shape[0]} px, "
+            f"expected {width}x{height}"
         )
     plane = image.reshape(height, width, -1)
     return np.ascontiguousarray(np.broadcast_to(plane, (height, width, 3))).copy()
@@ -79,9 +79,7 @@ def draw_overlay(
             cv2.polylines(
                 picture, [points[:, None]], True, side_colour(name), thickness, cv2.LINE_AA, shift
             )
-    for name, pixel in zip(
-        MARKER_NAMES, project_camera(markers(body, pose), camera), strict=True
-    ):
+    for name, pixel in zip(MARKER_NAMES, project_camera(markers(body, pose), camera), strict=True):
         if np.isfinite(pixel).all():
             (centre,), shift = fixed_point(pixel[None])
             at, one = (int(centre[0]), int(centre[1])), 1 << shift

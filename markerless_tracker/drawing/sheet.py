@@ -27,7 +27,9 @@ def overlay_sheet(
         raise ImageError("overlay sheet: no picture was given, expected at least one")
     for name, image in images.items():
         if image.ndim not in (2, 3) or image.size == 0:
-            raise ImageError(f"{name}: picture of shape {image.shape}, expected (h, w) or (h, w, 3)")
+            raise ImageError(
+                f"{name}: picture of shape {image.shape}, expected (h, w) or (h, w, 3)"
+            )
     columns = columns or int(np.ceil(np.sqrt(len(images))))
     height = max(image.shape[0] for image in images.values())
     widest = max(round(image.shape[1] * height / image.shape[0]) for image in images.values())
@@ -48,6 +50,13 @@ def _tile(name: str, image: Image, height: int, width: int) -> Image:
         picture, size, interpolation=cv2.INTER_AREA if factor < 1.0 else cv2.INTER_LINEAR
     )
     cv2.putText(
-        tile, name, (4, _BAR_PX - 7), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (230, 230, 230), 1, cv2.LINE_AA
+        tile,
+        name,
+        (4, _BAR_PX - 7),
+        cv2.FONT_HERSHEY_SIMPLEX,
+        0.45,
+        (230, 230, 230),
+        1,
+        cv2.LINE_AA,
     )
     return tile

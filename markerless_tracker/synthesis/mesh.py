@@ -86,7 +86,10 @@ def _cone(length: float, shape: FloatArray) -> tuple[FloatArray, FloatArray, Int
     triangles = []
     for ring in range(ALONG):
         a, b = ring * AROUND + here, ring * AROUND + after
-        triangles += [np.column_stack([a, b, b + AROUND]), np.column_stack([a, b + AROUND, a + AROUND])]
+        triangles += [
+            np.column_stack([a, b, b + AROUND]),
+            np.column_stack([a, b + AROUND, a + AROUND]),
+        ]
     for cap in (ALONG + 1, ALONG + 2):
         fan = cap * AROUND + np.arange(AROUND)
         triangles.append(np.column_stack([np.full(AROUND - 2, fan[0]), fan[1:-1], fan[2:]]))

@@ -22,7 +22,7 @@ def _bump(phase: float, centre: float, sharpness: float) -> float:
 
 
 def _stride(phase: float, swing: float, lift: float, arm: float, elbow: float) -> Angles:
-    """One stride, left heel down at phase 0; angles are anatomical: flexion and bending positive."""
+    """One stride, left heel down at phase 0; anatomical angles: flexion and bending positive."""
     angles = {}
     for side, p in (("l", phase), ("r", phase + 0.5)):
         angles[f"{side}_hip_y"] = 0.06 + swing * np.cos(_TURN * p)
@@ -51,7 +51,8 @@ def _balance(phase: float) -> Angles:
     return {
         "pelvis_rx": 0.06 * slow, "pelvis_ry": 0.05 + 0.03 * quick,
         "l_hip_x": -0.06 * slow, "l_hip_y": 0.12 + 0.04 * quick, "l_knee": 0.14 + 0.08 * quick,
-        "r_hip_x": -0.12 + 0.05 * slow, "r_hip_y": 0.55 + 0.18 * quick, "r_knee": 0.80 + 0.25 * slow,
+        "r_hip_x": -0.12 + 0.05 * slow, "r_hip_y": 0.55 + 0.18 * quick,
+        "r_knee": 0.80 + 0.25 * slow,
         "l_shoulder_x": 1.10 - 0.18 * slow, "r_shoulder_x": 1.10 + 0.18 * slow,
         "l_shoulder_y": 0.10 + 0.10 * quick, "r_shoulder_y": 0.10 - 0.10 * quick,
         "l_elbow": 0.35 + 0.12 * quick, "r_elbow": 0.35 - 0.12 * quick,

@@ -48,8 +48,8 @@ def write_recording(
     for camera in scene.rig:
         if not lossless and (camera.size_px[0] % 2 or camera.size_px[1] % 2):
             raise DatasetError(
-                f"{camera.name}: size {camera.size_px[0]}x{camera.size_px[1]}, expected even numbers "
-                "for compressed video"
+                f"{camera.name}: size {camera.size_px[0]}x{camera.size_px[1]}, "
+                "expected even numbers for compressed video"
             )
         (folder / "masks" / camera.name).mkdir(parents=True)
     (folder / "background").mkdir()
@@ -67,7 +67,9 @@ def write_recording(
             write(images)
             if index % mask_every == 0:
                 for name, mask in masks.items():
-                    _write_image(folder / "masks" / name / f"{index:06d}.png", mask.astype("u1") * 255)
+                    _write_image(
+                        folder / "masks" / name / f"{index:06d}.png", mask.astype("u1") * 255
+                    )
             if progress is not None:
                 progress(index + 1)
 

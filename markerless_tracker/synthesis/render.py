@@ -32,7 +32,7 @@ class Look:
     Attributes:
         noise: standard deviation of the sensor's noise, in grey levels.
         shadow: part of the light that the shadow on the floor takes away, 0 for none.
-        samples: samples per pixel in each direction; 1 gives jagged outlines, odd ones unbiased masks.
+        samples: samples per pixel in each direction; odd: even ones bias masks outwards.
     """
 
     noise: float = 3.0
@@ -108,14 +108,14 @@ class Renderer:
         depth = apply(self.camera.T_cam_world, vertices)[:, 2]
         # Pixel centres lie at integers, those of samples as well.
         points = np.column_stack([(pixels + 0.5) * self.look.samples - 0.5, 1.0 / depth])
-        rasterize(
-            points, self.mesh.triangles, self.mesh.cone, shade, nearness, labels, shades
-        )
+        rasterize(points, self.mesh.triangles, self.mesh.cone, shade, nearness, labels, shades)
         return nearness, labels, shades
 
     def _noisy(self, image: NDArray[np.float32], rng: np.random.Generator) -> Image:
         if self.look.noise > 0.0:
-            image += np.float32(self.look.noise) * rng.standard_normal(image.shape, dtype=np.float32)
+            image += np.float32(self.look.noise) * rng.standard_normal(
+                image.shape, dtype=np.float32
+            )
         return np.clip(np.rint(image), 0.0, 255.0).astype(np.uint8)
 
 

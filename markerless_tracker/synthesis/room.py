@@ -61,4 +61,6 @@ def _texture(rng: np.random.Generator, base: tuple[float, float, float]) -> NDAr
         coarse = rng.standard_normal((cells, cells)).astype(np.float32)
         total += cv2.resize(coarse, total.shape, interpolation=cv2.INTER_CUBIC)
     brightness = 1.0 + _CONTRAST / 128.0 * total / total.std()
-    return np.asarray(np.clip(brightness[..., None] * np.array(base), 20.0, 245.0), dtype=np.float32)
+    return np.asarray(
+        np.clip(brightness[..., None] * np.array(base), 20.0, 245.0), dtype=np.float32
+    )

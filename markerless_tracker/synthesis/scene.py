@@ -76,7 +76,12 @@ class SyntheticScene:
         palette = clothes(self.body, np.random.default_rng([seed, 0]))
         self._renderers = {
             camera.name: Renderer(
-                self.body, camera, room_picture(camera, _ROOM_M, seed), palette, look=look, mesh=mesh
+                self.body,
+                camera,
+                room_picture(camera, _ROOM_M, seed),
+                palette,
+                look=look,
+                mesh=mesh,
             )
             for camera in self.rig
         }
