@@ -1,4 +1,4 @@
-"""A recording as a bag: MCAP rosbag2 of version 9 (Jazzy), with what the tracker needs beside it."""
+"""A recording as a bag: MCAP rosbag2, version 9 (Jazzy), with what the tracker needs beside it."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence

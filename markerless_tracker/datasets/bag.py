@@ -36,8 +36,8 @@ class BagRecording(Recording):
 
     Images of one stamp (of their headers) make a set; incomplete sets are skipped and counted in
     `warnings`. Of a cut or damaged file everything before the damage is read. `frame_count` is an
-    upper bound unless the file is damaged. Without a `calibration.toml` beside it, the rig comes from
-    `NAME/camera_info` and `/tf_static`.
+    upper bound unless the file is damaged. Without a `calibration.toml` beside it, the rig comes
+    from `NAME/camera_info` and `/tf_static`.
 
     Args:
         path: the bag's folder, or its `.mcap`.

@@ -55,11 +55,11 @@ class VideoRecording(Recording):
         for stream in streams.values():
             stream.close()
         for camera in rig:
-            came = streams[camera.name].size_px
-            if came != camera.size_px:
+            stream, expected = streams[camera.name], camera.size_px
+            if stream.size_px != expected:
                 raise ImageError(
-                    f"{camera.name}: {streams[camera.name].path} has images of "
-                    f"{came[0]}x{came[1]} px, expected {camera.size_px[0]}x{camera.size_px[1]} px as calibrated"
+                    f"{camera.name}: {stream.path} has images of {stream.size_px[0]}x"
+                    f"{stream.size_px[1]} px, expected {expected[0]}x{expected[1]} px as calibrated"
                 )
         counts = {name: stream.frame_count for name, stream in streams.items()}
         rates = {name: stream.fps for name, stream in streams.items()}

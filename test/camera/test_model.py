@@ -1,0 +1,118 @@
+"""Projection against OpenCV's own, scaling, and what a camera refuses."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from markerless_tracker.camera import CameraModel, CameraRig, project, project_camera, scaled_size
+from markerless_tracker.errors import CalibrationError
+from markerless_tracker.geometry import rotation_from_rodrigues, transform
+
+MATRIX = np.array([[1668.9, 0.0, 529.1], [0.0, 1681.1, 948.1], [0.0, 0.0, 1.0]])
+
+
+def camera(
+    *, name: str = "cam01", rotation=(1.2, -0.4, 0.3), translation=(0.1, 0.2, 3.0), lens=(0,) * 5
+) -> CameraModel:
+    return CameraModel(
+        name,
+        (1080, 1920),
+        MATRIX,
+        np.array(lens, dtype=float),
+        transform(rotation_from_rodrigues(rotation), translation),
+    )
+
+
+angles = st.floats(-3.0, 3.0)
+small = st.floats(-0.1, 0.1)
+
+
+@given(
+    st.tuples(angles, angles, angles),
+    st.lists(
+        st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(0.5, 8.0)), min_size=1
+    ),
+    st.tuples(small, small, small, small, small),
+)
+def test_projection_agrees_with_opencv(rotation, local, lens) -> None:
+    view = camera(rotation=rotation, lens=lens)
+    depth = np.array(local)[:, 2:]
+    points_cam = np.hstack([np.array(local)[:, :2] * depth, depth])
+    points_world = points_cam @ view.T_world_cam[:3, :3].T + view.T_world_cam[:3, 3]
+    expected, _ = cv2.projectPoints(
+        points_world,
+        np.array(rotation, dtype=float),
+        view.T_cam_world[:3, 3],
+        MATRIX,
+        np.array(lens),
+    )
+    np.testing.assert_allclose(
+        project_camera(points_world, view), expected[:, 0], rtol=1e-7, atol=1e-5
+    )
+
+
+def test_points_behind_the_camera_are_nan() -> None:
+    view = camera(rotation=(0, 0, 0), translation=(0, 0, 0))
+    pixels = project_camera(np.array([[0, 0, 2.0], [0, 0, -2.0], [0, 0, 0.0]]), view)
+    np.testing.assert_allclose(pixels[0], MATRIX[:2, 2])
+    assert np.isnan(pixels[1:]).all()
+
+
+def test_a_rig_projects_through_every_lens() -> None:
+    rig = CameraRig((camera(), camera(name="cam02", translation=(0.5, 0.0, 4.0), lens=(0.1,) * 4)))
+    points = np.array([[0.1, 0.2, 0.3], [0.0, 0.4, 1.0]])
+    pixels = project(points, rig)
+    assert pixels.shape == (2, 2, 2)
+    np.testing.assert_array_equal(pixels[1], project_camera(points, rig["cam02"]))
+
+
+@given(st.floats(0.05, 1.0))
+def test_scaling_moves_pixels_as_area_averaging_does(scale: float) -> None:
+    view = camera(lens=(-0.05, 0.1, 0.001, 0.002, 0.0))
+    scaled = view.scaled(scale)
+    points = np.array([[0.2, -0.1, 0.4], [0.0, 0.3, 0.0]])
+    factor = np.array(scaled.size_px) / np.array(view.size_px)
+    expected = (project_camera(points, view) + 0.5) * factor - 0.5
+    np.testing.assert_allclose(project_camera(points, scaled), expected, atol=1e-6)
+    assert scaled.size_px == scaled_size(view.size_px, scale)
+
+
+def test_halving_twice_is_quartering() -> None:
+    np.testing.assert_allclose(
+        camera().scaled(0.5).scaled(0.5).matrix, camera().scaled(0.25).matrix, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"matrix": np.eye(2)}, "matrix"),
+        ({"matrix": MATRIX * np.nan}, "matrix"),
+        ({"matrix": -MATRIX}, "focal lengths"),
+        ({"distortion": np.zeros(3)}, "3 distortion coefficients"),
+        ({"T_cam_world": np.eye(4) * 2.0}, "rotation"),
+        ({"size_px": (0, 10)}, "0x10"),
+    ],
+)
+def test_impossible_cameras_are_refused_by_name(change, said) -> None:
+    good = {
+        "name": "cam07",
+        "size_px": (10, 10),
+        "matrix": MATRIX,
+        "distortion": np.zeros(5),
+        "T_cam_world": np.eye(4),
+    }
+    with pytest.raises(CalibrationError, match=said) as error:
+        CameraModel(**{**good, **change})
+    assert "cam07" in str(error.value)
+
+
+def test_a_rig_wants_distinct_names_and_knows_its_cameras() -> None:
+    with pytest.raises(CalibrationError, match="distinct"):
+        CameraRig((camera(), camera()))
+    with pytest.raises(CalibrationError, match="cam09.*cam01"):
+        CameraRig((camera(),))["cam09"]
+    with pytest.raises(CalibrationError, match="at least one"):
+        CameraRig(())
