@@ -27,7 +27,7 @@ FLOORS = {
     "optim": 1,
     "ground": 0,
 }
-GROUND = {"", "geometry", "records", "errors", "resources"}
+GROUND = {"", "geometry", "records", "errors", "resources", "settings"}
 CONFINED = {
     "rosbags": ("bags/", "datasets/bag.py"),
     "rclpy": ("node/",),

@@ -1,0 +1,175 @@
+"""The demo: fetch, learn the backgrounds, convert, replay live twice, report."""
+
+import argparse
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from markerless_tracker.bags import write_bag
+from markerless_tracker.body import load_body, read_subject
+from markerless_tracker.cli.demo.live import Replay, replay
+from markerless_tracker.cli.demo.pictures import draw_pictures, mean_overlap, tracked_frames
+from markerless_tracker.cli.demo.scene import Scene, made_up_scene, real_scene
+from markerless_tracker.datasets import open_recording
+from markerless_tracker.datasets.empty_scene import backgrounds_of
+from markerless_tracker.errors import DatasetError, TrackerError
+from markerless_tracker.node.ros import require_ros
+
+SLOW_RATE = 0.1
+"""First try of a pace at which nothing is skipped: 6 sets a second of a 60 fps recording."""
+
+_TRIES = 3
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the demo; returns the exit status."""
+    parser = argparse.ArgumentParser(prog="make demo", description=__doc__)
+    parser.add_argument("--folder", type=Path, default=Path("demo"), help="where all files go")
+    parser.add_argument(
+        "--made-up", action="store_true", help="track a made-up person, fetch nothing"
+    )
+    args = parser.parse_args(argv)
+    console = Console(highlight=False)
+    try:
+        _demo(args.folder, console, made_up=args.made_up)
+    except KeyboardInterrupt:
+        return 130
+    except (TrackerError, OSError) as error:
+        print(f"demo: error: {' '.join(str(error).split())}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _demo(folder: Path, console: Console, *, made_up: bool) -> None:
+    require_ros()
+    started_s = time.monotonic()
+    scene = _scene(folder, console, made_up=made_up)
+    bag = folder / "bag"
+    sets, fps = _convert(scene, bag, console)
+    slow, live = _replays(scene, bag, folder, console, sets=sets, fps=fps)
+    frames = tracked_frames(slow.result)
+    if not frames:
+        raise DatasetError(f"{slow.result}.json: the person was tracked in no frame")
+    with _bar(console, "drawing", None):
+        body = load_body("balan31", read_subject(scene.subject))
+        sheets = draw_pictures(bag, frames, body, folder / "result" / "overlays")
+    _report(console, scene, (slow, live), mean_overlap(frames), sheets)
+    console.print(f"The demo took {time.monotonic() - started_s:.0f} s.")
+
+
+def _scene(folder: Path, console: Console, *, made_up: bool) -> Scene:
+    if made_up:
+        return made_up_scene(folder, "asked for with --made-up")
+    try:
+        with _bar(console, "fetching the recording", None):
+            return real_scene(folder)
+    except DatasetError as error:
+        console.print(f"{error}\nThe demo runs on a made-up person instead.", markup=False)
+        return made_up_scene(folder, str(error))
+
+
+def _convert(scene: Scene, bag: Path, console: Console) -> tuple[int, float]:
+    """Write the bag; returns its number of sets and rate (1/s)."""
+    recording = open_recording(scene.recording, scale=scene.scale)
+    with _bar(console, "learning the backgrounds", None):
+        backgrounds = backgrounds_of(recording)
+    shutil.rmtree(bag, ignore_errors=True)
+    with _bar(console, "writing the bag", recording.frame_count) as advance:
+        summary = write_bag(
+            recording, bag, backgrounds=backgrounds, progress=lambda done, _: advance("", done)
+        )
+    for warning in recording.warnings:
+        console.print(f"  {warning}", markup=False, style="dim")
+    return summary.sets, recording.fps
+
+
+def _replays(
+    scene: Scene, bag: Path, folder: Path, console: Console, *, sets: int, fps: float
+) -> tuple[Replay, Replay]:
+    """One replay at a pace at which nothing is skipped, one in real time."""
+    tracker = {
+        "calibration_file": bag / "calibration.toml",
+        "background_dir": bag / "background",
+        "subject_file": scene.subject,
+        "start_file": scene.start,
+    }
+
+    def run(rate: float, name: str, title: str) -> Replay:
+        with _bar(console, title, sets) as advance:
+            return replay(
+                bag,
+                sets=sets,
+                rate=rate,
+                fps=fps,
+                tracker=tracker,
+                result=folder / "result" / name,
+                log_dir=folder / "log",
+                report=advance,
+            )
+
+    rate = SLOW_RATE
+    for _ in range(_TRIES):
+        slow = run(rate, "every_frame", f"tracking at {rate:g} x real time")
+        if slow.skipped == 0 and slow.lost == 0:
+            break
+        rate /= 2
+    return slow, run(1.0, "real_time", "tracking in real time")
+
+
+@contextmanager
+def _bar(console: Console, title: str, total: int | None) -> Iterator[Callable[[str, int], None]]:
+    """A progress bar; yields a function that takes what goes on and the number done."""
+    columns = [TextColumn("{task.description:<42}"), BarColumn(), TimeElapsedColumn()]
+    if total is not None:
+        columns.insert(2, MofNCompleteColumn())
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task(title, total=total)
+
+        def advance(doing: str, done: int) -> None:
+            text = f"{title}: {doing}" if doing and not done else title
+            progress.update(task, description=text, completed=done)
+
+        yield advance
+        progress.update(task, description=title, total=total or 1, completed=total or 1)
+
+
+def _report(
+    console: Console,
+    scene: Scene,
+    replays: Sequence[Replay],
+    overlap: dict[str, float],
+    sheets: Sequence[Path],
+) -> None:
+    table = Table(title=f"Tracked live: {scene.title}")
+    for heading in ("pace", "sets", "tracked", "skipped", "fps", "latency median", "p95"):
+        table.add_column(heading, justify="right")
+    for run in replays:
+        table.add_row(
+            f"{run.rate:g} x",
+            str(run.sets),
+            str(run.tracked),
+            f"{run.skipped}" + (f" + {run.lost} lost" if run.lost else ""),
+            f"{run.fps:.1f}",
+            f"{run.latency_median_ms:.0f} ms",
+            f"{run.latency_p95_ms:.0f} ms",
+        )
+    console.print(table)
+    console.print(
+        "Overlap of silhouette and body, mean of frames: "
+        + ", ".join(f"{name} {value:.3f}" for name, value in overlap.items())
+    )
+    console.print("Markers:  " + ", ".join(f"{run.result}.trc" for run in replays), soft_wrap=True)
+    console.print("Overlays: " + ", ".join(map(str, sheets)), soft_wrap=True)
+    if scene.note:
+        console.print(f"Not the real recording: {scene.note}", markup=False)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,157 @@
+"""Replaying a bag into a running tracker, both processes of their own, and what came of it."""
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from markerless_tracker.cli.demo.processes import NodeError, NodeProcess
+from markerless_tracker.node.profile import apply_profile
+from markerless_tracker.node.watch import StateWatch
+
+READY_S = 240.0
+"""The first start compiles every kernel."""
+
+_QUIET_S = 5.0
+
+Report = Callable[[str, int], None]
+"""Called with what goes on and the number of sets the tracker has dealt with."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What a tracker did with one replay.
+
+    Attributes:
+        rate: pace of the replay, 1 = the recording's own.
+        sets: sets of images in the bag.
+        tracked: sets that were tracked.
+        skipped: complete sets that newer ones overtook.
+        lost: sets that never were complete.
+        fps: frames tracked per second of work.
+        latency_median_ms, latency_p95_ms: from the arrival of a set's last image to its result.
+        result: the result files' path without suffix.
+    """
+
+    rate: float
+    sets: int
+    tracked: int
+    skipped: int
+    lost: int
+    fps: float
+    latency_median_ms: float
+    latency_p95_ms: float
+    result: Path
+
+
+def replay(
+    bag: Path,
+    *,
+    sets: int,
+    rate: float,
+    fps: float,
+    tracker: Mapping[str, object],
+    result: Path,
+    log_dir: Path,
+    report: Report,
+) -> Replay:
+    """Start a tracker and a player, wait for the end of the bag, stop the tracker.
+
+    Args:
+        bag: the bag's folder.
+        sets: sets of images in it.
+        rate: pace, 1 = the recording's own.
+        fps: the recording's rate, 1/s.
+        tracker: the tracker's parameters.
+        result: path of the result files without suffix.
+        log_dir: folder for what the processes print.
+        report: told of the progress.
+
+    Raises:
+        NodeError: a process failed, or the tracker did not get ready in time.
+        RosMissingError: ROS 2 is not installed.
+    """
+    domain_id = own_domain()
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    apply_profile()
+    node = NodeProcess(
+        "markerless_tracker.node.tracker_node",
+        {**tracker, "result_file": result},
+        log=log_dir / f"tracker_{result.name}.log",
+        domain_id=domain_id,
+    )
+    with node, StateWatch(domain_id) as watch:
+        _until_ready(node, watch, report)
+        player = NodeProcess(
+            "markerless_tracker.node.player_node",
+            {"bag": bag, "rate": float(rate), "wait_for_subscribers": True},
+            log=log_dir / f"player_{result.name}.log",
+            domain_id=domain_id,
+        )
+        with player:
+            values = _until_through(node, player, watch, sets, sets / fps / rate, report)
+        node.check()
+    counted = {key: int(values.get(key, "0")) for key in ("tracked", "skipped")}
+    return Replay(
+        rate=rate,
+        sets=sets,
+        lost=max(0, sets - _dealt_with(values)),
+        fps=float(values.get("fps", "nan")),
+        latency_median_ms=float(values.get("latency_median_ms", "nan")),
+        latency_p95_ms=float(values.get("latency_p95_ms", "nan")),
+        result=result,
+        **counted,
+    )
+
+
+def own_domain() -> int:
+    """The user's ROS domain if one was chosen, else one that others on this machine hardly use."""
+    chosen = os.environ.get("ROS_DOMAIN_ID", "")
+    return int(chosen) if chosen.isdecimal() else 1 + os.getpid() % 101
+
+
+def _until_ready(node: NodeProcess, watch: StateWatch, report: Report) -> None:
+    deadline_s = time.monotonic() + READY_S
+    while True:
+        values = watch.listen(0.2)
+        if values.get("ready") == "true":
+            return
+        node.check()
+        if not node.running or time.monotonic() > deadline_s:
+            raise NodeError(f"tracker: not ready within {READY_S:g} s")
+        report(values.get("activity", "starting"), 0)
+
+
+def _until_through(
+    node: NodeProcess,
+    player: NodeProcess,
+    watch: StateWatch,
+    sets: int,
+    lasts_s: float,
+    report: Report,
+) -> Mapping[str, str]:
+    """Wait until the player has ended and the tracker has dealt with all it got."""
+    deadline_s = time.monotonic() + lasts_s + 60.0
+    changed_s, seen = time.monotonic(), -1
+    while True:
+        values = watch.listen(0.1)
+        done = _dealt_with(values)
+        now_s = time.monotonic()
+        if done != seen:
+            changed_s, seen = now_s, done
+        report("tracking", min(done, sets))
+        node.check()
+        player.check()
+        if not player.running and (done >= sets or now_s - changed_s > _QUIET_S):
+            return values
+        if now_s > deadline_s:
+            raise NodeError(
+                f"{'player' if player.running else 'tracker'}: not through {sets} sets after "
+                f"{lasts_s + 60.0:.0f} s, {done} were dealt with"
+            )
+
+
+def _dealt_with(values: Mapping[str, str]) -> int:
+    keys = ("tracked", "skipped", "dropped_before_start", "dropped_on_error")
+    return sum(int(values.get(key, "0")) for key in keys)

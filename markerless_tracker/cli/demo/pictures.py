@@ -1,0 +1,77 @@
+"""What the demo found, drawn over the images of every view, and how well it covers the person."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.datasets import open_recording
+from markerless_tracker.drawing import draw_overlay, overlay_sheet
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.records import TrackState
+
+Frame = Mapping[str, Any]
+
+
+def tracked_frames(result: Path) -> list[Frame]:
+    """The frames of `result`.json in which the person was tracked.
+
+    Raises:
+        DatasetError: the file is not there, or no result.
+    """
+    path = result.with_name(result.name + ".json")
+    try:
+        frames = json.loads(path.read_text(encoding="utf-8"))["frames"]
+    except (OSError, ValueError, KeyError) as error:
+        raise DatasetError(f"{path}: no result of a tracker ({error})") from error
+    return [frame for frame in frames if frame["state"] == TrackState.TRACKING.value]
+
+
+def mean_overlap(frames: list[Frame]) -> dict[str, float]:
+    """Camera -> overlap (IoU) of the person's silhouette and the projected body, mean of frames."""
+    values: dict[str, list[float]] = {}
+    for frame in frames:
+        for camera, overlap in frame["agreement"].items():
+            values.setdefault(camera, []).append(overlap)
+    return {camera: float(np.mean(found)) for camera, found in values.items()}
+
+
+def draw_pictures(bag: Path, frames: list[Frame], body: BodyModel, folder: Path) -> list[Path]:
+    """Draw the body over all views of the first, the middle and the last tracked frame.
+
+    Args:
+        bag: the images.
+        frames: what `tracked_frames` gave, at least one.
+        body: the tracked body.
+        folder: gets `NAME_FFFFFF.png` of each view and `all_FFFFFF.png` of all of them.
+
+    Returns:
+        The sheets of all views.
+    """
+    recording = open_recording(bag)
+    chosen = {frames[i]["stamp_ns"]: frames[i] for i in (0, len(frames) // 2, len(frames) - 1)}
+    folder.mkdir(parents=True, exist_ok=True)
+    sheets = []
+    for shown in recording.frames():
+        frame = chosen.get(shown.stamp_ns)
+        if frame is None:
+            continue
+        pose = np.array(frame["parameters"], dtype=np.float64)
+        views = {
+            camera.name: draw_overlay(shown.images[camera.name], camera, body, pose)
+            for camera in recording.rig
+        }
+        for name, picture in views.items():
+            _write(folder / f"{name}_{shown.index:06d}.png", picture)
+        sheets.append(folder / f"all_{shown.index:06d}.png")
+        _write(sheets[-1], overlay_sheet(views))
+    return sheets
+
+
+def _write(path: Path, picture: Any) -> None:
+    if not cv2.imwrite(str(path), picture):
+        raise DatasetError(f"{path}: the picture cannot be written")
