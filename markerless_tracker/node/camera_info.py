@@ -32,7 +32,7 @@ def camera_of(name: str, info: CameraInfo, T_cam_world: FloatArray) -> CameraMod
     """
     topic = f"{name}/camera_info"
     if not info.k[0]:
-        raise CalibrationError(f"{topic}: its K is zero (uncalibrated), expected a calibrated camera")
+        raise CalibrationError(f"{topic}: K is zero (uncalibrated), expected a calibrated camera")
     if info.distortion_model not in ("plumb_bob", "") and any(info.d):
         raise CalibrationError(
             f"{topic}: distortion model {info.distortion_model!r} is not supported, "

@@ -3,22 +3,13 @@
 import array
 from typing import Any, Protocol
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.datasets.encodings import ENCODINGS, decode_raw
 from markerless_tracker.errors import ImageError
 
 Array = NDArray[np.uint8]
-
-CHANNELS = {"mono8": 1, "8UC1": 1, "bgr8": 3, "8UC3": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
-"""Encodings understood, with their channels."""
-
-_TO_BGR = {
-    "rgb8": cv2.COLOR_RGB2BGR,
-    "bgra8": cv2.COLOR_BGRA2BGR,
-    "rgba8": cv2.COLOR_RGBA2BGR,
-}
 
 
 class ImageLike(Protocol):
@@ -31,11 +22,8 @@ class ImageLike(Protocol):
     data: Any
 
 
-def decode_image(message: ImageLike, topic: str) -> Array:
-    """The image of a sensor_msgs/Image as C-contiguous uint8, BGR (h, w, 3) or grey (h, w).
-
-    Shares the message's memory for mono8 and bgr8 without padding; padded rows, RGB and alpha
-    channels (dropped) cost one copy. ``is_bigendian`` says nothing about 8-bit channels.
+def check_layout(message: ImageLike, topic: str) -> None:
+    """Make sure that a sensor_msgs/Image can be decoded; looks at no pixel.
 
     Args:
         message: the message.
@@ -44,32 +32,38 @@ def decode_image(message: ImageLike, topic: str) -> Array:
     Raises:
         ImageError: unknown encoding, or width, height, step and data that do not fit each other.
     """
-    encoding = message.encoding
-    channels = CHANNELS.get(encoding)
-    if channels is None:
+    if message.encoding not in ENCODINGS:
         raise ImageError(
-            f"{topic}: encoding {encoding!r} is not understood, expected one of "
-            f"{', '.join(CHANNELS)}"
+            f"{topic}: image encoding {message.encoding!r} is not known, expected one of "
+            f"{', '.join(ENCODINGS)}"
         )
-    height, width, step = message.height, message.width, message.step
-    buffer = np.frombuffer(message.data, dtype=np.uint8) if len(message.data) else _NOTHING
-    if height < 1 or width < 1 or step < width * channels or buffer.size != height * step:
+    channels = ENCODINGS[message.encoding][0]
+    height, width, step, size = message.height, message.width, message.step, len(message.data)
+    if height < 1 or width < 1 or step < width * channels or size != height * step:
         raise ImageError(
-            f"{topic}: {buffer.size} bytes in rows of {step} do not make an image of "
-            f"{width}x{height} px {encoding}, expected {height} rows of at least "
-            f"{max(width, 1) * channels} bytes and nothing else"
+            f"{topic}: {size} bytes in rows of {step} are no image of {width}x{height} px "
+            f"{message.encoding}, expected {height} rows of at least {width * channels} bytes"
         )
-    rows = buffer.reshape(height, step)[:, : width * channels]
-    pixels = np.ascontiguousarray(rows)
-    if channels == 1:
-        return pixels
-    pixels = pixels.reshape(height, width, channels)
-    if encoding in _TO_BGR:
-        return np.asarray(cv2.cvtColor(pixels, _TO_BGR[encoding]), dtype=np.uint8)
-    return pixels
 
 
-_NOTHING: Array = np.empty(0, dtype=np.uint8)
+def decode_image(message: ImageLike, topic: str) -> Array:
+    """The image of a sensor_msgs/Image as C-contiguous uint8, BGR (h, w, 3) or grey (h, w).
+
+    Shares the message's memory for mono8 and bgr8 without padding; padded rows, RGB and alpha
+    channels (dropped) cost one copy. ``is_bigendian`` says nothing about 8-bit channels.
+
+    Raises:
+        ImageError: as `check_layout`.
+    """
+    check_layout(message, topic)
+    return decode_raw(
+        message.data,
+        encoding=message.encoding,
+        width=message.width,
+        height=message.height,
+        step=message.step,
+        where=topic,
+    )
 
 
 def fill_image(message: Any, image: Array, topic: str) -> Any:
@@ -77,24 +71,25 @@ def fill_image(message: Any, image: Array, topic: str) -> Any:
 
     Args:
         message: a sensor_msgs/Image; its header is left alone.
-        image: uint8, (h, w) becomes mono8, (h, w, 3) bgr8, (h, w, 4) bgra8.
+        image: uint8, (h, w) becomes mono8, (h, w, 3) bgr8.
         topic: where it goes, for the error message.
 
     Raises:
         ImageError: an array that is no such image.
     """
-    encoding = {2: "mono8", 3: {3: "bgr8", 4: "bgra8"}.get(image.shape[-1])}.get(image.ndim)
-    if image.dtype != np.uint8 or encoding is None or image.size == 0:
+    channels = image.shape[2] if image.ndim == 3 else 1
+    good = image.dtype == np.uint8 and image.ndim in (2, 3) and channels == 2 * image.ndim - 3
+    if not good or image.size == 0:
         raise ImageError(
-            f"{topic}: array {image.shape} of {image.dtype} is no image, "
-            "expected uint8 (h, w), (h, w, 3) or (h, w, 4)"
+            f"{topic}: an array {image.shape} of {image.dtype} is no image, "
+            "expected uint8 (h, w) or (h, w, 3)"
         )
     message.height, message.width = int(image.shape[0]), int(image.shape[1])
-    message.encoding = encoding
+    message.encoding = "mono8" if image.ndim == 2 else "bgr8"
     message.is_bigendian = 0
-    message.step = message.width * CHANNELS[encoding]
+    message.step = message.width * channels
     # Assigning the ndarray itself is checked byte by byte: a hundred times slower.
     data = array.array("B")
-    data.frombytes(memoryview(np.ascontiguousarray(image)).cast("B"))
+    data.frombytes(np.ascontiguousarray(image).data.cast("B"))
     message.data = data
     return message

@@ -3,6 +3,7 @@
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from typing import Any
 
 from markerless_tracker.errors import ConfigError, TrackerError
@@ -10,6 +11,16 @@ from markerless_tracker.node.profile import apply_profile
 
 NOT_INSTALLED = (
     "ROS 2 is not installed: pip install 'markerless_tracker[ros]' or source a ROS 2 Jazzy setup"
+)
+
+
+_NEEDED = (
+    "rclpy",
+    "diagnostic_msgs.msg",
+    "geometry_msgs.msg",
+    "sensor_msgs.msg",
+    "std_srvs.srv",
+    "visualization_msgs.msg",
 )
 
 
@@ -24,12 +35,8 @@ def require_ros() -> None:
         RosMissingError: they cannot; says how to install them.
     """
     try:
-        import diagnostic_msgs.msg
-        import geometry_msgs.msg
-        import rclpy
-        import sensor_msgs.msg
-        import std_srvs.srv
-        import visualization_msgs.msg  # noqa: F401
+        for module in _NEEDED:
+            import_module(module)
     except ImportError as error:
         missing = f" ({error.name} is missing)" if error.name else ""
         raise RosMissingError(NOT_INSTALLED + missing) from error

@@ -61,10 +61,10 @@ class TrackerStatus:
             self._latencies_s.append(finished_s - arrived_s)
             self._finished_s.append(finished_s)
 
-    def dropped(self, reason: str) -> None:
-        """Note a complete set that was not tracked, e.g. ``before_ready``."""
+    def dropped(self, reason: str, sets: int = 1) -> None:
+        """Note complete sets that were not tracked, e.g. ``before_ready``."""
         with self._lock:
-            self._dropped[reason] += 1
+            self._dropped[reason] += sets
 
     def refused(self, camera: str) -> None:
         """Note an image that could not be used."""
@@ -101,10 +101,12 @@ class TrackerStatus:
                 "state": (TrackState.SEARCHING if result is None else result.state).value,
                 "activity": self._activity,
                 "tracked": str(self._tracked),
-                "skipped": str(counts.skipped),
+                "skipped": str(counts.skipped if self._ready else 0),
                 "incomplete": str(counts.incomplete),
                 "restarts": str(counts.restarts),
-                "dropped_before_ready": str(self._dropped["before_ready"]),
+                "dropped_before_ready": str(
+                    self._dropped["before_ready"] if self._ready else counts.complete
+                ),
                 "dropped_before_start": str(self._dropped["before_start"]),
                 "dropped_on_error": str(self._dropped["error"]),
                 "latency_median_ms": _number(np.median(latencies) if latencies.size else None, 1),

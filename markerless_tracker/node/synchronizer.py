@@ -71,14 +71,13 @@ class Synchronizer(Generic[View]):
         ConfigError: no cameras, two of one name, or impossible numbers.
     """
 
-    def __init__(
-        self, cameras: Sequence[str], *, tolerance_ns: int = 0, depth: int = 24
-    ) -> None:
+    def __init__(self, cameras: Sequence[str], *, tolerance_ns: int = 0, depth: int = 24) -> None:
         if not cameras or len(set(cameras)) != len(cameras):
             raise ConfigError(f"cameras: got {list(cameras)}, expected at least one, distinct")
         if tolerance_ns < 0 or depth < 1:
             raise ConfigError(
-                f"sync_tolerance: got {tolerance_ns} ns and a depth of {depth}, expected >= 0 and >= 1"
+                f"sync_tolerance: got {tolerance_ns} ns and a depth of {depth}, expected at least "
+                "0 and 1"
             )
         self.cameras = tuple(cameras)
         self._tolerance_ns = tolerance_ns
@@ -151,13 +150,16 @@ class Synchronizer(Generic[View]):
                 if name not in self._heard_s or now_s - self._heard_s[name] > after_s
             )
 
-    def clear(self) -> None:
-        """Forget all views and stamps; the counts stay."""
+    def start_counting(self) -> SyncCounts:
+        """Forget the waiting set and begin all counts anew; returns what they were.
+
+        Views of sets not yet complete stay: they complete the first set of the new count.
+        """
         with self._changed:
-            for queue in self._pending.values():
-                queue.clear()
+            counts = SyncCounts(**self._counts)
+            self._counts = dict.fromkeys(self._counts, 0)
             self._waiting = None
-            self._last_ns = None
+            return counts
 
     def _match(self, camera: str, stamp_ns: int) -> dict[str, int] | None:
         """Positions of a set's members in the cameras' queues, if that view completes one."""
@@ -193,7 +195,7 @@ class Synchronizer(Generic[View]):
         self._waiting = MatchedSet(stamp_ns, views, now_s, restarted)
 
     def _give_up(self, camera: str) -> None:
-        """Drop a camera's oldest view; its set counts as incomplete when no other holds part of it."""
+        """Drop a camera's oldest view; the last view of a set to go counts it as incomplete."""
         stamp_ns = self._pending[camera].popleft().stamp_ns
         others = (queue for name, queue in self._pending.items() if name != camera)
         if not any(_nearest(queue, stamp_ns, self._tolerance_ns) is not None for queue in others):
@@ -209,4 +211,3 @@ def _nearest(queue: Iterable[_Entry[View]], stamp_ns: int, tolerance_ns: int) ->
         if gap <= best_gap:
             best, best_gap = position, gap
     return best
-

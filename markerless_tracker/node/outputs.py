@@ -1,0 +1,107 @@
+"""What the tracker node gives besides its messages: result files, pictures for those who look."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from sensor_msgs.msg import Image
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.datasets import tidy_fps
+from markerless_tracker.drawing import draw_overlay
+from markerless_tracker.evaluation.result import ResultWriter
+from markerless_tracker.node.images import fill_image
+from markerless_tracker.node.messages import header, optical_frame
+from markerless_tracker.node.qos import output_qos
+from markerless_tracker.node.worker import FittedSet
+from markerless_tracker.records import TrackResult
+from markerless_tracker.tracking import Tracker
+
+_LONE_RESULT_FPS = 60.0
+
+
+class ResultFile:
+    """NAME.trc and NAME.json, written when the node ends; nothing if there is no NAME.
+
+    The rate of a live stream is known at its end only. Safe to use from several threads.
+
+    Args:
+        name: path without suffix, None for no files.
+    """
+
+    def __init__(self, name: Path | None) -> None:
+        self._name = name
+        self._lock = Lock()
+        self._tracker: Tracker | None = None
+        self._results: list[TrackResult] = []
+
+    def open(self, tracker: Tracker) -> None:
+        """Find out at once whether the files can be written.
+
+        Raises:
+            DatasetError: they cannot.
+        """
+        if self._name is not None:
+            ResultWriter(self._name, tracker.body, tracker.config, fps=_LONE_RESULT_FPS)
+            self._tracker = tracker
+
+    def add(self, result: TrackResult) -> None:
+        """Take a result; too late after `close`."""
+        with self._lock:
+            if self._tracker is not None:
+                # The evidence would fill the memory.
+                self._results.append(replace(result, observations={}))
+
+    def close(self, notes: Mapping[str, Any]) -> None:
+        """Write the files, once, with notes such as counts of skipped sets.
+
+        Raises:
+            DatasetError: they cannot be written.
+        """
+        with self._lock:
+            tracker, self._tracker = self._tracker, None
+            if tracker is None or self._name is None:
+                return
+            steps_ns = np.diff([result.stamp_ns for result in self._results])
+            forward_ns = steps_ns[steps_ns > 0]
+            fps = 1e9 / float(np.median(forward_ns)) if forward_ns.size else _LONE_RESULT_FPS
+            writer = ResultWriter(
+                self._name, tracker.body, tracker.config, fps=tidy_fps(fps), source="live"
+            )
+            for result in self._results:
+                writer.add(result)
+            writer.note(notes)
+            writer.close()
+
+
+class Overlays:
+    """``debug/NAME/overlay``: the body over each camera's image, drawn only while subscribed.
+
+    Args:
+        node: creates the publishers.
+        rig: the cameras of the images that the tracker sees.
+        body: the body to draw.
+    """
+
+    def __init__(self, node: Any, rig: CameraRig, body: BodyModel) -> None:
+        self._rig = rig
+        self._body = body
+        self._publishers = {
+            name: node.create_publisher(Image, f"debug/{name}/overlay", output_qos())
+            for name in rig.names
+        }
+
+    def publish(self, fitted: FittedSet) -> None:
+        """Draw and publish those that somebody wants to see."""
+        for name, publisher in self._publishers.items():
+            if not publisher.get_subscription_count() or name not in fitted.images:
+                continue
+            image = fitted.images[name]
+            if fitted.result.pose is not None:
+                image = draw_overlay(image, self._rig[name], self._body, fitted.result.pose)
+            message = Image(header=header(fitted.result.stamp_ns, optical_frame(name)))
+            publisher.publish(fill_image(message, image, f"debug/{name}/overlay"))

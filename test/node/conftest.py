@@ -1,0 +1,93 @@
+"""A ROS graph of its own for every test process, and a node to talk from."""
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+# rclpy reads these when it is imported or initialised.
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
+
+DEADLINE_S = 30.0
+"""Discovery takes up to 3 s, more on a busy machine."""
+
+
+def _domain() -> int:
+    """One domain (1..101) per xdist worker, and another one in a test run beside this one."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")
+    run = os.getppid() if "PYTEST_XDIST_WORKER" in os.environ else os.getpid()
+    return (run * 8 + int(worker.removeprefix("gw"))) % 101 + 1
+
+
+os.environ["ROS_DOMAIN_ID"] = str(_domain())
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _ros_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    from markerless_tracker.node.profile import apply_profile
+
+    old = dict(os.environ)
+    os.environ["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("ros_log"))
+    apply_profile()
+    yield
+    os.environ.clear()
+    os.environ.update(old)
+
+
+class Peer:
+    """A node of the test's own, and a way to wait for things."""
+
+    def __init__(self, context: Any) -> None:
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.node import Node
+
+        self.context = context
+        self.node = Node("peer", context=context)
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(self.node)
+
+    def until(
+        self, condition: Callable[[], Any], what: str, *, deadline_s: float = DEADLINE_S
+    ) -> Any:
+        """Spin until the condition holds; fails the test, saying what was missing, if it never does."""
+        end_s = time.monotonic() + deadline_s
+        while not (value := condition()):
+            assert time.monotonic() < end_s, f"timed out waiting for {what}"
+            self.executor.spin_once(timeout_sec=0.05)
+        return value
+
+    def collect(self, kind: type, topic: str, qos: Any) -> list[Any]:
+        """A list that fills with the messages of a topic."""
+        got: list[Any] = []
+        self.node.create_subscription(kind, topic, got.append, qos)
+        return got
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+
+
+@pytest.fixture
+def ros_context() -> Iterator[Any]:
+    rclpy = pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    context = rclpy.Context()
+    rclpy.init(context=context, args=[])
+    yield context
+    context.try_shutdown()
+
+
+@pytest.fixture
+def peer(ros_context: Any) -> Iterator[Peer]:
+    peer = Peer(ros_context)
+    yield peer
+    peer.close()
+
+
+@pytest.fixture
+def run_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
