@@ -57,6 +57,14 @@ class NodeProcess:
         """Whether the process has not ended."""
         return self._process.poll() is None
 
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for its end; returns whether it has ended."""
+        try:
+            self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
     def check(self) -> None:
         """Make sure that it runs, or ended well.
 
@@ -71,11 +79,9 @@ class NodeProcess:
         """Ask it to end (SIGINT), and insist after a while; returns its exit status."""
         if self.running:
             self._process.send_signal(signal.SIGINT)
-        try:
-            status = self._process.wait(timeout_s)
-        except subprocess.TimeoutExpired:
+        if not self.wait(timeout_s):
             self._process.kill()
-            status = self._process.wait()
+        status = self._process.wait()
         self._sink.close()
         return status
 
@@ -93,7 +99,7 @@ def ros_arguments(parameters: Mapping[str, object]) -> Sequence[str]:
             text = text.lower()
         elif isinstance(value, (str, Path)):
             # Quoted, or a path such as 2026 or 1e3 would arrive as a number.
-            text = f"'{text}'"
+            text = "'" + text.replace("'", "''") + "'"
         words += ["-p", f"{name}:={text}"]
     return words
 

@@ -1,0 +1,31 @@
+"""What the demo reads out of a result."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from markerless_tracker.cli.demo.pictures import mean_overlap, tracked_frames
+from markerless_tracker.errors import DatasetError
+
+
+def test_only_tracked_frames_count(tmp_path: Path) -> None:
+    frames = [
+        {"stamp_ns": 0, "state": "SEARCHING", "agreement": {}},
+        {"stamp_ns": 1, "state": "TRACKING", "agreement": {"cam01": 0.5, "cam02": 0.25}},
+        {"stamp_ns": 2, "state": "TRACKING", "agreement": {"cam01": 1.0}},
+        {"stamp_ns": 3, "state": "LOST", "agreement": {"cam01": 0.0}},
+    ]
+    (tmp_path / "run.v1.json").write_text(json.dumps({"frames": frames}))
+    found = tracked_frames(tmp_path / "run.v1")
+    assert [frame["stamp_ns"] for frame in found] == [1, 2]
+    assert mean_overlap(found) == {"cam01": 0.75, "cam02": 0.25}
+
+
+@pytest.mark.parametrize("text", [None, "{}", "not json", '{"frames"'])
+def test_no_result_is_one_line(tmp_path: Path, text: str | None) -> None:
+    if text is not None:
+        (tmp_path / "run.json").write_text(text)
+    with pytest.raises(DatasetError, match="run.json: no result of a tracker") as caught:
+        tracked_frames(tmp_path / "run")
+    assert "\n" not in str(caught.value)
