@@ -1,8 +1,14 @@
 """Fixtures for every room: recordings that may lie beside the project."""
 
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.datasets.writer import new_recording
+from markerless_tracker.geometry import rotation_from_rodrigues, transform
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED_DATA = ROOT.parent / "shared" / "data"
@@ -31,3 +37,43 @@ def balance_real() -> Path:
 def render_walk() -> Path:
     """Folder of a rendered recording with exact masks, in the neutral layout."""
     return _recording("render_walk")
+
+
+@pytest.fixture
+def make_recording(tmp_path: Path) -> Callable[..., Path]:
+    """Writes a small recording folder (two cameras, lossless video, deterministic noise).
+
+    `make_recording(name, frames=, fps=, backgrounds=, size_px=)` returns its folder; backgrounds is
+    how many empty-scene images each camera gets.
+    """
+
+    def make(
+        name: str = "small",
+        *,
+        frames: int = 6,
+        fps: float = 60.0,
+        backgrounds: int = 1,
+        size_px: tuple[int, int] = (64, 48),
+    ) -> Path:
+        rng = np.random.default_rng(7)
+        shape = (size_px[1], size_px[0], 3)
+        matrix = np.array([[80.0, 0.0, 31.123456789], [0.0, 81.0, 23.987654321], [0, 0, 1]])
+        cameras = [
+            CameraModel(
+                camera,
+                size_px,
+                matrix,
+                np.array([-0.05, 0.1, 0.001, -0.002]),
+                transform(rotation_from_rodrigues(rotation), [0.1, 0.2, 3.0]),
+            )
+            for camera, rotation in (("cam01", [1.2, 0.3, -0.4]), ("cam02", [1.1, -1.3, 0.7]))
+        ]
+        with new_recording(tmp_path / name, CameraRig(tuple(cameras)), fps, lossless=True) as out:
+            for _ in range(frames):
+                out.write({c.name: rng.integers(0, 256, shape, dtype=np.uint8) for c in cameras})
+            for camera in cameras:
+                empty = [rng.integers(0, 256, shape, np.uint8) for _ in range(backgrounds)]
+                out.write_background(camera.name, empty)
+        return tmp_path / name
+
+    return make

@@ -13,7 +13,7 @@ FRAMES = 36
 def backgrounds_of(recording: Recording, folder: Path | None = None) -> dict[str, list[Image]]:
     """Camera name -> empty-scene images (scaled) of every camera of a recording.
 
-    Images come from `folder`, the recording's own `background/` if None. Cameras without any get one
+    Images come from `folder`, or the recording's own `background/`. Cameras without any get one
     learned from the recording's stills of the room and its own frames; a warning of the recording
     says from what, and what that costs. The same frames give the same image, whatever they are
     stored in.
