@@ -23,9 +23,9 @@ _REACH = 14.0
 # A change from frame to frame beyond this is a body's, not the light's.
 _ABRUPT = 35.0
 # Where things are covered for this share of the time, someone is burnt into the steady image.
-_RESTLESS = 0.2
+_RESTLESS = 0.15
 # Size of the neighbourhood that is judged together, as a share of the image's longer side.
-_WINDOW = 0.02
+_WINDOW = 0.03
 # A value seen in this share of the frames was really there.
 _SEEN_SHARE = 0.05
 
