@@ -1,0 +1,31 @@
+"""Finding out what lies at a path."""
+
+from pathlib import Path
+
+import pytest
+
+from markerless_tracker.datasets import detect_format, open_recording
+from markerless_tracker.errors import DatasetError
+
+
+def test_nothing_known(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="no such file or folder"):
+        open_recording(tmp_path / "none")
+    with pytest.raises(DatasetError, match="no recording; expected.*calibration.toml.*mcap"):
+        open_recording(tmp_path)
+    (tmp_path / "file.txt").write_text("hello")
+    with pytest.raises(DatasetError, match="no recording"):
+        open_recording(tmp_path / "file.txt")
+    with pytest.raises(DatasetError, match="'video'.*folder, pose2sim, bag"):
+        open_recording(tmp_path, format="video")
+
+
+def test_formats_are_told_apart(tmp_path: Path, make_recording) -> None:
+    assert detect_format(make_recording()) == "folder"
+    (tmp_path / "project" / "videos").mkdir(parents=True)
+    assert detect_format(tmp_path / "project") is None
+    (tmp_path / "project" / "Calibration").mkdir()
+    assert detect_format(tmp_path / "project") == "pose2sim"
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "x.mcap").write_bytes(b"")
+    assert detect_format(tmp_path / "bag") == detect_format(tmp_path / "bag" / "x.mcap") == "bag"
