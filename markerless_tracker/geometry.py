@@ -15,7 +15,7 @@ def rotation_from_rodrigues(vector: Any) -> FloatArray:
     if angle < 1e-12:
         return np.eye(3) + skew(v)
     k = skew(v / angle)
-    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
+    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k))
 
 
 def rodrigues_from_rotation(rotation: Any) -> FloatArray:
@@ -24,8 +24,8 @@ def rodrigues_from_rotation(rotation: Any) -> FloatArray:
     axis = np.array([x, y, z])
     length = float(np.linalg.norm(axis))
     if length < 1e-12:
-        return 2.0 * axis
-    return axis / length * 2.0 * np.arctan2(length, w)
+        return np.asarray(2.0 * axis)
+    return np.asarray(axis / length * 2.0 * np.arctan2(length, w))
 
 
 def skew(vector: Any) -> FloatArray:
@@ -49,9 +49,9 @@ def quaternion_from_rotation(rotation: Any) -> FloatArray:
     best = int(np.argmax(squares))
     a, b, c = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
     d, e, f = r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1]
-    rows = ([squares[0], a, b, c], [a, squares[1], d, e], [b, d, squares[2], f], [c, e, f, squares[3]])
-    q = np.array(rows[best]) / (2.0 * np.sqrt(squares[best]))
-    return -q if q[0] < 0.0 else q
+    rows = np.array([[0.0, a, b, c], [a, 0.0, d, e], [b, d, 0.0, f], [c, e, f, 0.0]])
+    q = (rows + np.diag(squares))[best] / (2.0 * np.sqrt(squares[best]))
+    return np.asarray(-q if q[0] < 0.0 else q)
 
 
 def rotation_from_quaternion(quaternion: Any) -> FloatArray:

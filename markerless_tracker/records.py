@@ -149,7 +149,9 @@ class Stage:
                 "must be (p,) both"
             )
         if self.active.size == 0 or self.active.min() < 0 or self.active.max() >= self.centre.size:
-            raise SearchError(f"stage {self.name}: active parameters must be 0..{self.centre.size - 1}")
+            raise SearchError(
+                f"stage {self.name}: active parameters must be 0..{self.centre.size - 1}"
+            )
         if self.particles < 1 or self.iterations < 1:
             raise SearchError(
                 f"stage {self.name}: {self.particles} particles x {self.iterations} iterations, "

@@ -23,7 +23,7 @@ HELP = (
     "Track the person in a recording folder, a Pose2Sim project or a bag, as fast as it goes, and "
     "write NAME.trc (15 markers, metres) and NAME.json (settings, state, fitness, parameters)."
 )
-EXAMPLE = "markerless_tracker track recordings/walk -o out/walk --start recordings/walk/ground_truth.trc"
+EXAMPLE = "markerless_tracker track RECORDING -o out/walk --start RECORDING/ground_truth.trc"
 
 _KEYS = ("optimizer", "body", "evaluations", "seed", "threads")
 
@@ -39,19 +39,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--subject-from", type=Path, metavar="TRC", help="measure the subject on its first row"
     )
-    parser.add_argument("--stature", type=float, metavar="M", help="a generic person of that height")
+    parser.add_argument(
+        "--stature", type=float, metavar="M", help="a generic person of that height"
+    )
     parser.add_argument("--optimizer", help="search algorithm (default sppso)")
     parser.add_argument("--body", metavar="NAME|FILE", help="body description")
     parser.add_argument("--evaluations", type=int, metavar="N", help="evaluations per frame")
     parser.add_argument("--preset", choices=tuple(PRESETS), help="tuned (default) or paper")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
-    parser.add_argument("--fps", type=float, metavar="N", help="keep every k-th frame from the start")
-    parser.add_argument("--scale", type=float, default=1.0, metavar="S", help="factor for the images")
-    parser.add_argument("--background", type=Path, metavar="DIR", help="empty-scene images per camera")
+    parser.add_argument(
+        "--fps", type=float, metavar="N", help="keep every k-th frame from the start"
+    )
+    parser.add_argument(
+        "--scale", type=float, default=1.0, metavar="S", help="factor for the images"
+    )
+    parser.add_argument(
+        "--background", type=Path, metavar="DIR", help="empty-scene images per camera"
+    )
     parser.add_argument("--seed", type=int, metavar="N", help="seed of all random draws")
     parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")
     parser.add_argument(
-        "--debug-images", type=Path, metavar="DIR", help="per frame and camera: input, evidence, body"
+        "--debug-images",
+        type=Path,
+        metavar="DIR",
+        help="per frame and camera: input, evidence, body",
     )
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
 
@@ -92,9 +103,13 @@ def run(args: argparse.Namespace) -> int:
                 state = tracked.result.state.value
                 states[state] = states.get(state, 0) + 1
                 if debug:
-                    debug.write(tracked.images, tracked.result, setup.tracker.rig, setup.tracker.body)
+                    debug.write(
+                        tracked.images, tracked.result, setup.tracker.rig, setup.tracker.body
+                    )
                 frames += 1
-                bars.update(task, completed=frames, total=_total(recording, setup.start_stamp_ns, rate))
+                bars.update(
+                    task, completed=frames, total=_total(recording, setup.start_stamp_ns, rate)
+                )
         seconds = time.perf_counter() - started
     for warning in recording.warnings:
         console.print(f"warning: {warning}", markup=False, highlight=False, soft_wrap=True)
@@ -133,7 +148,9 @@ def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
             first = str(error).splitlines()[0]
             raise ConfigError(f"{path}: cannot read the settings: {first}") from error
         if loaded is not None and not isinstance(loaded, dict):
-            raise ConfigError(f"{path}: expected a mapping of settings, got {type(loaded).__name__}")
+            raise ConfigError(
+                f"{path}: expected a mapping of settings, got {type(loaded).__name__}"
+            )
         values = {str(key): value for key, value in (loaded or {}).items()}
     return TrackerConfig.from_mapping({**values, **flags})
 

@@ -77,7 +77,9 @@ class ResultWriter:
         """
         write_trc(self.trc_path, self.track(), self._fps)
         try:
-            self.json_path.write_text(json.dumps(self._summary(), indent=1) + "\n", encoding="utf-8")
+            self.json_path.write_text(
+                json.dumps(self._summary(), indent=1) + "\n", encoding="utf-8"
+            )
         except OSError as error:
             raise DatasetError(f"{self.json_path}: cannot be written: {error.strerror}") from error
 
@@ -103,7 +105,9 @@ class ResultWriter:
                 "lengths_m": {k: float(v) for k, v in self._body.lengths_m.items()},
                 "cones_m": {
                     name: shape.tolist()
-                    for name, shape in zip(self._body.cone_names, self._body.cone_shape, strict=True)
+                    for name, shape in zip(
+                        self._body.cone_names, self._body.cone_shape, strict=True
+                    )
                 },
             },
             **self._notes,

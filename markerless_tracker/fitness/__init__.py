@@ -1,7 +1,13 @@
 """Projected body against image evidence: the costs that searches minimise."""
 
 from markerless_tracker.fitness.arrays import Views, lay_out_views
-from markerless_tracker.fitness.evaluator import EDGE_RULES, EDGE_TERMS, Evaluator, Fitness, ViewTerms
+from markerless_tracker.fitness.evaluator import (
+    EDGE_RULES,
+    EDGE_TERMS,
+    Evaluator,
+    Fitness,
+    ViewTerms,
+)
 
 __all__ = [
     "EDGE_RULES",

@@ -79,9 +79,7 @@ def body_arrays(body: BodyModel) -> BodyArrays:
     )
 
 
-def lay_out_views(
-    cameras: Sequence[CameraModel], observations: Mapping[str, Observation]
-) -> Views:
+def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Observation]) -> Views:
     """Lay out the views of the cameras that have an observation, in the cameras' order.
 
     Raises:

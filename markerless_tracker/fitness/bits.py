@@ -1,6 +1,5 @@
 """Rows of bits: 64 pixels a word, least significant first (as `records.pack_mask`)."""
 
-# ruff: noqa: ANN001, ANN201
 from typing import Any
 
 import numpy as np
@@ -41,8 +40,6 @@ def is_set(rows, u, v):  # type: ignore[no-untyped-def]
     """Whether the bit of column u in row v is set; both must lie inside."""
     word = rows[np.uint64(v), np.uint64(u >> 6)]
     return (word >> np.uint64(u & 63)) & np.uint64(1) != np.uint64(0)
-
-
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]

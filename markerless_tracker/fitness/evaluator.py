@@ -63,9 +63,13 @@ class Fitness:
         edge_step_px: float = 2.0,
     ) -> None:
         if edge_rule not in EDGE_RULES:
-            raise ConfigError(f"edge_rule is {edge_rule!r}, expected one of {', '.join(EDGE_RULES)}")
+            raise ConfigError(
+                f"edge_rule is {edge_rule!r}, expected one of {', '.join(EDGE_RULES)}"
+            )
         if edge_term not in EDGE_TERMS:
-            raise ConfigError(f"edge_term is {edge_term!r}, expected one of {', '.join(EDGE_TERMS)}")
+            raise ConfigError(
+                f"edge_term is {edge_term!r}, expected one of {', '.join(EDGE_TERMS)}"
+            )
         self.body = body
         self.cameras = tuple(cameras)
         self.threads = max(1, min(threads, numba.config.NUMBA_NUM_THREADS))
@@ -99,7 +103,10 @@ class Fitness:
         """Counts (n, v, 4) of poses (n, p): see the columns of `kernels`."""
         counts = np.empty((len(poses), len(views.names), 4))
         sampled = self.body.cone_edges & edge_cones[:, None]
-        args = (poses, self._body, views.arrays, silhouette_cones, sampled, self._rule, self._scratch, counts)
+        args = (
+            poses, self._body, views.arrays, silhouette_cones, sampled,
+            self._rule, self._scratch, counts,
+        )  # fmt: skip
         if self.threads == 1:
             kernels.count_serial(*args)
         else:

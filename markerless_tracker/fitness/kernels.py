@@ -25,7 +25,7 @@ SIDES, VISIBLE, OUTLINE = 0, 1, 2
 
 
 class EdgeRule(NamedTuple):
-    """How edges are sampled: rule, spacing and outward step in px, and whether costs are squared."""
+    """How edges are sampled: rule, spacing and outward step in px, whether costs are squared."""
 
     rule: int
     spacing_px: float
@@ -169,7 +169,7 @@ def sample_side(p, q, outward, rows, edges, width, height, rule, counts):  # typ
     length = np.sqrt(du * du + dv * dv)
     if not (length > 0.0 and length < 1e6):
         return
-    samples = max(4, np.int64(length / rule.spacing_px))
+    samples = np.int64(max(4.0, length / rule.spacing_px))
     step = outward * rule.step_px / length
     for i in range(samples):
         t = (i + 0.5) / samples
@@ -207,7 +207,21 @@ def _sample_cone(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def compare_view(body_cones, edge_cones, views, view, rule, local, points, sides, order, rows, left, right, counts):  # type: ignore[no-untyped-def]  # noqa: E501
+def compare_view(  # type: ignore[no-untyped-def]
+    body_cones,
+    edge_cones,
+    views,
+    view,
+    rule,
+    local,
+    points,
+    sides,
+    order,
+    rows,
+    left,
+    right,
+    counts,
+):
     """Project the cones (given in the camera's frame) and compare them with one view.
 
     Args:
@@ -276,7 +290,7 @@ def compare_view(body_cones, edge_cones, views, view, rule, local, points, sides
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def _work(poses, body, views, body_cones, edge_cones, rule, scratch, counts, thread, threads):  # type: ignore[no-untyped-def]  # noqa: E501
+def _work(poses, body, views, body_cones, edge_cones, rule, scratch, counts, thread, threads):  # type: ignore[no-untyped-def]
     """Evaluate every `threads`-th pose, from pose `thread` on."""
     for n in range(thread, poses.shape[0], threads):
         finite = True
@@ -299,13 +313,13 @@ def _work(poses, body, views, body_cones, edge_cones, rule, scratch, counts, thr
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def count_serial(poses, body, views, body_cones, edge_cones, rule, scratch, counts):  # type: ignore[no-untyped-def]  # noqa: E501
+def count_serial(poses, body, views, body_cones, edge_cones, rule, scratch, counts):  # type: ignore[no-untyped-def]
     """Fill counts (n, v, 4) for poses (n, p) on the calling thread; NaN for non-finite poses."""
     _work(poses, body, views, body_cones, edge_cones, rule, scratch, counts, 0, 1)
 
 
 @njit(cache=True, nogil=True, parallel=True)  # type: ignore[misc]
-def count_parallel(poses, body, views, body_cones, edge_cones, rule, scratch, counts):  # type: ignore[no-untyped-def]  # noqa: E501
+def count_parallel(poses, body, views, body_cones, edge_cones, rule, scratch, counts):  # type: ignore[no-untyped-def]
     """As `count_serial`, on as many threads as the scratch memory is for."""
     threads = scratch.rows.shape[0]
     for thread in prange(threads):

@@ -22,7 +22,8 @@ def project_point(x, y, z, k, distortion, distorted, out):  # type: ignore[no-un
     a = x / z
     b = y / z
     if distorted:
-        k1, k2, p1, p2, k3 = distortion[0], distortion[1], distortion[2], distortion[3], distortion[4]
+        k1, k2, k3 = distortion[0], distortion[1], distortion[4]
+        p1, p2 = distortion[2], distortion[3]
         r2 = a * a + b * b
         radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
         ab = a * b
@@ -76,7 +77,8 @@ def cone_outline(ends, k, distortion, distorted, points, sides):  # type: ignore
         # Seen end-on: one ellipse hides the other and is the whole outline.
         count = 2 * ARC_POINTS - 2
         outer = 1 - inner
-        _arc(ends, outer, 0.0, turn * (1.0 - 1.0 / count), count, k, distortion, distorted, points, 0)
+        sweep = turn * (1.0 - 1.0 / count)
+        _arc(ends, outer, 0.0, sweep, count, k, distortion, distorted, points, 0)
         for s in range(3):
             for i in range(2):
                 sides[s, 0, i] = np.nan
@@ -91,12 +93,12 @@ def cone_outline(ends, k, distortion, distorted, points, sides):  # type: ignore
             gx = flat[1, 0, 0] - flat[0, 0, 0]
             gy = flat[1, 0, 1] - flat[0, 0, 1]
             for e in range(2):
-                s = 1.0 if e == 1 else -1.0
+                towards = 1.0 if e == 1 else -1.0
                 pa = flat[e, 1, 0] * nx + flat[e, 1, 1] * ny
                 pb = flat[e, 2, 0] * nx + flat[e, 2, 1] * ny
                 length = np.sqrt(pa * pa + pb * pb) + 1e-300
-                gx += s * (flat[e, 1, 0] * pa + flat[e, 2, 0] * pb) / length
-                gy += s * (flat[e, 1, 1] * pa + flat[e, 2, 1] * pb) / length
+                gx += towards * (flat[e, 1, 0] * pa + flat[e, 2, 0] * pb) / length
+                gy += towards * (flat[e, 1, 1] * pa + flat[e, 2, 1] * pb) / length
             length = np.sqrt(gx * gx + gy * gy) + 1e-300
             nx, ny = -gy / length * sense, gx / length * sense
         for e in range(2):

@@ -50,7 +50,9 @@ class Optimizer(ABC):
             SearchError: called twice without `tell`, or after the budget is spent.
         """
         if self._asked is not None or self.finished:
-            raise SearchError("ask() was called out of turn: tell() the costs first, stop when finished")
+            raise SearchError(
+                "ask() was called out of turn: tell() the costs first, stop when finished"
+            )
         self._asked, self._barred = self._ask()
         return self._asked
 

@@ -38,13 +38,15 @@ class Problem:
         d = self.centre.size
         if self.bounds.shape != (2, d) or self.sigma.shape != (d,):
             raise SearchError(
-                f"bounds {self.bounds.shape} and sigma {self.sigma.shape} do not fit a centre of {d}"
+                f"bounds {self.bounds.shape} and sigma {self.sigma.shape} "
+                f"do not fit a centre of {d}"
             )
         if np.any(self.bounds[0] > self.bounds[1]) or not np.all(self.sigma >= 0.0):
             raise SearchError("bounds must not cross and sigma must not be negative")
         if self.particles < 1 or self.iterations < 1:
             raise SearchError(
-                f"{self.particles} particles x {self.iterations} iterations, expected at least 1 x 1"
+                f"{self.particles} particles x {self.iterations} iterations, "
+                "expected at least 1 x 1"
             )
 
 

@@ -5,6 +5,8 @@ Video-Based Markerless Pose Tracking", ACIVS 2012, Eqs 1-3 and the algorithm of 
 partition itself, two such stages with their parameters and spreads, is made in `tracking`.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,7 +32,7 @@ def acceleration(k: int, iterations: int) -> float:
 def constriction(c: float) -> float:
     """χ for c1 = c2 = c (Eq 3), φ = 2c > 4."""
     phi = 2.0 * c
-    return 2.0 / abs(2.0 - phi - np.sqrt(phi * phi - 4.0 * phi))
+    return 2.0 / abs(2.0 - phi - math.sqrt(phi * phi - 4.0 * phi))
 
 
 def constricted_step(

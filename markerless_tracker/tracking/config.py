@@ -63,28 +63,37 @@ class TrackerConfig(ImagingSettings):
     )
     collision: str = setting(
         "elliptic",
-        "inter-penetration rule: elliptic sections with a margin; published: round, no margin; none",
+        "inter-penetration rule: elliptic sections with a margin; published: round, no margin; "
+        "none",
         choices=RULES,
     )
     update: str = setting(
-        "iteration", "when a swarm's best is updated; particle: as printed in SPPSO", choices=UPDATES
+        "iteration",
+        "when a swarm's best is updated; particle: as printed in SPPSO",
+        choices=UPDATES,
     )
     sigma_scale: float = setting(
         0.5, "factor of the published spreads of the search", least=0.01, most=100.0
     )
     sigma_rate_max: float = setting(
-        6.0, "spreads grow with the time between frames up to this many 60ths of a second", least=1.0,
+        6.0,
+        "spreads grow with the time between frames up to this many 60ths of a second",
+        least=1.0,
         most=1000.0,
     )
     edge_weight: float = setting(0.5, "weight of f_e beside f_s", least=0.0, most=100.0)
     edge_rule: str = setting(
         "outline",
-        "model edges that are sampled: sides: all; visible: those no nearer part hides; outline: those "
-        "on the outline of the whole body",
+        "model edges that are sampled: sides: all; visible: those no nearer part hides; outline: "
+        "those on the outline of the whole body",
         choices=tuple(EDGE_RULES),
     )
-    edge_term: str = setting("ssd", "f_e from edge strengths M: 1 - mean (1 - M)², or mean M", choices=EDGE_TERMS)
-    edge_spacing_px: float = setting(5.0, "distance of edge samples along a side", least=0.5, most=100.0)
+    edge_term: str = setting(
+        "ssd", "f_e from edge strengths M: 1 - mean (1 - M)², or mean M", choices=EDGE_TERMS
+    )
+    edge_spacing_px: float = setting(
+        5.0, "distance of edge samples along a side", least=0.5, most=100.0
+    )
     edge_step_px: float = setting(
         2.0, "outline: how far outside a sample must be free of the body", least=0.5, most=50.0
     )

@@ -85,7 +85,8 @@ def build_tracker(
         subject = subject_from_markers(description, start.markers_m)
     else:
         raise ConfigError(
-            f"{start_file} gives a pose but no subject: name one (--subject, --subject-from or --stature)"
+            f"{start_file} gives a pose but no subject: name one "
+            "(--subject, --subject-from or --stature)"
         )
     body = build_body(description, subject)
     if start is not None:
@@ -114,5 +115,3 @@ def first_row(path: Path) -> _MarkerRow:
 
 def _limits(body: BodyModel, config: TrackerConfig) -> FloatArray:
     return body.walking_limits if config.limits == "bt_walking" else body.limits
-
-

@@ -4,8 +4,10 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.body.model import IntArray
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Stage
@@ -32,7 +34,8 @@ def scaled_particles(
         below, above = evaluations // step * step, (evaluations // step + 1) * step
         near = f"{below} or {above}" if below > 0 else f"{above} or {above + step}"
         raise ConfigError(
-            f"evaluations is {evaluations}, which {optimizer} cannot spend exactly: nearest are {near}"
+            f"evaluations is {evaluations}, which {optimizer} cannot spend exactly: "
+            f"nearest are {near}"
         )
     share = Fraction(evaluations, whole)
     return tuple(int(particles * share) for particles, _ in published)
@@ -51,7 +54,9 @@ def sppso_stages(
     settled = sigma.copy()
     settled[translations(body)] /= _SOFT
 
-    def stage(name: str, active: FloatArray, spread: FloatArray, edge_cones: FloatArray) -> Stage:
+    def stage(
+        name: str, active: IntArray, spread: FloatArray, edge_cones: NDArray[np.bool_]
+    ) -> Stage:
         particles, iterations = {"root": (first, 20), "body": (second, 40)}[name]
         return Stage(
             name=name,
@@ -74,7 +79,7 @@ def sppso_stages(
     )
 
 
-def translations(body: BodyModel) -> FloatArray:
+def translations(body: BodyModel) -> IntArray:
     """Indices of the parameters that are translations."""
     moving = body.node_kind >= _TRANSLATION
     return np.sort(body.node_parameter[moving])

@@ -60,7 +60,8 @@ class Tracker:
         self._start = np.array(start_pose, dtype=np.float64)
         if self._start.shape != (body.size,) or not np.isfinite(self._start).all():
             raise BodyModelError(
-                f"start pose has shape {self._start.shape}, body {body.name} expects {body.size} numbers"
+                f"start pose has shape {self._start.shape}, "
+                f"body {body.name} expects {body.size} numbers"
             )
         self._pose = self._start
         self._stamp_ns: int | None = None
@@ -173,7 +174,9 @@ class Tracker:
             if isinstance(view, Observation):
                 return view
             if name not in self._segmenters:
-                raise ImageError(f"{name}: an image came, but no background to tell the person from")
+                raise ImageError(
+                    f"{name}: an image came, but no background to tell the person from"
+                )
             return self._segmenters[name].observe(view, stamp_ns)
 
         return dict(zip(views, self._pool.map(evidence, views.items()), strict=True))

@@ -26,14 +26,10 @@ class DebugImages:
         except OSError as error:
             raise DatasetError(f"{folder}: cannot be made: {error.strerror}") from error
 
-    def write(
-        self, images: FrameSet, result: TrackResult, rig: CameraRig, body: BodyModel
-    ) -> None:
+    def write(self, images: FrameSet, result: TrackResult, rig: CameraRig, body: BodyModel) -> None:
         """Write the pictures of one frame."""
         for name, observation in result.observations.items():
-            picture = draw_evidence(
-                images.images[name], observation, rig[name], body, result.pose
-            )
+            picture = draw_evidence(images.images[name], observation, rig[name], body, result.pose)
             path = self.folder / name / f"{images.index:06d}.jpg"
             path.parent.mkdir(exist_ok=True)
             if not cv2.imwrite(str(path), picture):
