@@ -32,7 +32,7 @@ class _Nodes:
         for move in chain:
             if isinstance(move.argument, str) and move.argument in self.parameters:
                 kind = _AXES.index(move.kind[1]) + (3 if move.kind[0] == "t" else 0)
-                parent = self._node(parent, fixed, kind, move.sign, self.parameters.index(move.argument))
+                parent = self._node(parent, fixed, kind, move.factor, self.parameters.index(move.argument))
                 fixed = np.eye(4)
             else:
                 fixed = fixed @ self.constant(move, where)
@@ -55,13 +55,13 @@ class _Nodes:
         result = np.eye(4)
         axis = _AXES.index(move.kind[1])
         if move.kind[0] == "t":
-            result[axis, 3] = move.sign * value
+            result[axis, 3] = move.factor * value
             return result
         if not isinstance(move.argument, float):
             raise BodyModelError(f"{where}: rotates by the length {move.argument!r}")
         i, j = (axis + 1) % 3, (axis + 2) % 3
         # Quarter turns stay exact.
-        angle = move.sign * value
+        angle = move.factor * value
         cos, sin = np.round([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))], 15)
         result[i, i], result[i, j], result[j, i], result[j, j] = cos, -sin, sin, cos
         return result

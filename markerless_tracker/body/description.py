@@ -10,7 +10,10 @@ import yaml
 
 from markerless_tracker.errors import BodyModelError
 
-_MOVE = re.compile(r"([rt][xyz])\(\s*([+-]?)\s*([A-Za-z_]\w*|\d+(?:\.\d*)?|\.\d+)\s*\)")
+_NUMBER = r"\d+(?:\.\d*)?|\.\d+"
+_MOVE = re.compile(
+    rf"([rt][xyz])\(\s*([+-]?)\s*(?:({_NUMBER})\s*\*\s*)?([A-Za-z_]\w*|{_NUMBER})\s*\)"
+)
 _SECTIONS = (
     "name lengths parameters frames root markers cones collisions subspaces".split()
 )
@@ -18,10 +21,10 @@ _SECTIONS = (
 
 @dataclass(frozen=True)
 class Move:
-    """One elementary move of a chain: ``rx(-l_hip_x)`` is kind 'rx', sign -1, argument 'l_hip_x'."""
+    """One elementary move of a chain: ``tz(-0.4*torso)`` is kind 'tz', factor -0.4, argument 'torso'."""
 
     kind: str
-    sign: float
+    factor: float
     argument: str | float
 
 
@@ -41,7 +44,7 @@ class BodyDescription:
 
 
 def parse_chain(text: str, where: str) -> tuple[Move, ...]:
-    """Parse moves such as ``ry(180) ty(+l_hip) rx(-l_hip_x)``.
+    """Parse moves such as ``ry(180) ty(+l_hip) tz(0.4*torso) rx(-l_hip_x)``.
 
     Raises:
         BodyModelError: something in the text is no move.
@@ -52,9 +55,10 @@ def parse_chain(text: str, where: str) -> tuple[Move, ...]:
             "expected moves such as rx(90) tz(-length) ry(parameter)"
         )
     moves = []
-    for kind, sign, argument in _MOVE.findall(text):
+    for kind, sign, factor, argument in _MOVE.findall(text):
         number = argument[0].isdigit() or argument[0] == "."
-        moves.append(Move(kind, -1.0 if sign == "-" else 1.0, float(argument) if number else argument))
+        signed = (-1.0 if sign == "-" else 1.0) * float(factor or 1.0)
+        moves.append(Move(kind, signed, float(argument) if number else argument))
     return tuple(moves)
 
 
