@@ -213,7 +213,9 @@ class BagRecording(Recording):
         return rig_from_messages({name: infos[name] for name in names}, transforms, where=str(path))
 
     def _listed(self) -> str:
-        return ", ".join(f"{topic} ({kind})" for topic, kind in self._files.types.items()) or "none"
+        topics = ", ".join(f"{topic} ({kind})" for topic, kind in self._files.types.items())
+        damage = f"; {self._files.damage}" if self._files.damage else ""
+        return (topics or "no topics") + damage
 
     def _count(self, path: Path) -> int:
         if self._files.counts is not None:

@@ -1,0 +1,325 @@
+"""Bags that others wrote, or that were cut, damaged or incomplete."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from markerless_tracker.camera import CameraRig, read_calibration
+from markerless_tracker.datasets import open_recording
+from markerless_tracker.errors import CalibrationError, DatasetError, ImageError, TrackerError
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+IMAGE, INFO, TF = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo", "tf2_msgs/msg/TFMessage"
+COMPRESSED = "sensor_msgs/msg/CompressedImage"
+STEP_NS = 50_000_000
+FRAME = np.random.default_rng(5).integers(0, 256, (48, 64, 3), dtype=np.uint8)
+
+
+def make(kind: str, **fields):
+    return STORE.types[kind](**fields)
+
+
+def header(stamp_ns: int, frame: str = "x"):
+    time = make("builtin_interfaces/msg/Time", sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
+    return make("std_msgs/msg/Header", stamp=time, frame_id=frame)
+
+
+def image(stamp_ns: int, pixels: np.ndarray = FRAME, encoding: str = "bgr8"):
+    return make(
+        IMAGE,
+        header=header(stamp_ns),
+        height=pixels.shape[0],
+        width=pixels.shape[1],
+        encoding=encoding,
+        is_bigendian=0,
+        step=pixels[0].size,
+        data=np.ascontiguousarray(pixels).reshape(-1),
+    )
+
+
+def save(path: Path, messages, *, rig_of: Path | None = None) -> Path:
+    """Writes (topic, type, message) triples as a bag, with a calibration beside it if given."""
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = {}
+        for number, (topic, kind, message) in enumerate(messages):
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
+            writer.write(connections[topic], number, STORE.serialize_cdr(message, kind))
+    if rig_of is not None:
+        shutil.copy(rig_of / "calibration.toml", path)
+    return path
+
+
+def both(stamp_ns: int, **kwargs):
+    return [(f"/{name}/image_raw", IMAGE, image(stamp_ns, **kwargs)) for name in ("cam01", "cam02")]
+
+
+@pytest.fixture
+def bag(make_recording, tmp_path: Path) -> Callable[..., Path]:
+    rig = make_recording()
+    return lambda messages, name="bag": save(tmp_path / name, messages, rig_of=rig)
+
+
+def test_sets_are_grouped_by_header_stamp_not_by_order(bag) -> None:
+    pairs = [both(10**18 + i * STEP_NS) for i in range(4)]
+    mixed = [pairs[0][0], pairs[1][0], pairs[0][1], pairs[1][1], *pairs[2][::-1], *pairs[3]]
+    recording = open_recording(bag(mixed))
+    assert [s.stamp_ns - 10**18 for s in recording.frames()] == [i * STEP_NS for i in range(4)]
+    assert recording.fps == 20.0 and recording.warnings == ()
+    assert recording.start_index(10**18 + 2 * STEP_NS + 1000) == 2
+    with pytest.raises(DatasetError, match="no frame within half a frame"):
+        recording.start_index(0)
+    assert [s.index for s in recording.frames(start=1, every=2)] == [1, 3]
+
+
+def test_incomplete_sets_are_skipped_and_counted(bag) -> None:
+    pairs = [both(i * STEP_NS) for i in range(6)]
+    messages = [*pairs[0], pairs[1][0], *pairs[2], pairs[3][1], *pairs[4], pairs[5][0]]
+    recording = open_recording(bag(messages))
+    assert [s.stamp_ns // STEP_NS for s in recording.frames()] == [0, 2, 4]
+    assert len(recording.warnings) == 1 and "cam01 1, cam02 2" in recording.warnings[0]
+
+
+def test_a_silent_camera_fills_no_memory_and_ends_in_an_error(bag) -> None:
+    messages = [both(i * STEP_NS)[0] for i in range(50)]
+    messages += [both(10**12)[1]]
+    with pytest.raises(DatasetError, match="no set of images is complete.*cam01, cam02"):
+        open_recording(bag(messages))
+
+
+def test_time_running_back_is_told(bag) -> None:
+    messages = [m for i in (0, 1, 2, 0, 1) for m in both(i * STEP_NS)]
+    recording = open_recording(bag(messages))
+    assert len(list(recording.frames())) == 3
+    assert "came after later ones" in recording.warnings[0] and "cam01 2" in recording.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "pixels"),
+    [("rgb8", FRAME[..., ::-1]), ("bgra8", np.dstack([FRAME, FRAME[..., 0]])), ("bgr8", FRAME)],
+)
+def test_encodings(bag, encoding: str, pixels: np.ndarray) -> None:
+    recording = open_recording(bag(both(0, pixels=pixels, encoding=encoding)))
+    np.testing.assert_array_equal(next(recording.frames()).images["cam02"], FRAME)
+
+
+def test_grey_and_compressed_images(bag) -> None:
+    data = cv2.imencode(".png", FRAME)[1].reshape(-1)
+    messages = [("/cam01/image_raw", IMAGE, image(0, FRAME[..., 0], "mono8"))]
+    png = make(COMPRESSED, header=header(0), format="png", data=data)
+    messages += [("/ns/cam02/image_raw/compressed", COMPRESSED, png)]
+    images = next(open_recording(bag(messages)).frames()).images
+    np.testing.assert_array_equal(images["cam01"], FRAME[..., 0])
+    np.testing.assert_array_equal(images["cam02"], FRAME)
+
+
+def test_images_that_do_not_fit_are_named(bag) -> None:
+    recording = open_recording(bag(both(0, pixels=FRAME[:40]), "cut"))
+    with pytest.raises(ImageError, match="/cam01/image_raw.*64x40.*64x48"):
+        next(recording.frames())
+    recording = open_recording(bag(both(0, pixels=FRAME, encoding="yuv422"), "yuv"))
+    with pytest.raises(ImageError, match="/cam01/image_raw.*yuv422.*bgr8"):
+        next(recording.frames())
+
+
+def test_missing_topics_are_listed(bag) -> None:
+    only = [m for i in range(2) for m in both(i * STEP_NS)[:1]]
+    with pytest.raises(
+        DatasetError, match="no images of cam02.*/cam02/image_raw.*/cam01/image_raw"
+    ):
+        open_recording(bag(only))
+
+
+def info(name: str, rig: CameraRig, **changes):
+    camera = rig[name]
+    fields = {
+        "header": header(0, f"{name}_optical_frame"),
+        "height": camera.size_px[1],
+        "width": camera.size_px[0],
+        "distortion_model": "plumb_bob",
+        "d": camera.distortion.copy(),
+        "k": camera.matrix.reshape(-1).copy(),
+        "r": np.eye(3).reshape(-1),
+        "p": np.zeros(12),
+        "binning_x": 0,
+        "binning_y": 0,
+        "roi": make(
+            "sensor_msgs/msg/RegionOfInterest",
+            x_offset=0,
+            y_offset=0,
+            height=0,
+            width=0,
+            do_rectify=False,
+        ),
+    }
+    return (f"/{name}/camera_info", INFO, make(INFO, **{**fields, **changes}))
+
+
+def static(parent: str, child: str, translation, quaternion=(1.0, 0.0, 0.0, 0.0)):
+    w, x, y, z = quaternion
+    tx, ty, tz = translation
+    return make(
+        "geometry_msgs/msg/TransformStamped",
+        header=header(0, parent),
+        child_frame_id=child,
+        transform=make(
+            "geometry_msgs/msg/Transform",
+            translation=make("geometry_msgs/msg/Vector3", x=tx, y=ty, z=tz),
+            rotation=make("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
+        ),
+    )
+
+
+def frames_message(*transforms):
+    return ("/tf_static", TF, make(TF, transforms=list(transforms)))
+
+
+def test_without_calibration_file_the_topics_tell(make_recording, tmp_path: Path) -> None:
+    rig = read_calibration(make_recording() / "calibration.toml")
+    # map -> rig (turned by 90 degrees about z) -> camera.
+    chain = frames_message(
+        static("map", "rig", (1.0, 2.0, 3.0), (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5))),
+        static("rig", "cam01_optical_frame", (1.0, 0.0, 0.0)),
+        static("map", "cam02_optical_frame", (0.0, 0.0, 1.0)),
+    )
+    messages = [chain, info("cam01", rig), info("cam02", rig), *both(0), *both(STEP_NS)]
+    recording = open_recording(save(tmp_path / "bag", messages))
+    assert recording.rig.names == ("cam01", "cam02")
+    camera = recording.rig["cam01"]
+    np.testing.assert_allclose(camera.T_world_cam[:3, 3], [1.0, 3.0, 3.0], atol=1e-12)
+    np.testing.assert_allclose(camera.T_world_cam[:3, 0], [0.0, 1.0, 0.0], atol=1e-12)
+    np.testing.assert_array_equal(camera.matrix, rig["cam01"].matrix)
+    np.testing.assert_array_equal(camera.distortion, rig["cam01"].distortion)
+
+
+def test_topics_that_tell_too_little_are_named(make_recording, tmp_path: Path) -> None:
+    rig = read_calibration(make_recording() / "calibration.toml")
+    infos = [info("cam01", rig), info("cam02", rig)]
+    one = static("map", "cam01_optical_frame", (0.0, 0.0, 0.0))
+    two = static("map", "cam02_optical_frame", (0.0, 0.0, 0.0))
+    nothing = static("map", "cam02_optical_frame", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
+    cases = [
+        ([infos[0]], DatasetError, "no calibration of cam02.*cam02/camera_info"),
+        ([*infos, frames_message(one)], CalibrationError, "cam02.*no static transform"),
+        ([*infos, frames_message(one, nothing)], CalibrationError, "cam02.*no rotation"),
+        (
+            [*infos, frames_message(one, static("odom", "cam02_optical_frame", (0.0, 0.0, 0.0)))],
+            CalibrationError,
+            "cam02 in odom",
+        ),
+        (
+            [*infos, frames_message(one, two, static("cam02_optical_frame", "map", (0.0,) * 3))],
+            CalibrationError,
+            "circle",
+        ),
+        (
+            [
+                infos[0],
+                info("cam02", rig, distortion_model="equidistant"),
+                frames_message(one, two),
+            ],
+            CalibrationError,
+            "cam02.*equidistant",
+        ),
+        (
+            [infos[0], info("cam02", rig, k=np.zeros(9)), frames_message(one, two)],
+            CalibrationError,
+            "cam02.*focal",
+        ),
+    ]
+    for number, (messages, error, said) in enumerate(cases):
+        with pytest.raises(error, match=said):
+            open_recording(save(tmp_path / f"bag{number}", [*messages, *both(0)]))
+
+
+def test_a_bag_without_images_lists_what_it_has(tmp_path: Path) -> None:
+    text = make("std_msgs/msg/String", data="hello")
+    with pytest.raises(DatasetError, match=r"NAME/image_raw.*/chatter \(std_msgs/msg/String\)"):
+        open_recording(save(tmp_path / "bag", [("/chatter", "std_msgs/msg/String", text)]))
+    with pytest.raises(DatasetError, match="the bag has no topics"):
+        open_recording(save(tmp_path / "empty", []))
+
+
+def cut(path: Path, share: float) -> None:
+    file = next(path.glob("*.mcap"))
+    content = file.read_bytes()
+    file.write_bytes(content[: int(len(content) * share)])
+
+
+def test_of_a_cut_bag_everything_before_the_cut_is_read(bag) -> None:
+    path = bag([m for i in range(200) for m in both(i * STEP_NS)])
+    cut(path, 0.6)
+    recording = open_recording(path)
+    read = list(recording.frames())
+    assert 50 < len(read) < 200 and recording.frame_count == len(read)
+    assert [s.stamp_ns for s in read] == [i * STEP_NS for i in range(len(read))]
+    assert any("cut or damaged" in warning for warning in recording.warnings)
+    # The bag's description may be missing, too: it is written last.
+    (path / "metadata.yaml").unlink()
+    assert len(list(open_recording(path).frames())) == len(read)
+
+
+def test_a_bag_cut_before_its_first_set_is_an_error(bag) -> None:
+    path = bag([m for i in range(4) for m in both(i * STEP_NS)])
+    file = next(path.glob("*.mcap"))
+    for size in (0, 5, 40, 400):
+        file.write_bytes(file.read_bytes()[:400][:size].ljust(size, b"\0"))
+        with pytest.raises(DatasetError, match="not an MCAP|cut or damaged"):
+            open_recording(path)
+
+
+@settings(
+    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(st.lists(st.tuples(st.floats(0, 1), st.integers(0, 255)), min_size=1, max_size=30))
+def test_damaged_bytes_never_escape_as_another_error(whole_bag, edits) -> None:
+    file = next(whole_bag.glob("*.mcap"))
+    content = file.read_bytes()
+    damaged = bytearray(content)
+    for place, value in edits:
+        damaged[int(place * (len(damaged) - 1))] = value
+    file.write_bytes(damaged)
+    try:
+        for frame in open_recording(whole_bag).frames():
+            assert set(frame.images) == {"cam01", "cam02"}
+    except TrackerError as error:
+        assert "\n" not in str(error)
+    finally:
+        file.write_bytes(content)
+
+
+@pytest.fixture
+def whole_bag(bag) -> Path:
+    tiny = np.zeros((48, 64), np.uint8)
+    return bag([m for i in range(3) for m in both(i * STEP_NS, pixels=tiny, encoding="mono8")])
+
+
+def test_what_is_no_bag_is_named(tmp_path: Path, bag) -> None:
+    (tmp_path / "x.mcap").write_bytes(b"hello world, not a bag")
+    with pytest.raises(DatasetError, match="x.mcap: not an MCAP"):
+        open_recording(tmp_path / "x.mcap")
+    path = bag(both(0))
+    described = (path / "metadata.yaml").read_text()
+    for text, said in (
+        ("a: [", "not a rosbag2 description"),
+        ("[]", "not a rosbag2 description"),
+        (described.replace("storage_identifier: mcap", "storage_identifier: sqlite3"), "sqlite3"),
+        (described.replace("bag.mcap", "gone.mcap"), "gone.mcap: cannot be read"),
+        (described.replace("compression_mode: ''", "compression_mode: FILE"), "compressed by FILE"),
+    ):
+        assert text != described
+        (path / "metadata.yaml").write_text(text)
+        with pytest.raises(DatasetError, match=said) as error:
+            open_recording(path)
+        assert "\n" not in str(error.value)
+    (tmp_path / "void").mkdir()
+    with pytest.raises(DatasetError, match="no bag"):
+        open_recording(tmp_path / "void", format="bag")
