@@ -83,6 +83,9 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
             length or names a cone the body does not have.
     """
     d = description
+    strange = sorted(str(name) for name in subject.lengths_m if name not in d.lengths)
+    if strange:
+        raise BodyModelError(f"subject {subject.name}: body {d.name} has no length {', '.join(strange)}")
     lengths = {name: subject.length(name) for name in d.lengths}
     parameters = tuple(d.parameters)
     nodes = _Nodes(parameters, lengths)

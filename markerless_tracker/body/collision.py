@@ -40,7 +40,7 @@ class Spheres:
 def fill_with_spheres(body: BodyModel) -> Spheres:
     """Fill every cone with n + 1 spheres, n = round(length / greatest radius / 2), 1 <= n <= 20.
 
-    The radius is interpolated between the ends' mean radii and divided by
+    The radius is interpolated between the ends' greater radii and divided by
     sqrt(1 + (difference / length)²), which makes the sphere touch the cone's side.
     """
     first, centres, radii = [0], [], []

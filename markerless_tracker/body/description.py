@@ -8,20 +8,18 @@ from typing import Any
 
 import yaml
 
+from markerless_tracker.body.schema import check_description
 from markerless_tracker.errors import BodyModelError
 
 _NUMBER = r"\d+(?:\.\d*)?|\.\d+"
 _MOVE = re.compile(
     rf"([rt][xyz])\(\s*([+-]?)\s*(?:({_NUMBER})\s*\*\s*)?([A-Za-z_]\w*|{_NUMBER})\s*\)"
 )
-_SECTIONS = (
-    "name lengths parameters frames root markers cones collisions subspaces".split()
-)
 
 
 @dataclass(frozen=True)
 class Move:
-    """One elementary move of a chain: ``tz(-0.4*torso)`` is kind 'tz', factor -0.4, argument 'torso'."""
+    """One elementary move of a chain: ``tz(-0.4*torso)`` moves along z by -0.4 times 'torso'."""
 
     kind: str
     factor: float
@@ -66,29 +64,23 @@ def read_description(path: Path) -> BodyDescription:
     """Read a body description file.
 
     Raises:
-        BodyModelError: the file cannot be read, is not YAML, or a section is missing or unknown.
+        BodyModelError: the file cannot be read, is not YAML, or does not have the shape that
+            `check_description` asks for.
     """
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as error:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         first = str(error).splitlines()[0]
         raise BodyModelError(f"{path}: cannot read the body description: {first}") from error
-    if not isinstance(data, dict):
-        raise BodyModelError(f"{path}: expected a mapping with {', '.join(_SECTIONS)}")
-    wrong = sorted(set(data) ^ set(_SECTIONS))
-    if wrong:
-        raise BodyModelError(
-            f"{path}: sections {', '.join(map(str, wrong))} missing or unknown, "
-            f"expected exactly {', '.join(_SECTIONS)}"
-        )
+    check_description(data, str(path))
     return BodyDescription(
-        name=str(data["name"]),
+        name=data["name"],
         lengths=data["lengths"],
         parameters=data["parameters"],
         frames=data["frames"],
-        root=str(data["root"]),
+        root=data["root"],
         markers=data["markers"],
         cones=data["cones"],
-        collisions=tuple((str(a), str(b)) for a, b in data["collisions"]),
+        collisions=tuple((a, b) for a, b in data["collisions"]),
         subspaces={name: tuple(members) for name, members in data["subspaces"].items()},
     )

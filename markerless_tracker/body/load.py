@@ -23,13 +23,26 @@ def load_description(name_or_file: str | Path) -> BodyDescription:
     shipped = folder / f"{name_or_file}.yaml"
     if not shipped.is_file():
         names = ", ".join(sorted(p.stem for p in folder.glob("*.yaml")))
-        raise BodyModelError(f"body {str(name_or_file)!r} is unknown, expected {names} or a .yaml file")
+        raise BodyModelError(
+            f"body {str(name_or_file)!r} is unknown, expected {names} or a .yaml file"
+        )
     return read_description(shipped)
 
 
 def load_body(name_or_file: str | Path, subject: Subject | float = 1.72) -> BodyModel:
-    """A body with a subject's sizes; a number is a stature in metres."""
+    """A body with a subject's sizes; a number is a stature in metres.
+
+    Raises:
+        BodyModelError: no such body, it is malformed (the message names a file's path), or the subject
+            does not fit it.
+    """
     description = load_description(name_or_file)
     if not isinstance(subject, Subject):
         subject = subject_from_stature(description, subject)
-    return build_body(description, subject)
+    try:
+        return build_body(description, subject)
+    except BodyModelError as error:
+        # What is wrong with the subject is not the description's fault.
+        if str(error).startswith("subject ") or str(name_or_file) == description.name:
+            raise
+        raise BodyModelError(f"{name_or_file}: {error}") from error

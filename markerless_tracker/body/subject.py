@@ -30,15 +30,21 @@ class Subject:
 
     def __post_init__(self) -> None:
         for key, value in self.lengths_m.items():
-            if not (isinstance(value, (int, float)) and np.isfinite(value) and 0.0 < value < 3.0):
+            number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            if not (number and np.isfinite(value) and 0.0 < value < 3.0):
                 raise BodyModelError(
-                    f"subject {self.name}: length {key} is {value!r}, expected metres between 0 and 3"
+                    f"subject {self.name}: length {key} is {value!r}, "
+                    "expected metres between 0 and 3"
                 )
         for key, shape in self.cones_m.items():
             if np.shape(shape) != (2, 4) or not np.isfinite(np.asarray(shape, dtype=float)).all():
                 raise BodyModelError(
                     f"subject {self.name}: cone {key} needs two rows of "
                     "[radius x, radius y, offset x, offset y] in metres"
+                )
+            if np.min(np.asarray(shape, dtype=float)[:, :2]) <= 0.0:
+                raise BodyModelError(
+                    f"subject {self.name}: cone {key} has a radius that is not above 0"
                 )
 
     def length(self, name: str) -> float:
@@ -109,14 +115,18 @@ def read_subject(path: Path) -> Subject:
     """
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise BodyModelError(f"{path}: cannot read the subject: {str(error).splitlines()[0]}") from error
     if not isinstance(data, dict) or not isinstance(data.get("lengths_m"), dict):
         raise BodyModelError(f"{path}: expected name, lengths_m and optionally cones_m")
     unknown = sorted(set(map(str, data)) - {"name", "lengths_m", "cones_m"})
     if unknown:
         raise BodyModelError(f"{path}: unknown entry {', '.join(unknown)}")
-    return Subject(str(data.get("name", path.stem)), data["lengths_m"], _shapes(data, path))
+    shapes = _shapes(data, path)
+    try:
+        return Subject(str(data.get("name", path.stem)), data["lengths_m"], shapes)
+    except BodyModelError as error:
+        raise BodyModelError(f"{path}: {error}") from error
 
 
 def write_subject(path: Path, subject: Subject) -> None:

@@ -44,13 +44,13 @@ TABLE = (
 )
 
 
-def test_parameters_stand_in_the_published_order():
+def test_parameters_stand_in_the_published_order() -> None:
     assert BODY.parameter_names == tuple(row[0] for row in TABLE)
     assert BODY.size == 31 and len(BODY.cone_names) == 10
 
 
 @pytest.mark.parametrize(("name", "sigma", "least", "most"), TABLE)
-def test_sigma_and_walking_limits_are_the_published_ones(name, sigma, least, most):
+def test_sigma_and_walking_limits_are_the_published_ones(name, sigma, least, most) -> None:
     unit = 0.001 if name in ("pelvis_tx", "pelvis_ty", "pelvis_tz") else 1.0
     i = BODY.index(name)
     assert BODY.sigma[i] == pytest.approx(sigma * unit, rel=1e-12)
@@ -58,7 +58,7 @@ def test_sigma_and_walking_limits_are_the_published_ones(name, sigma, least, mos
     np.testing.assert_allclose(BODY.walking_limits[:, i], expected, rtol=1e-12)
 
 
-def test_default_limits_are_anatomical():
+def test_default_limits_are_anatomical() -> None:
     def degrees(name):
         i = BODY.index(name)
         return np.rad2deg(BODY.limits[:, i] - BODY.neutral[i])
@@ -81,19 +81,19 @@ def test_default_limits_are_anatomical():
         np.testing.assert_allclose(degrees(name), [-50, 50])
 
 
-def test_neutral_keeps_every_default_rule():
+def test_neutral_keeps_every_default_rule() -> None:
     for rule in ("elliptic", "published"):
         assert Feasibility(BODY, BODY.limits, rule)(BODY.neutral[None]).all()
 
 
-def test_subspaces_share_out_the_parameters():
+def test_subspaces_share_out_the_parameters() -> None:
     members = np.concatenate(list(BODY.subspaces.values()))
     assert sorted(members) == list(range(31))
     sizes = {name: len(part) for name, part in BODY.subspaces.items()}
     assert sizes == {"root": 6, "torso_head": 5, "l_arm": 6, "r_arm": 6, "l_leg": 4, "r_leg": 4}
 
 
-def test_cones_have_the_sample_subjects_proportions():
+def test_cones_have_the_sample_subjects_proportions() -> None:
     """Radii over length of the published sample subject (mm)."""
     published = {
         "torso": (160 * 0.884, 160, 160 * 0.884, 160, 579),
@@ -114,13 +114,13 @@ def test_cones_have_the_sample_subjects_proportions():
         assert not BODY.cone_shape[i, :, 2:].any()
 
 
-def test_edges_leave_the_head_out():
+def test_edges_leave_the_head_out() -> None:
     """Sides of every cone but the head's, and the upper edge of the torso."""
     for name, (sides, top) in zip(BODY.cone_names, BODY.cone_edges, strict=True):
         assert sides == (name != "head") and top == (name == "torso")
 
 
-def test_collision_pairs_are_the_published_ones():
+def test_collision_pairs_are_the_published_ones() -> None:
     pairs = {frozenset(BODY.cone_names[i] for i in pair) for pair in BODY.collisions}
     assert pairs == {
         frozenset(("l_forearm", "torso")),
@@ -129,17 +129,17 @@ def test_collision_pairs_are_the_published_ones():
     }
 
 
-def test_arrays_are_read_only():
+def test_arrays_are_read_only() -> None:
     with pytest.raises(ValueError, match="read-only"):
         BODY.limits[0, 0] = 1.0
 
 
-def test_unknown_parameter_is_named():
+def test_unknown_parameter_is_named() -> None:
     with pytest.raises(BodyModelError, match="balan31 has no parameter 'l_toe'"):
         BODY.index("l_toe")
 
 
-def test_stature_scales_everything():
+def test_stature_scales_everything() -> None:
     small, tall = load_body("balan31", 1.0), load_body("balan31", 2.0)
     np.testing.assert_allclose(2 * small.cone_length, tall.cone_length)
     np.testing.assert_allclose(2 * small.cone_shape, tall.cone_shape)

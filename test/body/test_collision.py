@@ -36,14 +36,14 @@ def spheres_of(body, name):
     return spheres.centre[part], spheres.radius[part]
 
 
-def test_spheres_of_a_straight_cone_by_hand():
+def test_spheres_of_a_straight_cone_by_hand() -> None:
     # round(0.9 / 0.1 / 2) = round(4.5) = 4, five spheres; the flat section (0.05) is ignored.
     centre, radius = spheres_of(with_cone(0.9, [0.05, 0.1, 0, 0], [0.05, 0.1, 0, 0]), "torso")
     np.testing.assert_allclose(centre, [[0, 0, z] for z in (0, 0.225, 0.45, 0.675, 0.9)])
     np.testing.assert_allclose(radius, 0.1)
 
 
-def test_spheres_of_a_tapered_leaning_cone_by_hand():
+def test_spheres_of_a_tapered_leaning_cone_by_hand() -> None:
     # round(0.4 / 0.1 / 2) = 2, three spheres; radii shrink by sqrt(1 + (0.03 / 0.4)²).
     body = with_cone(0.4, [0.1, 0.1, 0, 0], [0.07, 0.07, 0.02, -0.04])
     centre, radius = spheres_of(body, "torso")
@@ -52,7 +52,7 @@ def test_spheres_of_a_tapered_leaning_cone_by_hand():
 
 
 @pytest.mark.parametrize(("length", "count"), [(0.1, 2), (0.5, 3), (100.0, 21)])
-def test_at_least_two_spheres_and_at_most_twenty_one(length, count):
+def test_at_least_two_spheres_and_at_most_twenty_one(length, count) -> None:
     _, radius = spheres_of(with_cone(length, [0.1, 0.1, 0, 0], [0.1, 0.1, 0, 0]), "torso")
     assert len(radius) == count
 
@@ -106,13 +106,13 @@ def crowded_poses(seed, count):
 @pytest.mark.parametrize(
     ("rule", "twin"), [("published", slow_published), ("elliptic", slow_elliptic)]
 )
-def test_rules_agree_with_their_slow_twins(rule, twin, seed):
+def test_rules_agree_with_their_slow_twins(rule, twin, seed) -> None:
     poses = crowded_poses(seed, 8)
     expected = [twin(BODY, pose) for pose in poses]
     np.testing.assert_array_equal(Feasibility(BODY, FREE, rule)(poses), expected)
 
 
-def test_crowded_poses_are_told_apart():
+def test_crowded_poses_are_told_apart() -> None:
     """Otherwise the comparison with the twins would prove nothing."""
     poses = crowded_poses(0, 400)
     shares = {r: Feasibility(BODY, FREE, r)(poses).mean() for r in ("published", "elliptic")}
@@ -159,14 +159,14 @@ def beside_torso(x, y):
         (0.0, 0.241, True, True),
     ],
 )
-def test_a_forearm_beside_the_torso(x, y, elliptic, published):
+def test_a_forearm_beside_the_torso(x, y, elliptic, published) -> None:
     assert beside_torso(x, y) == {"elliptic": elliptic, "published": published}
 
 
 # --- limits ----------------------------------------------------------------------------------
 
 
-def test_limits_are_kept_including_the_ends():
+def test_limits_are_kept_including_the_ends() -> None:
     poses = np.tile(BODY.neutral, (4, 1))
     knee = BODY.index("l_knee")
     low, high = BODY.limits[:, knee]
@@ -176,16 +176,16 @@ def test_limits_are_kept_including_the_ends():
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_poses_that_are_no_numbers_are_infeasible(value):
+def test_poses_that_are_no_numbers_are_infeasible(value) -> None:
     pose = BODY.neutral.copy()
     pose[BODY.index("l_elbow")] = value
     assert not Feasibility(BODY, BODY.limits, "elliptic")(pose[None]).any()
 
 
-def test_no_poses():
+def test_no_poses() -> None:
     assert Feasibility(BODY, BODY.limits, "elliptic")(np.empty((0, BODY.size))).shape == (0,)
 
 
-def test_unknown_rule():
+def test_unknown_rule() -> None:
     with pytest.raises(ConfigError, match="collision is 'soft', expected one of elliptic, pub"):
         Feasibility(BODY, BODY.limits, "soft")

@@ -72,7 +72,10 @@ def published_frames(x, d):
     frames["thorax"] = thorax
     for side, sign, c in (("l", -1, 15), ("r", 1, 21)):
         clavicle = (
-            thorax @ rx(sign * pi / 2) @ e_inv(x[c], x[c + 1], 0) @ move(0, 0, -d[f"{side}_clavicle"])
+            thorax
+            @ rx(sign * pi / 2)
+            @ e_inv(x[c], x[c + 1], 0)
+            @ move(0, 0, -d[f"{side}_clavicle"])
         )
         shoulder = clavicle @ rx(-pi / 2) @ rz(pi) @ ry(-pi / 2) @ e_inv(*x[c + 2 : c + 5])
         elbow = shoulder @ move(0, 0, -d[f"{side}_upper_arm"]) @ e_inv(0, x[c + 5], 0)
@@ -99,7 +102,7 @@ def published_markers(x, d):
 
 @settings(max_examples=50, deadline=None)
 @given(POSES)
-def test_frames_are_the_published_ones(pose):
+def test_frames_are_the_published_ones(pose) -> None:
     nodes = transforms(BODY, pose)
     expected = published_frames(pose, _LENGTHS)
     assert set(expected) == set(BODY.frames)
@@ -109,13 +112,13 @@ def test_frames_are_the_published_ones(pose):
 
 @settings(max_examples=50, deadline=None)
 @given(POSES)
-def test_markers_are_the_published_ones(pose):
+def test_markers_are_the_published_ones(pose) -> None:
     np.testing.assert_allclose(markers(BODY, pose), published_markers(pose, _LENGTHS), atol=1e-12)
 
 
 @settings(max_examples=20, deadline=None)
 @given(POSES)
-def test_cones_lie_between_their_joints(pose):
+def test_cones_lie_between_their_joints(pose) -> None:
     """Legs and head along their frames' +z, arms along -z, the torso rigid with the pelvis."""
     frames = published_frames(pose, _LENGTHS)
     down = rx(np.pi)
@@ -132,13 +135,13 @@ def test_cones_lie_between_their_joints(pose):
         assert BODY.cone_length[i] == _LENGTHS[name]
 
 
-def test_root_transform_is_the_pelvis():
+def test_root_transform_is_the_pelvis() -> None:
     pose = np.linspace(-1, 1, BODY.size)
     T = root_transform(BODY, pose)
     np.testing.assert_allclose(T, published_frames(pose, _LENGTHS)["pelvis"], atol=1e-12)
 
 
-def test_neutral_stands_upright_with_hanging_arms():
+def test_neutral_stands_upright_with_hanging_arms() -> None:
     at = dict(zip(MARKER_NAMES, markers(BODY, BODY.neutral), strict=True))
     d = _LENGTHS
     np.testing.assert_allclose(at["LHip"], [0, d["l_hip_offset"], 0], atol=1e-12)
@@ -150,7 +153,7 @@ def test_neutral_stands_upright_with_hanging_arms():
         assert np.hypot(*arm[:2]) < 1e-9 and arm[2] < -0.4
 
 
-def test_signs_of_flexion():
+def test_signs_of_flexion() -> None:
     """Forward is +x: what each joint's positive direction does, as users and start files need it."""
     for name, marker, direction in (
         ("l_hip_y", "LKnee", 1), ("r_hip_y", "RKnee", 1),
@@ -184,7 +187,7 @@ def slow_transforms(pose, parent, fixed, kind, sign, parameter):
 
 @settings(max_examples=100, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12), st.integers(1, 6))
-def test_any_tree_moves_as_its_slow_twin(seed, nodes, parameters):
+def test_any_tree_moves_as_its_slow_twin(seed, nodes, parameters) -> None:
     rng = np.random.default_rng(seed)
     parent = np.array([rng.integers(-1, n) for n in range(nodes)])
     kind = rng.integers(-1, 6, nodes)
@@ -201,7 +204,7 @@ def test_any_tree_moves_as_its_slow_twin(seed, nodes, parameters):
     )
 
 
-def test_description_and_body_agree_on_names():
+def test_description_and_body_agree_on_names() -> None:
     description = load_description("balan31")
     assert tuple(description.parameters) == BODY.parameter_names
     assert BODY.joint_names == BODY.parameter_names[6:]

@@ -50,14 +50,14 @@ def random_pose(seed):
 
 @settings(max_examples=12, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_exact_markers_are_met_within_a_millimetre(seed):
+def test_exact_markers_are_met_within_a_millimetre(seed) -> None:
     points = markers(BODY, random_pose(seed))
     fitted = pose_from_markers(BODY, named(points))
     assert error_mm(BODY, fitted, points) < 1.0
     assert (BODY.limits[0] <= fitted).all() and (fitted <= BODY.limits[1]).all()
 
 
-def test_missing_markers_leave_their_joints_near_neutral():
+def test_missing_markers_leave_their_joints_near_neutral() -> None:
     pose = BODY.neutral.copy()
     pose[BODY.index("l_hip_y")] += 0.5
     points = named(markers(BODY, pose))
@@ -69,7 +69,7 @@ def test_missing_markers_leave_their_joints_near_neutral():
     assert abs(fitted[BODY.index("l_elbow")]) < 0.1
 
 
-def test_narrower_limits_are_kept():
+def test_narrower_limits_are_kept() -> None:
     limits = np.stack([BODY.neutral - 0.05, BODY.neutral + 0.05])
     limits[:, BODY.root] = [[-np.inf], [np.inf]]
     pose = BODY.neutral.copy()
@@ -79,19 +79,19 @@ def test_narrower_limits_are_kept():
 
 
 @pytest.mark.parametrize("missing", ["LHip", "RHip", "Neck"])
-def test_markers_that_give_no_heading_are_named(missing):
+def test_markers_that_give_no_heading_are_named(missing) -> None:
     points = named(markers(BODY, BODY.neutral))
     del points[missing]
     with pytest.raises(BodyModelError, match=f"start pose: marker {missing} is missing, expected"):
         pose_from_markers(BODY, points)
 
 
-def test_no_markers():
+def test_no_markers() -> None:
     with pytest.raises(BodyModelError, match="got none"):
         pose_from_markers(BODY, {})
 
 
-def test_markers_on_a_line():
+def test_markers_on_a_line() -> None:
     points = {"LHip": np.array([0, 0, 0.1]), "RHip": np.zeros(3), "Neck": np.array([0, 0, 1.0])}
     with pytest.raises(BodyModelError, match="LHip, RHip and Neck lie on one line"):
         pose_from_markers(BODY, points)
@@ -101,7 +101,7 @@ def test_markers_on_a_line():
 
 
 @pytest.mark.parametrize(("name", "most_mm"), [("balance_real", 20.0), ("render_walk", 4.0)])
-def test_reference_poses_are_feasible(name, most_mm):
+def test_reference_poses_are_feasible(name, most_mm) -> None:
     """Every 10th reference row has a pose that the default rules allow; the walking limits do not."""
     path = DATA / name / "ground_truth.trc"
     if not path.is_file():
@@ -134,9 +134,11 @@ def test_reference_poses_are_feasible(name, most_mm):
 # --- files -----------------------------------------------------------------------------------
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_a_pose_file_is_read_back_exactly(tmp_path, seed):
+def test_a_pose_file_is_read_back_exactly(tmp_path, seed) -> None:
     pose = random_pose(seed)
     write_pose(tmp_path / "start.yaml", BODY, pose)
     np.testing.assert_array_equal(read_pose(tmp_path / "start.yaml", BODY), pose)
@@ -145,7 +147,7 @@ def test_a_pose_file_is_read_back_exactly(tmp_path, seed):
 ROOT = "\n".join(f"pelvis_{name}: 0.5" for name in ("rx", "ry", "rz", "tx", "ty", "tz"))
 
 
-def test_parameters_that_are_not_named_stay_neutral(tmp_path):
+def test_parameters_that_are_not_named_stay_neutral(tmp_path) -> None:
     file = tmp_path / "start.yaml"
     file.write_text(ROOT + "\nl_knee: -1\n")
     expected = BODY.neutral.copy()
@@ -169,7 +171,7 @@ def test_parameters_that_are_not_named_stay_neutral(tmp_path):
         ("l_knee: -1", "pelvis_rx, pelvis_ry, pelvis_rz, pelvis_tx, pelvis_ty, pelvis_tz must"),
     ],
 )
-def test_malformed_pose_files_name_file_and_key(tmp_path, text, words):
+def test_malformed_pose_files_name_file_and_key(tmp_path, text, words) -> None:
     file = tmp_path / "start.yaml"
     file.write_text(text)
     with pytest.raises(BodyModelError, match=words) as error:
@@ -177,7 +179,7 @@ def test_malformed_pose_files_name_file_and_key(tmp_path, text, words):
     assert str(file) in str(error.value) and "\n" not in str(error.value)
 
 
-def test_missing_and_binary_pose_files(tmp_path):
+def test_missing_and_binary_pose_files(tmp_path) -> None:
     with pytest.raises(BodyModelError, match="nowhere.yaml"):
         read_pose(tmp_path / "nowhere.yaml", BODY)
     (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00\x81")

@@ -53,7 +53,7 @@ def link_transforms(text, values, T_world_root):
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_links_and_markers_lie_where_the_body_has_them(seed):
+def test_links_and_markers_lie_where_the_body_has_them(seed) -> None:
     pose = np.random.default_rng(seed).uniform(-3, 3, BODY.size)
     values = dict(zip(BODY.parameter_names, pose, strict=True))
     root, links = link_transforms(urdf(BODY), values, root_transform(BODY, pose))
@@ -66,7 +66,7 @@ def test_links_and_markers_lie_where_the_body_has_them(seed):
         np.testing.assert_allclose(links[frame][:3], nodes[node], atol=1e-9)
 
 
-def test_joints_carry_the_joint_names_and_limits():
+def test_joints_carry_the_joint_names_and_limits() -> None:
     robot = ElementTree.fromstring(urdf(BODY))
     moving = [joint for joint in robot.findall("joint") if joint.get("type") != "fixed"]
     assert sorted(joint.get("name") for joint in moving) == sorted(BODY.joint_names)
@@ -77,7 +77,7 @@ def test_joints_carry_the_joint_names_and_limits():
         np.testing.assert_allclose([float(limit.get("lower")), float(limit.get("upper"))], expected)
 
 
-def test_cones_are_cylinders_of_their_length():
+def test_cones_are_cylinders_of_their_length() -> None:
     robot = ElementTree.fromstring(urdf(BODY))
     visuals = {visual.get("name"): visual for visual in robot.iter("visual")}
     assert set(visuals) == set(BODY.cone_names)
@@ -88,7 +88,7 @@ def test_cones_are_cylinders_of_their_length():
     np.testing.assert_allclose(thigh, [0, 0, BODY.lengths_m["l_thigh"] / 2])
 
 
-def test_a_free_joint_is_continuous():
+def test_a_free_joint_is_continuous() -> None:
     limits = BODY.limits.copy()
     limits[:, BODY.index("l_knee")] = -np.inf, np.inf
     robot = ElementTree.fromstring(urdf(dataclasses.replace(BODY, limits=limits)))
@@ -96,7 +96,7 @@ def test_a_free_joint_is_continuous():
     assert knee.get("type") == "continuous" and knee.find("limit") is None
 
 
-def test_a_parameter_of_two_joints_is_mimicked():
+def test_a_parameter_of_two_joints_is_mimicked() -> None:
     parameters = BODY.node_parameter.copy()
     parameters[parameters == BODY.index("r_knee")] = BODY.index("l_knee")
     body = dataclasses.replace(BODY, node_parameter=parameters)
@@ -107,14 +107,14 @@ def test_a_parameter_of_two_joints_is_mimicked():
     assert len({joint.get("name") for joint in joints}) == len(joints)
 
 
-def test_a_frame_beside_the_root_is_an_error():
+def test_a_frame_beside_the_root_is_an_error() -> None:
     parents = BODY.node_parent.copy()
     parents[BODY.frames["head"] - 2] = -1
     with pytest.raises(BodyModelError, match="does not hang from the root frame pelvis"):
         urdf(dataclasses.replace(BODY, node_parent=parents))
 
 
-def test_links_of_one_name_are_an_error():
+def test_links_of_one_name_are_an_error() -> None:
     frames = {("LKnee" if name == "l_knee" else name): node for name, node in BODY.frames.items()}
     with pytest.raises(BodyModelError, match="must differ in name"):
         urdf(dataclasses.replace(BODY, frames=frames))
