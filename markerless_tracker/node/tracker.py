@@ -63,7 +63,7 @@ class TrackerNode(Node):
         declare_effective(
             self, parameters.effective_values(self._settings), parameters.descriptions()
         )
-        self._clock: Callable[[], float] = time.monotonic
+        self._seconds: Callable[[], float] = time.monotonic
         self._source = RigSource(self._settings)
         names = self._source.names
         tolerance_ns = round(self._settings.sync_tolerance * 1e9)
@@ -87,7 +87,7 @@ class TrackerNode(Node):
             prepare=self._prepare,
             publish=self._publish,
             report=self._warn,
-            clock=self._clock,
+            clock=self._seconds,
         )
         self._worker.start()
 
@@ -113,7 +113,7 @@ class TrackerNode(Node):
     def _input(self, name: str) -> CameraInput:
         camera = None if self._source.rig is None else self._source.rig[name]
         return CameraInput(
-            name, camera, self._sets, self._status, report=self._warn, clock=self._clock
+            name, camera, self._sets, self._status, report=self._warn, clock=self._seconds
         )
 
     def _listen(self) -> None:
@@ -218,7 +218,7 @@ class TrackerNode(Node):
             return message
 
     def _tick(self) -> None:
-        now_s = self._clock()
+        now_s = self._seconds()
         silent = self._sets.silent(now_s, PATIENCE_S)
         others_speak = len(silent) < len(self._inputs)
         missing: list[str] = []
