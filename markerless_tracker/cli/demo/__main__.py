@@ -86,7 +86,7 @@ def _convert(scene: Scene, bag: Path, console: Console) -> tuple[int, float]:
             recording, bag, backgrounds=backgrounds, progress=lambda done, _: advance("", done)
         )
     for warning in recording.warnings:
-        console.print(f"  {warning}", markup=False, style="dim")
+        console.print(f"  {warning}", markup=False, style="dim", soft_wrap=True)
     return summary.sets, recording.fps
 
 
