@@ -11,18 +11,19 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from markerless_tracker.body import MARKER_NAMES
-from markerless_tracker.datasets import MarkerTrack, write_trc
-from markerless_tracker.datasets.target import new_folder
+from markerless_tracker.body import MARKER_NAMES, Subject, write_pose, write_subject
+from markerless_tracker.datasets import MarkerTrack
+from markerless_tracker.datasets.writer import new_recording
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.synthesis import MILD_LENS, MOTIONS, SyntheticScene, write_recording
+from markerless_tracker.synthesis import MILD_LENS, MOTIONS, SyntheticScene
 
 HELP = (
     "Write a made-up person (shaded cones in a textured room) as a recording folder: calibration, "
-    "videos, empty-scene videos, exact masks and markers, subject and start pose. What a tracker "
+    "videos, empty-scene images, exact masks and markers, subject and start pose. What a tracker "
     "scores on it proves that the parts fit together; it is no measure of accuracy."
 )
 EXAMPLE = "markerless_tracker synthesize made_up --seconds 2 --motion balance"
+EMPTY_IMAGES = 10
 _MOST_FRAMES = 100_000
 
 
@@ -101,21 +102,45 @@ def synthesize(
     scene: SyntheticScene,
     *,
     frames: int,
+    mask_every: int = 50,
     lossless: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> None:
     """Write a scene's first frames as a recording folder, which appears when it is whole.
 
-    Beside what `write_recording` writes: `ground_truth.trc`, the 15 markers of every frame.
+    Written: `calibration.toml`, `camNN.mp4` (`.mkv` if lossless: some 0.6 MB per image of 656x490),
+    `background/camNN/` with empty images, `masks/camNN/FFFFFF.png` for every `mask_every`-th frame,
+    `ground_truth.trc` (the 15 markers of every frame), `subject.yaml` and `start.yaml` (the true pose
+    of frame 0).
+
+    Args:
+        out: a new or an empty folder.
+        scene: what to write; it names the frame rate.
+        frames: number of frames.
+        mask_every: distance of the frames with exact masks.
+        lossless: keep every grey level instead of compressing as ordinary cameras do.
+        progress: called with the number of frames written so far.
 
     Raises:
-        DatasetError: something is at `out` already, or it cannot be written.
+        DatasetError: something is at `out` already, it cannot be written, or a size is odd.
     """
-    with new_folder(out) as folder:
-        write_recording(scene, folder, frames=frames, lossless=lossless, progress=progress)
+    with new_recording(out, scene.rig, scene.fps, lossless=lossless) as writer:
+        for name, images in scene.backgrounds(EMPTY_IMAGES).items():
+            writer.write_background(name, images)
+        write_subject(writer.folder / "subject.yaml", Subject("made up", scene.body.lengths_m))
+        write_pose(writer.folder / "start.yaml", scene.body, scene.pose(0))
+        for index in range(frames):
+            views, masks, _ = scene.frame(index)
+            wanted = masks if index % mask_every == 0 else {}
+            pictures = {
+                name: mask.astype(np.uint8) * np.uint8(255) for name, mask in wanted.items()
+            }
+            writer.write(views, masks=pictures)
+            if progress is not None:
+                progress(index + 1)
         stamps = np.array([scene.stamp_ns(i) for i in range(frames)], dtype=np.int64)
         truth = np.array([scene.markers(i) for i in range(frames)])
-        write_trc(folder / "ground_truth.trc", MarkerTrack(MARKER_NAMES, stamps, truth), scene.fps)
+        writer.write_truth(MarkerTrack(MARKER_NAMES, stamps, truth))
 
 
 def _size(text: str) -> tuple[int, int]:

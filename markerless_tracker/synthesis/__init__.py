@@ -1,7 +1,6 @@
 """Made-up people: motions, cameras, pictures. Errors on them are never accuracy."""
 
 from markerless_tracker.synthesis.motion import MOTIONS, Motion
-from markerless_tracker.synthesis.recording import write_recording
 from markerless_tracker.synthesis.rig import MILD_LENS, look_at, ring_rig
 from markerless_tracker.synthesis.scene import SyntheticScene
 
@@ -12,5 +11,4 @@ __all__ = [
     "SyntheticScene",
     "look_at",
     "ring_rig",
-    "write_recording",
 ]
