@@ -14,6 +14,8 @@ SIDE_SEGMENTS = 3
 MAX_POINTS = 2 * ARC_POINTS + 2 * SIDE_SEGMENTS
 NEAR_M = 0.1
 """Cones that come nearer to a camera's plane than this are not drawn in it."""
+HIDDEN, TAPERED, ONLY_END = 0, 1, 2
+"""Forms of an outline; see `cone_tangents`."""
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
@@ -35,6 +37,85 @@ def project_point(x, y, z, k, distortion, distorted, out):  # type: ignore[no-un
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
+def cone_tangents(ends, flat, arcs):  # type: ignore[no-untyped-def]
+    """Where the outline of a cone given in the camera's frame runs along its end ellipses.
+
+    Args:
+        ends: (2, 3, 3) per end its centre and its two radius vectors, m, camera frame.
+        flat: (2, 3, 2) filled with their images to first order, at focal length 1.
+        arcs: (2, 2) filled per end with the angle, rad, at which its arc begins and the angle it
+            sweeps. End 1's arc leads from the first side to the second, end 0's back. The sides
+            join the end of one arc to the beginning of the other; side 0 lies to the right of the
+            way from end 0 to end 1 as the camera sees it (y down), side 1 to the left.
+
+    Returns:
+        HIDDEN if the cone comes too near to the camera's plane, TAPERED, or, where one end's
+        ellipse hides all the rest, ONLY_END + that end, whose arc is then a full turn.
+    """
+    for e in range(2):
+        depth = ends[e, 0, 2]
+        reach = abs(ends[e, 1, 2]) + abs(ends[e, 2, 2])
+        if not depth - reach > NEAR_M:
+            return HIDDEN
+        x, y = ends[e, 0, 0] / depth, ends[e, 0, 1] / depth
+        flat[e, 0, 0], flat[e, 0, 1] = x, y
+        for m in range(1, 3):
+            flat[e, m, 0] = (ends[e, m, 0] - x * ends[e, m, 2]) / depth
+            flat[e, m, 1] = (ends[e, m, 1] - y * ends[e, m, 2]) / depth
+    turn = 2.0 * np.pi
+    gap_x = flat[1, 0, 0] - flat[0, 0, 0]
+    gap_y = flat[1, 0, 1] - flat[0, 0, 1]
+    gap = np.sqrt(gap_x * gap_x + gap_y * gap_y)
+    outer = -1
+    dx, dy = 1.0, 0.0
+    if gap >= 1e-9:
+        dx, dy = gap_x / gap, gap_y / gap
+        if gap + _support(flat, 1, dx, dy) <= _support(flat, 0, dx, dy):
+            outer = 0
+        elif gap + _support(flat, 0, dx, dy) <= _support(flat, 1, dx, dy):
+            outer = 1
+    else:
+        outer = 0 if _support(flat, 0, dx, dy) >= _support(flat, 1, dx, dy) else 1
+    if outer >= 0:
+        arcs[outer, 0] = 0.0
+        arcs[outer, 1] = turn
+        return ONLY_END + outer
+
+    angle = np.empty((2, 2))
+    for side in range(2):
+        sense = 1.0 if side == 0 else -1.0
+        nx, ny = -dy * sense, dx * sense
+        for _ in range(2):
+            # The line through the two points that reach farthest along n gives a better n.
+            tx, ty = gap_x, gap_y
+            for e in range(2):
+                s = 1.0 if e == 1 else -1.0
+                pa = flat[e, 1, 0] * nx + flat[e, 1, 1] * ny
+                pb = flat[e, 2, 0] * nx + flat[e, 2, 1] * ny
+                length = np.sqrt(pa * pa + pb * pb) + 1e-300
+                tx += s * (flat[e, 1, 0] * pa + flat[e, 2, 0] * pb) / length
+                ty += s * (flat[e, 1, 1] * pa + flat[e, 2, 1] * pb) / length
+            length = np.sqrt(tx * tx + ty * ty) + 1e-300
+            nx, ny = -ty / length * sense, tx / length * sense
+        for e in range(2):
+            angle[e, side] = np.arctan2(
+                flat[e, 2, 0] * nx + flat[e, 2, 1] * ny, flat[e, 1, 0] * nx + flat[e, 1, 1] * ny
+            )
+    for e in range(2):
+        sweep = angle[e, e] - angle[e, 1 - e]
+        # Which way round leads over the outside depends on how the camera sees the ellipse.
+        seen = flat[e, 1, 0] * flat[e, 2, 1] - flat[e, 1, 1] * flat[e, 2, 0]
+        if seen > 0.0:
+            if sweep > 0.0:
+                sweep -= turn
+        elif sweep < 0.0:
+            sweep += turn
+        arcs[e, 0] = angle[e, 1 - e]
+        arcs[e, 1] = sweep
+    return TAPERED
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
 def cone_outline(ends, k, distortion, distorted, points, sides):  # type: ignore[no-untyped-def]
     """Outline of a cone given in the camera's frame.
 
@@ -43,86 +124,36 @@ def cone_outline(ends, k, distortion, distorted, points, sides):  # type: ignore
         k: (5,) fx, skew, cx, fy, cy.
         distortion, distorted: (5,) and whether any of it matters.
         points: (MAX_POINTS, 2) px, filled with the polygon.
-        sides: (3, 2, 2) px, filled with the two sides' and the far end's first and last point.
+        sides: (3, 2, 2) px, filled with the two sides' and the far end's first and last point;
+            NaN where the cone has none.
 
     Returns:
         Number of polygon points; 0 if the cone comes too near to the camera's plane.
     """
     flat = np.empty((2, 3, 2))
-    for e in range(2):
-        depth = ends[e, 0, 2]
-        reach = abs(ends[e, 1, 2]) + abs(ends[e, 2, 2])
-        if not depth - reach > NEAR_M:
-            return 0
-        # The ellipse's image to first order: good enough to find the tangents' angles.
-        x, y = ends[e, 0, 0] / depth, ends[e, 0, 1] / depth
-        flat[e, 0, 0], flat[e, 0, 1] = x, y
-        for m in range(1, 3):
-            flat[e, m, 0] = (ends[e, m, 0] - x * ends[e, m, 2]) / depth
-            flat[e, m, 1] = (ends[e, m, 1] - y * ends[e, m, 2]) / depth
-    dx = flat[1, 0, 0] - flat[0, 0, 0]
-    dy = flat[1, 0, 1] - flat[0, 0, 1]
-    gap = np.sqrt(dx * dx + dy * dy)
-    inner = -1
-    if gap < 1e-9:
-        inner = 1 if _support(flat, 0, 1.0, 0.0) > _support(flat, 1, 1.0, 0.0) else 0
-    else:
-        dx, dy = dx / gap, dy / gap
-        if gap + _support(flat, 1, dx, dy) <= _support(flat, 0, dx, dy):
-            inner = 1
-        elif gap + _support(flat, 0, dx, dy) <= _support(flat, 1, dx, dy):
-            inner = 0
-    turn = 2.0 * np.pi
-    if inner >= 0:
-        # Seen end-on: one ellipse hides the other and is the whole outline.
-        count = 2 * ARC_POINTS - 2
-        outer = 1 - inner
-        sweep = turn * (1.0 - 1.0 / count)
-        _arc(ends, outer, 0.0, sweep, count, k, distortion, distorted, points, 0)
+    arcs = np.empty((2, 2))
+    form = cone_tangents(ends, flat, arcs)
+    if form != TAPERED:
         for s in range(3):
             for i in range(2):
                 sides[s, 0, i] = np.nan
                 sides[s, 1, i] = np.nan
+        if form == HIDDEN:
+            return 0
+        count = 2 * ARC_POINTS - 2
+        sweep = 2.0 * np.pi * (1.0 - 1.0 / count)
+        _arc(ends, form - ONLY_END, 0.0, sweep, count, k, distortion, distorted, points, 0)
         return count
-
-    angle = np.empty((2, 2))
-    for side in range(2):
-        sense = 1.0 if side == 0 else -1.0
-        nx, ny = -dy * sense, dx * sense
-        for _ in range(2):
-            gx = flat[1, 0, 0] - flat[0, 0, 0]
-            gy = flat[1, 0, 1] - flat[0, 0, 1]
-            for e in range(2):
-                towards = 1.0 if e == 1 else -1.0
-                pa = flat[e, 1, 0] * nx + flat[e, 1, 1] * ny
-                pb = flat[e, 2, 0] * nx + flat[e, 2, 1] * ny
-                length = np.sqrt(pa * pa + pb * pb) + 1e-300
-                gx += towards * (flat[e, 1, 0] * pa + flat[e, 2, 0] * pb) / length
-                gy += towards * (flat[e, 1, 1] * pa + flat[e, 2, 1] * pb) / length
-            length = np.sqrt(gx * gx + gy * gy) + 1e-300
-            nx, ny = -gy / length * sense, gx / length * sense
-        for e in range(2):
-            angle[e, side] = np.arctan2(
-                flat[e, 2, 0] * nx + flat[e, 2, 1] * ny, flat[e, 1, 0] * nx + flat[e, 1, 1] * ny
-            )
 
     steps = SIDE_SEGMENTS if distorted else 1
     n = 0
-    # Up the first side, the far end (end 1) from side 0 to side 1, down, and around end 0.
+    # Around the far end (end 1) from side 0 to side 1, down side 1, around end 0, up side 0.
     for e in (1, 0):
-        start = angle[e, 1 - e]
-        sweep = angle[e, e] - start
-        # Which way round leads over the outside depends on how the camera sees the ellipse.
-        seen = flat[e, 1, 0] * flat[e, 2, 1] - flat[e, 1, 1] * flat[e, 2, 0]
-        if seen > 0.0:
-            if sweep > 0.0:
-                sweep -= turn
-        elif sweep < 0.0:
-            sweep += turn
-        _arc(ends, e, start, sweep, ARC_POINTS, k, distortion, distorted, points, n)
+        _arc(ends, e, arcs[e, 0], arcs[e, 1], ARC_POINTS, k, distortion, distorted, points, n)
         n += ARC_POINTS
         if steps > 1:
-            _side(ends, e, angle[e, e], angle[1 - e, e], steps, k, distortion, distorted, points, n)
+            leave, arrive = arcs[e, 0] + arcs[e, 1], arcs[1 - e, 0]
+            _side(ends, e, leave, arrive, steps, k, distortion, distorted, points, n)
             n += steps - 1
     far = ARC_POINTS + steps - 1
     for i in range(2):
