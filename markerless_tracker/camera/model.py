@@ -38,7 +38,9 @@ class CameraModel:
             raise CalibrationError(
                 f"{self.name}: {distortion.size} distortion coefficients, expected k1 k2 p1 p2 (k3)"
             )
-        object.__setattr__(self, "distortion", locked(np.resize(np.append(distortion, 0.0), 5), float))
+        object.__setattr__(
+            self, "distortion", locked(np.resize(np.append(distortion, 0.0), 5), float)
+        )
         for field, shape in (("matrix", (3, 3)), ("T_cam_world", (4, 4))):
             value = locked(getattr(self, field), float)
             if value.shape != shape or not np.isfinite(value).all():
@@ -49,7 +51,9 @@ class CameraModel:
         if not np.isfinite(self.distortion).all():
             raise CalibrationError(f"{self.name}: distortion coefficients must be finite")
         if self.matrix[0, 0] <= 0 or self.matrix[1, 1] <= 0:
-            raise CalibrationError(f"{self.name}: focal lengths must be positive, K is {self.matrix.tolist()}")
+            raise CalibrationError(
+                f"{self.name}: focal lengths must be positive, K is {self.matrix.tolist()}"
+            )
         rotation = self.T_cam_world[:3, :3]
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0:
             raise CalibrationError(f"{self.name}: its rotation is not a rotation matrix")
