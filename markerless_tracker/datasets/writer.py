@@ -48,7 +48,7 @@ class RecordingWriter:
                     "be written, expected even numbers"
                 )
             path = folder / f"{camera.name}{suffix}"
-            fourcc = cv2.VideoWriter_fourcc(*codec)
+            fourcc = int.from_bytes(codec.encode("ascii"), "little")
             self._videos[camera.name] = cv2.VideoWriter(str(path), fourcc, fps, camera.size_px)
             if not self._videos[camera.name].isOpened():
                 raise DatasetError(

@@ -22,7 +22,7 @@ def rig(make_recording):
 def test_stills_videos_and_folders(tmp_path: Path, rig) -> None:
     write_image(tmp_path / "bg" / "cam01.png", IMAGE)
     video = cv2.VideoWriter(
-        str(tmp_path / "bg" / "cam02.mp4"), cv2.VideoWriter_fourcc(*"mp4v"), 10.0, (64, 48)
+        str(tmp_path / "bg" / "cam02.mp4"), int.from_bytes(b"mp4v", "little"), 10.0, (64, 48)
     )
     for _ in range(3):
         video.write(IMAGE)
