@@ -117,8 +117,10 @@ def _replays(
     rate = SLOW_RATE
     for _ in range(_TRIES):
         slow = run(rate, "every_frame", f"tracking at {rate:g} x real time")
-        if slow.skipped == 0 and slow.lost == 0:
+        missed = slow.skipped + slow.lost
+        if not missed:
             break
+        console.print(f"  {missed} of {sets} sets were skipped at this pace")
         rate /= 2
     return slow, run(1.0, "real_time", "tracking in real time")
 
@@ -163,7 +165,8 @@ def _report(
     console.print(table)
     console.print(
         "Overlap of silhouette and body, mean of frames: "
-        + ", ".join(f"{name} {value:.3f}" for name, value in overlap.items())
+        + ", ".join(f"{name} {value:.3f}" for name, value in overlap.items()),
+        soft_wrap=True,
     )
     console.print("Markers:  " + ", ".join(f"{run.result}.trc" for run in replays), soft_wrap=True)
     console.print("Overlays: " + ", ".join(map(str, sheets)), soft_wrap=True)
