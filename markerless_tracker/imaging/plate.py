@@ -21,9 +21,13 @@ _FRAMES = 36
 # Grey levels within which two pictures show the same thing.
 _REACH = 14.0
 # A change from frame to frame beyond this is a body's, not the light's.
-_ABRUPT = 35.0
+_ABRUPT = 28.0
 # Where things are covered for this share of the time, someone is burnt into the steady image.
 _RESTLESS = 0.15
+# A frame is calm around a pixel if less than this share of what is known there differs.
+_CALM = 0.05
+# A value shown in this share of the frames around nothing but scene is scene.
+_OFTEN = 0.35
 # Size of the neighbourhood that is judged together, as a share of the image's longer side.
 _WINDOW = 0.03
 # A value seen in this share of the frames was really there.
@@ -169,14 +173,17 @@ def _covered(
     How restless is averaged over the neighbourhood that differs: plain clothes show motion at their
     outline only, and an arm that sweeps over a person of the still for a moment is outvoted.
     """
-    differ = (np.abs(picture - steady).max(axis=2) > _REACH).astype(np.uint8)
+    apart = np.abs(picture - steady).max(axis=2)
+    differ = (apart > _REACH).astype(np.uint8)
     differ = np.asarray(cv2.morphologyEx(differ, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)))
     weight = differ.astype(np.float32)
     sigma = _WINDOW * max(differ.shape)
     restless = share * (jump > _ABRUPT) * weight
     blurred = cv2.GaussianBlur(restless, (0, 0), sigma)
     mass = cv2.GaussianBlur(weight, (0, 0), sigma)
-    return np.asarray((differ > 0) & (blurred > _RESTLESS * mass))
+    covered = ((differ > 0) & (blurred > _RESTLESS * mass)).astype(np.uint8)
+    # The soft fringe of a person differs less than the person.
+    return np.asarray((cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0) & (apart > 0.5 * _REACH))
 
 
 def _fill(
@@ -188,6 +195,7 @@ def _fill(
     filled = steady.copy()
     best = np.zeros(steady.shape[:2])
     covered = np.zeros(steady.shape[:2], dtype=bool)
+    doubtful = covered.copy()
     for index, picture in enumerate(pictures):
         matches, mean = matching_frames(stack, picture, _REACH)
         others = sum(
@@ -202,37 +210,77 @@ def _fill(
         filled[better] = np.where(seen[:, :, None], mean, picture)[better]
         best[better] = score[better]
         covered |= here
-    filled, confirmed = _grow(stack, filled, ~covered | (best >= least))
-    return filled, ~confirmed
+        doubtful |= (np.abs(picture - steady).max(axis=2) > 2.0 * _REACH) & ~here
+    if not covered.any():
+        return filled, covered
+    return _grow(stack, filled, steady, covered, doubtful)
 
 
 def _grow(
-    stack: Image, filled: FloatImage, confirmed: BoolImage
+    stack: Image, filled: FloatImage, steady: FloatImage, covered: BoolImage, doubtful: BoolImage
 ) -> tuple[FloatImage, BoolImage]:
-    """Confirm pixels from the frames in which everything known around them is scene."""
-    side = max(9, round(0.02 * max(confirmed.shape)) | 1)
+    """Work inward from what is known, with the frames in which all known pixels around are scene.
+
+    What such frames show confirms the still, or overrules it next to people of the still
+    (``doubtful``): a person of the still may stand behind the one in the clips.
+
+    Returns:
+        The plate, and where neither clips confirmed nor overruled the still.
+    """
+    longer = max(covered.shape)
+    side = max(5, round(0.25 * _WINDOW * longer) | 1)
+    # Islands that happen to agree inside a covered area are no knowledge.
+    brush = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * side + 1, 2 * side + 1))
+    closed = cv2.morphologyEx(covered.astype(np.uint8), cv2.MORPH_CLOSE, brush)
+    v, u = np.nonzero(closed)
+    box = (
+        slice(max(int(v.min()) - 3 * side, 0), int(v.max()) + 3 * side + 1),
+        slice(max(int(u.min()) - 3 * side, 0), int(u.max()) + 3 * side + 1),
+    )
+    plate, unknown = filled[box].copy(), closed[box] > 0
+    frames, doubt = stack[(slice(None), *box)], doubtful[box].copy()
+    person = steady[box]
+    far = np.stack([np.abs(frame - plate).max(axis=2) > _REACH for frame in frames])
+    wide = 2 * side + 1
+    reach = np.ones((side, side), dtype=np.uint8)
+    for _ in range(4 * max(unknown.shape) // side):
+        known = (~unknown).astype(np.float32)
+        front = np.nonzero(unknown & (cv2.boxFilter(known, -1, (side, side)) > 0.3))
+        if not front[0].size:
+            break
+        mass = cv2.boxFilter(known, -1, (wide, wide))[front]
+        calm = np.stack(
+            [cv2.boxFilter(known * wrong, -1, (wide, wide))[front] < _CALM * mass for wrong in far]
+        )
+        agreeing = calm & ~far[:, *front]
+        values = frames[:, *front].astype(np.float32)
+        count, agreed_count = calm.sum(axis=0), agreeing.sum(axis=0)
+        shown, same = _mean(values, calm), _mean(values, agreeing)
+        # What the clips show most of the time may be a person: only if it is shown often around
+        # nothing but scene, or is something else, does it overrule a still.
+        apart = np.abs(shown - person[front]).max(axis=1) > 2.0 * _REACH
+        suspect = cv2.dilate(doubt.astype(np.uint8), reach)[front] > 0
+        agreed = (agreed_count >= 2) & (agreed_count >= 0.5 * count)
+        overruled = ~agreed & suspect & (count >= 2) & (apart | (count > _OFTEN * len(stack)))
+        settled = agreed | overruled
+        if not settled.any():
+            break
+        where = (front[0][settled], front[1][settled])
+        plate[where] = np.where(agreed[:, None], same, shown)[settled]
+        far[:, *where] = np.abs(values[:, settled] - plate[where]).max(axis=2) > _REACH
+        doubt[front[0][overruled], front[1][overruled]] = True
+        unknown[where] = False
     filled = filled.copy()
-    for _ in range(12):
-        known = confirmed.astype(np.float32)
-        mass = cv2.boxFilter(known, -1, (side, side))
-        # A front of pixels with enough known ones around them; it moves inward with each round.
-        front = ~confirmed & (mass > 0.3)
-        if not front.any():
-            break
-        total = np.zeros_like(filled)
-        count = np.zeros(confirmed.shape, dtype=np.float32)
-        for frame in stack:
-            wrong = (np.abs(frame - filled).max(axis=2) > _REACH) & confirmed
-            share = cv2.boxFilter(wrong.astype(np.float32), -1, (side, side)) / np.maximum(mass, 1e-6)
-            calm = front & (share < 0.04)
-            total[calm] += frame[calm]
-            count += calm
-        found = count >= 2
-        if not found.any():
-            break
-        filled[found] = total[found] / count[found][:, None]
-        confirmed = confirmed | found
-    return filled, confirmed
+    filled[box] = np.where(covered[box][:, :, None], plate, filled[box])
+    unsure = np.zeros_like(covered)
+    unsure[box] = unknown & covered[box]
+    return filled, unsure
+
+
+def _mean(values: FloatImage, chosen: BoolImage) -> FloatImage:
+    """Mean over the frames chosen, per pixel: values (n, k, c), chosen (n, k); 0 where none is."""
+    total = np.einsum("nkc,nk->kc", values, chosen.astype(np.float32))
+    return np.asarray(total / np.maximum(chosen.sum(axis=0), 1)[:, None], dtype=np.float32)
 
 
 def _from_stills(stills: Sequence[Image]) -> Plate:
