@@ -1,6 +1,5 @@
 """The fitness f = f_s + f_e of SPPSO over all views, and the evaluators that searches call."""
 
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,15 +13,12 @@ from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.fitness import kernels
 from markerless_tracker.fitness.arrays import Views, body_arrays, lay_out_views
+from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, Stage
 
 EDGE_RULES = {"sides": kernels.SIDES, "visible": kernels.VISIBLE, "outline": kernels.OUTLINE}
 EDGE_TERMS = ("ssd", "mean")
-
-# numba's workqueue layer, the only one without a library to install, takes one caller at a time.
-numba.config.THREADING_LAYER = "workqueue"
-_ONE_CALLER = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -72,7 +68,7 @@ class Fitness:
             )
         self.body = body
         self.cameras = tuple(cameras)
-        self.threads = max(1, min(threads, numba.config.NUMBA_NUM_THREADS))
+        self.threads = usable_threads(threads)
         self._body = body_arrays(body)
         self._rule = kernels.EdgeRule(
             EDGE_RULES[edge_rule], float(edge_spacing_px), float(edge_step_px), edge_term == "ssd"
@@ -110,7 +106,7 @@ class Fitness:
         if self.threads == 1:
             kernels.count_serial(*args)
         else:
-            with _ONE_CALLER:
+            with ONE_CALLER:
                 numba.set_num_threads(self.threads)
                 kernels.count_parallel(*args)
         return counts

@@ -1,0 +1,95 @@
+"""Levenberg-Marquardt with Gaussian priors, bounds, and a reach that shrinks.
+
+For robust least squares whose normal equations somebody else sums: contour refinement.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from markerless_tracker.errors import SearchError
+from markerless_tracker.geometry import FloatArray
+
+Equations = Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]
+"""At a point (p,) and a reach: JᵀWJ (p, p) and JᵀWr (p,), in units of the data's precision."""
+
+_DAMPING = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """A Gaussian belief about each parameter.
+
+    Attributes:
+        mean: (p,).
+        precision: (p,) 1 / variance; 0 = no belief.
+    """
+
+    mean: FloatArray
+    precision: FloatArray
+
+
+def damped_step(
+    hessian: FloatArray, slope: FloatArray, x: FloatArray, bounds: FloatArray, damping: float
+) -> FloatArray:
+    """The step (p,) of (H + damping diag H) step = -slope that keeps x + step within bounds (2, p).
+
+    Parameters that the free step would take out of bounds are put on them and the rest is solved
+    again, once.
+
+    Raises:
+        SearchError: the equations are singular or not finite.
+    """
+    a = hessian + np.diag(damping * np.diag(hessian) + 1e-12)
+    try:
+        step = np.linalg.solve(a, -slope)
+        target = np.clip(x + step, bounds[0], bounds[1])
+        held = target != x + step
+        if held.any() and not held.all():
+            free = ~held
+            step[held] = (target - x)[held]
+            right = -slope[free] - a[np.ix_(free, held)] @ step[held]
+            step[free] = np.linalg.solve(a[np.ix_(free, free)], right)
+    except np.linalg.LinAlgError as error:
+        raise SearchError("contour refinement: the normal equations are singular") from error
+    if not np.isfinite(step).all():
+        raise SearchError("contour refinement: the step is not finite")
+    return np.asarray(np.clip(x + step, bounds[0], bounds[1]) - x)
+
+
+def refine(
+    equations: Equations,
+    start: FloatArray,
+    *,
+    priors: tuple[Prior, ...],
+    bounds: FloatArray,
+    iterations: int,
+    reach: tuple[float, float],
+) -> FloatArray:
+    """Refine a point (p,) by a fixed number of damped Gauss-Newton steps.
+
+    Args:
+        equations: the data's normal equations.
+        start: (p,) where to begin.
+        priors: added to the data's equations.
+        bounds: (2, p), kept.
+        iterations: number of steps; the reach shrinks geometrically over them.
+        reach: residuals beyond it are outliers, in the first and in the last step.
+
+    Returns:
+        The refined point (p,). A step whose equations cannot be solved ends the refinement.
+    """
+    x = np.clip(start, bounds[0], bounds[1])
+    for i in range(iterations):
+        share = i / (iterations - 1) if iterations > 1 else 1.0
+        hessian, slope = equations(x, reach[0] * (reach[1] / reach[0]) ** share)
+        hessian, slope = hessian.copy(), slope.copy()
+        for prior in priors:
+            hessian[np.diag_indices_from(hessian)] += prior.precision
+            slope += prior.precision * (x - prior.mean)
+        try:
+            x = x + damped_step(hessian, slope, x, bounds, _DAMPING)
+        except SearchError:
+            return x
+    return x
