@@ -12,6 +12,9 @@ from markerless_tracker.errors import ImageError, SearchError
 
 MaskWords = NDArray[np.uint64]
 
+CONTOUR = "contour"
+"""The algorithm of a stage that refines on contours instead of evaluating particles."""
+
 
 def locked(array: Any, dtype: Any) -> NDArray[Any]:
     """A C-contiguous read-only array of that type; copied only if the type or layout differs."""
@@ -112,12 +115,13 @@ class Stage:
 
     Attributes:
         name: distinct within a frame; keys the random draws.
-        algorithm: registered name of the optimiser.
+        algorithm: registered name of the optimiser, or 'contour' for contour refinement.
         active: (d,) indices of the parameters that vary.
         centre: (p,) pose the search starts from; the others stay at it.
-        sigma: (p,) spread of the search in m or rad; only the active ones are read.
-        particles: particles per iteration.
-        iterations: iterations, the initial sample being the first.
+        sigma: (p,) spread of the search in m or rad; only the active ones are read. For 'contour'
+            the spread of the belief about the centre.
+        particles: particles per iteration; 0 for 'contour'.
+        iterations: iterations, of a swarm the initial sample being the first.
         silhouette_weight, edge_weight: weights of f_s and f_e.
         silhouette_cones, edge_cones: (c,) cones that each term uses.
     """
@@ -152,7 +156,7 @@ class Stage:
             raise SearchError(
                 f"stage {self.name}: active parameters must be 0..{self.centre.size - 1}"
             )
-        if self.particles < 1 or self.iterations < 1:
+        if self.particles < (0 if self.algorithm == CONTOUR else 1) or self.iterations < 1:
             raise SearchError(
                 f"stage {self.name}: {self.particles} particles x {self.iterations} iterations, "
                 "expected at least 1 of each"
@@ -184,6 +188,7 @@ class TrackResult:
         fitness: f = f_s + f_e in [0, 2] of the estimate (NaN without one).
         agreement: per camera, overlap (IoU) of the silhouette and the projected body.
         evaluations: evaluations of the objective that the swarms spent on this frame.
+        refinements: iterations of contour refinement spent on this frame.
         observations: the evidence each camera gave.
         warnings: what the user should know about this frame, one line each.
     """
@@ -195,6 +200,7 @@ class TrackResult:
     fitness: float
     agreement: Mapping[str, float]
     evaluations: int
+    refinements: int = 0
     observations: Mapping[str, Observation] = field(default_factory=dict, repr=False)
     warnings: tuple[str, ...] = ()
 

@@ -12,6 +12,7 @@ from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
 _AXES = "xyz"
+_SPREAD_RAD = 0.6
 
 
 class _Nodes:
@@ -32,7 +33,9 @@ class _Nodes:
         for move in chain:
             if isinstance(move.argument, str) and move.argument in self.parameters:
                 kind = _AXES.index(move.kind[1]) + (3 if move.kind[0] == "t" else 0)
-                parent = self._node(parent, fixed, kind, move.factor, self.parameters.index(move.argument))
+                parent = self._node(
+                    parent, fixed, kind, move.factor, self.parameters.index(move.argument)
+                )
                 fixed = np.eye(4)
             else:
                 fixed = fixed @ self.constant(move, where)
@@ -49,7 +52,9 @@ class _Nodes:
 
     def constant(self, move: Move, where: str) -> FloatArray:
         """The transform (4, 4) of a move by a number or a length."""
-        value = move.argument if isinstance(move.argument, float) else self.lengths.get(move.argument)
+        value = (
+            move.argument if isinstance(move.argument, float) else self.lengths.get(move.argument)
+        )
         if value is None:
             raise BodyModelError(f"{where}: {move.argument!r} is neither a parameter nor a length")
         result = np.eye(4)
@@ -85,7 +90,9 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
     d = description
     strange = sorted(str(name) for name in subject.lengths_m if name not in d.lengths)
     if strange:
-        raise BodyModelError(f"subject {subject.name}: body {d.name} has no length {', '.join(strange)}")
+        raise BodyModelError(
+            f"subject {subject.name}: body {d.name} has no length {', '.join(strange)}"
+        )
     lengths = {name: subject.length(name) for name in d.lengths}
     parameters = tuple(d.parameters)
     nodes = _Nodes(parameters, lengths)
@@ -93,7 +100,9 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
     for name, entry in d.frames.items():
         where = f"body {d.name}, frame {name}"
         chain = parse_chain(_get(entry, "chain", where), where)
-        frames[name] = nodes.append(_look(frames, _get(entry, "parent", where), where), chain, where)
+        frames[name] = nodes.append(
+            _look(frames, _get(entry, "parent", where), where), chain, where
+        )
     del frames["world"]
     if sorted(set(nodes.parameter) - {-1}) != list(range(len(parameters))):
         raise BodyModelError(f"body {d.name}: every parameter must move some frame")
@@ -104,11 +113,15 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
     for name in MARKER_NAMES:
         where = f"body {d.name}, marker {name}"
         place = nodes.place(parse_chain(d.markers[name].get("chain", ""), where), where)
-        marker_places.append((_look(frames, _get(d.markers[name], "frame", where), where), place[:3, 3]))
+        marker_places.append(
+            (_look(frames, _get(d.markers[name], "frame", where), where), place[:3, 3])
+        )
 
     unknown = sorted(set(subject.cones_m) - set(d.cones))
     if unknown:
-        raise BodyModelError(f"subject {subject.name}: body {d.name} has no cone {', '.join(unknown)}")
+        raise BodyModelError(
+            f"subject {subject.name}: body {d.name} has no cone {', '.join(unknown)}"
+        )
     cone_node, cone_fixed, cone_length, cone_shape, cone_edges = [], [], [], [], []
     for name, cone in d.cones.items():
         where = f"body {d.name}, cone {name}"
@@ -118,7 +131,9 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
         cone_length.append(unit * float(cone.get("factor", 1.0)))
         shape = subject.cones_m.get(name)
         if shape is None:
-            shape = unit * np.array([_get(cone, "start", where), _get(cone, "end", where)], dtype=float)
+            shape = unit * np.array(
+                [_get(cone, "start", where), _get(cone, "end", where)], dtype=float
+            )
         cone_shape.append(np.asarray(shape, dtype=float).reshape(2, 4))
         edges = cone.get("edges", ["sides"])
         cone_edges.append(["sides" in edges, "top" in edges])
@@ -136,8 +151,16 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
         node_parameter=np.array(nodes.parameter, dtype=np.int64),
         frames=frames,
         root_frame=d.root,
-        sigma=np.array([float(_get(v, "sigma", f"parameter {k}")) for k, v in d.parameters.items()]),
+        sigma=np.array(
+            [float(_get(v, "sigma", f"parameter {k}")) for k, v in d.parameters.items()]
+        ),
         neutral=neutral,
+        spread=np.array(
+            [
+                np.inf if k in d.subspaces["root"] else float(v.get("spread", _SPREAD_RAD))
+                for k, v in d.parameters.items()
+            ]
+        ),
         limits=limits,
         walking_limits=walking,
         marker_node=np.array([node for node, _ in marker_places], dtype=np.int64),
@@ -182,5 +205,7 @@ def _get(entry: Any, key: str, where: str) -> Any:
 
 def _look(table: Mapping[str, Any], name: str, where: str) -> Any:
     if name not in table:
-        raise BodyModelError(f"{where}: {name!r} is not defined (before it), known: {', '.join(table)}")
+        raise BodyModelError(
+            f"{where}: {name!r} is not defined (before it), known: {', '.join(table)}"
+        )
     return table[name]

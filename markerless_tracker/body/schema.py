@@ -63,7 +63,10 @@ _EDGES = ("a list of 'sides' and 'top'", _edges)
 # Keys of the entries of each section; those in the first mapping are required.
 _ENTRIES: Mapping[str, tuple[Mapping[str, tuple[str, Check]], Mapping[str, tuple[str, Check]]]] = {
     "lengths": ({"stature": _POSITIVE}, {"markers": _PAIR}),
-    "parameters": ({"sigma": _POSITIVE}, {"neutral": _NUMBER, "limits": _RANGE, "walking": _RANGE}),
+    "parameters": (
+        {"sigma": _POSITIVE},
+        {"neutral": _NUMBER, "spread": _POSITIVE, "limits": _RANGE, "walking": _RANGE},
+    ),
     "frames": ({"parent": _TEXT, "chain": _TEXT}, {}),
     "markers": ({"frame": _TEXT}, {"chain": _TEXT}),
     "cones": (

@@ -66,7 +66,9 @@ def read_pose(path: Path, body: BodyModel) -> FloatArray:
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        raise BodyModelError(f"{path}: cannot read the pose: {str(error).splitlines()[0]}") from error
+        raise BodyModelError(
+            f"{path}: cannot read the pose: {str(error).splitlines()[0]}"
+        ) from error
     if not isinstance(data, dict):
         raise BodyModelError(f"{path}: expected a mapping of parameter names to m or rad")
     pose = body.neutral.copy()

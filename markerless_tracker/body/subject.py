@@ -70,7 +70,9 @@ def subject_from_stature(description: BodyDescription, stature_m: float) -> Subj
     return Subject(f"stature {stature_m:g} m", lengths)
 
 
-def subject_from_markers(description: BodyDescription, markers_m: Mapping[str, FloatArray]) -> Subject:
+def subject_from_markers(
+    description: BodyDescription, markers_m: Mapping[str, FloatArray]
+) -> Subject:
     """Segment lengths from one row of named markers (3,), in m, any frame.
 
     A missing Pelvis is the midpoint of the hips; a length whose markers are missing is taken from
@@ -116,7 +118,9 @@ def read_subject(path: Path) -> Subject:
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        raise BodyModelError(f"{path}: cannot read the subject: {str(error).splitlines()[0]}") from error
+        raise BodyModelError(
+            f"{path}: cannot read the subject: {str(error).splitlines()[0]}"
+        ) from error
     if not isinstance(data, dict) or not isinstance(data.get("lengths_m"), dict):
         raise BodyModelError(f"{path}: expected name, lengths_m and optionally cones_m")
     unknown = sorted(set(map(str, data)) - {"name", "lengths_m", "cones_m"})
@@ -137,11 +141,15 @@ def write_subject(path: Path, subject: Subject) -> None:
     }
     if subject.cones_m:
         data["cones_m"] = {name: np.asarray(v).tolist() for name, v in subject.cones_m.items()}
-    path.write_text(yaml.safe_dump(data, sort_keys=False, default_flow_style=None), encoding="utf-8")
+    path.write_text(
+        yaml.safe_dump(data, sort_keys=False, default_flow_style=None), encoding="utf-8"
+    )
 
 
 def _shapes(data: dict[str, Any], path: Path) -> dict[str, FloatArray]:
     try:
         return {name: np.array(v, dtype=float) for name, v in (data.get("cones_m") or {}).items()}
     except (TypeError, ValueError, AttributeError) as error:
-        raise BodyModelError(f"{path}: cones_m must map cones to two rows of four numbers") from error
+        raise BodyModelError(
+            f"{path}: cones_m must map cones to two rows of four numbers"
+        ) from error

@@ -157,7 +157,24 @@ def _surface(ends, shape, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def _add_sample(view, cone, world, local, k, distortion, distorted, nu, nv, length_px, step_px, width, height, rows, shape, samples):  # type: ignore[no-untyped-def]  # noqa: E501
+def _add_sample(
+    view,
+    cone,
+    world,
+    local,
+    k,
+    distortion,
+    distorted,
+    nu,
+    nv,
+    length_px,
+    step_px,
+    width,
+    height,
+    rows,
+    shape,
+    samples,
+):  # type: ignore[no-untyped-def]  # noqa: E501
     """Keep a point of one cone's outline if the pixel `step_px` outside it is free of the body."""
     n = samples.count[view]
     if n >= samples.cone.shape[1]:
@@ -451,7 +468,9 @@ def _accumulate(view, body, samples, residuals, scratch):  # type: ignore[no-unt
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def _one_view(view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch):  # type: ignore[no-untyped-def]  # noqa: E501
+def _one_view(
+    view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
+):  # type: ignore[no-untyped-def]  # noqa: E501
     root = scratch.world[0, 0, 0]
     r, t = views.rotation[view], views.translation[view]
     depth = r[2, 0] * root[0] + r[2, 1] * root[1] + r[2, 2] * root[2] + t[2]
@@ -462,7 +481,9 @@ def _one_view(view, body, views, contours, spacing_m, step_px, reach_m, samples,
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def equations_serial(pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch):  # type: ignore[no-untyped-def]  # noqa: E501
+def equations_serial(
+    pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
+):  # type: ignore[no-untyped-def]  # noqa: E501
     """Residuals and per-view normal equations at a pose (p,), on the calling thread."""
     cone_ends(pose, body, scratch.nodes, scratch.world)
     for view in range(views.size.shape[0]):
@@ -472,7 +493,9 @@ def equations_serial(pose, body, views, contours, spacing_m, step_px, reach_m, s
 
 
 @njit(cache=True, nogil=True, parallel=True)  # type: ignore[misc]
-def equations_parallel(pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch):  # type: ignore[no-untyped-def]  # noqa: E501
+def equations_parallel(
+    pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
+):  # type: ignore[no-untyped-def]  # noqa: E501
     """As `equations_serial`, a thread a view; each view sums for itself, so nothing changes."""
     cone_ends(pose, body, scratch.nodes, scratch.world)
     for view in prange(views.size.shape[0]):

@@ -14,9 +14,13 @@ from markerless_tracker.settings import setting
 PRESETS: Mapping[str, Mapping[str, Any]] = {
     "tuned": {},
     "paper": {
+        "body": "balan31",
         "edge_form": "published",
         "edge_rule": "visible",
         "edge_weight": 1.0,
+        "fit_shape": False,
+        "prediction": 0.0,
+        "refinement": "none",
         "sigma_scale": 1.0,
     },
 }
@@ -48,9 +52,49 @@ class TrackerConfig(ImagingSettings):
         choices=tuple(PRESETS),
     )
     optimizer: str = setting("sppso", "search algorithm", choices=("sppso",))
-    body: str = setting("balan31", "body: a shipped one's name, or a YAML file")
+    body: str = setting("person31", "body: a shipped one's name, or a YAML file")
     evaluations: int = setting(
-        1000, "evaluations of the fitness per frame, shared out as published", least=1, most=10**7
+        1000,
+        "budget per frame, in evaluations of the fitness: exactly that many without refinement; with "
+        "it the time that swarm and refinement may take together",
+        least=1,
+        most=10**7,
+    )
+    refinement: str = setting(
+        "contour",
+        "contour: align with the silhouettes' edges before and after the swarm; none: swarm alone",
+        choices=("contour", "none"),
+    )
+    refine_iterations: int = setting(
+        4, "iterations of each of the two contour refinements", least=1, most=1000
+    )
+    refine_reach_m: float = setting(
+        0.10,
+        "outline farther than this from a silhouette's edge is an outlier, at first",
+        least=0.001,
+        most=10.0,
+    )
+    refine_reach_end_m: float = setting(
+        0.035, "the same, in the last iteration", least=0.001, most=10.0
+    )
+    refine_sigma_m: float = setting(
+        0.01, "noise believed of a silhouette's edge, for refinement", least=1e-4, most=1.0
+    )
+    refine_prior: float = setting(
+        4.0,
+        "spread of the belief about the predicted pose, in published spreads",
+        least=0.01,
+        most=1e6,
+    )
+    prediction: float = setting(
+        0.6,
+        "share of the last change of pose that is expected again; 0 = zero motion",
+        least=0.0,
+        most=1.0,
+    )
+    fit_shape: bool = setting(
+        True,
+        "fit the sections of the body to the first frame's silhouettes, unless the subject has them",
     )
     seed: int = setting(0, "seed of all random draws", least=0, most=2**63 - 1)
     threads: int = setting(

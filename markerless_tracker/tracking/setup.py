@@ -93,7 +93,14 @@ def build_tracker(
         pose = pose_from_markers(body, start.markers_m, limits=_limits(body, config))
     else:
         pose = read_pose(start_file, body)
-    tracker = Tracker(rig, body, config, start_pose=pose, backgrounds=backgrounds)
+    tracker = Tracker(
+        rig,
+        body,
+        config,
+        start_pose=pose,
+        backgrounds=backgrounds,
+        shape_known=bool(subject.cones_m),
+    )
     return TrackerSetup(tracker, None if start is None else start.stamp_ns)
 
 

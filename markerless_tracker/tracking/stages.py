@@ -10,13 +10,59 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Stage
+from markerless_tracker.records import CONTOUR, Stage
 from markerless_tracker.tracking.config import TrackerConfig
 
 SPPSO_STAGES = ((10, 20), (20, 40))
 """Particles and iterations of SPPSO's two stages at 1000 evaluations."""
+SWARM_SHARE = Fraction(2, 10)
+"""Share of the budget that the swarm keeps beside contour refinement."""
 _SOFT = 10.0
 _TRANSLATION = 3
+
+
+def frame_stages(
+    body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
+) -> tuple[Stage, ...]:
+    """The stages of one frame, in order; each starts from the estimate so far.
+
+    Args:
+        body: the body.
+        config: names the optimiser and how the budget is shared out.
+        centre: (p,) predicted pose.
+        sigma: (p,) published spreads, widened for the time since the last frame.
+
+    Raises:
+        ConfigError: the budget cannot be spent exactly.
+    """
+    swarm = STAGES[config.optimizer](body, config, centre, config.sigma_scale * sigma)
+    if config.refinement == "none":
+        return swarm
+    return (
+        contour_stage("align", body, config, centre, sigma),
+        *swarm,
+        contour_stage("polish", body, config, centre, sigma),
+    )
+
+
+def contour_stage(
+    name: str, body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
+) -> Stage:
+    """A contour refinement of all parameters."""
+    every_cone = np.ones(len(body.cone_names), dtype=np.bool_)
+    return Stage(
+        name=name,
+        algorithm=CONTOUR,
+        active=np.arange(body.size),
+        centre=centre,
+        sigma=config.refine_prior * sigma,
+        particles=0,
+        iterations=config.refine_iterations,
+        silhouette_weight=1.0,
+        edge_weight=config.edge_weight,
+        silhouette_cones=every_cone,
+        edge_cones=every_cone,
+    )
 
 
 def scaled_particles(
@@ -48,8 +94,12 @@ def sppso_stages(
 
     Stage 1 varies the root's six parameters and samples edges on the cones that are rigid with
     it; stage 2 varies all, with the root's position spread divided by 10, from stage 1's estimate.
+    Beside a refinement the swarm keeps `SWARM_SHARE` of the budget.
     """
-    first, second = scaled_particles(SPPSO_STAGES, config.evaluations, "sppso")
+    budget = config.evaluations
+    if config.refinement != "none":
+        budget = int(budget * SWARM_SHARE)
+    first, second = scaled_particles(SPPSO_STAGES, budget, "sppso")
     every_cone = np.ones(len(body.cone_names), dtype=np.bool_)
     settled = sigma.copy()
     settled[translations(body)] /= _SOFT

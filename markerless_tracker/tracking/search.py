@@ -1,0 +1,186 @@
+"""Searching one frame: runs its stages, each from the estimate so far."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel, Feasibility
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.fitness import Fitness
+from markerless_tracker.fitness.contours import ContourFrame
+from markerless_tracker.fitness.evaluator import ViewTerms
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import Prior, Problem, Sppso, keyed_generator, refine
+from markerless_tracker.records import CONTOUR, Observation, Stage
+from markerless_tracker.tracking.config import TrackerConfig
+
+CORRELATION_M = 0.05
+"""Length of outline whose errors go together, for weighing contours against beliefs."""
+_NEAREST_M = 0.5
+
+
+class Searcher:
+    """Searches frames with one body, however its stages are composed.
+
+    Args:
+        rig: the cameras.
+        body: the body with the person's shape.
+        config: settings.
+        limits: (2, p) joint limits.
+        threads: threads of the fitness; results do not depend on them.
+        mapper: `map`, or a thread pool's.
+    """
+
+    def __init__(
+        self,
+        rig: CameraRig,
+        body: BodyModel,
+        config: TrackerConfig,
+        *,
+        limits: FloatArray,
+        threads: int,
+        mapper: Callable[..., object] = map,
+    ) -> None:
+        self.body = body
+        self.config = config
+        self.limits = limits
+        self.threads = threads
+        self.mapper = mapper
+        self.cameras: Mapping[str, CameraModel] = {camera.name: camera for camera in rig}
+        self.feasible = Feasibility(body, limits, config.collision)
+        self.fitness = Fitness(
+            body,
+            rig.cameras,
+            threads=threads,
+            edge_rule=config.edge_rule,
+            edge_term=config.edge_term,
+            edge_spacing_px=config.edge_spacing_px,
+            edge_step_px=config.edge_step_px,
+        )
+
+    def frame(
+        self, observations: Mapping[str, Observation], stamp_ns: int, predicted: FloatArray
+    ) -> "FrameSearch":
+        """The search of one frame, around a predicted pose (p,)."""
+        return FrameSearch(self, observations, stamp_ns, predicted)
+
+
+class FrameSearch:
+    """The search of one frame.
+
+    Attributes:
+        pose: (p,) the estimate so far.
+        evaluations, refinements: what was spent.
+    """
+
+    def __init__(
+        self,
+        searcher: Searcher,
+        observations: Mapping[str, Observation],
+        stamp_ns: int,
+        predicted: FloatArray,
+    ) -> None:
+        self.pose = predicted
+        self.evaluations = 0
+        self.refinements = 0
+        self._searcher = searcher
+        self._observations = observations
+        self._stamp_ns = stamp_ns
+        self._views = searcher.fitness.lay_out(observations)
+        self._contours: ContourFrame | None = None
+
+    @property
+    def contours(self) -> ContourFrame:
+        """The frame's contour evidence, made when first asked for."""
+        if self._contours is None:
+            searcher = self._searcher
+            self._contours = ContourFrame(
+                searcher.body,
+                searcher.cameras,
+                self._observations,
+                self._views,
+                pixels_per_m=self._pixels_per_m(),
+                threads=searcher.threads,
+                step_px=searcher.config.edge_step_px,
+                mapper=searcher.mapper,
+            )
+        return self._contours
+
+    def run(self, stages: tuple[Stage, ...]) -> FloatArray:
+        """Run stages from the estimate so far; returns the new one (p,).
+
+        Swarms alone: the last one's best, as published. With contour refinement among them a
+        stage's result is taken only if it explains the views better: the swarm rescues a refinement
+        that is stuck, the refinement sharpens the swarm.
+        """
+        compared = any(stage.algorithm == CONTOUR for stage in stages)
+        cost = self._cost(stages[0], self.pose) if compared else np.inf
+        for stage in stages:
+            centred = replace(stage, centre=self.pose)
+            found = self._refine(centred) if stage.algorithm == CONTOUR else self._swarm(centred)
+            if not compared:
+                self.pose = found
+                continue
+            found_cost = self._cost(stages[0], found)
+            if found_cost < cost:
+                self.pose, cost = found, found_cost
+        return self.pose
+
+    def terms(self) -> dict[str, ViewTerms]:
+        """How well the estimate explains each view."""
+        return self._searcher.fitness.terms(self._views, self.pose)
+
+    def _cost(self, stage: Stage, pose: FloatArray) -> float:
+        evaluator = self._searcher.fitness.prepare(self._views, stage)
+        return float(evaluator(pose[None, stage.active])[0])
+
+    def _swarm(self, stage: Stage) -> FloatArray:
+        searcher = self._searcher
+        evaluator = searcher.fitness.prepare(self._views, stage)
+        problem = Problem(
+            bounds=searcher.limits[:, stage.active],
+            centre=stage.centre[stage.active],
+            sigma=stage.sigma[stage.active],
+            particles=stage.particles,
+            iterations=stage.iterations,
+            feasible=lambda points: searcher.feasible(evaluator.poses(points)),
+            rng=keyed_generator(searcher.config.seed, self._stamp_ns, stage.name),
+        )
+        optimizer = Sppso(problem, update=searcher.config.update)
+        best = optimizer.run(evaluator)
+        self.evaluations += optimizer.evaluations
+        return evaluator.poses(best[None])[0]
+
+    def _refine(self, stage: Stage) -> FloatArray:
+        searcher, config = self._searcher, self._searcher.config
+        scale = 1.0 / (CORRELATION_M * config.refine_sigma_m**2)
+        contours = self.contours
+
+        def equations(pose: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
+            sums = contours.equations(pose, reach_m)
+            return sums.hessian * scale, sums.slope * scale
+
+        self.refinements += stage.iterations
+        return refine(
+            equations,
+            stage.centre,
+            priors=(
+                Prior(stage.centre, 1.0 / stage.sigma**2),
+                Prior(searcher.body.neutral, 1.0 / searcher.body.spread**2),
+            ),
+            bounds=searcher.limits,
+            iterations=stage.iterations,
+            reach=(config.refine_reach_m, config.refine_reach_end_m),
+        )
+
+    def _pixels_per_m(self) -> dict[str, float]:
+        """Size of a metre at the body in each view, px."""
+        searcher = self._searcher
+        at = self.pose[[searcher.body.index(f"pelvis_t{axis}") for axis in "xyz"]]
+        sizes = {}
+        for name in self._views.names:
+            camera = searcher.cameras[name]
+            depth = float(camera.T_cam_world[2, :3] @ at + camera.T_cam_world[2, 3])
+            sizes[name] = float(camera.matrix[0, 0]) / max(depth, _NEAREST_M)
+        return sizes
