@@ -35,7 +35,9 @@ def align_geometry(image: Image, reference: Image) -> Image:
     if len(here) < 6:
         return resized
     # Seeded inside OpenCV: the same images give the same map.
-    affine, inliers = cv2.estimateAffine2D(there, here, method=cv2.RANSAC, ransacReprojThreshold=0.5)
+    affine, inliers = cv2.estimateAffine2D(
+        there, here, method=cv2.RANSAC, ransacReprojThreshold=0.5
+    )
     if affine is None or int(inliers.sum()) < max(6, len(here) // 3):
         return resized
     corners = np.array([[0, 0, 1], [width, 0, 1], [0, height, 1], [width, height, 1]], dtype=float)
@@ -43,7 +45,9 @@ def align_geometry(image: Image, reference: Image) -> Image:
         return resized
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.asarray(
-        cv2.warpAffine(resized, affine, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE),
+        cv2.warpAffine(
+            resized, affine, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE
+        ),
         dtype=np.uint8,
     )
 
@@ -92,7 +96,8 @@ def align_exposure(image: FloatImage, reference: FloatImage) -> FloatImage:
     spread = np.abs(rest).max(axis=2)
     agree = (spread < max(8.0, 2.5 * float(np.median(spread)))).astype(np.float32)
     size = max(3.0, 0.04 * max(image.shape[:2]))
-    return np.clip(fitted + _smooth(rest, agree, size), 0.0, 255.0).astype(np.float32)
+    aligned: FloatImage = np.clip(fitted + _smooth(rest, agree, size), 0.0, 255.0)
+    return aligned
 
 
 def _robust_line(x: FloatImage, y: FloatImage) -> tuple[float, float]:

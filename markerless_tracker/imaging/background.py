@@ -121,14 +121,15 @@ def model_from_moments(
     *,
     note: str | None = None,
 ) -> BackgroundModel:
-    """A model from the mean and the sum of squared deviations of ``count`` frames, each (h, w, c)."""
+    """A model from the mean and summed squared deviations (h, w, c) of ``count`` frames."""
     if count == 1:
         sigma = settings.background_sigma_still
         variance = np.full_like(mean, sigma**2)
         how = f"one still image; a sensor noise of {sigma:g} grey levels is assumed"
     else:
-        typical = np.median(moment, axis=(0, 1)) / np.float32(count - 1)
-        variance = (moment + _PRIOR_FRAMES * typical) / np.float32(count - 1 + _PRIOR_FRAMES)
+        typical = np.median(moment, axis=(0, 1)) / (count - 1)
+        pooled = (moment + _PRIOR_FRAMES * typical) / (count - 1 + _PRIOR_FRAMES)
+        variance = pooled.astype(np.float32)
         how = f"mean and variance of {count} frames"
     np.maximum(variance, settings.background_sigma_min**2, out=variance)
     return BackgroundModel(mean, variance, note if note is not None else how)
@@ -148,4 +149,5 @@ def foreground_limit(variance: FloatImage, risk: float) -> FloatImage:
     channels = variance.shape[2]
     bound = 2.0 * channels * (math.log(256.0) + risk * math.log(10.0) / 3.0)
     spread = np.log(2.0 * math.pi * variance.astype(np.float64) / 255.0**2).sum(axis=2)
-    return np.maximum(bound - spread, 1.0).astype(np.float32)
+    limit: FloatImage = np.maximum(bound - spread, 1.0).astype(np.float32)
+    return limit

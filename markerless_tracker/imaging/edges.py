@@ -30,22 +30,30 @@ def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
     reach = margin + settings.edge_blur_px + 1
     u0, v0 = max(left - reach, 0), max(top - reach, 0)
     u1, v1 = min(left + w + reach, width), min(top + h + reach, height)
-    grey = grey_of(image[v0:v1, u0:u1])
-    across = cv2.Sobel(grey, cv2.CV_16S, 1, 0, borderType=cv2.BORDER_REPLICATE)
-    down = cv2.Sobel(grey, cv2.CV_16S, 0, 1, borderType=cv2.BORDER_REPLICATE)
-    square = cv2.magnitude(across.astype(np.float32), down.astype(np.float32))
-    threshold = 8.0 * settings.edge_gradient
-    if settings.edge_form == "published":
-        strength = (square >= threshold).astype(np.uint8) * np.uint8(255)
-    else:
-        gain = 255.0 / (1.5 * threshold)
-        strength = cv2.convertScaleAbs(np.maximum(square - 0.5 * threshold, 0.0), alpha=gain)
+    strength = _gradient_strength(grey_of(image[v0:v1, u0:u1]), settings)
     near = mask[v0:v1, u0:u1]
     if margin > 0:
-        near = cv2.dilate(near, np.ones((2 * margin + 1, 2 * margin + 1), dtype=np.uint8))
-    strength = cv2.bitwise_and(strength, near)
+        brush = np.ones((2 * margin + 1, 2 * margin + 1), dtype=np.uint8)
+        near = np.asarray(cv2.dilate(near, brush), dtype=np.uint8)
+    cv2.bitwise_and(strength, near, dst=strength)
     side = settings.edge_blur_px
     if side > 1:
-        strength = cv2.GaussianBlur(strength, (side, side), 0.0, borderType=cv2.BORDER_REPLICATE)
+        border = cv2.BORDER_REPLICATE
+        cv2.GaussianBlur(strength, (side, side), 0.0, dst=strength, borderType=border)
     edges[v0:v1, u0:u1] = strength
     return edges
+
+
+def _gradient_strength(grey: Image, settings: ImagingSettings) -> Image:
+    """Sobel gradient of a grey image (h, w), thresholded as `edge_form` says, 0..255."""
+    border = cv2.BORDER_REPLICATE
+    across = cv2.Sobel(grey, cv2.CV_32F, 1, 0, borderType=border)
+    down = cv2.Sobel(grey, cv2.CV_32F, 0, 1, borderType=border)
+    size = cv2.magnitude(across, down)
+    threshold = 8.0 * settings.edge_gradient
+    if settings.edge_form == "published":
+        return (size >= threshold).astype(np.uint8) * np.uint8(255)
+    gain = 255.0 / (1.5 * threshold)
+    # Saturates at 255; what lies below half the threshold is cut off by the subtraction.
+    strength = np.maximum(size - np.float32(0.5 * threshold), 0.0)
+    return np.asarray(cv2.convertScaleAbs(strength, alpha=gain), dtype=np.uint8)

@@ -60,7 +60,9 @@ def scale_image(image: Image, size_px: tuple[int, int]) -> Image:
     check_image(image, "image to scale")
     width, height = size_px
     if width < 1 or height < 1:
-        raise ImageError(f"image to scale: got a size of {width}x{height} px, expected at least 1x1")
+        raise ImageError(
+            f"image to scale: got a size of {width}x{height} px, expected at least 1x1"
+        )
     if (image.shape[1], image.shape[0]) == (width, height):
         return image
     return np.asarray(

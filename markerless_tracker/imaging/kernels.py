@@ -9,8 +9,8 @@ import numpy as np
 
 from markerless_tracker.imaging.shadow import is_shadow
 
-FOREGROUND = np.uint8(255)
-SHADOW = np.uint8(127)
+FOREGROUND = 255
+SHADOW = 127
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -44,7 +44,7 @@ def label_colour(image, mean, scale, rule, labels):  # type: ignore[no-untyped-d
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def label_grey(image, mean, scale, rule, labels):  # type: ignore[no-untyped-def]
-    """As `label_colour` for a grey image (h, w); mean, scale (h, w); the value ratio decides alone."""
+    """As `label_colour`, everything (h, w); the ratio of brightness alone tells a shadow."""
     one = np.float32(1.0)
     height, width = labels.shape
     for v in range(height):

@@ -16,7 +16,7 @@ def disc(side_px: int) -> Mask:
 
 
 def clean_mask(mask: Mask, settings: ImagingSettings) -> Mask:
-    """Open, close, fill small holes, drop small blobs: mask (h, w) of 0 and 255, changed in place."""
+    """Open, close, drop small blobs, fill small holes: mask (h, w), 0 or 255, in place."""
     if settings.mask_open_px > 1:
         cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc(settings.mask_open_px), dst=mask)
     if settings.mask_close_px > 1:
@@ -28,19 +28,37 @@ def clean_mask(mask: Mask, settings: ImagingSettings) -> Mask:
 
 def drop_blobs(mask: Mask, least_px: float) -> None:
     """Clear 8-connected blobs of fewer than ``least_px`` pixels, in place."""
-    _recolour_small(mask, least_px, 8, 0)
+    window = _occupied(mask)
+    part = np.ascontiguousarray(window)
+    _clear_small(part, least_px, 8)
+    window[...] = part
 
 
 def fill_holes(mask: Mask, largest_px: float) -> None:
-    """Set 4-connected gaps of fewer than ``largest_px`` pixels that do not touch the border, in place."""
-    inverse = cv2.bitwise_not(mask)
-    _recolour_small(inverse, largest_px, 4, 0, spare_border=True)
-    cv2.bitwise_not(inverse, dst=mask)
+    """Set 4-connected gaps of fewer than ``largest_px`` pixels inside the image, in place.
+
+    A gap that reaches the border of the mask's bounding box is no hole.
+    """
+    window = _occupied(mask)
+    if window.size == 0:
+        return
+    gaps = np.asarray(cv2.bitwise_not(window), dtype=np.uint8)
+    _clear_small(gaps, largest_px, 4, spare_border=True)
+    cv2.bitwise_not(gaps, dst=gaps)
+    window[...] = gaps
 
 
-def _recolour_small(
-    mask: Mask, least_px: float, connectivity: int, colour: int, *, spare_border: bool = False
+def _occupied(mask: Mask) -> Mask:
+    """The part of the mask inside its bounding box: labelling empty image is what costs most."""
+    left, top, width, height = cv2.boundingRect(mask)
+    return mask[top : top + height, left : left + width]
+
+
+def _clear_small(
+    mask: Mask, least_px: float, connectivity: int, *, spare_border: bool = False
 ) -> None:
+    if mask.size == 0:
+        return
     count, labels, stats, _ = cv2.connectedComponentsWithStats(
         mask, connectivity=connectivity, ltype=cv2.CV_32S
     )
@@ -52,4 +70,4 @@ def _recolour_small(
         if spare_border and (left == 0 or top == 0 or left + w == width or top + h == height):
             continue
         window = (slice(top, top + h), slice(left, left + w))
-        mask[window][labels[window] == index] = colour
+        mask[window][labels[window] == index] = 0

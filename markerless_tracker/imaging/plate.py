@@ -1,6 +1,6 @@
 """An image of the empty scene, put together from clips and stills in which people appear."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging.align import align_exposure, align_geometry
 from markerless_tracker.imaging.images import Image, check_image
-from markerless_tracker.imaging.steady import matching_frames, motion, steady_image
+from markerless_tracker.imaging.steady import (
+    ALONE_SHARE,
+    matching_frames,
+    motion,
+    steady_image,
+    thinned,
+)
 from markerless_tracker.records import locked
 
 FloatImage = NDArray[np.float32]
@@ -88,20 +94,19 @@ def background_plate(
     for number, still in enumerate(stills):
         if still.ndim != reference.ndim:
             raise ImageError(
-                f"{camera}: still {number} is {still.shape}, expected channels as in {reference.shape}"
+                f"{camera}: still {number} is {still.shape}, expected channels as in "
+                f"{reference.shape}"
             )
     if not frames:
         return _from_stills(stills)
     stack = _stack(frames)
-    steady, _ = steady_image(stack)
+    steady, _ = steady_image(stack) if stills else steady_image(stack, share=ALONE_SHARE)
     guide = np.clip(np.rint(steady), 0, 255).astype(np.uint8).reshape(reference.shape)
-    pictures = [
-        align_exposure(_float(align_geometry(still, guide)), steady) for still in stills
-    ]
+    pictures = [align_exposure(_float(align_geometry(still, guide)), steady) for still in stills]
     if not pictures:
         note = (
             f"{len(stack)} frames of {len(frames)} clip(s), no still: whoever covers a "
-            "place for more than half of the time is burnt in there"
+            "place for most of the time is burnt in there"
         )
         return _finish(steady, np.zeros(steady.shape[:2], dtype=bool), reference, note)
     filled, unsure = _fill(stack, steady, pictures)
@@ -112,36 +117,19 @@ def background_plate(
     return _finish(filled, unsure, reference, note)
 
 
-def thinned(frames: Iterable[Image], most: int) -> Iterator[tuple[int, Image]]:
-    """At most ``most`` frames, evenly spread, of a sequence whose length need not be known.
-
-    Yields (index, frame). Holds up to ``most`` frames at a time.
-    """
-    kept: list[tuple[int, Image]] = []
-    stride = 1
-    for index, frame in enumerate(frames):
-        if index % stride:
-            continue
-        if len(kept) == most:
-            kept = kept[::2]
-            stride *= 2
-            if index % stride:
-                continue
-        kept.append((index, frame))
-    yield from kept
-
-
 def _clip_frames(sequences: Sequence[Iterable[Image]], camera: str) -> list[list[Image]]:
     frames: list[list[Image]] = []
     share = max(2, _FRAMES // max(1, len(sequences)))
     for number, sequence in enumerate(sequences):
-        chosen = []
+        chosen: list[Image] = []
         for index, frame in thinned(sequence, share):
             what = f"{camera}: clip {number}, frame {index}"
             check_image(frame, what)
             first = frames[0][0] if frames else chosen[0] if chosen else frame
             if frame.shape != first.shape:
-                raise ImageError(f"{what}: got an image of {frame.shape}, the first was {first.shape}")
+                raise ImageError(
+                    f"{what}: got an image of {frame.shape}, the first was {first.shape}"
+                )
             chosen.append(frame)
         if chosen:
             frames.append(chosen)
@@ -168,7 +156,7 @@ def _stack(frames: list[list[Image]]) -> Image:
 def _covered(
     share: FloatImage, jump: FloatImage, steady: FloatImage, picture: FloatImage
 ) -> BoolImage:
-    """Where the clips show a person and the still does not: they differ, and the clips are restless.
+    """Where the clips show a person and the still does not: they differ, the clips are restless.
 
     How restless is averaged over the neighbourhood that differs: plain clothes show motion at their
     outline only, and an arm that sweeps over a person of the still for a moment is outvoted.
@@ -238,7 +226,7 @@ def _grow(
         slice(max(int(u.min()) - 3 * side, 0), int(u.max()) + 3 * side + 1),
     )
     plate, unknown = filled[box].copy(), closed[box] > 0
-    frames, doubt = stack[(slice(None), *box)], doubtful[box].copy()
+    frames, doubt = stack[:, box[0], box[1]], doubtful[box].copy()
     person = steady[box]
     far = np.stack([np.abs(frame - plate).max(axis=2) > _REACH for frame in frames])
     wide = 2 * side + 1
@@ -252,8 +240,8 @@ def _grow(
         calm = np.stack(
             [cv2.boxFilter(known * wrong, -1, (wide, wide))[front] < _CALM * mass for wrong in far]
         )
-        agreeing = calm & ~far[:, *front]
-        values = frames[:, *front].astype(np.float32)
+        agreeing = calm & ~far[:, front[0], front[1]]
+        values = frames[:, front[0], front[1]].astype(np.float32)
         count, agreed_count = calm.sum(axis=0), agreeing.sum(axis=0)
         shown, same = _mean(values, calm), _mean(values, agreeing)
         # What the clips show most of the time may be a person: only if it is shown often around
@@ -267,7 +255,7 @@ def _grow(
             break
         where = (front[0][settled], front[1][settled])
         plate[where] = np.where(agreed[:, None], same, shown)[settled]
-        far[:, *where] = np.abs(values[:, settled] - plate[where]).max(axis=2) > _REACH
+        far[:, where[0], where[1]] = np.abs(values[:, settled] - plate[where]).max(axis=2) > _REACH
         doubt[front[0][overruled], front[1][overruled]] = True
         unknown[where] = False
     filled = filled.copy()
@@ -294,7 +282,9 @@ def _from_stills(stills: Sequence[Image]) -> Plate:
     ]
     apart = np.abs(np.stack([picture - base for picture in aligned[1:]])).max(axis=(0, 3)) > _REACH
     if len(stills) == 2:
-        note = "two stills, the first taken as it is: where they differ nothing tells which is empty"
+        note = (
+            "two stills, the first taken as it is: where they differ nothing tells which is empty"
+        )
         return Plate(reference.copy(), apart, note)
     median = np.median(np.stack(aligned), axis=0).astype(np.float32)
     note = f"median of {len(stills)} stills: whoever is at one place in half of them stays"

@@ -1,5 +1,6 @@
 """One camera's image to evidence: silhouette and edge map."""
 
+import cv2
 import numpy as np
 
 from markerless_tracker.errors import ImageError
@@ -32,7 +33,10 @@ class Segmenter:
     """
 
     def __init__(
-        self, camera: str, background: BackgroundModel | None, settings: ImagingSettings | None = None
+        self,
+        camera: str,
+        background: BackgroundModel | None,
+        settings: ImagingSettings | None = None,
     ) -> None:
         if background is None:
             raise ImageError(f"{camera}: no background came, expected one to tell the person from")
@@ -79,7 +83,7 @@ class Segmenter:
 
     def mask(self, image: Image) -> Mask:
         """The silhouette (h, w) uint8, 0 or 255; overwritten by the next call."""
-        np.multiply(self.labels(image) == kernels.FOREGROUND, 255, out=self._mask, casting="unsafe")
+        cv2.threshold(self.labels(image), kernels.SHADOW, 255, cv2.THRESH_BINARY, dst=self._mask)
         return clean_mask(self._mask, self.settings)
 
     def observe(self, image: Image, stamp_ns: int) -> Observation:

@@ -8,7 +8,7 @@ from markerless_tracker.settings import check_settings, setting
 
 @dataclass(frozen=True, kw_only=True)
 class ImagingSettings:
-    """Settings of the imaging room; each field's metadata holds ``doc``, ``min``, ``max``, ``choices``.
+    """Settings of the imaging room; fields have metadata ``doc``, ``min``, ``max``, ``choices``.
 
     Lengths ending in ``_px`` are pixels of the image as the segmenter gets it, areas are shares of
     that image, sigmas and gradients are grey levels of 0..255.

@@ -28,7 +28,7 @@ def hue_deg(blue, green, red, value, chroma):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
 def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped-def]
-    """Eq 12 for one colour pixel (float32 BGR) against its background; ``rule`` of `shadow_rule`."""
+    """Eq 12 for one colour pixel (float32 BGR) and its background; ``rule`` of `shadow_rule`."""
     value = max(b, g, r)
     mean_value = max(mean_b, mean_g, mean_r)
     if value < rule[0] * mean_value or value > rule[1] * mean_value:
@@ -45,7 +45,9 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
         return True
     if chroma <= np.float32(0.0) or mean_chroma <= np.float32(0.0):
         return chroma == mean_chroma
-    turn = abs(hue_deg(b, g, r, value, chroma) - hue_deg(mean_b, mean_g, mean_r, mean_value, mean_chroma))
+    turn = abs(
+        hue_deg(b, g, r, value, chroma) - hue_deg(mean_b, mean_g, mean_r, mean_value, mean_chroma)
+    )
     return min(turn, np.float32(360.0) - turn) <= rule[3]
 
 

@@ -1,5 +1,7 @@
 """What a pixel shows most steadily over time, and how often it shows something else."""
 
+from collections.abc import Iterable, Iterator
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +23,10 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
     for v in range(height):
         for u in range(width):
             for t in range(count):
-                total = 0
+                key = 0
                 for c in range(channels):
-                    total += np.int32(stack[t, v, u, c])
-                key = total * 4096 + t
+                    key += int(stack[t, v, u, c])
+                key = key * 4096 + t
                 slot = t
                 while slot > 0 and keys[slot - 1] > key:
                     keys[slot] = keys[slot - 1]
@@ -41,7 +43,7 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
             for c in range(channels):
                 total = 0
                 for i in range(best, best + need):
-                    total += np.int32(stack[keys[i] & 4095, v, u, c])
+                    total += int(stack[keys[i] & 4095, v, u, c])
                 value = np.float32(total) / np.float32(need)
                 steady[v, u, c] = value
                 square = np.float32(0.0)
@@ -52,6 +54,11 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
                         square += deviation * deviation
                         inside += 1
                 variance[v, u, c] = square / np.float32(max(inside, 1))
+
+
+# Where clips are all there is: a fifth of the frames is enough to prefer a floor seen now and then,
+# which stands perfectly still, to a body that is there more often but never quite the same.
+ALONE_SHARE = 0.2
 
 
 def steady_image(
@@ -150,3 +157,22 @@ def motion(
     jump = np.empty_like(share)
     motion_kernel(stack, steady, np.float32(reach), share, jump)
     return share, jump
+
+
+def thinned(frames: Iterable[Image], most: int) -> Iterator[tuple[int, Image]]:
+    """At most ``most`` frames, evenly spread, of a sequence whose length need not be known.
+
+    Yields (index, frame). Holds up to ``most`` frames at a time.
+    """
+    kept: list[tuple[int, Image]] = []
+    stride = 1
+    for index, frame in enumerate(frames):
+        if index % stride:
+            continue
+        if len(kept) == most:
+            kept = kept[::2]
+            stride *= 2
+            if index % stride:
+                continue
+        kept.append((index, frame))
+    yield from kept
