@@ -110,8 +110,8 @@ def synthesize(
 
     Written: `calibration.toml`, `camNN.mp4` (`.mkv` if lossless: some 0.6 MB per image of 656x490),
     `background/camNN/` with empty images, `masks/camNN/FFFFFF.png` for every `mask_every`-th frame,
-    `ground_truth.trc` (the 15 markers of every frame), `subject.yaml` and `start.yaml` (the true pose
-    of frame 0).
+    `ground_truth.trc` (the 15 markers of every frame), `subject.yaml` and `start.yaml` (the true
+    pose of frame 0).
 
     Args:
         out: a new or an empty folder.

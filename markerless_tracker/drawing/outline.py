@@ -89,7 +89,9 @@ def _surface(length: float, shape: FloatArray) -> FloatArray:
     normal span the side.
     """
     angle = 2.0 * np.pi * np.arange(END_POINTS) / END_POINTS
-    normal = np.column_stack([np.cos(angle), np.sin(angle)])
+    # Normals of evenly spaced points on the mean section: even ones leave flat sides to few points.
+    normal = np.column_stack([np.cos(angle), np.sin(angle)]) / shape[:, :2].mean(axis=0)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
     start, end = (
         row[2:] + row[:2] ** 2 * normal / np.linalg.norm(row[:2] * normal, axis=1)[:, None]
         for row in shape

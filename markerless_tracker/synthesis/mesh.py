@@ -63,7 +63,9 @@ def body_mesh(body: BodyModel) -> BodyMesh:
 
 def _cone(length: float, shape: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
     angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
-    direction = np.column_stack([np.cos(angle), np.sin(angle)])
+    # Normals of evenly spaced points on the mean section: even ones leave flat sides to few points.
+    direction = np.column_stack([np.cos(angle), np.sin(angle)]) / shape[:, :2].mean(axis=0)
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
     # The point of an ellipse with radii r whose normal is n: r² n / |r n|.
     ends = [
         e[2:] + e[:2] ** 2 * direction / np.linalg.norm(e[:2] * direction, axis=1)[:, None]

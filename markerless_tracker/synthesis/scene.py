@@ -67,6 +67,10 @@ class SyntheticScene:
         _check("shadow", shadow, 0.0, 1.0)
         _check("samples", samples, 1, 8)
         _check("seed", seed, 0, 2**63)
+        if len(distortion) not in (4, 5) or not np.isfinite(distortion).all():
+            raise ConfigError(
+                f"distortion has {len(distortion)} coefficients, expected finite k1 k2 p1 p2 (k3)"
+            )
         self.body = body if isinstance(body, BodyModel) else load_body(body, stature_m)
         self.rig: CameraRig = ring_rig(cameras, size_px, distortion=tuple(distortion))
         self.fps = float(fps)
