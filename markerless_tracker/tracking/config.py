@@ -55,8 +55,8 @@ class TrackerConfig(ImagingSettings):
     body: str = setting("person31", "body: a shipped one's name, or a YAML file")
     evaluations: int = setting(
         1000,
-        "budget per frame, in evaluations of the fitness: exactly that many without refinement; with "
-        "it the time that swarm and refinement may take together",
+        "budget per frame, in evaluations of the fitness: exactly that many without refinement; "
+        "with it the time that swarm and refinement may take together",
         least=1,
         most=10**7,
     )
@@ -94,7 +94,7 @@ class TrackerConfig(ImagingSettings):
     )
     fit_shape: bool = setting(
         True,
-        "fit the sections of the body to the first frame's silhouettes, unless the subject has them",
+        "fit the body's sections to the first frame's silhouettes, unless the subject has them",
     )
     seed: int = setting(0, "seed of all random draws", least=0, most=2**63 - 1)
     threads: int = setting(
