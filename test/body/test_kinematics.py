@@ -154,7 +154,7 @@ def test_neutral_stands_upright_with_hanging_arms() -> None:
 
 
 def test_signs_of_flexion() -> None:
-    """Forward is +x: what each joint's positive direction does, as users and start files need it."""
+    """Forward is +x: what the positive direction of each joint does, as start files need it."""
     for name, marker, direction in (
         ("l_hip_y", "LKnee", 1), ("r_hip_y", "RKnee", 1),
         ("l_knee", "LAnkle", 1), ("r_knee", "RAnkle", 1),

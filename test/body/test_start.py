@@ -102,7 +102,7 @@ def test_markers_on_a_line() -> None:
 
 @pytest.mark.parametrize(("name", "most_mm"), [("balance_real", 20.0), ("render_walk", 4.0)])
 def test_reference_poses_are_feasible(name, most_mm) -> None:
-    """Every 10th reference row has a pose that the default rules allow; the walking limits do not."""
+    """The default rules allow the pose of every 10th reference row; the walking limits do not."""
     path = DATA / name / "ground_truth.trc"
     if not path.is_file():
         pytest.skip(f"../shared/data/{name} is not there")

@@ -25,7 +25,7 @@ def region():
     )  # fmt: skip
 
 
-def test_four_panels():
+def test_four_panels() -> None:
     mask, edges, observation = region()
     picture = draw_evidence(IMAGE, observation, CAMERA, BODY, POSE)
     assert picture.shape == (90, 480, 3) and picture.dtype == np.uint8
@@ -40,12 +40,14 @@ def test_four_panels():
     np.testing.assert_array_equal(over, draw_overlay(IMAGE, CAMERA, BODY, POSE, mask=full))
 
 
-def test_without_a_pose_the_last_panel_is_the_input():
+def test_without_a_pose_the_last_panel_is_the_input() -> None:
     picture = draw_evidence(IMAGE[..., 0], region()[2], CAMERA, BODY, None)
     np.testing.assert_array_equal(picture[:, 360:], np.repeat(IMAGE[..., :1], 3, axis=2))
 
 
-def test_an_observation_of_another_size():
+def test_an_observation_of_another_size() -> None:
     other = Observation.from_mask("cam01", 0, np.ones((9, 9)), np.zeros((9, 9), np.uint8))
-    with pytest.raises(ImageError, match="cam01: observation of a frame of 9x9 px, expected 120x90"):
+    with pytest.raises(
+        ImageError, match="cam01: observation of a frame of 9x9 px, expected 120x90"
+    ):
         draw_evidence(IMAGE, other, CAMERA)

@@ -1,5 +1,7 @@
 """Outlines and silhouettes."""
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
@@ -35,7 +37,7 @@ def inside(polygon, points, slack_px):
 
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([LENS, (0.0,) * 5]))
-def test_outlines_hold_their_cones_and_no_more(seed, lens):
+def test_outlines_hold_their_cones_and_no_more(seed, lens) -> None:
     """Points sampled inside each cone project inside its outline; every corner lies on the cone."""
     rng = np.random.default_rng(seed)
     camera = ring_rig(4, (400, 300), distortion=lens).cameras[rng.integers(4)]
@@ -53,9 +55,7 @@ def test_outlines_hold_their_cones_and_no_more(seed, lens):
         assert all(inside(polygon, project_camera(points, camera), 0.05))
         rim = np.linspace(0, 2 * np.pi, 2000)
         ends = [
-            np.column_stack(
-                [ox + rx * np.cos(rim), oy + ry * np.sin(rim), np.full(2000, z)]
-            )
+            np.column_stack([ox + rx * np.cos(rim), oy + ry * np.sin(rim), np.full(2000, z)])
             for (rx, ry, ox, oy), z in ((shape[0], 0.0), (shape[1], length))
         ]
         pixels = project_camera(np.concatenate(ends) @ T[:, :3].T + T[:, 3], camera)
@@ -64,7 +64,7 @@ def test_outlines_hold_their_cones_and_no_more(seed, lens):
         assert all(inside(hull, polygon, 0.3 if any(lens) else 0.01))
 
 
-def test_an_upright_cylinder_by_hand():
+def test_an_upright_cylinder_by_hand() -> None:
     """A cylinder 0.1 m in radius and 0.5 m high, 2 m in front of a camera at half its height."""
     camera = CameraModel(
         "c", (400, 400), np.array([[500.0, 0, 200], [0, 500, 200], [0, 0, 1]]), np.zeros(5),
@@ -73,8 +73,6 @@ def test_an_upright_cylinder_by_hand():
     body = load_body("balan31")
     shapes, lengths = body.cone_shape.copy(), body.cone_length.copy()
     shapes[0], lengths[0] = [[0.1, 0.1, 0, 0]] * 2, 0.5
-    import dataclasses
-
     body = dataclasses.replace(body, cone_shape=shapes, cone_length=lengths)
     polygon = outlines(body, body.neutral, camera)[0]
     # Sides touch at sin(a) = 0.1 / 2; ends are highest at the near rim, 1.9 m away.
@@ -85,7 +83,7 @@ def test_an_upright_cylinder_by_hand():
     np.testing.assert_allclose(200 - polygon[:, 1].min(), 500 * 0.25 / 1.9, atol=0.05)
 
 
-def test_silhouette_is_the_union_of_the_filled_outlines():
+def test_silhouette_is_the_union_of_the_filled_outlines() -> None:
     camera = ring_rig(4, (328, 246), distortion=LENS).cameras[1]
     mask = silhouette(BODY, standing(), camera)
     filled = np.zeros(mask.shape, dtype=np.uint8)
@@ -97,7 +95,7 @@ def test_silhouette_is_the_union_of_the_filled_outlines():
     assert not ((filled == 1) & (grown == 0)).any()
 
 
-def test_pixel_centres_decide_without_samples():
+def test_pixel_centres_decide_without_samples() -> None:
     camera = ring_rig(1, (120, 90)).cameras[0]
     mask = silhouette(BODY, standing(), camera)
     polygons = outlines(BODY, standing(), camera)
@@ -111,7 +109,7 @@ def test_pixel_centres_decide_without_samples():
             assert mask[v, u] == (max(distances) > 0)
 
 
-def test_samples_converge():
+def test_samples_converge() -> None:
     camera = ring_rig(2, (120, 90)).cameras[1]
     fine = silhouette(BODY, standing(), camera, samples=9)
     for samples, most in ((1, 0.03), (3, 0.015), (5, 0.01)):
@@ -119,7 +117,7 @@ def test_samples_converge():
         assert (mask ^ fine).sum() <= most * fine.sum()
 
 
-def test_chosen_cones_alone_are_drawn():
+def test_chosen_cones_alone_are_drawn() -> None:
     camera = ring_rig(4, (328, 246)).cameras[0]
     every = silhouette(BODY, standing(), camera)
     parts = np.zeros_like(every)
@@ -130,7 +128,7 @@ def test_chosen_cones_alone_are_drawn():
     np.testing.assert_array_equal(parts, every)
 
 
-def test_a_body_beside_or_behind_the_camera_leaves_nothing():
+def test_a_body_beside_or_behind_the_camera_leaves_nothing() -> None:
     camera = ring_rig(1, (120, 90)).cameras[0]
     behind = standing()
     eye = camera.T_world_cam[:3, 3]
@@ -143,12 +141,12 @@ def test_a_body_beside_or_behind_the_camera_leaves_nothing():
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 200), (200, 3)])
-def test_tiny_images(size):
+def test_tiny_images(size) -> None:
     camera = ring_rig(1, (120, 90)).cameras[0].resized(size)
     assert silhouette(BODY, standing(), camera, samples=2).shape == size[::-1]
 
 
-def test_joints_lie_inside():
+def test_joints_lie_inside() -> None:
     camera = ring_rig(4, (656, 490), distortion=LENS).cameras[2]
     mask = silhouette(BODY, standing(), camera)
     pixels = np.rint(project_camera(markers(BODY, standing()), camera)).astype(int)

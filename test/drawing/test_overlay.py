@@ -5,7 +5,7 @@ import pytest
 
 from markerless_tracker.body import MARKER_NAMES, load_body, markers
 from markerless_tracker.camera import project_camera
-from markerless_tracker.drawing import draw_overlay
+from markerless_tracker.drawing import draw_overlay, silhouette
 from markerless_tracker.drawing.overlay import CENTRE_BGR, LEFT_BGR, RIGHT_BGR, side_colour
 from markerless_tracker.errors import ImageError
 from markerless_tracker.synthesis import ring_rig
@@ -20,14 +20,14 @@ def blank(*, colour=True):
     return np.full((246, 328, 3) if colour else (246, 328), 90, dtype=np.uint8)
 
 
-def test_the_image_is_left_as_it_was():
+def test_the_image_is_left_as_it_was() -> None:
     image = blank()
     drawn = draw_overlay(image, CAMERA, BODY, POSE)
     assert (image == 90).all() and (drawn != 90).any()
     assert drawn.shape == (246, 328, 3) and drawn.dtype == np.uint8
 
 
-def test_sides_have_their_colours():
+def test_sides_have_their_colours() -> None:
     names = ["l_thigh", "LKnee", "r_forearm", "RWrist", "torso", "head", "Neck"]
     assert [side_colour(n) for n in names] == [LEFT_BGR] * 2 + [RIGHT_BGR] * 2 + [CENTRE_BGR] * 3
     drawn = draw_overlay(blank(), CAMERA, BODY, POSE)
@@ -37,9 +37,7 @@ def test_sides_have_their_colours():
             assert np.abs(drawn[v, u].astype(int) - side_colour(name)).max() < 60
 
 
-def test_lines_lie_at_the_rim_of_the_body():
-    from markerless_tracker.drawing import silhouette
-
+def test_lines_lie_at_the_rim_of_the_body() -> None:
     drawn = (draw_overlay(blank(), CAMERA, BODY, POSE) != 90).any(axis=2)
     mask = silhouette(BODY, POSE, CAMERA)
     inner = mask[1:-1, 1:-1] & mask[:-2, 1:-1] & mask[2:, 1:-1] & mask[1:-1, :-2] & mask[1:-1, 2:]
@@ -48,13 +46,14 @@ def test_lines_lie_at_the_rim_of_the_body():
     assert drawn[rim].mean() > 0.97
 
 
-def test_grey_images_become_colour():
+def test_grey_images_become_colour() -> None:
     np.testing.assert_array_equal(
-        draw_overlay(blank(colour=False), CAMERA, BODY, POSE), draw_overlay(blank(), CAMERA, BODY, POSE)
+        draw_overlay(blank(colour=False), CAMERA, BODY, POSE),
+        draw_overlay(blank(), CAMERA, BODY, POSE),
     )
 
 
-def test_a_mask_is_tinted():
+def test_a_mask_is_tinted() -> None:
     mask = np.zeros((246, 328), dtype=np.bool_)
     mask[5:9, 5:9] = True
     drawn = draw_overlay(blank(), CAMERA, BODY, POSE, mask=mask)
@@ -62,13 +61,13 @@ def test_a_mask_is_tinted():
     assert (drawn[:5, :12] == 90).all()
 
 
-def test_a_body_behind_the_camera_draws_nothing():
+def test_a_body_behind_the_camera_draws_nothing() -> None:
     pose = POSE.copy()
     pose[[BODY.index("pelvis_tx"), BODY.index("pelvis_ty")]] = 3 * CAMERA.T_world_cam[:2, 3]
     assert (draw_overlay(blank(), CAMERA, BODY, pose) == 90).all()
 
 
-def test_a_body_that_fills_the_view_does_no_harm():
+def test_a_body_that_fills_the_view_does_no_harm() -> None:
     for distance in (0.2, 0.31, 0.5):
         pose = POSE.copy()
         eye, forward = CAMERA.T_world_cam[:3, 3], CAMERA.T_world_cam[:3, 2]
@@ -85,11 +84,11 @@ def test_a_body_that_fills_the_view_does_no_harm():
         (np.zeros(10, np.uint8), r"cam01: image of shape \(10,\)"),
     ],
 )
-def test_images_that_do_not_fit(image, words):
+def test_images_that_do_not_fit(image, words) -> None:
     with pytest.raises(ImageError, match=words):
         draw_overlay(image, CAMERA, BODY, POSE)
 
 
-def test_a_mask_that_does_not_fit():
+def test_a_mask_that_does_not_fit() -> None:
     with pytest.raises(ImageError, match=r"cam01: mask of shape \(3, 3\), expected \(246, 328\)"):
         draw_overlay(blank(), CAMERA, BODY, POSE, mask=np.ones((3, 3), dtype=np.bool_))

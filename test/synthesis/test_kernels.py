@@ -36,7 +36,7 @@ def run_rasterize(points, triangles, label, shade, height, width):
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8))
-def test_triangles_are_drawn_as_by_the_slow_twin(seed, count):
+def test_triangles_are_drawn_as_by_the_slow_twin(seed, count) -> None:
     rng = np.random.default_rng(seed)
     # No corner is shared: on a shared edge either triangle may win by rounding.
     points = np.column_stack([rng.uniform(-6, 20, (24, 2)), rng.uniform(0.2, 1.0, 24)])
@@ -49,7 +49,7 @@ def test_triangles_are_drawn_as_by_the_slow_twin(seed, count):
 
 
 @pytest.mark.parametrize("far", [1e9, 1e300, np.inf, -np.inf, np.nan])
-def test_corners_far_outside_are_cut_off(far):
+def test_corners_far_outside_are_cut_off(far) -> None:
     points = np.array([[far, 0, 1.0], [0, -1e9, 1.0], [0, 1e9, 1.0], [3, 3, 1.0]])
     nearness, _, _ = run_rasterize(
         points, np.array([[0, 1, 2], [3, 3, 3]]), np.zeros(4, int), np.ones(4), 6, 6
@@ -57,7 +57,7 @@ def test_corners_far_outside_are_cut_off(far):
     assert set(np.unique(nearness)) <= {0.0, 1.0} or np.isfinite(nearness).all()
 
 
-def test_touching_triangles_leave_no_gap():
+def test_touching_triangles_leave_no_gap() -> None:
     corners = np.array([[-1.0, -1, 1], [9, -1, 1], [9, 9, 1], [-1, 9, 1], [3.7, 4.2, 1]])
     fan = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
     nearness, _, _ = run_rasterize(corners, fan, np.zeros(5, int), np.ones(5), 8, 8)
@@ -66,7 +66,7 @@ def test_touching_triangles_leave_no_gap():
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 4))
-def test_samples_are_averaged_as_by_the_slow_twin(seed, samples):
+def test_samples_are_averaged_as_by_the_slow_twin(seed, samples) -> None:
     rng = np.random.default_rng(seed)
     height, width, darkness = 3, 5, 0.3
     background = rng.uniform(0, 255, (height, width, 3)).astype(np.float32)

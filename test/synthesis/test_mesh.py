@@ -31,7 +31,7 @@ def volume(vertices, triangles):
     return np.abs(np.einsum("ni,ni->n", a - middle, np.cross(b - middle, c - middle))).sum() / 6
 
 
-def test_a_cylinder():
+def test_a_cylinder() -> None:
     vertices, normals, triangles = one_cone(0.5, [[0.1, 0.1, 0, 0]] * 2)
     assert volume(vertices, triangles) == pytest.approx(np.pi * 0.01 * 0.5, rel=0.005)
     side = normals[:, 2] == 0.0
@@ -39,19 +39,19 @@ def test_a_cylinder():
     np.testing.assert_array_equal(np.unique(normals[~side, 2]), [-1.0, 1.0])
 
 
-end = st.tuples(st.floats(0.05, 0.2), st.floats(0.05, 0.2), st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))
+end = st.tuples(
+    st.floats(0.05, 0.2), st.floats(0.05, 0.2), st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)
+)
 
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.05, 1.0), end, end)
-def test_the_mesh_is_the_convex_hull_of_the_ends(length, start, stop):
+def test_the_mesh_is_the_convex_hull_of_the_ends(length, start, stop) -> None:
     vertices, normals, triangles = one_cone(length, [start, stop])
     angle = np.linspace(0, 2 * np.pi, 181)[:-1]
     ends = np.concatenate(
         [
-            np.column_stack(
-                [ox + rx * np.cos(angle), oy + ry * np.sin(angle), np.full(180, z)]
-            )
+            np.column_stack([ox + rx * np.cos(angle), oy + ry * np.sin(angle), np.full(180, z)])
             for (rx, ry, ox, oy), z in ((start, 0.0), (stop, length))
         ]
     )
@@ -66,7 +66,7 @@ def test_the_mesh_is_the_convex_hull_of_the_ends(length, start, stop):
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0)
 
 
-def test_posed_vertices_hang_from_their_cones():
+def test_posed_vertices_hang_from_their_cones() -> None:
     pose = np.linspace(-1, 1, BODY.size)
     mesh = body_mesh(BODY)
     vertices, normals = mesh.posed(BODY, pose)

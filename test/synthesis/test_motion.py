@@ -20,7 +20,7 @@ def poses(body, kind, seed, frames=360):
 
 @pytest.mark.parametrize("kind", MOTIONS)
 @pytest.mark.parametrize("name", sorted(BODIES))
-def test_poses_are_possible(name, kind):
+def test_poses_are_possible(name, kind) -> None:
     body = BODIES[name]
     for seed in (0, 1, 2):
         assert Feasibility(body, body.limits, "elliptic")(poses(body, kind, seed, 240)).all()
@@ -29,7 +29,7 @@ def test_poses_are_possible(name, kind):
 @pytest.mark.parametrize(
     ("kind", "most"), [("walk", 1.05), ("balance", 1.05), ("stand", 1.05), ("jog", 2.5)]
 )
-def test_changes_between_frames_are_those_of_people(kind, most):
+def test_changes_between_frames_are_those_of_people(kind, most) -> None:
     """In units of the greatest change in recorded walks; running is faster than walking."""
     changes = np.abs(np.diff(poses(BODY, kind, 3), axis=0)) / BODY.sigma
     assert changes.max() < most
@@ -38,7 +38,7 @@ def test_changes_between_frames_are_those_of_people(kind, most):
 
 @pytest.mark.parametrize("kind", MOTIONS)
 @pytest.mark.parametrize("name", sorted(BODIES))
-def test_feet_stay_near_the_floor(name, kind):
+def test_feet_stay_near_the_floor(name, kind) -> None:
     body = BODIES[name]
     mesh = body_mesh(body)
     low = [mesh.posed(body, pose)[0][:, 2].min() for pose in poses(body, kind, 4, 120)]
@@ -46,7 +46,7 @@ def test_feet_stay_near_the_floor(name, kind):
 
 
 @pytest.mark.parametrize(("kind", "speed"), [("walk", 0.8), ("jog", 1.8)])
-def test_walking_goes_forward_around_the_origin(kind, speed):
+def test_walking_goes_forward_around_the_origin(kind, speed) -> None:
     track = poses(BODY, kind, 5)
     position = track[:, [BODY.index("pelvis_tx"), BODY.index("pelvis_ty")]]
     radius = np.linalg.norm(position, axis=1)
@@ -59,14 +59,16 @@ def test_walking_goes_forward_around_the_origin(kind, speed):
     assert along.min() > 0.95
 
 
-@pytest.mark.parametrize(("kind", "feet"), [("balance", ["LAnkle"]), ("stand", ["LAnkle", "RAnkle"])])
-def test_standing_feet_stay_over_one_point(kind, feet):
+@pytest.mark.parametrize(
+    ("kind", "feet"), [("balance", ["LAnkle"]), ("stand", ["LAnkle", "RAnkle"])]
+)
+def test_standing_feet_stay_over_one_point(kind, feet) -> None:
     rows = [MARKER_NAMES.index(name) for name in feet]
     over = np.array([markers(BODY, pose)[rows, :2].mean(axis=0) for pose in poses(BODY, kind, 6)])
     np.testing.assert_allclose(over, 0.0, atol=1e-9)
 
 
-def test_legs_and_arms_swing_in_opposition():
+def test_legs_and_arms_swing_in_opposition() -> None:
     track = poses(BODY, "walk", 7)
     left, right = (track[:, BODY.index(f"{side}_hip_y")] for side in "lr")
     arm = -track[:, BODY.index("l_shoulder_y")]
@@ -74,11 +76,11 @@ def test_legs_and_arms_swing_in_opposition():
     assert np.corrcoef(left, arm)[0, 1] < -0.9
 
 
-def test_a_seed_names_a_motion():
+def test_a_seed_names_a_motion() -> None:
     np.testing.assert_array_equal(poses(BODY, "walk", 1, 9), poses(BODY, "walk", 1, 9))
     assert np.abs(poses(BODY, "walk", 1, 9) - poses(BODY, "walk", 2, 9)).max() > 0.05
 
 
-def test_unknown_motion():
+def test_unknown_motion() -> None:
     with pytest.raises(ConfigError, match="motion is 'fly', expected one of walk, jog, balance"):
         Motion(BODY, "fly")

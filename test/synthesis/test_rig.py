@@ -14,7 +14,7 @@ from markerless_tracker.synthesis import look_at, ring_rig
     st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(0.5, 5)),
     st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0, 2)),
 )
-def test_a_camera_looks_at_its_target_upright(eye, target):
+def test_a_camera_looks_at_its_target_upright(eye, target) -> None:
     eye, target = np.array(eye), np.array(target)
     if np.hypot(*(eye - target)[:2]) < 0.1:
         return
@@ -28,7 +28,7 @@ def test_a_camera_looks_at_its_target_upright(eye, target):
 
 @pytest.mark.parametrize("cameras", [1, 2, 4, 7])
 @pytest.mark.parametrize("size", [(656, 490), (270, 480)])
-def test_every_camera_sees_the_whole_person(cameras, size):
+def test_every_camera_sees_the_whole_person(cameras, size) -> None:
     rig = ring_rig(cameras, size)
     assert rig.names == tuple(f"cam{i + 1:02d}" for i in range(cameras))
     places = [[0.9, 0], [-0.9, 0], [0, 0.9], [0, -0.9], [0, 0]]
@@ -38,6 +38,8 @@ def test_every_camera_sees_the_whole_person(cameras, size):
     assert (pixels >= 0).all() and (pixels <= np.array(size) - 1).all()
 
 
-def test_the_target_lies_in_the_middle_of_the_image():
+def test_the_target_lies_in_the_middle_of_the_image() -> None:
     for camera in ring_rig(3, (640, 480), distortion=(0.0,) * 5):
-        np.testing.assert_allclose(project_camera(np.array([[0, 0, 0.85]]), camera)[0], [319.5, 239.5])
+        np.testing.assert_allclose(
+            project_camera(np.array([[0, 0, 0.85]]), camera)[0], [319.5, 239.5]
+        )

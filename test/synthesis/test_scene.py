@@ -22,7 +22,7 @@ def scene():
     return SyntheticScene(motion="balance", size_px=SMALL, seed=5)
 
 
-def test_frames_hold_every_camera(scene):
+def test_frames_hold_every_camera(scene) -> None:
     images, masks, pose = scene.frame(3)
     assert tuple(images) == tuple(masks) == scene.rig.names == ("cam01", "cam02", "cam03", "cam04")
     for name in images:
@@ -33,7 +33,7 @@ def test_frames_hold_every_camera(scene):
 
 
 @pytest.mark.parametrize("body", ["balan31", "person31"])
-def test_masks_are_the_silhouettes_of_the_body(body):
+def test_masks_are_the_silhouettes_of_the_body(body) -> None:
     """Drawn by outlines, without the mesh: the same to a few pixels, lens included."""
     strong = (-0.25, 0.08, 0.002, -0.001, 0.0)
     scene = SyntheticScene(body=body, size_px=SMALL, seed=1, distortion=strong, cameras=2)
@@ -45,7 +45,7 @@ def test_masks_are_the_silhouettes_of_the_body(body):
             assert overlap(masks[camera.name], expected) > 0.995
 
 
-def test_markers_lie_inside_the_masks(scene):
+def test_markers_lie_inside_the_masks(scene) -> None:
     _, masks, _ = scene.frame(0)
     inside = []
     for camera in scene.rig:
@@ -55,7 +55,7 @@ def test_markers_lie_inside_the_masks(scene):
     assert np.mean(inside) > 0.8
 
 
-def test_body_and_shadow_are_all_that_differs_from_the_empty_room():
+def test_body_and_shadow_are_all_that_differs_from_the_empty_room() -> None:
     clean = SyntheticScene(size_px=SMALL, noise=0.0, shadow=0.0, seed=2)
     dark = SyntheticScene(size_px=SMALL, noise=0.0, shadow=0.4, seed=2)
     empty = clean.backgrounds(1)
@@ -71,7 +71,7 @@ def test_body_and_shadow_are_all_that_differs_from_the_empty_room():
         assert np.percentile(inside, 5) == pytest.approx(0.6, abs=0.02)
 
 
-def test_the_tracker_s_own_segmentation_finds_the_person(scene):
+def test_the_tracker_s_own_segmentation_finds_the_person(scene) -> None:
     settings = ImagingSettings()
     empty = scene.backgrounds(8)
     images, masks, _ = scene.frame(10)
@@ -80,7 +80,7 @@ def test_the_tracker_s_own_segmentation_finds_the_person(scene):
         assert overlap(segmenter.observe(images[name], 0).mask, masks[name]) > 0.9
 
 
-def test_noise_has_its_deviation_and_no_mean(scene):
+def test_noise_has_its_deviation_and_no_mean(scene) -> None:
     quiet = SyntheticScene(motion="balance", size_px=SMALL, seed=5, noise=0.0).backgrounds(1)
     for name, (a, b) in scene.backgrounds(2).items():
         error = a.astype(float) - quiet[name][0]
@@ -91,7 +91,7 @@ def test_noise_has_its_deviation_and_no_mean(scene):
         assert abs((error * other).mean()) < 0.3
 
 
-def test_everything_depends_on_the_arguments_alone():
+def test_everything_depends_on_the_arguments_alone() -> None:
     one, two = (SyntheticScene(size_px=(96, 64), seed=9, motion="jog") for _ in range(2))
     two.frame(0)  # what was asked for before does not matter
     for a, b in zip(one.frame(7)[:2], two.frame(7)[:2], strict=True):
@@ -103,7 +103,7 @@ def test_everything_depends_on_the_arguments_alone():
     assert any((one.frame(7)[0][n] != other.frame(7)[0][n]).any() for n in one.rig.names)
 
 
-def test_frames_and_cameras_have_noise_of_their_own():
+def test_frames_and_cameras_have_noise_of_their_own() -> None:
     still = SyntheticScene(size_px=(96, 64), seed=9, motion="stand", cameras=2)
     quiet = SyntheticScene(size_px=(96, 64), seed=9, motion="stand", cameras=2, noise=0.0)
     noise = [
@@ -116,13 +116,13 @@ def test_frames_and_cameras_have_noise_of_their_own():
             assert abs(np.corrcoef(a.ravel(), b.ravel())[0, 1]) < 0.05
 
 
-def test_stamps_and_poses_follow_the_rate():
+def test_stamps_and_poses_follow_the_rate() -> None:
     slow, fast = (SyntheticScene(size_px=(32, 32), fps=fps, cameras=1) for fps in (20.0, 60.0))
     assert [fast.stamp_ns(i) for i in range(4)] == [0, 16666667, 33333333, 50000000]
     np.testing.assert_allclose(slow.pose(1), fast.pose(3), atol=1e-12)
 
 
-def test_a_person_partly_out_of_view_is_cut_off():
+def test_a_person_partly_out_of_view_is_cut_off() -> None:
     body = load_body("balan31")
     scene = SyntheticScene(body=body, size_px=(64, 48), cameras=1)
     (renderer,) = scene._renderers.values()
@@ -136,7 +136,7 @@ def test_a_person_partly_out_of_view_is_cut_off():
     assert not mask.any() and np.isfinite(image).all()
 
 
-def test_a_person_around_the_camera_does_no_harm():
+def test_a_person_around_the_camera_does_no_harm() -> None:
     body = load_body("balan31")
     scene = SyntheticScene(body=body, size_px=(64, 48), cameras=1)
     (renderer,) = scene._renderers.values()
@@ -154,13 +154,13 @@ def test_a_person_around_the_camera_does_no_harm():
         ("seed", -1), ("motion", "fly"), ("distortion", (0.1,)),
     ],
 )  # fmt: skip
-def test_impossible_arguments_are_named(argument, value):
+def test_impossible_arguments_are_named(argument, value) -> None:
     words = {"size_px": "image", "distortion": "has 1 coefficients"}
     with pytest.raises(ConfigError, match=words.get(argument, argument)):
         SyntheticScene(**{argument: value})
 
 
-def test_impossible_body_and_stature():
+def test_impossible_body_and_stature() -> None:
     with pytest.raises(BodyModelError, match="body 'spider' is unknown"):
         SyntheticScene(body="spider")
     with pytest.raises(BodyModelError, match="stature is 17"):

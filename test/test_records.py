@@ -1,0 +1,149 @@
+"""Records that cross rooms: packed masks, observations, stages, results."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from markerless_tracker.errors import ImageError, SearchError
+from markerless_tracker.records import (
+    Observation,
+    Stage,
+    TrackResult,
+    TrackState,
+    locked,
+    pack_mask,
+    unpack_mask,
+)
+
+masks = hnp.arrays(np.bool_, hnp.array_shapes(min_dims=2, max_dims=2, max_side=150))
+
+
+@given(masks)
+def test_masks_come_back(mask: np.ndarray) -> None:
+    words = pack_mask(mask)
+    assert words.dtype == np.uint64 and words.shape == (len(mask), -(-mask.shape[1] // 64))
+    np.testing.assert_array_equal(unpack_mask(words, mask.shape[1]), mask)
+
+
+@given(masks)
+def test_bits_count_the_pixels_and_padding_is_zero(mask: np.ndarray) -> None:
+    assert sum(int(word).bit_count() for word in pack_mask(mask).ravel()) == mask.sum()
+
+
+@pytest.mark.parametrize("column", [0, 1, 7, 8, 63, 64, 65, 129])
+def test_a_column_is_its_bit(column: int) -> None:
+    mask = np.zeros((2, 130))
+    mask[1, column] = 255
+    words = pack_mask(mask)
+    expected = np.zeros((2, 3), dtype=np.uint64)
+    expected[1, column // 64] = np.uint64(1 << column % 64)
+    np.testing.assert_array_equal(words, expected)
+
+
+def test_any_non_zero_value_is_body() -> None:
+    mask = np.array([[0, 1, 255, -3]], dtype=np.int16)
+    assert unpack_mask(pack_mask(mask), 4).tolist() == [[False, True, True, True]]
+
+
+# --- locked ----------------------------------------------------------------------------------
+
+
+def test_locked_arrays_cannot_be_written() -> None:
+    array = np.arange(6.0)
+    fixed = locked(array, float)
+    with pytest.raises(ValueError, match="read-only"):
+        fixed[0] = 1.0
+    array[1] = 7.0  # its owner still may
+
+
+def test_locked_copies_only_what_it_must() -> None:
+    array = np.arange(6.0)
+    assert np.shares_memory(locked(array, float), array)
+    assert locked(array, np.float32).dtype == np.float32
+    transposed = np.arange(6.0).reshape(2, 3).T
+    assert locked(transposed, float).flags.c_contiguous and transposed.flags.writeable
+
+
+# --- observations ----------------------------------------------------------------------------
+
+
+@given(masks, st.integers(0, 9), st.integers(0, 9), st.integers(0, 9), st.integers(0, 9))
+def test_observations_give_back_what_they_hold(
+    mask: np.ndarray, u: int, v: int, right: int, below: int
+) -> None:
+    height, width = mask.shape
+    edges = np.arange(height * width, dtype=np.uint8).reshape(height, width)
+    size = (u + width + right, v + height + below)
+    seen = Observation.from_mask("cam01", 5, mask, edges, size_px=size, offset_px=(u, v))
+    np.testing.assert_array_equal(seen.mask, mask)
+    np.testing.assert_array_equal(seen.edges, edges)
+    assert (seen.width, seen.height, seen.size_px, seen.offset_px) == (width, height, size, (u, v))
+    assert seen.stamp_ns == 5 and not seen.edges.flags.writeable
+
+
+def test_the_region_is_the_frame_unless_given() -> None:
+    seen = Observation.from_mask("cam01", 0, np.ones((4, 7)), np.zeros((4, 7), np.uint8))
+    assert seen.size_px == (7, 4) and seen.offset_px == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("size", "offset", "words", "message"),
+    [
+        ((9, 4), (3, 0), 1, r"cam01: region 7x4 at \(3, 0\) does not lie inside .* 9x4"),
+        ((9, 9), (-1, 0), 1, r"cam01: region 7x4 at \(-1, 0\)"),
+        ((9, 5), (0, 2), 1, r"cam01: region 7x4 at \(0, 2\)"),
+        ((9, 9), (0, 0), 2, r"cam01: observation holds edges \(4, 7\) and mask words \(4, 2\)"),
+    ],
+)
+def test_observations_that_contradict_themselves(
+    size: tuple[int, int], offset: tuple[int, int], words: int, message: str
+) -> None:
+    with pytest.raises(ImageError, match=message):
+        Observation("cam01", 0, size, offset, np.zeros((4, words), np.uint64), np.zeros((4, 7)))
+
+
+# --- stages and results ----------------------------------------------------------------------
+
+GOOD_STAGE = {
+    "name": "one", "algorithm": "sppso", "active": [0, 2], "centre": np.zeros(3),
+    "sigma": np.ones(3), "particles": 10, "iterations": 20, "silhouette_weight": 1.0,
+    "edge_weight": 0.5, "silhouette_cones": [True], "edge_cones": [False],
+}  # fmt: skip
+
+
+def test_a_stage_counts_its_evaluations_and_is_frozen() -> None:
+    stage = Stage(**GOOD_STAGE)
+    assert stage.evaluations == 200 and stage.active.dtype == np.int64
+    with pytest.raises(ValueError, match="read-only"):
+        stage.centre[0] = 1.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        stage.particles = 1  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"sigma": np.ones(4)}, r"stage one: centre \(3,\) and sigma \(4,\)"),
+        ({"centre": np.zeros((1, 3)), "sigma": np.ones((1, 3))}, "stage one: centre"),
+        ({"active": [0, 3]}, r"stage one: active parameters must be 0\.\.2"),
+        ({"active": [-1]}, "stage one: active"),
+        ({"active": []}, "stage one: active"),
+        ({"particles": 0}, "stage one: 0 particles x 20 iterations, expected at least 1"),
+        ({"iterations": 0}, "stage one: 10 particles x 0 iterations"),
+    ],
+)
+def test_impossible_stages(change: dict[str, object], message: str) -> None:
+    with pytest.raises(SearchError, match=message):
+        Stage(**{**GOOD_STAGE, **change})
+
+
+def test_results_are_read_only_and_may_be_empty() -> None:
+    result = TrackResult(1, TrackState.TRACKING, np.zeros(31), np.zeros((15, 3)), 1.5, {}, 1000)
+    for array in (result.pose, result.markers_m):
+        assert array is not None and not array.flags.writeable
+    nothing = TrackResult(1, TrackState.LOST, None, None, float("nan"), {}, 0)
+    assert nothing.pose is None and nothing.markers_m is None and nothing.warnings == ()
