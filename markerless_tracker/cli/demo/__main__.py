@@ -15,7 +15,7 @@ from rich.table import Table
 from markerless_tracker.bags import write_bag
 from markerless_tracker.body import load_body, read_subject
 from markerless_tracker.cli.demo.live import Replay, replay
-from markerless_tracker.cli.demo.pictures import draw_pictures, mean_overlap, tracked_frames
+from markerless_tracker.cli.demo.pictures import draw_pictures, mean_overlap, read_outcome
 from markerless_tracker.cli.demo.scene import Scene, made_up_scene, real_scene
 from markerless_tracker.datasets import open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
@@ -54,13 +54,11 @@ def _demo(folder: Path, console: Console, *, made_up: bool) -> None:
     bag = folder / "bag"
     sets, fps = _convert(scene, bag, console)
     slow, live = _replays(scene, bag, folder, console, sets=sets, fps=fps)
-    frames = tracked_frames(slow.result)
-    if not frames:
-        raise DatasetError(f"{slow.result}.json: the person was tracked in no frame")
+    outcome = read_outcome(slow.result)
     with _bar(console, "drawing", None):
-        body = load_body("balan31", read_subject(scene.subject))
-        sheets = draw_pictures(bag, frames, body, folder / "result" / "overlays")
-    _report(console, scene, (slow, live), mean_overlap(frames), sheets)
+        body = load_body(outcome.body, read_subject(scene.subject))
+        sheets = draw_pictures(bag, outcome.frames, body, folder / "result" / "overlays")
+    _report(console, scene, (slow, live), mean_overlap(outcome.frames), sheets)
     console.print(f"The demo took {time.monotonic() - started_s:.0f} s.")
 
 
@@ -94,11 +92,12 @@ def _replays(
     scene: Scene, bag: Path, folder: Path, console: Console, *, sets: int, fps: float
 ) -> tuple[Replay, Replay]:
     """One replay at a pace at which nothing is skipped, one in real time."""
-    tracker = {
+    tracker: dict[str, object] = {
         "calibration_file": bag / "calibration.toml",
         "background_dir": bag / "background",
         "subject_file": scene.subject,
         "start_file": scene.start,
+        **({"body": scene.body} if scene.body else {}),
     }
 
     def run(rate: float, name: str, title: str) -> Replay:

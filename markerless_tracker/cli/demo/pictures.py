@@ -1,7 +1,8 @@
 """What the demo found, drawn over the images of every view, and how well it covers the person."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,21 +18,38 @@ from markerless_tracker.records import TrackState
 Frame = Mapping[str, Any]
 
 
-def tracked_frames(result: Path) -> list[Frame]:
-    """The frames of `result`.json in which the person was tracked.
+@dataclass(frozen=True)
+class Outcome:
+    """What a tracker wrote about a run.
+
+    Attributes:
+        body: name or file of the tracked body.
+        frames: entries of the frames in which the person was tracked.
+    """
+
+    body: str
+    frames: Sequence[Frame]
+
+
+def read_outcome(result: Path) -> Outcome:
+    """Read `result`.json.
 
     Raises:
-        DatasetError: the file is not there, or no result.
+        DatasetError: the file is not there, no result, or one without any tracked frame.
     """
     path = result.with_name(result.name + ".json")
     try:
-        frames = json.loads(path.read_text(encoding="utf-8"))["frames"]
+        content = json.loads(path.read_text(encoding="utf-8"))
+        body, frames = content["settings"]["body"], content["frames"]
     except (OSError, ValueError, KeyError) as error:
         raise DatasetError(f"{path}: no result of a tracker ({error})") from error
-    return [frame for frame in frames if frame["state"] == TrackState.TRACKING.value]
+    tracked = [frame for frame in frames if frame["state"] == TrackState.TRACKING.value]
+    if not tracked:
+        raise DatasetError(f"{path}: the person was tracked in none of {len(frames)} frames")
+    return Outcome(body, tracked)
 
 
-def mean_overlap(frames: list[Frame]) -> dict[str, float]:
+def mean_overlap(frames: Sequence[Frame]) -> dict[str, float]:
     """Camera -> overlap (IoU) of the person's silhouette and the projected body, mean of frames."""
     values: dict[str, list[float]] = {}
     for frame in frames:
@@ -40,12 +58,12 @@ def mean_overlap(frames: list[Frame]) -> dict[str, float]:
     return {camera: float(np.mean(found)) for camera, found in values.items()}
 
 
-def draw_pictures(bag: Path, frames: list[Frame], body: BodyModel, folder: Path) -> list[Path]:
+def draw_pictures(bag: Path, frames: Sequence[Frame], body: BodyModel, folder: Path) -> list[Path]:
     """Draw the body over all views of the first, the middle and the last tracked frame.
 
     Args:
         bag: the images.
-        frames: what `tracked_frames` gave, at least one.
+        frames: those of an `Outcome`.
         body: the tracked body.
         folder: gets `NAME_FFFFFF.png` of each view and `all_FFFFFF.png` of all of them.
 

@@ -12,6 +12,7 @@ SCALE = 0.5
 """Full-size sets are 25 MB; no middleware carries sixty of those a second."""
 
 MADE_UP_SECONDS = 1.5
+MADE_UP_BODY = "balan31"
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class Scene:
         scale: factor for its images.
         subject: sizes of the person (YAML).
         start: pose in the first frame (YAML).
+        body: body to track with, the tracker's own choice if empty.
         note: why it is not the real recording; empty if it is.
     """
 
@@ -32,6 +34,7 @@ class Scene:
     scale: float
     subject: Path
     start: Path
+    body: str = ""
     note: str = ""
 
 
@@ -59,7 +62,10 @@ def made_up_scene(folder: Path, note: str) -> Scene:
     """
     recording = folder / "made_up"
     if not recording.is_dir():
-        status = command(["synthesize", str(recording), "--seconds", str(MADE_UP_SECONDS)])
+        status = command(
+            ["synthesize", str(recording), "--body", MADE_UP_BODY]
+            + ["--seconds", str(MADE_UP_SECONDS)]
+        )
         if status:
             raise DatasetError(f"{recording}: synthesize ended with status {status}")
     return Scene(
@@ -68,5 +74,6 @@ def made_up_scene(folder: Path, note: str) -> Scene:
         1.0,
         recording / "subject.yaml",
         recording / "start.yaml",
-        note,
+        body=MADE_UP_BODY,
+        note=note,
     )
