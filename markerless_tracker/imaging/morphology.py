@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.imaging.kernels import SHADOW
 from markerless_tracker.imaging.settings import ImagingSettings
 
 Mask = NDArray[np.uint8]
@@ -13,6 +14,29 @@ def disc(side_px: int) -> Mask:
     """A round structuring element of that side."""
     shape = cv2.MORPH_ELLIPSE if side_px > 3 else cv2.MORPH_CROSS
     return np.asarray(cv2.getStructuringElement(shape, (side_px, side_px)), dtype=np.uint8)
+
+
+def foreground_mask(labels: Mask, mask: Mask, least_shadow_px: float, *, grey: bool) -> None:
+    """The foreground with the shadow patches too small to be shadows.
+
+    Args:
+        labels: (h, w) uint8: 0 background, 127 shadow, 255 foreground.
+        mask: (h, w) uint8, written: 0 or 255.
+        least_shadow_px: smaller patches of shadow (4-connected) become foreground.
+        grey: the patches are opened first; the value ratio alone leaves them ragged.
+    """
+    if least_shadow_px <= 1.0:
+        cv2.threshold(labels, SHADOW, 255, cv2.THRESH_BINARY, dst=mask)
+        return
+    cv2.threshold(labels, 0, 255, cv2.THRESH_BINARY, dst=mask)
+    shadow = np.asarray(cv2.inRange(labels, (SHADOW,), (SHADOW,)), dtype=np.uint8)
+    if grey:
+        cv2.morphologyEx(shadow, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8), dst=shadow)
+    window = occupied(shadow)
+    patches = np.ascontiguousarray(window)
+    _clear_small(patches, least_shadow_px, 4)
+    window[...] = patches
+    cv2.subtract(mask, shadow, dst=mask)
 
 
 def clean_mask(mask: Mask, settings: ImagingSettings) -> Mask:
@@ -28,7 +52,7 @@ def clean_mask(mask: Mask, settings: ImagingSettings) -> Mask:
 
 def drop_blobs(mask: Mask, least_px: float) -> None:
     """Clear 8-connected blobs of fewer than ``least_px`` pixels, in place."""
-    window = _occupied(mask)
+    window = occupied(mask)
     part = np.ascontiguousarray(window)
     _clear_small(part, least_px, 8)
     window[...] = part
@@ -39,7 +63,7 @@ def fill_holes(mask: Mask, largest_px: float) -> None:
 
     A gap that reaches the border of the mask's bounding box is no hole.
     """
-    window = _occupied(mask)
+    window = occupied(mask)
     if window.size == 0:
         return
     gaps = np.asarray(cv2.bitwise_not(window), dtype=np.uint8)
@@ -48,7 +72,7 @@ def fill_holes(mask: Mask, largest_px: float) -> None:
     window[...] = gaps
 
 
-def _occupied(mask: Mask) -> Mask:
+def occupied(mask: Mask) -> Mask:
     """The part of the mask inside its bounding box: labelling empty image is what costs most."""
     left, top, width, height = cv2.boundingRect(mask)
     return mask[top : top + height, left : left + width]
@@ -59,15 +83,16 @@ def _clear_small(
 ) -> None:
     if mask.size == 0:
         return
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(
         mask, connectivity=connectivity, ltype=cv2.CV_32S
     )
-    height, width = mask.shape
-    for index in range(1, count):
-        left, top, w, h, area = (int(x) for x in stats[index])
-        if area >= least_px:
-            continue
-        if spare_border and (left == 0 or top == 0 or left + w == width or top + h == height):
-            continue
-        window = (slice(top, top + h), slice(left, left + w))
-        mask[window][labels[window] == index] = 0
+    keep = stats[:, cv2.CC_STAT_AREA] >= least_px
+    if spare_border:
+        right = stats[:, cv2.CC_STAT_LEFT] + stats[:, cv2.CC_STAT_WIDTH]
+        bottom = stats[:, cv2.CC_STAT_TOP] + stats[:, cv2.CC_STAT_HEIGHT]
+        keep |= (stats[:, cv2.CC_STAT_LEFT] == 0) | (stats[:, cv2.CC_STAT_TOP] == 0)
+        keep |= (right == mask.shape[1]) | (bottom == mask.shape[0])
+    if keep[1:].all():
+        return
+    keep[0] = False
+    mask[...] = (keep.astype(np.uint8) * np.uint8(255))[labels]

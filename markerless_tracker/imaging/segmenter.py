@@ -1,6 +1,5 @@
 """One camera's image to evidence: silhouette and edge map."""
 
-import cv2
 import numpy as np
 
 from markerless_tracker.errors import ImageError
@@ -8,7 +7,7 @@ from markerless_tracker.imaging import kernels
 from markerless_tracker.imaging.background import BackgroundModel, foreground_limit
 from markerless_tracker.imaging.edges import edge_map
 from markerless_tracker.imaging.images import Image, check_image, grey_of
-from markerless_tracker.imaging.morphology import Mask, clean_mask
+from markerless_tracker.imaging.morphology import Mask, clean_mask, foreground_mask
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.imaging.shadow import shadow_rule
 from markerless_tracker.records import Observation
@@ -55,9 +54,12 @@ class Segmenter:
             mean, scale = mean[:, :, 0], scale[:, :, 0]
         self._mean = np.ascontiguousarray(mean, dtype=np.float32)
         self._scale = np.ascontiguousarray(scale, dtype=np.float32)
-        self._rule = shadow_rule(self.settings)
+        self._rule = shadow_rule(self.settings, grey=self._grey)
         self._labels = np.empty(self._mean.shape[:2], dtype=np.uint8)
         self._mask = np.empty_like(self._labels)
+        options = self.settings
+        share = options.shadow_grey_blob_share if self._grey else options.shadow_blob_share
+        self._least_shadow_px = share * self._mask.size
 
     def labels(self, image: Image) -> Mask:
         """(h, w) uint8: 0 background, 127 shadow, 255 foreground, before any repair.
@@ -83,7 +85,7 @@ class Segmenter:
 
     def mask(self, image: Image) -> Mask:
         """The silhouette (h, w) uint8, 0 or 255; overwritten by the next call."""
-        cv2.threshold(self.labels(image), kernels.SHADOW, 255, cv2.THRESH_BINARY, dst=self._mask)
+        foreground_mask(self.labels(image), self._mask, self._least_shadow_px, grey=self._grey)
         return clean_mask(self._mask, self.settings)
 
     def observe(self, image: Image, stamp_ns: int) -> Observation:

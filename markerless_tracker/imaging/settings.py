@@ -44,7 +44,7 @@ class ImagingSettings:
         most=2.0,
     )
     shadow_saturation_max: float = setting(
-        0.04,
+        0.05,
         "a shadow's saturation exceeds the background's by no more than this",
         least=-1.0,
         most=1.0,
@@ -61,6 +61,27 @@ class ImagingSettings:
         "much colour (largest minus smallest channel, grey levels); below it hue is noise",
         least=0.0,
         most=255.0,
+    )
+    shadow_blob_share: float = setting(
+        2e-4,
+        "shadow patches below this share of the image belong to the person, colour cameras",
+        least=0.0,
+        most=1.0,
+    )
+    shadow_grey_value_min: float = setting(
+        0.75,
+        "shadow_value_min of grey cameras, where no colour protects clothes",
+        least=0.0,
+        most=1.0,
+    )
+    shadow_grey_value_max: float = setting(
+        0.95, "shadow_value_max of grey cameras", least=0.0, most=2.0
+    )
+    shadow_grey_blob_share: float = setting(
+        1e-3,
+        "shadow_blob_share of grey cameras; the patches are opened first",
+        least=0.0,
+        most=1.0,
     )
     mask_open_px: int = setting(
         3, "side of the opening that removes specks; 0 or 1 = none", least=0, most=101
@@ -93,10 +114,12 @@ class ImagingSettings:
 
     def __post_init__(self) -> None:
         check_settings(self)
-        if self.shadow_value_min > self.shadow_value_max:
-            raise ConfigError(
-                f"shadow_value_min: got {self.shadow_value_min}, expected at most shadow_value_max "
-                f"({self.shadow_value_max})"
-            )
+        for least, most in (
+            ("shadow_value_min", "shadow_value_max"),
+            ("shadow_grey_value_min", "shadow_grey_value_max"),
+        ):
+            low, high = getattr(self, least), getattr(self, most)
+            if low > high:
+                raise ConfigError(f"{least}: got {low}, expected at most {most} ({high})")
         if self.edge_blur_px % 2 == 0:
             raise ConfigError(f"edge_blur_px: got {self.edge_blur_px}, expected an odd number")

@@ -3,7 +3,9 @@
 A shadow darkens a surface but leaves its colour: with image I and background B in HSV, a pixel is
 shadow where w <= I_V / B_V <= e, I_S - B_S <= tau_S and |I_H - B_H| <= tau_H. Hue is an angle, so
 the difference is taken around the circle, and it is compared only where both pixels have colour.
-On grey cameras the ratio of brightness decides alone. The paper prints no values.
+On grey cameras the ratio of brightness decides alone, in a narrower range. The paper prints no
+values: the defaults are measured. A shadow is also a patch of some size, which a few pixels of
+clothes that happen to pass are not (`morphology.foreground_mask`; not in the paper).
 """
 
 import numba
@@ -51,7 +53,7 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
     return min(turn, np.float32(360.0) - turn) <= rule[3]
 
 
-def shadow_rule(settings: ImagingSettings) -> tuple[np.float32, ...]:
+def shadow_rule(settings: ImagingSettings, *, grey: bool = False) -> tuple[np.float32, ...]:
     """(least ratio, largest ratio, tau_S, tau_H, least chroma) for `is_shadow`.
 
     With shadow removal off no ratio passes.
@@ -59,8 +61,8 @@ def shadow_rule(settings: ImagingSettings) -> tuple[np.float32, ...]:
     if not settings.shadow_removal:
         return tuple(np.float32(x) for x in (2.0, -1.0, 0.0, 0.0, 0.0))
     return (
-        np.float32(settings.shadow_value_min),
-        np.float32(settings.shadow_value_max),
+        np.float32(settings.shadow_grey_value_min if grey else settings.shadow_value_min),
+        np.float32(settings.shadow_grey_value_max if grey else settings.shadow_value_max),
         np.float32(settings.shadow_saturation_max),
         np.float32(settings.shadow_hue_max_deg),
         np.float32(settings.shadow_chroma_min),
