@@ -51,7 +51,7 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> EdgeOfMask:
     runs midway between pixels inside and outside; where the silhouette leaves the frame, and
     around specks, there are no points.
     """
-    mask = observation.mask.view(np.uint8)
+    mask = _full_frame(observation)
     height, width = mask.shape
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if rows.size == 0:
@@ -79,24 +79,35 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> EdgeOfMask:
         u, v = kept[:, 0], kept[:, 1]
         normal = np.column_stack([steep_u[v, u], steep_v[v, u]]).astype(np.float64)
         length = np.linalg.norm(normal, axis=1)
-        at = kept + (left, top) + observation.offset_px
-        inner = (at > 0).all(axis=1) & (at < np.array(observation.size_px) - 1).all(axis=1)
+        at = kept + (left, top)
+        inner = (at > 0).all(axis=1) & (at < (width - 1, height - 1)).all(axis=1)
         good = inner & (length > 0)
         normal = normal[good] / length[good, None]
-        points.append(kept[good] + (left, top) + 0.5 * normal)
+        points.append(at[good] + 0.5 * normal)
         normals.append(normal)
         spacing.append(np.full(int(good.sum()), float(steps.sum()) / len(kept)))
-    offset = observation.offset_px
     if not points:
         points, normals, spacing = [np.empty((0, 2))], [np.empty((0, 2))], [np.empty(0)]
     return EdgeOfMask(
         distance,
-        int(left + offset[0]),
-        int(top + offset[1]),
-        np.concatenate(points) + offset,
+        int(left),
+        int(top),
+        np.concatenate(points),
         np.concatenate(normals),
         np.concatenate(spacing),
     )
+
+
+def _full_frame(observation: Observation) -> NDArray[np.uint8]:
+    """The mask (h, w) of the whole frame: outside the observation's region there is no body."""
+    mask = observation.mask.view(np.uint8)
+    width, height = observation.size_px
+    if mask.shape == (height, width):
+        return mask
+    u, v = observation.offset_px
+    frame = np.zeros((height, width), dtype=np.uint8)
+    frame[v : v + observation.height, u : u + observation.width] = mask
+    return frame
 
 
 def join_edges(edges: Sequence[EdgeOfMask]) -> ContourViews:
