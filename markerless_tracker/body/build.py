@@ -7,7 +7,7 @@ import numpy as np
 
 from markerless_tracker.body.description import BodyDescription, Move, parse_chain
 from markerless_tracker.body.model import MARKER_NAMES, BodyModel
-from markerless_tracker.body.subject import Subject
+from markerless_tracker.body.subject import Subject, fitted_lengths
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
@@ -88,12 +88,7 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
             length or names a cone the body does not have.
     """
     d = description
-    strange = sorted(str(name) for name in subject.lengths_m if name not in d.lengths)
-    if strange:
-        raise BodyModelError(
-            f"subject {subject.name}: body {d.name} has no length {', '.join(strange)}"
-        )
-    lengths = {name: subject.length(name) for name in d.lengths}
+    lengths = fitted_lengths(d, subject)
     parameters = tuple(d.parameters)
     nodes = _Nodes(parameters, lengths)
     frames: dict[str, int] = {"world": -1}

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import yaml
 
 from markerless_tracker.body.schema import check_description
 from markerless_tracker.errors import BodyModelError
+from markerless_tracker.resources import config_dir
 
 _NUMBER = r"\d+(?:\.\d*)?|\.\d+"
 _MOVE = re.compile(
@@ -84,3 +86,10 @@ def read_description(path: Path) -> BodyDescription:
         collisions=tuple((a, b) for a, b in data["collisions"]),
         subspaces={name: tuple(members) for name, members in data["subspaces"].items()},
     )
+
+
+@cache
+def shipped_lengths() -> frozenset[str]:
+    """Names of the lengths of all shipped bodies."""
+    files = sorted((config_dir() / "bodies").glob("*.yaml"))
+    return frozenset(name for file in files for name in read_description(file).lengths)

@@ -33,8 +33,8 @@ def load_body(name_or_file: str | Path, subject: Subject | float = 1.72) -> Body
     """A body with a subject's sizes; a number is a stature in metres.
 
     Raises:
-        BodyModelError: no such body, it is malformed (the message names a file's path), or the subject
-            does not fit it.
+        BodyModelError: no such body, it is malformed (the message names a file's path), or the
+            subject does not fit it.
     """
     description = load_description(name_or_file)
     if not isinstance(subject, Subject):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from markerless_tracker.body.description import BodyDescription
+from markerless_tracker.body.description import BodyDescription, shipped_lengths
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
@@ -47,16 +47,6 @@ class Subject:
                     f"subject {self.name}: cone {key} has a radius that is not above 0"
                 )
 
-    def length(self, name: str) -> float:
-        """A named length in metres.
-
-        Raises:
-            BodyModelError: the subject does not have it.
-        """
-        if name not in self.lengths_m:
-            raise BodyModelError(f"subject {self.name}: length {name!r} is missing")
-        return float(self.lengths_m[name])
-
 
 def subject_from_stature(description: BodyDescription, stature_m: float) -> Subject:
     """A generic person of that height (fractions of stature after Drillis and Contini).
@@ -92,11 +82,44 @@ def subject_from_markers(
             f"{len(measured)} of {len(description.lengths)} segment lengths can be measured from "
             f"markers {', '.join(sorted(known)) or 'none'}, expected at least half"
         )
+    return Subject("markers", _completed(description, measured))
+
+
+def fitted_lengths(description: BodyDescription, subject: Subject) -> dict[str, float]:
+    """A subject's lengths (m) for a body, in the body's order.
+
+    A subject measured for another body may lack lengths (hands, feet) or have some to spare: what
+    is missing is taken from the stature that the other lengths suggest.
+
+    Raises:
+        BodyModelError: the subject lacks more than half of the lengths, or has one that no body
+            knows.
+    """
+    known = {name: float(v) for name, v in subject.lengths_m.items() if name in description.lengths}
+    if len(known) < len(subject.lengths_m):
+        familiar = shipped_lengths()
+        strange = [str(n) for n in subject.lengths_m if n not in known and n not in familiar]
+        if strange:
+            raise BodyModelError(
+                f"subject {subject.name}: no body has a length {', '.join(strange)}, "
+                f"{description.name} has {', '.join(description.lengths)}"
+            )
+    missing = [name for name in description.lengths if name not in known]
+    if 2 * len(missing) > len(description.lengths):
+        raise BodyModelError(
+            f"subject {subject.name}: lengths {', '.join(missing)} of body {description.name} are "
+            "missing, expected at least half of them"
+        )
+    return _completed(description, known)
+
+
+def _completed(description: BodyDescription, known: Mapping[str, float]) -> dict[str, float]:
+    """All lengths; the unknown ones from the median stature that the known ones suggest."""
     fractions = {name: float(v["stature"]) for name, v in description.lengths.items()}
-    stature = float(np.median([measured[name] / fractions[name] for name in measured]))
-    return Subject(
-        "markers", {name: measured.get(name, f * stature) for name, f in fractions.items()}
-    )
+    if len(known) == len(fractions):
+        return {name: known[name] for name in fractions}
+    stature = float(np.median([known[name] / fractions[name] for name in known]))
+    return {name: known.get(name, f * stature) for name, f in fractions.items()}
 
 
 def complete_markers(markers_m: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
