@@ -1,9 +1,9 @@
 """The compiled loops against the slow twin of `conftest`.
 
-Tolerances: the kernel draws a cone's end as an arc of seven points, so pixel counts may differ by a
-strip 0.06 px wide along all outlines (0.1 px where cones are seen end-on); f_s by 0.005. Edge samples
-may lie on the other side of a hiding part's boundary: their number may differ by 2 and 5 %, the mean
-of the map by 0.01.
+Tolerances: the kernel draws a cone's end as an arc of seven points, so pixel counts may differ by
+a strip 0.06 px wide along all outlines (0.1 px where cones are seen end-on); f_s by 0.005. Edge
+samples may lie on the other side of a hiding part's boundary: their number may differ by 2 and
+5 %, the mean of the map by 0.01.
 """
 
 from dataclasses import replace
