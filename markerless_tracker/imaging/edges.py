@@ -49,7 +49,9 @@ def _gradient_strength(grey: Image, settings: ImagingSettings) -> Image:
     border = cv2.BORDER_REPLICATE
     across = cv2.Sobel(grey, cv2.CV_32F, 1, 0, borderType=border)
     down = cv2.Sobel(grey, cv2.CV_32F, 0, 1, borderType=border)
-    size = cv2.magnitude(across, down)
+    # Squares and their sum are whole numbers below 2^24, hence exact. cv2.magnitude is not: its
+    # last bit depends on where the arrays lie in memory, and results would differ between runs.
+    size = np.sqrt(across * across + down * down)
     threshold = 8.0 * settings.edge_gradient
     if settings.edge_form == "published":
         return (size >= threshold).astype(np.uint8) * np.uint8(255)
