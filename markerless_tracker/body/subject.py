@@ -65,7 +65,8 @@ def subject_from_markers(
 ) -> Subject:
     """Segment lengths from one row of named markers (3,), in m, any frame.
 
-    A missing Pelvis is the midpoint of the hips; a length whose markers are missing is taken from
+    Left and right (names that begin with ``l_`` and ``r_``) get their mean: people are more alike
+    on both sides than markers are placed. A missing Pelvis is the midpoint of the hips; a length whose markers are missing is taken from
     the stature that the other lengths suggest.
 
     Raises:
@@ -82,7 +83,17 @@ def subject_from_markers(
             f"{len(measured)} of {len(description.lengths)} segment lengths can be measured from "
             f"markers {', '.join(sorted(known)) or 'none'}, expected at least half"
         )
-    return Subject("markers", _completed(description, measured))
+    return Subject("markers", _completed(description, _both_sides_alike(measured)))
+
+
+def _both_sides_alike(lengths: Mapping[str, float]) -> dict[str, float]:
+    """The lengths with those of `l_` and `r_` replaced by their mean where both are known."""
+    alike = dict(lengths)
+    for name in lengths:
+        other = "r_" + name[2:]
+        if name.startswith("l_") and other in lengths:
+            alike[name] = alike[other] = 0.5 * (lengths[name] + lengths[other])
+    return alike
 
 
 def fitted_lengths(description: BodyDescription, subject: Subject) -> dict[str, float]:
