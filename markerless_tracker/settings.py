@@ -1,10 +1,12 @@
 """Settings as dataclass fields that carry their documentation and the values they may take."""
 
-import math
 from dataclasses import field, fields
 from typing import Any
 
 from markerless_tracker.errors import ConfigError
+
+# Whole numbers up to here are floats without loss; no setting needs larger ones.
+_EXACT = 2**53
 
 
 def setting(
@@ -32,12 +34,12 @@ def check_settings(record: Any) -> None:
 
 def _checked(entry: Any, value: Any) -> Any:
     kind = type(entry.default)
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+    if kind is float and type(value) is int and abs(value) <= _EXACT:
         value = float(value)
     if type(value) is not kind:
         raise ConfigError(f"{entry.name}: got {value!r}, expected {kind.__name__}")
     least, most = entry.metadata.get("min"), entry.metadata.get("max")
-    if least is not None and not (math.isfinite(value) and least <= value <= most):
+    if least is not None and not least <= value <= most:
         raise ConfigError(f"{entry.name}: got {value!r}, expected {least} to {most}")
     choices = entry.metadata.get("choices")
     if choices is not None and value not in choices:

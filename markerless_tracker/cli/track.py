@@ -100,6 +100,7 @@ def run(args: argparse.Namespace) -> int:
         with writer:
             for tracked in track_recording(recording, setup, fps=args.fps):
                 writer.add(tracked.result)
+                writer.body = setup.tracker.body
                 state = tracked.result.state.value
                 states[state] = states.get(state, 0) + 1
                 if debug:

@@ -26,7 +26,7 @@ class ResultWriter:
 
     Args:
         name: path without suffix; NAME.trc and NAME.json are written, their folder is made.
-        body: the tracked body.
+        body: the tracked body; also an attribute, for a tracker that fits it on the way.
         config: the tracker's settings.
         fps: rate of the results, 1/s.
         source: what was tracked, for the reader of the JSON file.
@@ -45,12 +45,13 @@ class ResultWriter:
             self.json_path.write_text("{}\n", encoding="utf-8")
         except OSError as error:
             raise DatasetError(f"{self.json_path}: cannot be written: {error.strerror}") from error
-        self._body = body
+        self.body = body
         self._config = config
         self._fps = fps
         self._source = source
         self._results: list[TrackResult] = []
         self._notes: dict[str, Any] = {}
+        write_trc(self.trc_path, self.track(), fps)
 
     def __enter__(self) -> "ResultWriter":
         return self
@@ -100,14 +101,12 @@ class ResultWriter:
             "settings": self._config.as_mapping(),
             "versions": versions(),
             "body": {
-                "name": self._body.name,
-                "parameters": list(self._body.parameter_names),
-                "lengths_m": {k: float(v) for k, v in self._body.lengths_m.items()},
+                "name": self.body.name,
+                "parameters": list(self.body.parameter_names),
+                "lengths_m": {k: float(v) for k, v in self.body.lengths_m.items()},
                 "cones_m": {
                     name: shape.tolist()
-                    for name, shape in zip(
-                        self._body.cone_names, self._body.cone_shape, strict=True
-                    )
+                    for name, shape in zip(self.body.cone_names, self.body.cone_shape, strict=True)
                 },
             },
             **self._notes,

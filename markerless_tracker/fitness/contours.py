@@ -13,7 +13,7 @@ from markerless_tracker.camera import CameraModel
 from markerless_tracker.fitness import contour_kernels as kernels
 from markerless_tracker.fitness.arrays import BodyArrays, Views, body_arrays
 from markerless_tracker.fitness.contour_kernels import ContourViews, Residuals, Samples
-from markerless_tracker.fitness.threads import ONE_CALLER
+from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
@@ -169,7 +169,7 @@ class ContourFrame:
         self.body = body
         self.views = views
         self._arrays: BodyArrays = body_arrays(body)
-        self._threads = threads
+        self._threads = usable_threads(threads)
         self._step_px = step_px
 
         def edge(name: str) -> EdgeOfMask:

@@ -174,7 +174,7 @@ class TrackerConfig(ImagingSettings):
             if key not in known:
                 raise ConfigError(f"unknown setting {key!r}{nearest(str(key), known)}")
         name = values.get("preset", preset or "tuned")
-        if name not in PRESETS:
+        if not isinstance(name, str) or name not in PRESETS:
             raise ConfigError(f"preset is {name!r}, expected one of {', '.join(PRESETS)}")
         return cls(**{**PRESETS[name], **values, "preset": name})
 

@@ -150,7 +150,7 @@ class FrameSearch:
         optimizer = Sppso(problem, update=searcher.config.update)
         best = optimizer.run(evaluator)
         self.evaluations += optimizer.evaluations
-        return evaluator.poses(best[None])[0]
+        return np.asarray(evaluator.poses(best[None])[0])
 
     def _refine(self, stage: Stage) -> FloatArray:
         searcher, config = self._searcher, self._searcher.config

@@ -24,7 +24,7 @@ def explained_part(
         The observation, the very same if nothing was left out, and the number of pixels left out.
     """
     mask = observation.mask.view(np.uint8)
-    count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_16U)
+    count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
     if count <= 2:
         return observation, 0
     near = _thick_body(observation, camera, body, pose, margin_px)

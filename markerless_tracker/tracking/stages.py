@@ -1,5 +1,6 @@
 """Which searches a frame is made of: the algorithms' partitions of the body, as lists of stages."""
 
+import math
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 
@@ -66,16 +67,19 @@ def contour_stage(
 
 
 def scaled_particles(
-    published: tuple[tuple[int, int], ...], evaluations: int, optimizer: str
+    published: tuple[tuple[int, int], ...],
+    evaluations: int,
+    optimizer: str,
+    *,
+    share: Fraction = Fraction(1),
 ) -> tuple[int, ...]:
-    """Particles per stage for a budget: they scale with it, the iterations stay.
+    """Particles per stage for the swarm's share of a budget: they scale, the iterations stay.
 
     Raises:
         ConfigError: the budget cannot be met exactly; names the nearest that can.
     """
-    whole = sum(particles * iterations for particles, iterations in published)
-    smallest = np.gcd.reduce([particles for particles, _ in published])
-    step = whole // int(smallest)
+    whole = sum(particles * iterations for particles, iterations in published) / share
+    step = math.ceil(whole / math.gcd(*(particles for particles, _ in published)))
     if evaluations % step or evaluations <= 0:
         below, above = evaluations // step * step, (evaluations // step + 1) * step
         near = f"{below} or {above}" if below > 0 else f"{above} or {above + step}"
@@ -83,8 +87,7 @@ def scaled_particles(
             f"evaluations is {evaluations}, which {optimizer} cannot spend exactly: "
             f"nearest are {near}"
         )
-    share = Fraction(evaluations, whole)
-    return tuple(int(particles * share) for particles, _ in published)
+    return tuple(int(particles * evaluations / whole) for particles, _ in published)
 
 
 def sppso_stages(
@@ -96,10 +99,8 @@ def sppso_stages(
     it; stage 2 varies all, with the root's position spread divided by 10, from stage 1's estimate.
     Beside a refinement the swarm keeps `SWARM_SHARE` of the budget.
     """
-    budget = config.evaluations
-    if config.refinement != "none":
-        budget = int(budget * SWARM_SHARE)
-    first, second = scaled_particles(SPPSO_STAGES, budget, "sppso")
+    share = Fraction(1) if config.refinement == "none" else SWARM_SHARE
+    first, second = scaled_particles(SPPSO_STAGES, config.evaluations, "sppso", share=share)
     every_cone = np.ones(len(body.cone_names), dtype=np.bool_)
     settled = sigma.copy()
     settled[translations(body)] /= _SOFT

@@ -31,6 +31,9 @@ class DebugImages:
         for name, observation in result.observations.items():
             picture = draw_evidence(images.images[name], observation, rig[name], body, result.pose)
             path = self.folder / name / f"{images.index:06d}.jpg"
-            path.parent.mkdir(exist_ok=True)
+            try:
+                path.parent.mkdir(exist_ok=True)
+            except OSError as error:
+                raise DatasetError(f"{path.parent}: cannot be made: {error.strerror}") from error
             if not cv2.imwrite(str(path), picture):
                 raise DatasetError(f"{path}: cannot be written")
