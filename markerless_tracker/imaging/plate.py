@@ -100,7 +100,8 @@ def background_plate(
     if not frames:
         return _from_stills(stills)
     stack = _stack(frames)
-    steady, _ = steady_image(stack) if stills else steady_image(stack, share=ALONE_SHARE)
+    alone = len(frames) == 1 and not stills
+    steady, _ = steady_image(stack, share=ALONE_SHARE) if alone else steady_image(stack)
     guide = np.clip(np.rint(steady), 0, 255).astype(np.uint8).reshape(reference.shape)
     pictures = [align_exposure(_float(align_geometry(still, guide)), steady) for still in stills]
     if not pictures:

@@ -14,12 +14,15 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
     """Per pixel, the mean of the frames in the shortest brightness interval that holds ``share``.
 
     Choosing whole frames by their brightness (and not each channel for itself) keeps colours that
-    the pixel really had. ``variance`` gets the mean square, per channel, of the deviations from
+    the pixel really had; frames of the interval far from its mean colour are left out again.
+    ``variance`` gets the mean square, per channel, of the deviations from
     that value of all frames within three times the interval (at least 6 grey levels).
     """
     count, height, width, channels = stack.shape
     need = max(1, int(np.ceil(share * count)))
     keys = np.empty(count, dtype=np.int32)
+    rough = np.empty(channels, dtype=np.float32)
+    sums = np.empty(channels, dtype=np.int64)
     for v in range(height):
         for u in range(width):
             for t in range(count):
@@ -44,7 +47,21 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
                 total = 0
                 for i in range(best, best + need):
                     total += int(stack[keys[i] & 4095, v, u, c])
-                value = np.float32(total) / np.float32(need)
+                rough[c] = np.float32(total) / np.float32(need)
+                sums[c] = 0
+            # As bright but of another colour: something else that passed.
+            kept = 0
+            for i in range(best, best + need):
+                t = keys[i] & 4095
+                near = True
+                for c in range(channels):
+                    near = near and abs(np.float32(stack[t, v, u, c]) - rough[c]) <= 2.0 * reach
+                if near:
+                    kept += 1
+                    for c in range(channels):
+                        sums[c] += int(stack[t, v, u, c])
+            for c in range(channels):
+                value = np.float32(sums[c]) / np.float32(kept) if kept > 0 else rough[c]
                 steady[v, u, c] = value
                 square = np.float32(0.0)
                 inside = 0

@@ -9,7 +9,12 @@ from markerless_tracker.imaging import ImagingSettings
 def test_every_setting_has_a_doc_and_names_are_flat() -> None:
     for entry in dataclasses.fields(ImagingSettings):
         assert entry.metadata["doc"]
-        assert entry.type in (float, int, bool, str) or entry.type in ("float", "int", "bool", "str")
+        assert entry.type in (float, int, bool, str) or entry.type in (
+            "float",
+            "int",
+            "bool",
+            "str",
+        )
 
 
 @pytest.mark.parametrize(
