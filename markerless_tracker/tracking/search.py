@@ -82,6 +82,7 @@ class FrameSearch:
         predicted: FloatArray,
     ) -> None:
         self.pose = predicted
+        self._predicted = predicted
         self.evaluations = 0
         self.refinements = 0
         self._searcher = searcher
@@ -166,7 +167,7 @@ class FrameSearch:
             equations,
             stage.centre,
             priors=(
-                Prior(stage.centre, 1.0 / stage.sigma**2),
+                Prior(self._predicted, 1.0 / stage.sigma**2),
                 Prior(searcher.body.neutral, 1.0 / searcher.body.spread**2),
             ),
             bounds=searcher.limits,
