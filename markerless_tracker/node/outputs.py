@@ -84,24 +84,22 @@ class Overlays:
     Args:
         node: creates the publishers.
         rig: the cameras of the images that the tracker sees.
-        body: the body to draw.
     """
 
-    def __init__(self, node: Any, rig: CameraRig, body: BodyModel) -> None:
+    def __init__(self, node: Any, rig: CameraRig) -> None:
         self._rig = rig
-        self._body = body
         self._publishers = {
             name: node.create_publisher(Image, f"debug/{name}/overlay", output_qos())
             for name in rig.names
         }
 
-    def publish(self, fitted: FittedSet) -> None:
+    def publish(self, fitted: FittedSet, body: BodyModel) -> None:
         """Draw and publish those that somebody wants to see."""
         for name, publisher in self._publishers.items():
             if not publisher.get_subscription_count() or name not in fitted.images:
                 continue
             image = fitted.images[name]
             if fitted.result.pose is not None:
-                image = draw_overlay(image, self._rig[name], self._body, fitted.result.pose)
+                image = draw_overlay(image, self._rig[name], body, fitted.result.pose)
             message = Image(header=header(fitted.result.stamp_ns, optical_frame(name)))
             publisher.publish(fill_image(message, image, f"debug/{name}/overlay"))

@@ -14,6 +14,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
+from markerless_tracker.body import BodyModel
 from markerless_tracker.body.urdf import urdf
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.imaging import scale_image
@@ -71,7 +72,7 @@ class TrackerNode(Node):
         self._sets: Synchronizer[Image] = Synchronizer(names, tolerance_ns=tolerance_ns)
         self._inputs = [self._input(name) for name in names]
         self._fitting: Fitting | None = None
-        self._body: Any = None
+        self._described: BodyModel | None = None
         self._no_pose_shown = False
         self._missing: Sequence[str] = ()
         self._state_lock = Lock()
@@ -168,10 +169,10 @@ class TrackerNode(Node):
         scaled = rig.scaled(self._settings.scale)
         setup = build(self._settings, rig, scaled)
         sizes_px = {camera.name: camera.size_px for camera in scaled}
-        self._body = setup.tracker.body
+        self._tracker = setup.tracker
         self._result_file.open(setup.tracker)
-        self._overlays = Overlays(self, scaled, setup.tracker.body)
-        self._descriptions.publish(String(data=urdf(setup.tracker.body)))
+        self._overlays = Overlays(self, scaled)
+        self._describe(setup.tracker.body)
         self._fitting = Fitting(setup.tracker, setup.start_stamp_ns, partial(_decode, sizes_px))
 
     # outputs
@@ -191,8 +192,13 @@ class TrackerNode(Node):
     def _publish(self, fitted: FittedSet) -> None:
         result, stamp_ns = fitted.result, fitted.result.stamp_ns
         self._result_file.add(result)
+        if not self.context.ok():  # a signal came while this set was fitted
+            return
+        # The tracker may have learned more of the person's shape meanwhile.
+        body = self._tracker.body
+        self._describe(body)
         if result.pose is not None and result.markers_m is not None:
-            body, pose, points = self._body, result.pose, result.markers_m
+            pose, points = result.pose, result.markers_m
             self._joint_states.publish(messages.joint_state(body, pose, stamp_ns))
             self._root_poses.publish(messages.root_pose(body, pose, stamp_ns))
             self._marker_poses.publish(messages.marker_poses(points, stamp_ns))
@@ -202,8 +208,13 @@ class TrackerNode(Node):
         elif not self._no_pose_shown:
             self._markers.publish(messages.no_markers(stamp_ns))
             self._no_pose_shown = True
-        self._overlays.publish(fitted)
+        self._overlays.publish(fitted, body)
         self._publish_state()
+
+    def _describe(self, body: BodyModel) -> None:
+        if body is not self._described:
+            self._descriptions.publish(String(data=urdf(body)))
+            self._described = body
 
     def _publish_state(self, missing: Sequence[str] | None = None) -> DiagnosticArray:
         with self._state_lock:

@@ -182,14 +182,21 @@ class FitWorker:
             images = {name: fitting.decode(name, view) for name, view in matched.views.items()}
             result = fitting.tracker.step(images, matched.stamp_ns)
             finished_s = self._clock()
-            self._status.tracked(result, arrived_s=matched.arrived_s, finished_s=finished_s)
-            self._publish(FittedSet(result, images))
         except Exception as error:
             # Whatever one set provokes, the next may be fine; the node goes on and says so.
             self._status.dropped("error")
-            message = f"stamp {matched.stamp_ns}: {one_line(error)}"
-            if self._status.failed(one_line(error)):
-                self._report(message)
+            self._trouble(matched.stamp_ns, error)
+            return
+        self._status.tracked(result, arrived_s=matched.arrived_s, finished_s=finished_s)
+        try:
+            self._publish(FittedSet(result, images))
+        except Exception as error:
+            self._trouble(matched.stamp_ns, error)
+
+    def _trouble(self, stamp_ns: int, error: Exception) -> None:
+        text = one_line(error)
+        if self._status.failed(text):
+            self._report(f"stamp {stamp_ns}: {text}")
 
 
 def one_line(error: BaseException) -> str:
