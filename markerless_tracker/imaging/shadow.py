@@ -2,7 +2,8 @@
 
 A shadow darkens a surface but leaves its colour: with image I and background B in HSV, a pixel is
 shadow where w <= I_V / B_V <= e, I_S - B_S <= tau_S and |I_H - B_H| <= tau_H. Hue is an angle, so
-the difference is taken around the circle, and it is compared only where the darkened background would have colour.
+the difference is taken around the circle, and it is compared only where the darkened background
+would have colour.
 On grey cameras the ratio of brightness decides alone, in a narrower range. The paper prints no
 values: the defaults are measured. A shadow is also a patch of some size, which a few pixels of
 clothes that happen to pass are not (`morphology.foreground_mask`; not in the paper).
