@@ -1,6 +1,6 @@
 """Edges of silhouettes, and pose refinement on them from end to end."""
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.body import BodyModel, load_body, markers
-from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contours import ContourFrame, EdgeOfMask, edge_of_mask, join_edges
@@ -178,3 +178,144 @@ def test_joined_edges_can_be_taken_apart() -> None:
         np.testing.assert_array_equal(joined.normals[part], edge.normals)
         np.testing.assert_array_equal(joined.spacing[part], edge.spacing)
     assert joined.point_start[-1] == len(joined.points) and len(joined.points) > 50
+
+
+# --- refinement from end to end ---------------------------------------------------------------
+
+PRECISION = 1.0 / (0.05 * 0.010**2)
+"""Of 10 mm of noise in pieces of outline 50 mm long."""
+LENS = (-0.15, 0.06, 0.002, -0.0015, 0.01)
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """A body, its true pose, and what four cameras see of it."""
+
+    body: BodyModel
+    rig: CameraRig
+    pose: FloatArray
+    observations: dict[str, Observation]
+
+    def frame(self, *, threads=1, black=()) -> ContourFrame:
+        seen = dict(self.observations)
+        for name in black:
+            nothing = np.zeros_like(seen[name].edges)
+            seen[name] = Observation.from_mask(name, 0, nothing, nothing)
+        return ContourFrame(
+            self.body,
+            {camera.name: camera for camera in self.rig},
+            seen,
+            Fitness(self.body, self.rig.cameras).lay_out(seen),
+            pixels_per_m={camera.name: camera.matrix[0, 0] / 4.5 for camera in self.rig},
+            threads=threads,
+        )
+
+    def start(self, seed, *, offset_m=0.06, turn_rad=0.15) -> tuple[FloatArray, Prior]:
+        """A disturbed pose, the root somewhere within `offset_m`, and the belief in it."""
+        moved = np.isin(np.arange(self.body.size), self.body.root[3:])
+        most = np.where(moved, offset_m / np.sqrt(3.0), turn_rad)
+        change = np.random.default_rng(seed).uniform(-most, most)
+        pose = np.clip(self.pose + change, *self.body.limits)
+        return pose, Prior(pose, 1.0 / most**2)
+
+    def error_mm(self, pose) -> float:
+        gap = markers(self.body, pose) - markers(self.body, self.pose)
+        return float(np.linalg.norm(gap, axis=1).mean() * 1000.0)
+
+
+def person(name, seed, **angles) -> Person:
+    """Somebody with limbs apart and bent, turned any way; named angles (rad) replace drawn ones."""
+    body = load_body(name, 1.75)
+    rng = np.random.default_rng(seed)
+    pose = body.neutral.copy()
+    pose[body.joints] += rng.uniform(-0.15, 0.15, body.joints.size)
+    pose[[body.index("pelvis_rz"), body.index("pelvis_tz")]] = rng.uniform(-3.0, 3.0), 0.95
+    for side, out in (("l", 0.2), ("r", -0.2)):
+        pose[body.index(f"{side}_knee")] = rng.uniform(-0.9, -0.3)
+        pose[body.index(f"{side}_elbow")] = rng.uniform(-1.2, -0.5)
+        pose[body.index(f"{side}_shoulder_x")] += 0.7
+        pose[body.index(f"{side}_hip_x")] += out
+    for key, value in angles.items():
+        pose[body.index(key)] = value
+    rig = ring_rig(4, (656, 490), distortion=LENS)
+    seen = {}
+    for camera in rig:
+        mask = silhouette(body, pose, camera)
+        seen[camera.name] = Observation.from_mask(
+            camera.name, 0, mask, np.zeros(mask.shape, np.uint8)
+        )
+    return Person(body, rig, pose, seen)
+
+
+def refined(shown: Person, frame: ContourFrame, start: FloatArray, prior: Prior, iterations=12):
+    def equations(pose, reach_m):
+        sums = frame.equations(pose, reach_m)
+        return sums.hessian * PRECISION, sums.slope * PRECISION
+
+    return refine(
+        equations, start, priors=(prior,), bounds=shown.body.limits, iterations=iterations,
+        reach=(0.2, 0.03),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["balan31", "person31"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_disturbed_pose_is_found_again(name, seed) -> None:
+    shown = person(name, seed)
+    start, prior = shown.start(100 + seed)
+    found = refined(shown, shown.frame(), start, prior)
+    assert shown.error_mm(start) > 70.0
+    assert shown.error_mm(found) < 5.0
+
+
+def test_a_small_disturbance_needs_few_iterations() -> None:
+    shown = person("person31", 0)
+    start, prior = shown.start(5, offset_m=0.02, turn_rad=0.05)
+    found = refined(shown, shown.frame(), start, prior, iterations=4)
+    assert shown.error_mm(start) > 20.0 and shown.error_mm(found) < 3.0
+
+
+def test_threads_give_the_same_bytes() -> None:
+    shown = person("person31", 1)
+    start, prior = shown.start(1)
+    once, again, threaded = (
+        refined(shown, shown.frame(threads=threads), start, prior) for threads in (1, 1, 2)
+    )
+    assert once.tobytes() == again.tobytes() == threaded.tobytes()
+
+
+@pytest.mark.parametrize("joint", ["l_elbow", "r_elbow", "l_knee", "r_knee"])
+@pytest.mark.parametrize("beyond", [0.0, 0.3])
+def test_limits_are_kept(joint, beyond) -> None:
+    """A limb straight to its limit, or bent beyond it by what nobody can."""
+    body = load_body("person31", 1.75)
+    most = body.limits[1, body.index(joint)]
+    shown = person("person31", 2, **{joint: most + beyond})
+    start, prior = shown.start(3, offset_m=0.03, turn_rad=0.1)
+    found = refined(shown, shown.frame(), start, prior)
+    assert (found >= body.limits[0]).all() and (found <= body.limits[1]).all()
+    at = found[body.index(joint)]
+    assert at == most if beyond else at > most - 0.1
+    assert shown.error_mm(found) < (25.0 if beyond else 5.0)
+
+
+def test_a_black_camera_is_no_trouble() -> None:
+    shown = person("person31", 3)
+    start, prior = shown.start(4, offset_m=0.03, turn_rad=0.08)
+    found = refined(shown, shown.frame(black=["cam02"]), start, prior)
+    assert np.isfinite(found).all()
+    assert shown.error_mm(found) < 10.0
+
+
+def test_all_cameras_black_leaves_the_start() -> None:
+    shown = person("balan31", 4)
+    start, prior = shown.start(5)
+    found = refined(shown, shown.frame(black=shown.rig.names), start, prior)
+    np.testing.assert_allclose(found, start, atol=1e-12)
+
+
+def test_a_missing_camera() -> None:
+    shown = person("person31", 5)
+    del shown.observations["cam03"]
+    start, prior = shown.start(6, offset_m=0.03, turn_rad=0.08)
+    assert shown.error_mm(refined(shown, shown.frame(), start, prior)) < 10.0
