@@ -15,6 +15,7 @@ Equations = Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]
 """At a point (p,) and a reach: JᵀWJ (p, p) and JᵀWr (p,), in units of the data's precision."""
 
 _DAMPING = 1e-3
+_ACTIVE_SETS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,22 +36,34 @@ def damped_step(
 ) -> FloatArray:
     """The step (p,) of (H + damping diag H) step = -slope that keeps x + step within bounds (2, p).
 
-    Parameters that the free step would take out of bounds are put on them and the rest is solved
-    again, once.
+    Parameters that a solution would take out of bounds are held on them and the rest is solved
+    again; those that the slope there pulls back inside are released (primal-dual active sets,
+    Hintermüller, Ito and Kunisch 2002).
 
     Raises:
         SearchError: the equations are singular or not finite.
     """
     a = hessian + np.diag(damping * np.diag(hessian) + 1e-12)
+    low, high = bounds[0] - x, bounds[1] - x
+    if not (np.isfinite(a).all() and np.isfinite(slope).all()):
+        raise SearchError("contour refinement: the normal equations are not finite")
     try:
         step = np.linalg.solve(a, -slope)
-        target = np.clip(x + step, bounds[0], bounds[1])
-        held = target != x + step
-        if held.any() and not held.all():
+        below, above = step < low, step > high
+        for _ in range(_ACTIVE_SETS):
+            held = below | above
+            if not held.any():
+                break
             free = ~held
-            step[held] = (target - x)[held]
+            step[held] = np.where(below, low, high)[held]
             right = -slope[free] - a[np.ix_(free, held)] @ step[held]
             step[free] = np.linalg.solve(a[np.ix_(free, free)], right)
+            pull = -(a @ step + slope)
+            still_below = (step < low) | (below & (pull < 0.0))
+            still_above = (step > high) | (above & (pull > 0.0))
+            if (still_below == below).all() and (still_above == above).all():
+                break
+            below, above = still_below, still_above
     except np.linalg.LinAlgError as error:
         raise SearchError("contour refinement: the normal equations are singular") from error
     if not np.isfinite(step).all():
@@ -89,7 +102,9 @@ def refine(
             hessian[np.diag_indices_from(hessian)] += prior.precision
             slope += prior.precision * (x - prior.mean)
         try:
-            x = x + damped_step(hessian, slope, x, bounds, _DAMPING)
+            step = damped_step(hessian, slope, x, bounds, _DAMPING)
         except SearchError:
             return x
+        # A sum may round to beyond a bound.
+        x = np.clip(x + step, bounds[0], bounds[1])
     return x
