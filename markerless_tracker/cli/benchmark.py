@@ -5,7 +5,7 @@ import itertools
 import json
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -82,11 +82,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write table.csv, table.json and a file per run, which is not repeated next time",
     )  # fmt: skip
     table.add_argument("--json", action="store_true", help="print the table as JSON")
+    speed = kinds.add_parser(
+        "speed",
+        help="time of each part, and ratios to a fixed reference timed in between",
+        description="Time of each part, and ratios to a fixed reference timed in between.",
+        epilog="example: markerless_tracker benchmark speed --threads 2",
+    )
+    speed.add_argument(
+        "source", nargs="?", type=Path, metavar="SOURCE",
+        help="recording with a ground_truth.trc; default: a made-up person, 4 x 644x488",
+    )  # fmt: skip
+    speed.add_argument(
+        "--scale", type=float, default=1.0, metavar="S", help="factor for the images"
+    )
+    speed.add_argument("--threads", type=int, default=0, metavar="N", help="0 = one per core")
+    speed.add_argument("--frames", type=_count, default=30, metavar="N", help="frames timed (30)")
+    speed.add_argument("--repeats", type=_count, default=5, metavar="N", help="least of N (5)")
+    speed.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Do it; returns the exit status."""
-    return {"tables": _tables}[args.kind](args)
+    return {"tables": _tables, "speed": _speed}[args.kind](args)
 
 
 def _tables(args: argparse.Namespace) -> int:
@@ -165,8 +182,8 @@ def _rendered(
     for heading in ("preset", "body", "refinement"):
         table.add_column(heading)
     headings = [
-        "fps", "frames", "eval.", "iter.", "mean", "max frame", "worst joint", "limbs", "last frame",
-        f"> {LOST_LIMB_MM:g} mm", "frames/s",
+        "fps", "frames", "eval.", "iter.", "mean", "max frame", "worst joint", "limbs",
+        "last frame", f"> {LOST_LIMB_MM:g} mm", "frames/s",
     ]  # fmt: skip
     if args.truth_score:
         headings.append("f truth-result")
@@ -202,14 +219,89 @@ def _spread(mean: float | None, sd: float | None) -> str:
     return f"{mean:.1f}" if sd is None else f"{mean:.1f} ± {sd:.1f}"
 
 
+def _speed(args: argparse.Namespace) -> int:
+    # A made-up person is only imported where one is wanted.
+    from markerless_tracker.evaluation.speed import measure
+    from markerless_tracker.evaluation.speed_scene import made_up_scene, recorded_scene
+
+    # The first frame fits the shape and is not timed.
+    frames = args.frames + 1
+    with _progress() as bars:
+        task = bars.add_task("reading images", total=None)
+        if args.source is None:
+            scene = made_up_scene(frames=frames)
+        else:
+            scene = recorded_scene(args.source, frames=frames, scale=args.scale)
+        figures = measure(
+            scene,
+            threads=args.threads,
+            repeats=args.repeats,
+            progress=lambda part, done, total: bars.update(
+                task, description=part, completed=done, total=total
+            ),
+        )
+    if args.json:
+        json.dump(figures, sys.stdout, indent=2, allow_nan=False)
+        sys.stdout.write("\n")
+        return 0
+    where = figures["machine"]
+    width, height = figures["image_size"]
+    console = Console(width=None if sys.stdout.isatty() else 100)
+    console.print(
+        f"{where['cpu']}, {where['cores']} cores; {figures['threads']} threads; "
+        f"{figures['source']}, {figures['cameras']} cameras, {width}x{height} px",
+        highlight=False,
+        markup=False,
+    )
+    console.print(speed_table(figures))
+    return 0
+
+
+def speed_table(figures: Mapping[str, Any]) -> Table:
+    """The figures of `evaluation.speed.measure` for people."""
+    table = Table()
+    table.add_column("part")
+    table.add_column("unit")
+    table.add_column("", justify="right")
+    table.add_column("p95", justify="right")
+    view = figures["view_evaluation_us"]
+    for label, key in (
+        ("view-evaluation, balan31, one thread", "full"),
+        ("view-evaluation, person31, one thread", "person31"),
+        ("view-evaluation, reference (NumPy, OpenCV)", "reference"),
+    ):
+        table.add_row(label, "µs", f"{view[key]:.1f}", "")
+    table.add_row("reference / balan31", "ratio", f"{figures['reference_ratio']:.1f}", "")
+    table.add_row("person31 / balan31", "ratio", f"{figures['person31_ratio']:.2f}", "")
+    frame = figures["frame_ms"]
+    for label, spread in (
+        ("fitness and swarm, balan31, 1000 evaluations", figures["swarm_ms"]["sppso_1000"]),
+        ("frame: background", frame["background"]),
+        ("frame: edges", frame["edges"]),
+        ("frame: evidence to pose, tuned", frame["fitness"]),
+        ("frame: images to pose, tuned", frame["total"]),
+        ("1000 evaluations of the tuned body", figures["thousand_evaluations_ms"]),
+    ):
+        table.add_row(label, "ms", f"{spread['median']:.2f}", f"{spread['p95']:.2f}")
+    table.add_row("contour refinement, one iteration", "ms", f"{figures['refine_ms']:.3f}", "")
+    table.add_row("contours of a frame", "ms", f"{figures['refine_setup_ms']:.2f}", "")
+    ratio = figures["fit_vs_1000_evaluations"]
+    table.add_row("evidence to pose / 1000 evaluations", "ratio", f"{ratio:.2f}", "")
+    return table
+
+
+def _progress() -> Progress:
+    return Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
+        TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True),
+    )  # fmt: skip
+
+
 class _Bars(tables.Progress):
     """Progress on standard error."""
 
     def __init__(self) -> None:
-        self._bars = Progress(
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-            TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True),
-        )  # fmt: skip
+        self._bars = _progress()
         self._runs = self._bars.add_task("runs", total=None)
         self._evidence = self._bars.add_task("evidence", total=None, visible=False)
 
