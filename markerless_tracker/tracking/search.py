@@ -115,15 +115,16 @@ class FrameSearch:
         stage's result is taken only if it explains the views better: the swarm rescues a refinement
         that is stuck, the refinement sharpens the swarm.
         """
-        compared = any(stage.algorithm == CONTOUR for stage in stages)
-        cost = self._cost(stages[0], self.pose) if compared else np.inf
+        # A contour stage looks at every parameter and every cone.
+        judge = next((stage for stage in stages if stage.algorithm == CONTOUR), None)
+        cost = self._cost(judge, self.pose) if judge is not None else np.inf
         for stage in stages:
             centred = replace(stage, centre=self.pose)
             found = self._refine(centred) if stage.algorithm == CONTOUR else self._swarm(centred)
-            if not compared:
+            if judge is None:
                 self.pose = found
                 continue
-            found_cost = self._cost(stages[0], found)
+            found_cost = self._cost(judge, found)
             if found_cost < cost:
                 self.pose, cost = found, found_cost
         return self.pose
