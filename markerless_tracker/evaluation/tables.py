@@ -11,6 +11,7 @@ from pathlib import Path
 from statistics import fmean, median, stdev
 from typing import Any
 
+from markerless_tracker.body import load_description
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.evaluation.evidence import Evidence, make_evidence
@@ -90,6 +91,9 @@ def make_table(
         TrackerError: a recording has no truth or cannot be read, or a run failed.
     """
     progress = progress or Progress()
+    for config in plan.configs:
+        # What cannot run says so before anything long begins.
+        load_description(config.body)
     pieces = [_Piece(source, plan) for source in sources]
     total = sum(len(piece.runs) for piece in pieces)
     rows: list[dict[str, Any]] = []

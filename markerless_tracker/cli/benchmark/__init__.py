@@ -1,0 +1,25 @@
+"""Verb `benchmark`: measured tables of accuracy and speed."""
+
+import argparse
+
+from markerless_tracker.cli.benchmark import speed, tables
+
+HELP = (
+    "Measure accuracy (tables) or speed (speed). Recordings for tables have a ground_truth.trc: "
+    "its first row is the start and gives the lengths, its rows are the truth."
+)
+EXAMPLE = "markerless_tracker benchmark tables RECORDING --fps 60,20 --seeds 6 -o out/tables"
+
+_KINDS = {"tables": tables, "speed": speed}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND")
+    for kind in _KINDS.values():
+        kind.add_parser(kinds)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do it; returns the exit status."""
+    return int(_KINDS[args.kind].run(args))
