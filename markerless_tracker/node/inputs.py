@@ -14,6 +14,8 @@ from markerless_tracker.node.synchronizer import Synchronizer
 PATIENCE_S = 2.0
 """How long a topic may stay silent while others speak before that is reported."""
 
+_GAP_MAX = 1000
+
 
 class CameraInput:
     """Receives one camera's images and calibration messages.
@@ -49,12 +51,19 @@ class CameraInput:
         self._first_image_s: float | None = None
         self._disagrees = False
         self._trouble = ""
+        self._sequence: int | None = None
         self._info_reported = False
         self._silence_reported = False
 
-    def on_image(self, message: Any) -> None:
-        """Take a sensor_msgs/Image; one that cannot be used is counted and reported."""
+    def on_image(self, message: Any, sequence: int | None = None) -> None:
+        """Take a sensor_msgs/Image; one that cannot be used is counted and reported.
+
+        Args:
+            message: the image.
+            sequence: its number at the publisher; gaps are images that the middleware lost.
+        """
         now_s = self._clock()
+        self._count_lost(sequence)
         if self._first_image_s is None:
             self._first_image_s = now_s
         try:
@@ -108,6 +117,14 @@ class CameraInput:
                 source = "waiting for it" if self.camera is None else "using the calibration file"
                 self._say(f"{self.info_topic}: no camera info comes with the images; {source}")
         return topics
+
+    def _count_lost(self, sequence: int | None) -> None:
+        before, self._sequence = self._sequence, sequence
+        if sequence is not None and before is not None:
+            gap = sequence - before - 1
+            # Another publisher counts from elsewhere.
+            if 0 < gap < _GAP_MAX:
+                self._status.lost(self.name, gap)
 
     def _check_size(self, message: Any) -> None:
         if self.camera is None:

@@ -83,7 +83,8 @@ def descriptions() -> dict[str, str]:
     for setting in TrackerConfig.settings():
         choices = f" ({', '.join(map(str, setting.choices))})" if setting.choices else ""
         lines[setting.name] = f"{setting.doc}{choices}"
-    lines.update(declared.attribute_lines(NodeSettings))
+    own = declared.attribute_lines(NodeSettings)
+    lines.update({name: own[name] for name in _OWN})
     return lines
 
 

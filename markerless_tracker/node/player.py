@@ -27,6 +27,7 @@ from markerless_tracker.node.qos import image_qos, latched_qos
 
 _AHEAD = 8
 _REMIND_S = 10.0
+_DISCOVERY_S = 1.0
 _ACKNOWLEDGE_S = 3.0
 # A subscriber that has acknowledged an image may yet have to look at it.
 _LINGER_S = 0.5
@@ -79,7 +80,8 @@ class PlayerNode(Node):
         Raises:
             TrackerError: the bag turns out to be unreadable.
         """
-        if self.settings.wait_for_subscribers and not self._wait(spin):
+        going = self._wait(spin) if self.settings.wait_for_subscribers else self._discover(spin)
+        if not going:
             return
         count = self._recording.frame_count
         self.get_logger().info(
@@ -87,7 +89,6 @@ class PlayerNode(Node):
             f"{len(self._recording.rig)} cameras at {self.settings.rate:g} x "
             f"{self._recording.fps:g} fps"
         )
-        going = True
         while going:
             going = self._pass(spin) and self.settings.loop
         for warning in self._recording.warnings:
@@ -99,6 +100,16 @@ class PlayerNode(Node):
             if publisher.get_subscription_count():
                 publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGE_S))
         spin(_LINGER_S)
+
+    def _discover(self, spin: Callable[[float], bool]) -> bool:
+        """Give those who listen a moment to be found: what is sent before is lost to them."""
+        until_s = time.monotonic() + _DISCOVERY_S
+        while time.monotonic() < until_s:
+            if all(publisher.get_subscription_count() for publisher in self._images.values()):
+                return True
+            if not spin(0.05):
+                return False
+        return True
 
     def _wait(self, spin: Callable[[float], bool]) -> bool:
         said, said_s = "", 0.0

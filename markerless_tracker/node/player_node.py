@@ -3,8 +3,13 @@
 import sys
 import time
 from collections.abc import Sequence
+from typing import Any
 
-from markerless_tracker.node.ros import init_context, run_executable
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.node.ros import StopSignals, init_context, run_executable
+
+# A signal is noticed at the latest after this.
+_NOTICE_S = 0.1
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -18,41 +23,41 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: list[str]) -> int:
     context = init_context(argv)
-    from rclpy.exceptions import ParameterException
-    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    try:
+        return _play(context)
+    finally:
+        context.try_shutdown()
 
-    from markerless_tracker.errors import ConfigError
+
+def _play(context: Any) -> int:
+    from rclpy.exceptions import ParameterException
+    from rclpy.executors import SingleThreadedExecutor
+
     from markerless_tracker.node.player import PlayerNode
 
-    executor = SingleThreadedExecutor(context=context)
-    node = None
-
-    def spin(seconds: float) -> bool:
-        until_s = time.monotonic() + seconds
-        while context.ok():
-            left_s = until_s - time.monotonic()
-            executor.spin_once(timeout_sec=max(0.0, left_s))
-            if left_s <= 0.0:
-                return bool(context.ok())
-        return False
-
     try:
-        try:
-            node = PlayerNode(context=context)
-        except ParameterException as error:
-            raise ConfigError(" ".join(str(error).split())) from error
-        executor.add_node(node)
+        node = PlayerNode(context=context)
+    except ParameterException as error:
+        raise ConfigError(" ".join(str(error).split())) from error
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    with StopSignals() as stop:
+
+        def spin(seconds: float) -> bool:
+            until_s = time.monotonic() + seconds
+            while not stop.asked:
+                left_s = until_s - time.monotonic()
+                executor.spin_once(timeout_sec=min(max(0.0, left_s), _NOTICE_S))
+                if left_s <= 0.0:
+                    break
+            return not stop.asked
+
         node.play(spin)
-        if context.ok():
+        if not stop.asked:
             node.finish(spin)
-            node.get_logger().info(f"played {node.sets_played} sets")
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
+        node.get_logger().info(f"played {node.sets_played} sets")
         executor.shutdown(timeout_sec=0)
-        if node is not None:
-            node.destroy_node()
-        context.try_shutdown()
+        node.destroy_node()
     return 0
 
 

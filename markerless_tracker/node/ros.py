@@ -53,7 +53,7 @@ def run_executable(
         argv: arguments without the program's name; those of this process if None.
     """
     try:
-        # Until rclpy takes SIGTERM over it would end the process with code 143.
+        # By default it ends the process with code 143.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         apply_profile()
         require_ros()
@@ -65,6 +65,30 @@ def run_executable(
         return 0
 
 
+class StopSignals:
+    """Notes SIGINT and SIGTERM instead of letting them break into whatever runs; a context manager.
+
+    Attributes:
+        asked: whether one has come.
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    def __enter__(self) -> "StopSignals":
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """The process is about to end: what comes now changes nothing."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
+
+    def _note(self, number: int, frame: object) -> None:
+        self.asked = True
+
+
 def init_context(arguments: Sequence[str]) -> Any:
     """Initialise rclpy with a context of its own and ROS arguments.
 
@@ -72,7 +96,7 @@ def init_context(arguments: Sequence[str]) -> Any:
         arguments: e.g. ``["--ros-args", "-p", "seed:=1"]``.
 
     Returns:
-        The ``rclpy.Context``; SIGINT and SIGTERM shut it down.
+        The ``rclpy.Context``; signals are left to the caller.
 
     Raises:
         ConfigError: an argument that ROS does not understand, or one outside ``--ros-args``.
@@ -92,7 +116,7 @@ def init_context(arguments: Sequence[str]) -> Any:
         rclpy.init(
             args=list(arguments),
             context=context,
-            signal_handler_options=SignalHandlerOptions.ALL,
+            signal_handler_options=SignalHandlerOptions.NO,
         )
     except ConfigError:
         raise

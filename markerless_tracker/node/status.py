@@ -23,6 +23,7 @@ class TrackerStatus:
         self._tracked = 0
         self._dropped: Counter[str] = Counter()
         self._refused: Counter[str] = Counter()
+        self._lost: Counter[str] = Counter()
         self._latencies_s: deque[float] = deque(maxlen=WINDOW)
         self._finished_s: deque[float] = deque(maxlen=WINDOW)
         self._result: TrackResult | None = None
@@ -70,6 +71,11 @@ class TrackerStatus:
         """Note an image that could not be used."""
         with self._lock:
             self._refused[camera] += 1
+
+    def lost(self, camera: str, images: int) -> None:
+        """Note images that were sent and never came."""
+        with self._lock:
+            self._lost[camera] += images
 
     def failed(self, message: str) -> bool:
         """Note an error; returns whether it differs from the last one."""
@@ -123,6 +129,8 @@ class TrackerStatus:
                 values[f"agreement/{name}"] = _number(agreement.get(name), 4)
             for name in cameras:
                 values[f"refused/{name}"] = str(self._refused[name])
+            for name in cameras:
+                values[f"lost/{name}"] = str(self._lost[name])
             values["missing"] = ", ".join(missing)
             values["warnings"] = "" if result is None else "; ".join(result.warnings)
             values["last_error"] = self._last_error

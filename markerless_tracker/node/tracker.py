@@ -132,8 +132,12 @@ class TrackerNode(Node):
         old = self._image_subscriptions.pop(source.name, None)
         if old is not None:
             self.destroy_subscription(old)
+
+        def take(message: Image, info: Any) -> None:
+            source.on_image(message, info["publication_sequence_number"])
+
         self._image_subscriptions[source.name] = self.create_subscription(
-            Image, source.image_topic, source.on_image, image_qos(reliable=reliable)
+            Image, source.image_topic, take, image_qos(reliable=reliable)
         )
 
     def _hear_best_effort(self, source: CameraInput) -> None:

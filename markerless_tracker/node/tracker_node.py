@@ -1,13 +1,16 @@
 """The executable `tracker`."""
 
 import os
-import signal
 import sys
 from collections.abc import Sequence
+from typing import Any
 
-from markerless_tracker.node.ros import init_context, run_executable
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.node.ros import StopSignals, init_context, run_executable
 
 _CLOSE_S = 5.0
+# A signal is noticed at the latest after this.
+_NOTICE_S = 0.1
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -20,42 +23,39 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: list[str]) -> int:
     context = init_context(argv)
-    from rclpy.exceptions import ParameterException
-    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    try:
+        return _serve(context)
+    finally:
+        context.try_shutdown()
 
-    from markerless_tracker.errors import ConfigError
+
+def _serve(context: Any) -> int:
+    from rclpy.exceptions import ParameterException
+    from rclpy.executors import SingleThreadedExecutor
+
     from markerless_tracker.node.tracker import TrackerNode
 
-    node = None
-    executor = SingleThreadedExecutor(context=context)
-    ended = True
     try:
-        try:
-            node = TrackerNode(context=context)
-        except ParameterException as error:
-            raise ConfigError(" ".join(str(error).split())) from error
-        executor.add_node(node)
-        while context.ok() and node.fatal is None:
-            executor.spin_once(timeout_sec=0.2)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        # Closing is short; a second signal must not cut the result file.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        node = TrackerNode(context=context)
+    except ParameterException as error:
+        raise ConfigError(" ".join(str(error).split())) from error
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    # A signal must not break into anything from here on, least of all into the result files.
+    with StopSignals() as stop:
+        while node.fatal is None and not stop.asked:
+            executor.spin_once(timeout_sec=_NOTICE_S)
+        ended = node.close(_CLOSE_S)
+        code = 0
+        if node.fatal is not None:
+            print(f"tracker: {node.fatal}", file=sys.stderr, flush=True)
+            code = 1
+        if not ended:
+            # The compiler cannot be interrupted, and Python would wait for it.
+            sys.stdout.flush()
+            os._exit(code)
         executor.shutdown(timeout_sec=0)
-        if node is not None:
-            ended = node.close(_CLOSE_S)
-            node.destroy_node()
-        context.try_shutdown()
-    code = 0
-    if node is not None and node.fatal is not None:
-        print(f"tracker: {node.fatal}", file=sys.stderr, flush=True)
-        code = 1
-    if not ended:
-        # The compiler cannot be interrupted, and Python would wait for it.
-        sys.stdout.flush()
-        os._exit(code)
+        node.destroy_node()
     return code
 
 

@@ -1,9 +1,13 @@
 """A ROS graph of its own for every test process, and a node to talk from."""
 
 import os
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -12,6 +16,7 @@ import pytest
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 
+ROOT = Path(__file__).resolve().parents[2]
 DEADLINE_S = 30.0
 """Discovery takes up to 3 s, more on a busy machine."""
 
@@ -53,7 +58,7 @@ class Peer:
     def until(
         self, condition: Callable[[], Any], what: str, *, deadline_s: float = DEADLINE_S
     ) -> Any:
-        """Spin until the condition holds; fails the test, saying what was missing, if it never does."""
+        """Spin until the condition holds; fails, saying what was missing, if it never does."""
         end_s = time.monotonic() + deadline_s
         while not (value := condition()):
             assert time.monotonic() < end_s, f"timed out waiting for {what}"
@@ -69,6 +74,12 @@ class Peer:
     def close(self) -> None:
         self.executor.shutdown()
         self.node.destroy_node()
+
+
+@pytest.fixture
+def other_domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A domain apart from that of nodes which outlive a test; name it before other fixtures."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str((int(os.environ["ROS_DOMAIN_ID"]) + 49) % 101 + 1))
 
 
 @pytest.fixture
@@ -91,3 +102,66 @@ def peer(ros_context: Any) -> Iterator[Peer]:
 def run_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+class Process:
+    """An executable of this package as a process of its own."""
+
+    def __init__(self, module: str, log: Path, parameters: dict[str, Any]) -> None:
+        arguments = ["--ros-args"]
+        for name, value in parameters.items():
+            text = str(value).lower() if isinstance(value, bool) else str(value)
+            arguments += ["-p", f"{name}:={text}"]
+        self.log = log
+        with log.open("wb") as sink:
+            self._popen = subprocess.Popen(
+                [sys.executable, "-m", f"markerless_tracker.node.{module}", *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=sink,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, "PYTHONPATH": str(ROOT)},
+            )
+
+    @property
+    def running(self) -> bool:
+        return self._popen.poll() is None
+
+    @property
+    def output(self) -> str:
+        return self.log.read_text(errors="replace")
+
+    def wait(self, timeout_s: float = 60.0) -> int:
+        return self._popen.wait(timeout_s)
+
+    def signal(self, number: int) -> None:
+        self._popen.send_signal(number)
+
+    def stop(self) -> None:
+        if self.running:
+            self._popen.send_signal(signal.SIGINT)
+            try:
+                self._popen.wait(20)
+            except subprocess.TimeoutExpired:
+                self._popen.kill()
+                self._popen.wait()
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Process]]:
+    started: list[Process] = []
+
+    def begin(module: str, **parameters: Any) -> Process:
+        pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+        process = Process(module, tmp_path / f"{module}{len(started)}.log", parameters)
+        started.append(process)
+        return process
+
+    yield begin
+    for process in started:
+        process.stop()
+
+
+@pytest.fixture(scope="session")
+def tools() -> Any:
+    """The classes above, for fixtures that live longer than a test."""
+    return SimpleNamespace(Peer=Peer, Process=Process)

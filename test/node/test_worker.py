@@ -13,6 +13,7 @@ from markerless_tracker.node.worker import FittedSet, Fitting, FitWorker, StartG
 from markerless_tracker.records import TrackResult, TrackState
 
 FRAME_NS = 16_666_667
+KEYS = ("tracked", "dropped_before_start")
 
 
 class FakeTracker:
@@ -193,8 +194,7 @@ def test_the_start_row_decides_where_it_begins_on_every_pass() -> None:
         for frame in range(4):
             before = bench.values()
             bench.offer(frame * FRAME_NS)
-            keys = ("tracked", "dropped_before_start")
-            bench.until(lambda b=before: any(bench.values()[k] != b[k] for k in keys))
+            bench.until(lambda b=before: any(bench.values()[k] != b[k] for k in KEYS))
     bench.until(lambda: len(bench.published) == 4)
     assert bench.worker.stop(20)
     assert [stamp // FRAME_NS for stamp, _ in bench.tracker.seen] == [2, 3, 2, 3]

@@ -1,0 +1,50 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.node.ros import run_executable
+
+WITHOUT_ROS = """
+import sys
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("rclpy", "sensor_msgs", "std_srvs", "diagnostic_msgs",
+                                  "geometry_msgs", "visualization_msgs", "std_msgs"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Missing())
+from markerless_tracker.node.MODULE import main
+sys.exit(main([]))
+"""
+
+
+@pytest.mark.parametrize("module", ["tracker_node", "player_node"])
+def test_without_ros_there_is_one_clear_line(module: str, project_root: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_ROS.replace("MODULE", module)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, "PYTHONPATH": str(project_root)},
+    )
+    assert done.returncode == 1 and done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert "ROS 2 is not installed" in line and "markerless_tracker[ros]" in line
+
+
+def test_errors_are_one_line_and_exit_1(capsys: pytest.CaptureFixture[str]) -> None:
+    def fail(_: list[str]) -> int:
+        raise ConfigError("seed: got -1, expected at least 0")
+
+    assert run_executable("tracker", fail, []) == 1
+    assert capsys.readouterr().err == "tracker: seed: got -1, expected at least 0\n"
+
+
+def test_an_interrupt_before_the_node_is_there_is_a_clean_end() -> None:
+    def interrupted(_: list[str]) -> int:
+        raise KeyboardInterrupt
+
+    assert run_executable("tracker", interrupted, []) == 0
