@@ -197,6 +197,12 @@ def body() -> BodyModel:
 
 
 @pytest.fixture(scope="session")
+def person() -> BodyModel:
+    """The shipped body of elliptic cones."""
+    return load_body("person31", 1.75)
+
+
+@pytest.fixture(scope="session")
 def elliptic_body(body: BodyModel) -> BodyModel:
     """The same bones in flat cones, each off its axis differently at both ends."""
     rng = np.random.default_rng(11)

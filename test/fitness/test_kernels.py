@@ -65,12 +65,10 @@ def check_silhouettes(
 
 
 @pytest.mark.parametrize("lens", [False, True], ids=["pinhole", "lens"])
-@pytest.mark.parametrize("elliptic", [False, True], ids=["round", "elliptic"])
-def test_silhouettes(
-    twin, make_pose, make_observation, body, elliptic_body, rig, lens_rig, elliptic, lens
-):
-    shown = elliptic_body if elliptic else body
-    rng = np.random.default_rng(100 + 10 * elliptic + lens)
+@pytest.mark.parametrize("name", ["body", "elliptic_body", "person"])
+def test_silhouettes(request, twin, make_pose, make_observation, rig, lens_rig, name, lens):
+    shown = request.getfixturevalue(name)
+    rng = np.random.default_rng([len(name), lens])
     # Nearly centred, then partly outside of some frames.
     poses = [make_pose(shown, rng, spread_m=spread) for spread in (0.3, 1.8)]
     cameras = (lens_rig if lens else rig).cameras
