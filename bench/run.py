@@ -1,0 +1,58 @@
+"""Remake the published figures: `make bench`; `bench/run.py PART...` for some of them."""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from markerless_tracker.cli.main import main
+
+ROOT = Path(__file__).resolve().parent.parent
+DATA = ROOT.parent / "shared" / "data"
+# Full size has four times the pixels and hardly a millimetre more to say.
+RECORDINGS = {"render_walk": "1", "balance_real": "0.5"}
+PARTS = ("accuracy", "start", "speed")
+
+
+def run(words: list[str]) -> None:
+    print(f"\n$ markerless_tracker {' '.join(words)}", flush=True)
+    status = main(words)
+    if status:
+        sys.exit(status)
+
+
+def bench(parts: list[str], data: Path, out: Path, seeds: int) -> None:
+    found = []
+    for name in RECORDINGS:
+        if (data / name / "ground_truth.trc").is_file():
+            found.append(name)
+        else:
+            print(f"{name}: left out, there is no such recording in {data}", flush=True)
+    for name in found:
+        tables = [
+            "benchmark", "tables", str(data / name), "--scale", RECORDINGS[name],
+            "--fps", "60,20", "--seeds", str(seeds), "-o",
+        ]  # fmt: skip
+        if "accuracy" in parts:
+            run([*tables, str(out / name), "--preset", "tuned,paper", "--truth-score"])
+        if "start" in parts:
+            for noise in ("10", "20"):
+                where = str(out / f"{name}_start_{noise}")
+                run([*tables, where, "--preset", "tuned", "--start-noise", noise])
+    if "speed" in parts:
+        run(["benchmark", "speed"])
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all")
+    parser.add_argument("--data", type=Path, default=DATA, help="folder of the recordings")
+    parser.add_argument("-o", dest="out", type=Path, default=ROOT / "out" / "bench")
+    parser.add_argument("--seeds", type=int, default=6)
+    args = parser.parse_args()
+    unknown = sorted(set(args.parts) - set(PARTS))
+    if unknown:
+        parser.error(f"unknown part {', '.join(unknown)}, expected some of {', '.join(PARTS)}")
+    started = time.monotonic()
+    bench(args.parts or list(PARTS), args.data, args.out, args.seeds)
+    print(f"\n{time.monotonic() - started:.0f} s; tables and runs are in {args.out}")
