@@ -74,7 +74,7 @@ class Samples(NamedTuple):
     length: FloatArray
     cone: NDArray[np.int64]
     shape: FloatArray
-    count: NDArray[np.int64]
+    count: NDArray[np.int64]  # type: ignore[assignment]
 
 
 class Residuals(NamedTuple):
@@ -93,7 +93,7 @@ class Residuals(NamedTuple):
     weight: FloatArray
     gradient: FloatArray
     sample: NDArray[np.int64]
-    count: NDArray[np.int64]
+    count: NDArray[np.int64]  # type: ignore[assignment]
     cost: FloatArray
 
 
@@ -157,7 +157,7 @@ def _surface(ends, shape, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def _add_sample(
+def _add_sample(  # type: ignore[no-untyped-def]
     view,
     cone,
     world,
@@ -174,7 +174,7 @@ def _add_sample(
     rows,
     shape,
     samples,
-):  # type: ignore[no-untyped-def]  # noqa: E501
+):
     """Keep a point of one cone's outline if the pixel `step_px` outside it is free of the body."""
     n = samples.count[view]
     if n >= samples.cone.shape[1]:
@@ -243,8 +243,8 @@ def sample_outline(view, views, spacing_px, step_px, scratch, samples):  # type:
             radius = 0.0
             for m in range(1, 3):
                 radius = max(radius, np.sqrt(flat[e, m, 0] ** 2 + flat[e, m, 1] ** 2))
-            n = max(3, np.int64(np.ceil(radius * k[0] * abs(arcs[e, 1]) / spacing_px)))
-            n = min(n, 200)
+            arc_px = radius * k[0] * abs(arcs[e, 1])
+            n = np.int64(min(max(3.0, np.ceil(arc_px / spacing_px)), 200.0))
             shape[4] = e
             for i in range(n):
                 angle = arcs[e, 0] + arcs[e, 1] * (i + 0.5) / n
@@ -281,7 +281,7 @@ def sample_outline(view, views, spacing_px, step_px, scratch, samples):  # type:
             project_point(p[0], p[1], p[2], k, distortion, distorted, b)
             du, dv = b[0] - a[0], b[1] - a[1]
             length = np.sqrt(du * du + dv * dv)
-            n = min(max(1, np.int64(np.ceil(length / spacing_px))), 400)
+            n = np.int64(min(max(1.0, np.ceil(length / spacing_px)), 400.0))
             nu, nv = (-dv, du) if side == 0 else (dv, -du)
             for i in range(n):
                 s = (i + 0.5) / n
@@ -468,9 +468,9 @@ def _accumulate(view, body, samples, residuals, scratch):  # type: ignore[no-unt
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def _one_view(
+def _one_view(  # type: ignore[no-untyped-def]
     view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
-):  # type: ignore[no-untyped-def]  # noqa: E501
+):
     root = scratch.world[0, 0, 0]
     r, t = views.rotation[view], views.translation[view]
     depth = r[2, 0] * root[0] + r[2, 1] * root[1] + r[2, 2] * root[2] + t[2]
@@ -481,9 +481,9 @@ def _one_view(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def equations_serial(
+def equations_serial(  # type: ignore[no-untyped-def]
     pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
-):  # type: ignore[no-untyped-def]  # noqa: E501
+):
     """Residuals and per-view normal equations at a pose (p,), on the calling thread."""
     cone_ends(pose, body, scratch.nodes, scratch.world)
     for view in range(views.size.shape[0]):
@@ -493,9 +493,9 @@ def equations_serial(
 
 
 @njit(cache=True, nogil=True, parallel=True)  # type: ignore[misc]
-def equations_parallel(
+def equations_parallel(  # type: ignore[no-untyped-def]
     pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
-):  # type: ignore[no-untyped-def]  # noqa: E501
+):
     """As `equations_serial`, a thread a view; each view sums for itself, so nothing changes."""
     cone_ends(pose, body, scratch.nodes, scratch.world)
     for view in prange(views.size.shape[0]):
