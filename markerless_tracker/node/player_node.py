@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.node.ros import StopSignals, init_context, run_executable
+from markerless_tracker.node.ros import StopSignals, init_context, print_help, run_executable
 
+_SUMMARY = "Plays a bag's images and camera infos to topics, with their own stamps."
+_EXAMPLE = "player --ros-args -p bag:=bag -p rate:=0.5 -p wait_for_subscribers:=true"
 # A signal is noticed at the latest after this.
 _NOTICE_S = 0.1
 
@@ -22,6 +24,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: list[str]) -> int:
+    if "-h" in argv or "--help" in argv:
+        from markerless_tracker.node.player_settings import descriptions
+
+        print_help("player", _SUMMARY, _EXAMPLE, descriptions())
+        return 0
     context = init_context(argv)
     try:
         return _play(context)

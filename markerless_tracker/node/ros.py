@@ -2,7 +2,7 @@
 
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
@@ -63,6 +63,16 @@ def run_executable(
         return 1
     except KeyboardInterrupt:
         return 0
+
+
+def print_help(name: str, summary: str, example: str, lines: Mapping[str, str]) -> None:
+    """Print what an executable does, an example, and its parameters with a line about each."""
+    width = max(map(len, lines)) + 2
+    listed = "\n".join(f"  {key:{width}}{line}" for key, line in lines.items())
+    print(
+        f"usage: {name} --ros-args [-p NAME:=VALUE ...] [--params-file FILE]\n\n{summary}\n\n"
+        f"example:\n  {example}\n\nparameters:\n{listed}"
+    )
 
 
 class StopSignals:

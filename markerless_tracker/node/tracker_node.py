@@ -6,8 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.node.ros import StopSignals, init_context, run_executable
+from markerless_tracker.node.ros import StopSignals, init_context, print_help, run_executable
 
+_SUMMARY = "Tracks a person in the images of several calibrated cameras."
+_EXAMPLE = (
+    "tracker --ros-args -p calibration_file:=bag/calibration.toml "
+    "-p background_dir:=bag/background -p stature:=1.75 -p start_file:=start.yaml"
+)
 _CLOSE_S = 5.0
 # A signal is noticed at the latest after this.
 _NOTICE_S = 0.1
@@ -22,6 +27,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: list[str]) -> int:
+    if "-h" in argv or "--help" in argv:
+        from markerless_tracker.node.parameters import descriptions
+
+        print_help("tracker", _SUMMARY, _EXAMPLE, descriptions())
+        return 0
     context = init_context(argv)
     try:
         return _serve(context)

@@ -3,6 +3,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.parameters import (
@@ -107,3 +108,9 @@ def test_the_players_impossible_values(given: dict[str, Any], says: str) -> None
 def test_the_players_values() -> None:
     settings = read_player_settings({"bag": "b", "rate": 2, "loop": True})
     assert settings == PlayerSettings(bag=Path("b"), rate=2.0, loop=True)
+
+
+def test_the_example_file_is_understood(project_root: Path) -> None:
+    content = yaml.safe_load((project_root / "config" / "tracker.yaml").read_text())
+    settings = read_settings(content["tracker"]["ros__parameters"])
+    assert settings.cameras == ("cam01", "cam02", "cam03", "cam04") and settings.stature == 1.72

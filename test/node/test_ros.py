@@ -1,3 +1,4 @@
+import importlib
 import os
 import subprocess
 import sys
@@ -48,3 +49,18 @@ def test_an_interrupt_before_the_node_is_there_is_a_clean_end() -> None:
         raise KeyboardInterrupt
 
     assert run_executable("tracker", interrupted, []) == 0
+
+
+@pytest.mark.parametrize(
+    ("module", "parameters"),
+    [("tracker_node", ("calibration_file", "edge_weight")), ("player_node", ("bag", "loop"))],
+)
+def test_help_lists_the_parameters(
+    module: str, parameters: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    main = importlib.import_module(f"markerless_tracker.node.{module}").main
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    assert "example:" in text
+    assert all(f"\n  {name} " in text for name in parameters)
