@@ -219,6 +219,29 @@ def test_lengths_add_up_to_the_outline(posed) -> None:
         assert 0.95 * whole <= px.sum() <= most * whole
 
 
+def test_samples_along_a_side_are_evenly_spaced_in_the_image(make_pose) -> None:
+    """Also where a limb points at the camera, and steps along it are not."""
+    made = scene("person31", 4, make_pose)
+    made.frame.collect(made.pose, 0.1)
+    samples, compared, uneven = made.frame.samples, 0, 0.0
+    for v in range(len(made.rig)):
+        n = samples.count[v]
+        for c in range(len(made.body.cone_names)):
+            (mine,) = np.nonzero(samples.cone[v, :n] == c)
+            for side in np.unique(samples.shape[v, mine, :4], axis=0):
+                on = mine[(samples.shape[v, mine, :4] == side).all(axis=1)]
+                if on.size < 4:
+                    continue
+                gap = np.linalg.norm(np.diff(samples.pixel[v, on], axis=0), axis=1)
+                # Points that other parts hide are left out.
+                steps = gap / gap.min()
+                np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
+                compared += on.size
+                along = np.diff(samples.shape[v, on, 4]) / np.rint(steps)
+                uneven = max(uneven, np.ptp(along) / along.mean())
+    assert compared > 500 and uneven > 0.02
+
+
 def test_parts_outside_the_frame_have_no_samples(make_pose) -> None:
     made = scene("person31", 5, make_pose, lens=LENS)
     pose = made.body.neutral.copy()
