@@ -9,12 +9,17 @@ CPUINFO = Path("/proc/cpuinfo")
 
 
 def machine() -> dict[str, Any]:
-    """Processor, cores this process may use, memory and system, as plain values."""
+    """Processor, cores this process may use, memory, system and load, as plain values.
+
+    Times taken under a load (of the last minute) well above the number of busy threads are too
+    long, those of parallel parts most of all.
+    """
     return {
         "cpu": processor(),
         "cores": usable_cores(),
         "memory_gib": _memory_gib(),
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "load": _load(),
     }
 
 
@@ -43,3 +48,10 @@ def _memory_gib() -> float | None:
     except (AttributeError, OSError, ValueError):
         return None
     return round(total / 2**30, 1)
+
+
+def _load() -> float | None:
+    try:
+        return round(os.getloadavg()[0], 2)
+    except (AttributeError, OSError):
+        return None

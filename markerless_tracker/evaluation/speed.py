@@ -2,7 +2,8 @@
 
 Every figure is taken several times, the parts taking turns, so that a busy moment of the machine
 meets all of them. View-evaluations and refinement: the least of the repeats. Frames: the least of
-the repeats of each frame, then median and 95th percentile over the frames.
+the repeats of each frame, then median and 95th percentile over the frames; the ratio of the whole
+fit to 1000 evaluations, whose work hardly differs between frames, is one of least times.
 """
 
 import time
@@ -84,7 +85,7 @@ def measure(
             key: _spread(frames[key]) for key in ("background", "edges", "fitness", "total")
         },
         "thousand_evaluations_ms": _spread(thousand),
-        "fit_vs_1000_evaluations": float(np.median(fit) / np.median(thousand)),
+        "fit_vs_1000_evaluations": float(fit.min() / thousand.min()),
     }
 
 

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     width, height = figures["image_size"]
     console = Console(width=None if sys.stdout.isatty() else 100)
     console.print(
-        f"{where['cpu']}, {where['cores']} cores; {figures['threads']} threads; "
+        f"{where['cpu']}, {where['cores']} cores, load {where['load']}; {figures['threads']} threads; "
         f"{figures['source']}, {figures['cameras']} cameras, {width}x{height} px",
         highlight=False,
         markup=False,
