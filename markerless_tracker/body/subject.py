@@ -72,18 +72,26 @@ def subject_from_markers(
     Raises:
         BodyModelError: fewer than half of the lengths can be measured.
     """
+    measured = measured_lengths(description, markers_m)
+    if 2 * len(measured) < len(description.lengths):
+        raise BodyModelError(
+            f"{len(measured)} of {len(description.lengths)} segment lengths can be measured from "
+            f"markers {', '.join(sorted(markers_m)) or 'none'}, expected at least half"
+        )
+    return Subject("markers", _completed(description, _both_sides_alike(measured)))
+
+
+def measured_lengths(
+    description: BodyDescription, markers_m: Mapping[str, FloatArray]
+) -> dict[str, float]:
+    """The lengths (m) whose two markers (3,) are there, each side for itself."""
     known = complete_markers(markers_m)
     measured: dict[str, float] = {}
     for name, entry in description.lengths.items():
         start, end = entry.get("markers", (None, None))
         if start in known and end in known:
             measured[name] = float(np.linalg.norm(known[start] - known[end]))
-    if 2 * len(measured) < len(description.lengths):
-        raise BodyModelError(
-            f"{len(measured)} of {len(description.lengths)} segment lengths can be measured from "
-            f"markers {', '.join(sorted(known)) or 'none'}, expected at least half"
-        )
-    return Subject("markers", _completed(description, _both_sides_alike(measured)))
+    return measured
 
 
 def _both_sides_alike(lengths: Mapping[str, float]) -> dict[str, float]:

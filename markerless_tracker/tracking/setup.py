@@ -16,12 +16,14 @@ from markerless_tracker.body import (
     subject_from_stature,
 )
 from markerless_tracker.body.build import build_body
+from markerless_tracker.body.subject import measured_lengths
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import read_trc
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.first_frame import start_noise_m
 from markerless_tracker.tracking.tracker import Tracker
 
 
@@ -100,6 +102,9 @@ def build_tracker(
         start_pose=pose,
         backgrounds=backgrounds,
         shape_known=bool(subject.cones_m),
+        start_noise_m=(
+            0.0 if start is None else start_noise_m(measured_lengths(description, start.markers_m))
+        ),
     )
     return TrackerSetup(tracker, None if start is None else start.stamp_ns)
 

@@ -9,12 +9,13 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import BodyModelError
-from markerless_tracker.fitness.shape import fit_shape
+from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
+from markerless_tracker.tracking.first_frame import shape_of_first_frame
 from markerless_tracker.tracking.loss import next_state
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.stages import frame_stages
@@ -38,6 +39,7 @@ class Tracker:
             only.
         shape_known: whether the body's sections are this person's; if not, and `fit_shape` is set,
             they are fitted to the first frame's silhouettes with the start pose held.
+        start_noise_m: how far the markers that gave the start pose may be off, per coordinate.
 
     Raises:
         BodyModelError: the start pose has another size or is not finite.
@@ -54,6 +56,7 @@ class Tracker:
         start_pose: FloatArray,
         backgrounds: Mapping[str, BackgroundModel] | None = None,
         shape_known: bool = False,
+        start_noise_m: float = 0.0,
     ) -> None:
         self.rig = rig
         self.config = config
@@ -73,6 +76,7 @@ class Tracker:
         self._evidence = EvidenceMaker(rig, config, backgrounds or {}, self._pool)
         self._fit_shape = config.fit_shape and not shape_known
         self._shape_fitted = not self._fit_shape
+        self._start_noise_m = start_noise_m
         self._searcher = self._searcher_for(body)
         # Refuses a budget that cannot be spent before the first frame comes.
         frame_stages(body, config, self._pose, body.sigma)
@@ -125,14 +129,28 @@ class Tracker:
         observations, warnings = self._evidence.select(observed, self.body, predicted)
         if not self._shape_fitted:
             self._shape_fitted = True
-            first = self._searcher.frame(observations, stamp_ns, self._pose)
-            self._searcher = self._searcher_for(
-                fit_shape(self.body, [(first.contours, self._pose)])
-            )
+            predicted = self._take_shape(observations, stamp_ns)
         search = self._searcher.frame(observations, stamp_ns, predicted)
         sigma = self.body.sigma * self._rate_factor(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
         return self._conclude(search, stamp_ns, observations, warnings)
+
+    def _take_shape(self, observations: Mapping[str, Observation], stamp_ns: int) -> FloatArray:
+        """Fit the body's sections to the first frame; returns the start pose (p,) to go on from."""
+
+        def contours(body: BodyModel, pose: FloatArray) -> ContourFrame:
+            return self._searcher_for(body).frame(observations, stamp_ns, pose).contours
+
+        body, pose = shape_of_first_frame(
+            self._generic,
+            self._pose,
+            self._start_noise_m,
+            contours,
+            self.config,
+            self._searcher.limits,
+        )
+        self._searcher = self._searcher_for(body)
+        return pose
 
     def _conclude(
         self,
