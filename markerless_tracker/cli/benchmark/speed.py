@@ -64,8 +64,8 @@ def run(args: argparse.Namespace) -> int:
     width, height = figures["image_size"]
     console = Console(width=None if sys.stdout.isatty() else 100)
     console.print(
-        f"{where['cpu']}, {where['cores']} cores, load {where['load']}; {figures['threads']} threads; "
-        f"{figures['source']}, {figures['cameras']} cameras, {width}x{height} px",
+        f"{where['cpu']}, {where['cores']} cores, load {where['load']}; "
+        f"{figures['threads']} threads; {figures['source']}, {figures['cameras']} cameras, {width}x{height} px",
         highlight=False,
         markup=False,
     )
