@@ -65,7 +65,8 @@ def run(args: argparse.Namespace) -> int:
     console = Console(width=None if sys.stdout.isatty() else 100)
     console.print(
         f"{where['cpu']}, {where['cores']} cores, load {where['load']}; "
-        f"{figures['threads']} threads; {figures['source']}, {figures['cameras']} cameras, {width}x{height} px",
+        f"{figures['threads']} threads; {figures['source']}, "
+        f"{figures['cameras']} cameras, {width}x{height} px",
         highlight=False,
         markup=False,
     )
