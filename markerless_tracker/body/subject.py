@@ -66,8 +66,8 @@ def subject_from_markers(
     """Segment lengths from one row of named markers (3,), in m, any frame.
 
     Left and right (names that begin with ``l_`` and ``r_``) get their mean: people are more alike
-    on both sides than markers are placed. A missing Pelvis is the midpoint of the hips; a length whose markers are missing is taken from
-    the stature that the other lengths suggest.
+    on both sides than markers are placed. A missing Pelvis is the midpoint of the hips; a length
+    whose markers are missing is taken from the stature that the other lengths suggest.
 
     Raises:
         BodyModelError: fewer than half of the lengths can be measured.

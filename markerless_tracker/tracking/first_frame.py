@@ -1,8 +1,8 @@
 """The first frame: the person's shape from the silhouettes, the start pose known or nearly so.
 
 Fitting pose and shape together drifts while the fitness rises, so the pose is held while the shape
-is fitted. A start whose markers are noisy would then be pressed into the shape; it is first moved to
-where a nearly generic body fits the silhouettes, as far as the noise lets it.
+is fitted. A start whose markers are noisy would then be pressed into the shape; it is first moved
+to where a nearly generic body fits the silhouettes, as far as the noise lets it.
 """
 
 from collections.abc import Callable, Mapping
