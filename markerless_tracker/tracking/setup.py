@@ -1,13 +1,15 @@
 """From files and settings to a tracker: what the node and the offline verbs share."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from markerless_tracker.body import (
+    MARKER_NAMES,
     BodyModel,
+    Subject,
     load_description,
     pose_from_markers,
     read_pose,
@@ -16,14 +18,15 @@ from markerless_tracker.body import (
     subject_from_stature,
 )
 from markerless_tracker.body.build import build_body
-from markerless_tracker.body.subject import measured_lengths
+from markerless_tracker.body.description import BodyDescription
+from markerless_tracker.body.subject import complete_markers, measured_lengths
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import read_trc
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.first_frame import start_noise_m
+from markerless_tracker.tracking.first_frame import StartMarkers, start_noise_m
 from markerless_tracker.tracking.tracker import Tracker
 
 
@@ -102,9 +105,7 @@ def build_tracker(
         start_pose=pose,
         backgrounds=backgrounds,
         shape_known=bool(subject.cones_m),
-        start_noise_m=(
-            0.0 if start is None else start_noise_m(measured_lengths(description, start.markers_m))
-        ),
+        start_markers=None if start is None else _start_markers(description, subject, start),
     )
     return TrackerSetup(tracker, None if start is None else start.stamp_ns)
 
@@ -123,6 +124,23 @@ def first_row(path: Path) -> _MarkerRow:
     row = int(rows[0])
     named = dict(zip(track.names, track.positions_m[row], strict=True))
     return _MarkerRow(int(track.stamps_ns[row]), named)
+
+
+def _start_markers(
+    description: BodyDescription, subject: Subject, start: _MarkerRow
+) -> StartMarkers:
+    missing = np.full(3, np.nan)
+    known = complete_markers(start.markers_m)
+
+    def resized(lengths_m: Mapping[str, float], like: BodyModel) -> BodyModel:
+        sized = build_body(description, Subject(subject.name, lengths_m))
+        return replace(sized, cone_shape=like.cone_shape)
+
+    return StartMarkers(
+        np.array([known.get(name, missing) for name in MARKER_NAMES]),
+        start_noise_m(measured_lengths(description, start.markers_m)),
+        resized,
+    )
 
 
 def _limits(body: BodyModel, config: TrackerConfig) -> FloatArray:

@@ -15,7 +15,7 @@ from markerless_tracker.imaging import BackgroundModel, Image
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
-from markerless_tracker.tracking.first_frame import shape_of_first_frame
+from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first_frame
 from markerless_tracker.tracking.loss import next_state
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.stages import frame_stages
@@ -39,7 +39,8 @@ class Tracker:
             only.
         shape_known: whether the body's sections are this person's; if not, and `fit_shape` is set,
             they are fitted to the first frame's silhouettes with the start pose held.
-        start_noise_m: how far the markers that gave the start pose may be off, per coordinate.
+        start_markers: the markers that gave the start pose; noisy ones are settled on the first
+            frame's silhouettes before the shape is fitted.
 
     Raises:
         BodyModelError: the start pose has another size or is not finite.
@@ -56,7 +57,7 @@ class Tracker:
         start_pose: FloatArray,
         backgrounds: Mapping[str, BackgroundModel] | None = None,
         shape_known: bool = False,
-        start_noise_m: float = 0.0,
+        start_markers: StartMarkers | None = None,
     ) -> None:
         self.rig = rig
         self.config = config
@@ -76,7 +77,7 @@ class Tracker:
         self._evidence = EvidenceMaker(rig, config, backgrounds or {}, self._pool)
         self._fit_shape = config.fit_shape and not shape_known
         self._shape_fitted = not self._fit_shape
-        self._start_noise_m = start_noise_m
+        self._start_markers = start_markers
         self._searcher = self._searcher_for(body)
         # Refuses a budget that cannot be spent before the first frame comes.
         frame_stages(body, config, self._pose, body.sigma)
@@ -144,7 +145,7 @@ class Tracker:
         body, pose = shape_of_first_frame(
             self._generic,
             self._pose,
-            self._start_noise_m,
+            self._start_markers,
             contours,
             self.config,
             self._searcher.limits,
