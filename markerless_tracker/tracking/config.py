@@ -86,6 +86,12 @@ class TrackerConfig(ImagingSettings):
         least=0.01,
         most=1e6,
     )
+    limb_spread: float = setting(
+        4.0,
+        "with refinement: spread of each limb's own small swarm, in published spreads",
+        least=0.01,
+        most=100.0,
+    )
     prediction: float = setting(
         0.6,
         "share of the last change of pose that is expected again; 0 = zero motion",

@@ -18,6 +18,9 @@ SPPSO_STAGES = ((10, 20), (20, 40))
 """Particles and iterations of SPPSO's two stages at 1000 evaluations."""
 SWARM_SHARE = Fraction(2, 10)
 """Share of the budget that the swarm keeps beside contour refinement."""
+LIMB_SWARM = (10, 5)
+"""Particles and iterations of each limb's own swarm at a budget of 1000."""
+_TRUNK = ("root", "torso_head")
 _SOFT = 10.0
 _TRANSLATION = 3
 
@@ -42,7 +45,33 @@ def frame_stages(
     return (
         contour_stage("align", body, config, centre, sigma),
         *swarm,
+        *limb_stages(body, config, centre, sigma),
         contour_stage("polish", body, config, centre, sigma),
+    )
+
+
+def limb_stages(
+    body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
+) -> tuple[Stage, ...]:
+    """A small, wide swarm for each limb alone: finds one that the refinement has lost."""
+    every_cone = np.ones(len(body.cone_names), dtype=np.bool_)
+    particles, iterations = LIMB_SWARM
+    return tuple(
+        Stage(
+            name=name,
+            algorithm="sppso",
+            active=active,
+            centre=centre,
+            sigma=config.limb_spread * sigma,
+            particles=max(1, particles * config.evaluations // 1000),
+            iterations=iterations,
+            silhouette_weight=1.0,
+            edge_weight=config.edge_weight,
+            silhouette_cones=every_cone,
+            edge_cones=every_cone,
+        )
+        for name, active in body.subspaces.items()
+        if name not in _TRUNK
     )
 
 

@@ -10,6 +10,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.records import CONTOUR
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.stages import (
+    LIMB_SWARM,
     SPPSO_STAGES,
     STAGES,
     SWARM_SHARE,
@@ -115,10 +116,20 @@ def test_the_swarm_alone_searches_with_scaled_spreads(body, swarm_settings):
 def test_refinement_stands_before_and_after_a_smaller_swarm(body, refined_settings):
     config = swarm(refined_settings, refine_iterations=7)
     stages = frame_stages(body, config, body.neutral, body.sigma)
-    assert [s.algorithm for s in stages] == [CONTOUR, "sppso", "sppso", CONTOUR]
-    assert len({s.name for s in stages}) == 4
-    assert sum(s.evaluations for s in stages) == 1000 * SWARM_SHARE
-    assert stages[0].iterations == stages[3].iterations == 7
+    assert [s.algorithm for s in stages] == [CONTOUR, *["sppso"] * 6, CONTOUR]
+    assert len({s.name for s in stages}) == 8
+    assert sum(s.evaluations for s in stages[1:3]) == 1000 * SWARM_SHARE
+    assert stages[0].iterations == stages[-1].iterations == 7
+
+
+def test_each_limb_has_a_small_wide_swarm_of_its_own(body, refined_settings):
+    config = swarm(refined_settings, limb_spread=3.0)
+    limbs = {s.name: s for s in frame_stages(body, config, body.neutral, body.sigma)[3:7]}
+    assert list(limbs) == ["l_arm", "r_arm", "l_leg", "r_leg"]
+    for name, stage in limbs.items():
+        np.testing.assert_array_equal(stage.active, body.subspaces[name])
+        np.testing.assert_allclose(stage.sigma, 3.0 * body.sigma)
+        assert (stage.particles, stage.iterations) == LIMB_SWARM
 
 
 def test_a_budget_that_cannot_be_spent_is_refused_in_the_users_terms(
