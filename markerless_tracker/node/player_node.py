@@ -17,13 +17,13 @@ _NOTICE_S = 0.1
 def main(argv: Sequence[str] | None = None) -> int:
     """Play a bag to topics; returns the exit code.
 
-    0 at the end of the bag and after a signal, 1 with one line on standard error for parameters or
-    a bag that cannot be used.
+    0 at the end of the bag and after SIGINT or SIGTERM, 1 with one line on standard error for
+    parameters or a bag that cannot be used.
     """
     return run_executable("player", _run, argv)
 
 
-def _run(argv: list[str]) -> int:
+def _run(argv: list[str], stop: StopSignals) -> int:
     if "-h" in argv or "--help" in argv:
         from markerless_tracker.node.player_settings import descriptions
 
@@ -31,12 +31,12 @@ def _run(argv: list[str]) -> int:
         return 0
     context = init_context(argv)
     try:
-        return _play(context)
+        return _play(context, stop)
     finally:
         context.try_shutdown()
 
 
-def _play(context: Any) -> int:
+def _play(context: Any, stop: StopSignals) -> int:
     from rclpy.exceptions import ParameterException
     from rclpy.executors import SingleThreadedExecutor
 
@@ -48,23 +48,22 @@ def _play(context: Any) -> int:
         raise ConfigError(" ".join(str(error).split())) from error
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
-    with StopSignals() as stop:
 
-        def spin(seconds: float) -> bool:
-            until_s = time.monotonic() + seconds
-            while not stop.asked:
-                left_s = until_s - time.monotonic()
-                executor.spin_once(timeout_sec=min(max(0.0, left_s), _NOTICE_S))
-                if left_s <= 0.0:
-                    break
-            return not stop.asked
+    def spin(seconds: float) -> bool:
+        until_s = time.monotonic() + seconds
+        while not stop.asked:
+            left_s = until_s - time.monotonic()
+            executor.spin_once(timeout_sec=min(max(0.0, left_s), _NOTICE_S))
+            if left_s <= 0.0:
+                break
+        return not stop.asked
 
-        node.play(spin)
-        if not stop.asked:
-            node.finish(spin)
-        node.get_logger().info(f"played {node.sets_played} sets")
-        executor.shutdown(timeout_sec=0)
-        node.destroy_node()
+    node.play(spin)
+    if not stop.asked:
+        node.finish(spin)
+    node.get_logger().info(f"played {node.sets_played} sets")
+    executor.shutdown(timeout_sec=0)
+    node.destroy_node()
     return 0
 
 

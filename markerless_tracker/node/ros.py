@@ -42,41 +42,11 @@ def require_ros() -> None:
         raise RosMissingError(NOT_INSTALLED + missing) from error
 
 
-def run_executable(
-    name: str, body: Callable[[list[str]], int], argv: Sequence[str] | None = None
-) -> int:
-    """Run an executable: one line on standard error and 1 for an error, 0 for an interrupt.
-
-    Args:
-        name: the executable's, for its messages.
-        body: called with the arguments after ROS is known to be there; returns the exit code.
-        argv: arguments without the program's name; those of this process if None.
-    """
-    try:
-        # By default it ends the process with code 143.
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        apply_profile()
-        require_ros()
-        return body(list(sys.argv[1:] if argv is None else argv))
-    except TrackerError as error:
-        print(f"{name}: {error}", file=sys.stderr, flush=True)
-        return 1
-    except KeyboardInterrupt:
-        return 0
-
-
-def print_help(name: str, summary: str, example: str, lines: Mapping[str, str]) -> None:
-    """Print what an executable does, an example, and its parameters with a line about each."""
-    width = max(map(len, lines)) + 2
-    listed = "\n".join(f"  {key:{width}}{line}" for key, line in lines.items())
-    print(
-        f"usage: {name} --ros-args [-p NAME:=VALUE ...] [--params-file FILE]\n\n{summary}\n\n"
-        f"example:\n  {example}\n\nparameters:\n{listed}"
-    )
-
-
 class StopSignals:
     """Notes SIGINT and SIGTERM instead of letting them break into whatever runs; a context manager.
+
+    An exception in the midst of writing a result would cut it, and one in the midst of an import
+    can make Python report a failure at its end although it was caught.
 
     Attributes:
         asked: whether one has come.
@@ -97,6 +67,37 @@ class StopSignals:
 
     def _note(self, number: int, frame: object) -> None:
         self.asked = True
+
+
+def run_executable(
+    name: str, body: Callable[[list[str], StopSignals], int], argv: Sequence[str] | None = None
+) -> int:
+    """Run an executable: one line on standard error and 1 for an error.
+
+    Args:
+        name: the executable's, for its messages.
+        body: called with the arguments after ROS is known to be there, and with what tells it that
+            it is time to end; returns the exit code.
+        argv: arguments without the program's name; those of this process if None.
+    """
+    with StopSignals() as stop:
+        try:
+            apply_profile()
+            require_ros()
+            return body(list(sys.argv[1:] if argv is None else argv), stop)
+        except TrackerError as error:
+            print(f"{name}: {error}", file=sys.stderr, flush=True)
+            return 1
+
+
+def print_help(name: str, summary: str, example: str, lines: Mapping[str, str]) -> None:
+    """Print what an executable does, an example, and its parameters with a line about each."""
+    width = max(map(len, lines)) + 2
+    listed = "\n".join(f"  {key:{width}}{line}" for key, line in lines.items())
+    print(
+        f"usage: {name} --ros-args [-p NAME:=VALUE ...] [--params-file FILE]\n\n{summary}\n\n"
+        f"example:\n  {example}\n\nparameters:\n{listed}"
+    )
 
 
 def init_context(arguments: Sequence[str]) -> Any:

@@ -1,13 +1,15 @@
 import importlib
 import os
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.node.ros import run_executable
+from markerless_tracker.node.ros import StopSignals, run_executable
 
 WITHOUT_ROS = """
 import sys
@@ -20,6 +22,29 @@ sys.meta_path.insert(0, Missing())
 from markerless_tracker.node.MODULE import main
 sys.exit(main([]))
 """
+
+
+SIGNALLED = """
+import os, sys
+from markerless_tracker.node.ros import run_executable
+def body(argv, stop):
+    for _ in range(3):
+        exec("os.kill(os.getpid(), int(sys.argv[1]))")
+    print("went on, asked:", stop.asked)
+    return 7
+sys.exit(run_executable("x", body, []))
+"""
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(autouse=True)
+def _own_signals() -> Iterator[None]:
+    """An executable ignores signals once it is through; the tests must not."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    handlers = [signal.getsignal(number) for number in numbers]
+    yield
+    for number, handler in zip(numbers, handlers, strict=True):
+        signal.signal(number, handler)
 
 
 @pytest.mark.parametrize("module", ["tracker_node", "player_node"])
@@ -37,18 +62,23 @@ def test_without_ros_there_is_one_clear_line(module: str, project_root: Path) ->
 
 
 def test_errors_are_one_line_and_exit_1(capsys: pytest.CaptureFixture[str]) -> None:
-    def fail(_: list[str]) -> int:
+    def fail(_: list[str], __: StopSignals) -> int:
         raise ConfigError("seed: got -1, expected at least 0")
 
     assert run_executable("tracker", fail, []) == 1
     assert capsys.readouterr().err == "tracker: seed: got -1, expected at least 0\n"
 
 
-def test_an_interrupt_before_the_node_is_there_is_a_clean_end() -> None:
-    def interrupted(_: list[str]) -> int:
-        raise KeyboardInterrupt
-
-    assert run_executable("tracker", interrupted, []) == 0
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_is_noted_and_breaks_nothing(number: int) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SIGNALLED, str(int(number))],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (7, "went on, asked: True\n", "")
 
 
 @pytest.mark.parametrize(
