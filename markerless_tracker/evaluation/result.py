@@ -1,4 +1,8 @@
-"""A result on disk: NAME.trc with the 15 markers, NAME.json with everything else."""
+"""A result on disk: NAME.trc with the 15 markers, NAME.json with everything else.
+
+NAME.subject.yaml holds the sizes of the tracked body, fitted ones included, for the next recording
+of the same person.
+"""
 
 import json
 import math
@@ -12,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from markerless_tracker import __version__
-from markerless_tracker.body import MARKER_NAMES, BodyModel
+from markerless_tracker.body import MARKER_NAMES, BodyModel, Subject, write_subject
 from markerless_tracker.datasets import MarkerTrack, write_trc
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.records import TrackResult
@@ -25,7 +29,8 @@ class ResultWriter:
     """Collects results and writes them when closed; also usable as a context manager.
 
     Args:
-        name: path without suffix; NAME.trc and NAME.json are written, their folder is made.
+        name: path without suffix; NAME.trc, NAME.json and NAME.subject.yaml are written, their
+            folder is made.
         body: the tracked body; also an attribute, for a tracker that fits it on the way.
         config: the tracker's settings.
         fps: rate of the results, 1/s.
@@ -40,6 +45,7 @@ class ResultWriter:
     ) -> None:
         self.trc_path = name.with_name(name.name + ".trc")
         self.json_path = name.with_name(name.name + ".json")
+        self.subject_path = name.with_name(name.name + ".subject.yaml")
         try:
             name.parent.mkdir(parents=True, exist_ok=True)
             self.json_path.write_text("{}\n", encoding="utf-8")
@@ -71,7 +77,7 @@ class ResultWriter:
         self._notes.update(notes)
 
     def close(self) -> None:
-        """Write both files.
+        """Write the files.
 
         Raises:
             DatasetError: a file cannot be written.
@@ -81,8 +87,9 @@ class ResultWriter:
             self.json_path.write_text(
                 json.dumps(self._summary(), indent=1) + "\n", encoding="utf-8"
             )
+            write_subject(self.subject_path, self._subject())
         except OSError as error:
-            raise DatasetError(f"{self.json_path}: cannot be written: {error.strerror}") from error
+            raise DatasetError(f"{error.filename}: cannot be written: {error.strerror}") from error
 
     def track(self) -> MarkerTrack:
         """The markers so far; frames without an estimate are rows without markers."""
@@ -93,6 +100,10 @@ class ResultWriter:
             np.array([r.stamp_ns for r in self._results], dtype=np.int64),
             np.array(rows).reshape(len(rows), len(MARKER_NAMES), 3),
         )
+
+    def _subject(self) -> Subject:
+        shapes = zip(self.body.cone_names, self.body.cone_shape, strict=True)
+        return Subject(self._source or "tracked", dict(self.body.lengths_m), dict(shapes))
 
     def _summary(self) -> dict[str, Any]:
         return {
@@ -116,6 +127,7 @@ class ResultWriter:
                     "state": r.state.value,
                     "fitness": r.fitness if math.isfinite(r.fitness) else None,
                     "evaluations": r.evaluations,
+                    "refinements": r.refinements,
                     "agreement": dict(r.agreement),
                     "parameters": None if r.pose is None else r.pose.tolist(),
                 }

@@ -43,7 +43,7 @@ class Tracker:
             frame's silhouettes before the shape is fitted.
 
     Raises:
-        BodyModelError: the start pose has another size or is not finite.
+        BodyModelError: the start pose has another size, is not finite or breaks a joint limit.
         ConfigError: the budget cannot be spent.
         ImageError: a background does not fit its camera.
     """
@@ -79,6 +79,12 @@ class Tracker:
         self._shape_fitted = not self._fit_shape
         self._start_markers = start_markers
         self._searcher = self._searcher_for(body)
+        low, high = self._searcher.limits
+        for name, value, a, b in zip(body.parameter_names, self._start, low, high, strict=True):
+            if not a <= value <= b:
+                raise BodyModelError(
+                    f"start pose: {name} is {value:.4g}, its limits are {a:.4g} to {b:.4g}"
+                )
         # Refuses a budget that cannot be spent before the first frame comes.
         frame_stages(body, config, self._pose, body.sigma)
 

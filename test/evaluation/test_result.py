@@ -1,12 +1,13 @@
 """Results on disk: NAME.trc with the markers, NAME.json with everything else."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from markerless_tracker import __version__
-from markerless_tracker.body import MARKER_NAMES, load_body
+from markerless_tracker.body import MARKER_NAMES, load_body, read_subject
 from markerless_tracker.datasets import read_trc
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.evaluation.result import ResultWriter, versions
@@ -160,3 +161,15 @@ def test_versions_name_what_numbers_depend_on():
     assert found["markerless_tracker"] == __version__
     assert found["numpy"] == np.__version__
     assert {"python", "numba", "scipy"} <= set(found)
+
+
+def test_the_subject_it_writes_gives_the_same_body_again(tmp_path) -> None:
+    body = load_body("person31", 1.69)
+    shape = body.cone_shape.copy()
+    shape[:, :, :2] *= 1.1
+    fitted = replace(body, cone_shape=shape)
+    with ResultWriter(tmp_path / "walk", body, TrackerConfig(), fps=60.0) as writer:
+        writer.body = fitted
+    again = load_body("person31", read_subject(tmp_path / "walk.subject.yaml"))
+    np.testing.assert_array_equal(again.cone_shape, fitted.cone_shape)
+    assert again.lengths_m == fitted.lengths_m

@@ -346,3 +346,10 @@ class TestErrors:
     def test_a_start_pose_that_is_none(self, make_tracker, start):
         with pytest.raises(BodyModelError, match="start pose has shape .* balan31 expects 31"):
             make_tracker(start_pose=start)
+
+
+def test_a_start_outside_the_limits_is_refused_by_name(scene, swarm_settings) -> None:
+    pose = scene.pose(0).copy()
+    pose[scene.body.index("l_knee")] = 1.0
+    with pytest.raises(BodyModelError, match=r"start pose: l_knee is 1, its limits are -2\.7"):
+        Tracker(scene.rig, scene.body, TrackerConfig.from_mapping(swarm_settings), start_pose=pose)
