@@ -120,7 +120,7 @@ class TrackerStatus:
                     np.percentile(latencies, 95) if latencies.size else None, 1
                 ),
                 "fps": _number(self._rate(), 2),
-                "stamp_ns": "0" if result is None else str(result.stamp_ns),
+                "stamp_ns": "" if result is None else str(result.stamp_ns),
                 "fitness": _number(None if result is None else result.fitness, 4),
                 "evaluations": "0" if result is None else str(result.evaluations),
             }
