@@ -124,6 +124,7 @@ class Stage:
         iterations: iterations, of a swarm the initial sample being the first.
         silhouette_weight, edge_weight: weights of f_s and f_e.
         silhouette_cones, edge_cones: (c,) cones that each term uses.
+        gain: where stages compete, f must rise by more than this for the result to be taken.
     """
 
     name: str
@@ -137,6 +138,7 @@ class Stage:
     edge_weight: float
     silhouette_cones: NDArray[np.bool_]
     edge_cones: NDArray[np.bool_]
+    gain: float = 0.0
 
     def __post_init__(self) -> None:
         for name, dtype in (

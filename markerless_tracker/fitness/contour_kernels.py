@@ -180,21 +180,23 @@ def _add_sample(  # type: ignore[no-untyped-def]
     if n >= samples.cone.shape[1]:
         return
     p = np.empty(3)
-    uv = np.empty(2)
+    uv = np.empty((1, 2))
     _surface(local, shape, p)
-    project_point(p[0], p[1], p[2], k, distortion, distorted, uv)
+    project_point(p[0], p[1], p[2], k, distortion, distorted, uv, 0)
     norm = np.sqrt(nu * nu + nv * nv)
     if not norm > 0.0:
         return
     nu, nv = nu / norm, nv / norm
     # Points outside the frame have no evidence.
-    if not (uv[0] >= 0.0 and uv[1] >= 0.0 and uv[0] <= width - 1.0 and uv[1] <= height - 1.0):
+    if not (
+        uv[0, 0] >= 0.0 and uv[0, 1] >= 0.0 and uv[0, 0] <= width - 1.0 and uv[0, 1] <= height - 1.0
+    ):
         return
-    u = np.int64(np.floor(uv[0] + step_px * nu + 0.5))
-    v = np.int64(np.floor(uv[1] + step_px * nv + 0.5))
+    u = np.int64(np.floor(uv[0, 0] + step_px * nu + 0.5))
+    v = np.int64(np.floor(uv[0, 1] + step_px * nv + 0.5))
     if 0 <= u < width and 0 <= v < height and is_set(rows, u, v):
         return
-    samples.pixel[view, n, 0], samples.pixel[view, n, 1] = uv[0], uv[1]
+    samples.pixel[view, n, 0], samples.pixel[view, n, 1] = uv[0, 0], uv[0, 1]
     samples.normal[view, n, 0], samples.normal[view, n, 1] = nu, nv
     _surface(world, shape, samples.world[view, n])
     samples.depth[view, n] = p[2]
@@ -218,20 +220,19 @@ def sample_outline(view, views, spacing_px, step_px, scratch, samples):  # type:
     used = np.empty(4, np.int64)
     used[0], used[1], used[2], used[3] = height, -1, rows.shape[1], -1
     sides = np.empty((3, 2, 2))
+    flat = np.empty((2, 3, 2))
+    arcs = np.empty((2, 5))
     to_camera(scratch.world, views.rotation[view], views.translation[view], local)
     for c in range(local.shape[0]):
-        count = cone_outline(local[c], k, distortion, distorted, points, sides)
+        count = cone_outline(local[c], k, distortion, distorted, points, sides, flat, arcs)
         if count > 0:
             fill_outline(
                 points, count, width, height, rows, scratch.left[view], scratch.right[view], used
             )
 
-    flat = np.empty((2, 3, 2))
-    arcs = np.empty((2, 2))
     shape = np.empty(5)
     p = np.empty(3)
-    a = np.empty(2)
-    b = np.empty(2)
+    pair = np.empty((2, 2))
     samples.count[view] = 0
     for c in range(local.shape[0]):
         form = cone_tangents(local[c], flat, arcs)
@@ -243,11 +244,12 @@ def sample_outline(view, views, spacing_px, step_px, scratch, samples):  # type:
             radius = 0.0
             for m in range(1, 3):
                 radius = max(radius, np.sqrt(flat[e, m, 0] ** 2 + flat[e, m, 1] ** 2))
-            arc_px = radius * k[0] * abs(arcs[e, 1])
+            arc_px = radius * k[0] * abs(arcs[e, 4])
             n = np.int64(min(max(3.0, np.ceil(arc_px / spacing_px)), 200.0))
             shape[4] = e
+            begin = np.arctan2(arcs[e, 1], arcs[e, 0])
             for i in range(n):
-                angle = arcs[e, 0] + arcs[e, 1] * (i + 0.5) / n
+                angle = begin + arcs[e, 4] * (i + 0.5) / n
                 cos, sin = np.cos(angle), np.sin(angle)
                 shape[0], shape[1], shape[2], shape[3] = cos, sin, cos, sin
                 # Along the arc, in the image; outward is across it, away from the middle.
@@ -255,7 +257,7 @@ def sample_outline(view, views, spacing_px, step_px, scratch, samples):  # type:
                 tv = k[3] * (cos * flat[e, 2, 1] - sin * flat[e, 1, 1])
                 mu = k[0] * (cos * flat[e, 1, 0] + sin * flat[e, 2, 0])
                 mv = k[3] * (cos * flat[e, 1, 1] + sin * flat[e, 2, 1])
-                length = np.sqrt(tu * tu + tv * tv) * abs(arcs[e, 1]) / n
+                length = np.sqrt(tu * tu + tv * tv) * abs(arcs[e, 4]) / n
                 nu, nv = tv, -tu
                 if nu * mu + nv * mv < 0.0:
                     nu, nv = -nu, -nv
@@ -267,19 +269,19 @@ def sample_outline(view, views, spacing_px, step_px, scratch, samples):  # type:
             continue
         for side in range(2):
             # Side 0 ends end 0's arc and begins end 1's; side 1 the other way.
-            at_0 = arcs[0, 0] + arcs[0, 1] if side == 0 else arcs[0, 0]
-            at_1 = arcs[1, 0] if side == 0 else arcs[1, 0] + arcs[1, 1]
-            shape[0], shape[1] = np.cos(at_0), np.sin(at_0)
-            shape[2], shape[3] = np.cos(at_1), np.sin(at_1)
+            at_0 = 2 if side == 0 else 0
+            at_1 = 2 - at_0
+            shape[0], shape[1] = arcs[0, at_0], arcs[0, at_0 + 1]
+            shape[2], shape[3] = arcs[1, at_1], arcs[1, at_1 + 1]
             shape[4] = 0.0
             _surface(local[c], shape, p)
             z0 = p[2]
-            project_point(p[0], p[1], p[2], k, distortion, distorted, a)
+            project_point(p[0], p[1], p[2], k, distortion, distorted, pair, 0)
             shape[4] = 1.0
             _surface(local[c], shape, p)
             z1 = p[2]
-            project_point(p[0], p[1], p[2], k, distortion, distorted, b)
-            du, dv = b[0] - a[0], b[1] - a[1]
+            project_point(p[0], p[1], p[2], k, distortion, distorted, pair, 1)
+            du, dv = pair[1, 0] - pair[0, 0], pair[1, 1] - pair[0, 1]
             length = np.sqrt(du * du + dv * dv)
             n = np.int64(min(max(1.0, np.ceil(length / spacing_px)), 400.0))
             nu, nv = (-dv, du) if side == 0 else (dv, -du)

@@ -133,6 +133,8 @@ class Evaluator:
         self._fitness = fitness
         self._views = views
         self._stage = stage
+        # A term without weight is not looked at.
+        self._edge_cones = stage.edge_cones & (stage.edge_weight != 0.0)
 
     def poses(self, points: FloatArray) -> FloatArray:
         """Full poses (n, p) of points (n, d): the other parameters stay at the stage's centre."""
@@ -144,7 +146,7 @@ class Evaluator:
         """Costs (n,) of points (n, d)."""
         stage, fitness = self._stage, self._fitness
         counts = fitness.count(
-            self._views, self.poses(points), stage.silhouette_cones, stage.edge_cones
+            self._views, self.poses(points), stage.silhouette_cones, self._edge_cones
         )
         costs = np.empty(len(points))
         _costs(

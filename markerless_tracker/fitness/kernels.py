@@ -45,6 +45,8 @@ class Scratch(NamedTuple):
     points: FloatArray  # (t, MAX_POINTS, 2)
     sides: FloatArray  # (t, c, 3, 2, 2)
     order: NDArray[np.int64]  # (t, c)
+    flat: FloatArray  # (t, 2, 3, 2)
+    arcs: FloatArray  # (t, 2, 5)
 
 
 def make_scratch(threads: int, nodes: int, cones: int, height: int, words: int) -> Scratch:
@@ -59,6 +61,8 @@ def make_scratch(threads: int, nodes: int, cones: int, height: int, words: int) 
         np.empty((threads, MAX_POINTS, 2)),
         np.empty((threads, cones, 3, 2, 2)),
         np.empty((threads, cones), dtype=np.int64),
+        np.empty((threads, 2, 3, 2)),
+        np.empty((threads, 2, 5)),
     )
 
 
@@ -208,27 +212,18 @@ def _sample_cone(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
 def compare_view(  # type: ignore[no-untyped-def]
-    body_cones,
-    edge_cones,
-    views,
-    view,
-    rule,
-    local,
-    points,
-    sides,
-    order,
-    rows,
-    left,
-    right,
-    counts,
+    body_cones, edge_cones, views, view, rule, scratch, thread, counts
 ):
-    """Project the cones (given in the camera's frame) and compare them with one view.
+    """Compare the cones in `scratch.local` (a camera's frame) with that camera's view.
 
     Args:
         body_cones: (c,) cones that make the silhouette.
         edge_cones: (c, 2) whether the sides, and the far edge, of a cone are sampled.
         counts: (4,) filled: OVERLAP, PROJECTED, EDGE_SUM, EDGE_COUNT.
     """
+    local, sides, order = scratch.local[thread], scratch.sides[thread], scratch.order[thread]
+    rows, left, right = scratch.rows[thread], scratch.left[thread], scratch.right[thread]
+    points, flat, arcs = scratch.points[thread], scratch.flat[thread], scratch.arcs[thread]
     width, height = views.size[view, 0], views.size[view, 1]
     words = views.words[view]
     edges = views.edges[views.edge_start[view] : views.edge_start[view] + width * height]
@@ -261,7 +256,7 @@ def compare_view(  # type: ignore[no-untyped-def]
         if not (body_cones[c] or sampled):
             continue
         count = cone_outline(
-            local[c], views.intrinsics[view], distortion, distorted, points, sides[c]
+            local[c], views.intrinsics[view], distortion, distorted, points, sides[c], flat, arcs
         )
         if count == 0:
             for s in range(3):
@@ -306,10 +301,8 @@ def _work(poses, body, views, body_cones, edge_cones, rule, scratch, counts, thr
                 scratch.local[thread],
             )  # fmt: skip
             compare_view(
-                body_cones, edge_cones, views, view, rule, scratch.local[thread],
-                scratch.points[thread], scratch.sides[thread], scratch.order[thread],
-                scratch.rows[thread], scratch.left[thread], scratch.right[thread], counts[n, view],
-            )  # fmt: skip
+                body_cones, edge_cones, views, view, rule, scratch, thread, counts[n, view]
+            )
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]

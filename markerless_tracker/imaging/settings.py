@@ -87,7 +87,7 @@ class ImagingSettings:
         3, "side of the opening that removes specks; 0 or 1 = none", least=0, most=101
     )
     mask_close_px: int = setting(
-        3, "side of the closing that mends cracks; 0 or 1 = none", least=0, most=101
+        5, "side of the closing that mends cracks; 0 or 1 = none", least=0, most=101
     )
     mask_hole_share: float = setting(
         2e-4, "holes up to this share of the image are filled", least=0.0, most=1.0

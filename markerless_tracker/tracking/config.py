@@ -92,6 +92,12 @@ class TrackerConfig(ImagingSettings):
         least=0.01,
         most=100.0,
     )
+    limb_gain: float = setting(
+        0.001,
+        "with refinement: how much f must rise for a limb's own swarm to be believed",
+        least=0.0,
+        most=2.0,
+    )
     prediction: float = setting(
         0.6,
         "share of the last change of pose that is expected again; 0 = zero motion",
@@ -131,7 +137,7 @@ class TrackerConfig(ImagingSettings):
         least=1.0,
         most=1000.0,
     )
-    edge_weight: float = setting(0.5, "weight of f_e beside f_s", least=0.0, most=100.0)
+    edge_weight: float = setting(0.0, "weight of f_e beside f_s", least=0.0, most=100.0)
     edge_rule: str = setting(
         "outline",
         "model edges that are sampled: sides: all; visible: those no nearer part hides; outline: "

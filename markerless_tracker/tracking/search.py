@@ -113,7 +113,7 @@ class FrameSearch:
 
         Swarms alone: the last one's best, as published. With contour refinement among them a
         stage's result is taken only if it explains the views better: the swarm rescues a refinement
-        that is stuck, the refinement sharpens the swarm.
+        that is stuck, the refinement sharpens the swarm. A stage may ask for a gain in f.
         """
         # A contour stage looks at every parameter and every cone.
         judge = next((stage for stage in stages if stage.algorithm == CONTOUR), None)
@@ -125,7 +125,7 @@ class FrameSearch:
                 self.pose = found
                 continue
             found_cost = self._cost(judge, found)
-            if found_cost < cost:
+            if found_cost < cost - stage.gain:
                 self.pose, cost = found, found_cost
         return self.pose
 

@@ -53,7 +53,11 @@ def frame_stages(
 def limb_stages(
     body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> tuple[Stage, ...]:
-    """A small, wide swarm for each limb alone: finds one that the refinement has lost."""
+    """A small, wide swarm for each limb alone: finds one that the refinement has lost.
+
+    A lost limb that is found raises f clearly; without asking for that, limbs that no view shows
+    would wander.
+    """
     every_cone = np.ones(len(body.cone_names), dtype=np.bool_)
     particles, iterations = LIMB_SWARM
     return tuple(
@@ -69,6 +73,7 @@ def limb_stages(
             edge_weight=config.edge_weight,
             silhouette_cones=every_cone,
             edge_cones=every_cone,
+            gain=config.limb_gain,
         )
         for name, active in body.subspaces.items()
         if name not in _TRUNK
