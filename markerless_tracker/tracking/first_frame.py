@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms, markers
 from markerless_tracker.fitness.contours import ContourFrame
-from markerless_tracker.fitness.shape import fit_shape
+from markerless_tracker.fitness.shape import CORRELATION_M, fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 from markerless_tracker.tracking.config import TrackerConfig
 
 TRUSTED_M = 0.003
 """Start markers at most this far off are taken as they are."""
-CORRELATION_M = 0.05
 _TIGHT = 3.0
 _ITERATIONS = 8
 _STEP = 1e-6

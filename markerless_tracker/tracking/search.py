@@ -10,13 +10,12 @@ from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.fitness.evaluator import ViewTerms
+from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, Problem, Sppso, keyed_generator, refine
 from markerless_tracker.records import CONTOUR, Observation, Stage
 from markerless_tracker.tracking.config import TrackerConfig
 
-CORRELATION_M = 0.05
-"""Length of outline whose errors go together, for weighing contours against beliefs."""
 _NEAREST_M = 0.5
 
 

@@ -59,7 +59,8 @@ def build_tracker(
     """Build a tracker from a start (TRC or YAML) and a subject.
 
     The subject is the file's, or measured on the first row of a TRC (`subject_from`), or a generic
-    person of a stature, or, when none is named, measured on the start's first row.
+    person of a stature, or, when none is named, measured on the start's first row; if that row's
+    markers are noisy, the first frame settles the lengths measured on it.
 
     Raises:
         ConfigError: no start, more than one subject, or none and the start is no TRC.
@@ -105,7 +106,9 @@ def build_tracker(
         start_pose=pose,
         backgrounds=backgrounds,
         shape_known=bool(subject.cones_m),
-        start_markers=None if start is None else _start_markers(description, subject, start),
+        start_markers=(
+            None if named or start is None else _start_markers(description, subject, start)
+        ),
     )
     return TrackerSetup(tracker, None if start is None else start.stamp_ns)
 
