@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,9 +29,10 @@ class Replay:
         tracked: sets that were tracked.
         skipped: complete sets that newer ones overtook.
         lost: sets that never were complete.
-        fps: frames tracked per second of work.
+        fps: frames tracked per second, at this pace.
         latency_median_ms, latency_p95_ms: from the arrival of a set's last image to its result.
         result: the result files' path without suffix.
+        warnings: what the player warned of.
     """
 
     rate: float
@@ -43,6 +44,7 @@ class Replay:
     latency_median_ms: float
     latency_p95_ms: float
     result: Path
+    warnings: Sequence[str]
 
 
 def replay(
@@ -91,6 +93,7 @@ def replay(
         )
         with player:
             values = _until_through(node, player, watch, sets, sets / fps / rate, report)
+            warnings = player.warnings()
         node.check()
     counted = {key: int(values.get(key, "0")) for key in ("tracked", "skipped")}
     return Replay(
@@ -101,6 +104,7 @@ def replay(
         latency_median_ms=float(values.get("latency_median_ms", "nan")),
         latency_p95_ms=float(values.get("latency_p95_ms", "nan")),
         result=result,
+        warnings=warnings,
         **counted,
     )
 

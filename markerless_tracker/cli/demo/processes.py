@@ -75,6 +75,11 @@ class NodeProcess:
         if status:
             raise NodeError(f"{self.name} ended with status {status}: {self._last_line()}")
 
+    def warnings(self) -> list[str]:
+        """The texts of the warnings that it has logged so far."""
+        lines = self._log.read_text(encoding="utf-8", errors="replace").splitlines()
+        return [line.partition("]: ")[2] for line in lines if line.startswith("[WARN]")]
+
     def stop(self, timeout_s: float = 20.0) -> int:
         """Ask it to end (SIGINT), and insist after a while; returns its exit status."""
         if self.running:

@@ -46,6 +46,13 @@ def test_a_failure_gives_the_last_line(tmp_path: Path, monkeypatch: pytest.Monke
             node.check()
 
 
+def test_its_warnings_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = "print('[INFO] [1.5] [player]: playing')\nprint('[WARN] [2.5] [player]: lens[1]: late')"
+    with start(write_module(tmp_path, monkeypatch, log), tmp_path) as node:
+        assert node.wait(20.0)
+        assert node.warnings() == ["lens[1]: late"]
+
+
 def test_it_is_asked_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module = write_module(
         tmp_path,
