@@ -92,9 +92,9 @@ class TrackerConfig(ImagingSettings):
         least=0.01,
         most=100.0,
     )
-    limb_gain: float = setting(
+    swarm_gain: float = setting(
         0.001,
-        "with refinement: how much f must rise for a limb's own swarm to be believed",
+        "with refinement: how much f must rise for a swarm's result to be taken",
         least=0.0,
         most=2.0,
     )

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -30,6 +31,9 @@ def frame_stages(
 ) -> tuple[Stage, ...]:
     """The stages of one frame, in order; each starts from the estimate so far.
 
+    Beside a refinement, swarms must raise f clearly: a body part that is found again does, while
+    without asking for that the parts that no view shows would wander.
+
     Args:
         body: the body.
         config: names the optimiser and how the budget is shared out.
@@ -44,7 +48,7 @@ def frame_stages(
         return swarm
     return (
         contour_stage("align", body, config, centre, sigma),
-        *swarm,
+        *(replace(stage, gain=config.swarm_gain) for stage in swarm),
         *limb_stages(body, config, centre, sigma),
         contour_stage("polish", body, config, centre, sigma),
     )
@@ -53,11 +57,7 @@ def frame_stages(
 def limb_stages(
     body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> tuple[Stage, ...]:
-    """A small, wide swarm for each limb alone: finds one that the refinement has lost.
-
-    A lost limb that is found raises f clearly; without asking for that, limbs that no view shows
-    would wander.
-    """
+    """A small, wide swarm for each limb alone: finds one that the refinement has lost."""
     every_cone = np.ones(len(body.cone_names), dtype=np.bool_)
     particles, iterations = LIMB_SWARM
     return tuple(
@@ -73,7 +73,7 @@ def limb_stages(
             edge_weight=config.edge_weight,
             silhouette_cones=every_cone,
             edge_cones=every_cone,
-            gain=config.limb_gain,
+            gain=config.swarm_gain,
         )
         for name, active in body.subspaces.items()
         if name not in _TRUNK

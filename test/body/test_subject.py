@@ -16,6 +16,7 @@ from markerless_tracker.body import (
     subject_from_stature,
     write_subject,
 )
+from markerless_tracker.body.subject import measured_lengths
 from markerless_tracker.errors import BodyModelError
 
 DESCRIPTION = load_description("balan31")
@@ -57,8 +58,12 @@ def test_lengths_are_measured_between_markers_of_any_pose(seed) -> None:
     sizes = Subject("random", {name: float(rng.uniform(0.1, 0.6)) for name in LENGTHS})
     body = load_body("balan31", sizes)
     points = markers(body, rng.uniform(-2, 2, body.size))
-    measured = subject_from_markers(DESCRIPTION, named(points))
-    assert measured.lengths_m == pytest.approx(sizes.lengths_m)
+    measured = measured_lengths(DESCRIPTION, named(points))
+    assert measured == pytest.approx(sizes.lengths_m)
+    alike = subject_from_markers(DESCRIPTION, named(points)).lengths_m
+    for name, length in sizes.lengths_m.items():
+        other = {"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]
+        assert alike[name] == pytest.approx((length + sizes.lengths_m[other]) / 2.0)
 
 
 def test_missing_markers_are_guessed_from_the_others() -> None:
