@@ -72,7 +72,9 @@ def _scene(folder: Path, console: Console, *, made_up: bool) -> Scene:
         with _bar(console, "fetching the recording", None):
             return real_scene(folder)
     except DatasetError as error:
-        console.print(f"{error}\nThe demo runs on a made-up person instead.", markup=False)
+        console.print(
+            f"{error}\nThe demo runs on a made-up person instead.", markup=False, soft_wrap=True
+        )
         return made_up_scene(folder, str(error))
 
 
@@ -186,7 +188,7 @@ def _report(
     console.print("Markers:  " + ", ".join(f"{run.result}.trc" for run in replays), soft_wrap=True)
     console.print("Overlays: " + ", ".join(map(str, sheets)), soft_wrap=True)
     if scene.note:
-        console.print(f"Not the real recording: {scene.note}", markup=False)
+        console.print(f"Not the real recording: {scene.note}", markup=False, soft_wrap=True)
 
 
 if __name__ == "__main__":
