@@ -13,6 +13,7 @@ from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.fitness import kernels
 from markerless_tracker.fitness.arrays import Views, body_arrays, lay_out_views
+from markerless_tracker.fitness.outline import make_outlines
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, Stage
@@ -73,11 +74,13 @@ class Fitness:
         self._rule = kernels.EdgeRule(
             EDGE_RULES[edge_rule], float(edge_spacing_px), float(edge_step_px), edge_term == "ssd"
         )
+        height = max(camera.size_px[1] for camera in cameras)
+        self._outlines = make_outlines(self.threads, height)
         self._scratch = kernels.make_scratch(
             self.threads,
             body.node_parent.size,
             len(body.cone_names),
-            max(camera.size_px[1] for camera in cameras),
+            height,
             max((camera.size_px[0] + 63) // 64 for camera in cameras),
         )
 
@@ -101,7 +104,7 @@ class Fitness:
         sampled = self.body.cone_edges & edge_cones[:, None]
         args = (
             poses, self._body, views.arrays, silhouette_cones, sampled,
-            self._rule, self._scratch, counts,
+            self._rule, self._scratch, self._outlines, counts,
         )  # fmt: skip
         if self.threads == 1:
             kernels.count_serial(*args)
