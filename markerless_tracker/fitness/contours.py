@@ -14,12 +14,14 @@ from markerless_tracker.fitness import contour_kernels as kernels
 from markerless_tracker.fitness.arrays import BodyArrays, Views, body_arrays
 from markerless_tracker.fitness.contour_kernels import ContourViews, Residuals, Samples
 from markerless_tracker.fitness.outline import Outlines, make_outlines
-from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads
+from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
 SPACING_M = 0.02
 """Distance of outline points along the body's outline."""
+_VIEW_S = 0.17e-3
+"""About how long the equations of one view take one thread."""
 _SMALLEST_EDGE_PX = 12
 _LEAST_MARGIN_PX = 24
 
@@ -205,7 +207,7 @@ class ContourFrame:
             SPACING_M, self._step_px, reach_m, self.samples, self.residuals, self._scratch,
             self._outlines,
         )  # fmt: skip
-        if self._threads == 1:
+        if not worth_waking(len(self.views.names) * _VIEW_S, self._threads):
             kernels.equations_serial(*args)
             return
         with ONE_CALLER:
