@@ -17,7 +17,7 @@ from markerless_tracker.body import (
 )
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.drawing import outlines, silhouette
-from markerless_tracker.fitness import Fitness
+from markerless_tracker.fitness import Fitness, threads
 from markerless_tracker.fitness.arrays import body_arrays
 from markerless_tracker.fitness.chain_kernels import SUMS, add_wrench, sum_chain
 from markerless_tracker.fitness.contour_kernels import MAX_SAMPLES
@@ -530,7 +530,8 @@ def test_the_slope_points_downhill(posed) -> None:
 # --- threads and memory -----------------------------------------------------------------------
 
 
-def test_threads_and_earlier_calls_change_nothing(make_pose) -> None:
+def test_threads_and_earlier_calls_change_nothing(monkeypatch, make_pose) -> None:
+    monkeypatch.setattr(threads, "launch_cost_s", lambda count: 0.0)
     one = scene("person31", 9, make_pose, lens=LENS, threads=1)
     two = scene("person31", 9, make_pose, lens=LENS, threads=2)
     pose = disturbed(one)
