@@ -74,7 +74,7 @@ def body_arrays(body: BodyModel) -> BodyArrays:
     """
     if len(body.cone_names) > LANES:
         raise BodyModelError(
-            f"{body.name}: {len(body.cone_names)} cones, expected {LANES} at the most"
+            f"body {body.name}: {len(body.cone_names)} cones, expected {LANES} at the most"
         )
     return BodyArrays(
         body.node_parent,

@@ -12,8 +12,9 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.fitness import contour_kernels as kernels
 from markerless_tracker.fitness.arrays import BodyArrays, Views, body_arrays
-from markerless_tracker.fitness.contour_kernels import ContourViews, Residuals, Samples
+from markerless_tracker.fitness.contour_kernels import ContourViews, Residuals
 from markerless_tracker.fitness.outline import Outlines, make_outlines
+from markerless_tracker.fitness.outline_samples import Samples, make_samples
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
@@ -181,7 +182,7 @@ class ContourFrame:
         self.contours = join_edges(list(mapper(edge, views.names)))  # type: ignore[call-overload]
         count = len(views.names)
         most = int(np.diff(self.contours.point_start).max())
-        self.samples: Samples = kernels.make_samples(count)
+        self.samples: Samples = make_samples(count)
         self.residuals: Residuals = kernels.make_residuals(count, most)
         height = int(views.arrays.size[:, 1].max())
         self._outlines: Outlines = make_outlines(count, height)

@@ -94,5 +94,7 @@ def test_a_frame_of_another_size_is_refused_naming_the_camera(cameras):
 
 def test_a_body_of_too_many_cones_is_refused_naming_it(body):
     many = replace(body, cone_names=tuple(f"c{i}" for i in range(LANES + 1)))
-    with pytest.raises(BodyModelError, match=rf"{body.name}: 65 cones, expected 64 at the most"):
+    with pytest.raises(
+        BodyModelError, match=rf"body {body.name}: 65 cones, expected 64 at the most"
+    ):
         body_arrays(many)

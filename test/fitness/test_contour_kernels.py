@@ -20,8 +20,8 @@ from markerless_tracker.drawing import outlines, silhouette
 from markerless_tracker.fitness import Fitness, threads
 from markerless_tracker.fitness.arrays import body_arrays
 from markerless_tracker.fitness.chain_kernels import SUMS, add_wrench, sum_chain
-from markerless_tracker.fitness.contour_kernels import MAX_SAMPLES
 from markerless_tracker.fitness.contours import SPACING_M, ContourFrame, EdgeOfMask, edge_of_mask
+from markerless_tracker.fitness.outline_samples import MAX_SAMPLES
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
