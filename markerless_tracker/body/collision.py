@@ -10,11 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from markerless_tracker.body.kinematics import moving_nodes, node_transform, transforms
 from markerless_tracker.body.model import BodyModel, IntArray
+from markerless_tracker.compiled import kernel
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import locked
@@ -120,49 +120,48 @@ class Feasibility:
         return lambda points: test(points, active, moving, touching)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _cone_point(node, fixed, point, out):  # type: ignore[no-untyped-def]
-    """World position (3,) of a point of a cone's base frame."""
-    x = fixed[0, 0] * point[0] + fixed[0, 1] * point[1] + fixed[0, 2] * point[2] + fixed[0, 3]
-    y = fixed[1, 0] * point[0] + fixed[1, 1] * point[1] + fixed[1, 2] * point[2] + fixed[1, 3]
-    z = fixed[2, 0] * point[0] + fixed[2, 1] * point[1] + fixed[2, 2] * point[2] + fixed[2, 3]
-    for i in range(3):
-        out[i] = node[i, 0] * x + node[i, 1] * y + node[i, 2] * z + node[i, 3]
+@kernel
+def _to_world(frame, x, y, z):  # type: ignore[no-untyped-def]
+    """A point of a frame (3, 4) in the world."""
+    return (
+        frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z + frame[0, 3],
+        frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z + frame[1, 3],
+        frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z + frame[2, 3],
+    )
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _inside_cone(node, fixed, length, shape, point, grow):  # type: ignore[no-untyped-def]
-    """Whether a world point lies inside a cone whose surface is moved out by `grow`."""
-    local = np.empty(3)
-    moved = np.empty(3)
-    for i in range(3):
-        moved[i] = point[i] - node[i, 3]
-    for i in range(3):
-        local[i] = node[0, i] * moved[0] + node[1, i] * moved[1] + node[2, i] * moved[2]
-    for i in range(3):
-        moved[i] = local[i] - fixed[i, 3]
-    for i in range(3):
-        local[i] = fixed[0, i] * moved[0] + fixed[1, i] * moved[1] + fixed[2, i] * moved[2]
-    if local[2] < -grow or local[2] > length + grow:
+@kernel
+def _from_world(frame, x, y, z):  # type: ignore[no-untyped-def]
+    """A world point in a frame (3, 4)."""
+    x, y, z = x - frame[0, 3], y - frame[1, 3], z - frame[2, 3]
+    return (
+        frame[0, 0] * x + frame[1, 0] * y + frame[2, 0] * z,
+        frame[0, 1] * x + frame[1, 1] * y + frame[2, 1] * z,
+        frame[0, 2] * x + frame[1, 2] * y + frame[2, 2] * z,
+    )
+
+
+@kernel
+def _inside_cone(x, y, z, length, shape, grow):  # type: ignore[no-untyped-def]
+    """Whether a point of a cone's base frame lies inside it, its surface moved out by `grow`."""
+    if z < -grow or z > length + grow:
         return False
-    t = min(max(local[2] / length, 0.0), 1.0)
+    t = min(max(z / length, 0.0), 1.0)
     rx = (1.0 - t) * shape[0, 0] + t * shape[1, 0] + grow
     ry = (1.0 - t) * shape[0, 1] + t * shape[1, 1] + grow
     if rx <= 0.0 or ry <= 0.0:
         return False
-    x = (local[0] - (1.0 - t) * shape[0, 2] - t * shape[1, 2]) / rx
-    y = (local[1] - (1.0 - t) * shape[0, 3] - t * shape[1, 3]) / ry
+    x = (x - (1.0 - t) * shape[0, 2] - t * shape[1, 2]) / rx
+    y = (y - (1.0 - t) * shape[0, 3] - t * shape[1, 3]) / ry
     return x * x + y * y < 1.0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def _feasible(  # type: ignore[no-untyped-def]
     points, active, pose, limits, moving, parent, fixed, kind, sign, parameter,
     cone_node, cone_fixed, cone_length, cone_shape, pairs, first, centre, radius,
     published, margin, nodes, out,
 ):  # fmt: skip
-    a = np.empty(3)
-    b = np.empty(3)
     for n in range(points.shape[0]):
         good = True
         for i in range(active.size):
@@ -176,20 +175,20 @@ def _feasible(  # type: ignore[no-untyped-def]
             for k in range(pairs.shape[0]):
                 p, q = pairs[k, 0], pairs[k, 1]
                 for i in range(first[p], first[p + 1]):
-                    _cone_point(nodes[cone_node[p]], cone_fixed[p], centre[i], a)
+                    x, y, z = _to_world(cone_fixed[p], centre[i, 0], centre[i, 1], centre[i, 2])
+                    x, y, z = _to_world(nodes[cone_node[p]], x, y, z)
                     if not published:
-                        if _inside_cone(
-                            nodes[cone_node[q]], cone_fixed[q], cone_length[q], cone_shape[q],
-                            a, radius[i] - 2.0 * margin,
-                        ):  # fmt: skip
+                        x, y, z = _from_world(nodes[cone_node[q]], x, y, z)
+                        x, y, z = _from_world(cone_fixed[q], x, y, z)
+                        grow = radius[i] - 2.0 * margin
+                        if _inside_cone(x, y, z, cone_length[q], cone_shape[q], grow):
                             good = False
                             break
                         continue
                     for j in range(first[q], first[q + 1]):
-                        _cone_point(nodes[cone_node[q]], cone_fixed[q], centre[j], b)
-                        gap = 0.0
-                        for m in range(3):
-                            gap += (a[m] - b[m]) ** 2
+                        u, v, w = _to_world(cone_fixed[q], centre[j, 0], centre[j, 1], centre[j, 2])
+                        u, v, w = _to_world(nodes[cone_node[q]], u, v, w)
+                        gap = (x - u) ** 2 + (y - v) ** 2 + (z - w) ** 2
                         if gap < (radius[i] + radius[j]) ** 2:
                             good = False
                             break

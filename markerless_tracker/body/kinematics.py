@@ -1,14 +1,14 @@
 """Forward kinematics of a `BodyModel`: poses to transforms, markers and cones."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from markerless_tracker.body.model import BodyModel, IntArray
+from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
+@kernel
 def node_transform(n, pose, parent, fixed, kind, sign, parameter, out):  # type: ignore[no-untyped-def]
     """Fill out[n] (3, 4) with the world transform of node n at a pose (p,), its parent's known."""
     above = parent[n]
@@ -37,7 +37,7 @@ def node_transform(n, pose, parent, fixed, kind, sign, parameter, out):  # type:
                 out[n, i, k] = cos * b - sin * a
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def node_transforms(pose, parent, fixed, kind, sign, parameter, out):  # type: ignore[no-untyped-def]
     """Fill out (m, 3, 4) with the world transforms of all nodes at a pose (p,)."""
     for n in range(parent.size):
@@ -51,12 +51,12 @@ def moving_nodes(body: BodyModel, active: IntArray) -> NDArray[np.bool_]:
     return moves
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def _find_moving(parent, parameter, active, moves):  # type: ignore[no-untyped-def]
     for n in range(parent.size):
         moves[n] = parent[n] >= 0 and moves[parent[n]]
-        for a in active:
-            if parameter[n] == a:
+        for i in range(active.size):
+            if parameter[n] == active[i]:
                 moves[n] = True
 
 

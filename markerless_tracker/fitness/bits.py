@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
-from markerless_tracker.fitness.compiled import inlined, kernel
+from markerless_tracker.compiled import inlined, kernel
 
 ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 

@@ -12,7 +12,7 @@ composite-rigid-body algorithm does for inertia: Featherstone, Rigid Body Dynami
 import numpy as np
 from numba import njit
 
-from markerless_tracker.fitness.compiled import kernel
+from markerless_tracker.compiled import kernel
 
 SUMS = 27
 """Per part: the upper triangle of the 6x6 sum of weighted outer products, then the 6 of W r."""

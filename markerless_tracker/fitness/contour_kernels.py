@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.chain_kernels import SUMS, add_wrench, sum_chain
-from markerless_tracker.fitness.compiled import kernel
 from markerless_tracker.fitness.kernels import cone_ends
 from markerless_tracker.fitness.outline import LANES
 from markerless_tracker.fitness.outline_samples import MAX_SAMPLES, sample_outline

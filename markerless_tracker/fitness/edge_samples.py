@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.bits import is_set
-from markerless_tracker.fitness.compiled import inlined, kernel
 from markerless_tracker.fitness.outline import ARC_POINTS, LANES, TAPERED
 
 SIDES, VISIBLE, OUTLINE = 0, 1, 2
@@ -34,8 +34,9 @@ def sample_side(  # type: ignore[no-untyped-def]
         bits: what hides a sample: nearer cones (VISIBLE) or the moving parts (OUTLINE).
         still: the still parts, flat from `start` on, which hide it too (OUTLINE); may be empty.
         edges: uint8 edge map, flat from `edge_start` on.
-        listed: None, or (s, 2): samples that other parts may hide (OUTLINE) are not added but
-            listed there, from row `listed_count` on: word * 64 + bit that hides it, what it adds.
+        listed: (s, 2): samples that other parts may hide (OUTLINE) are not added but listed there,
+            from row `listed_count` on: word * 64 + bit that hides it, what it adds. With no rows
+            all are added.
 
     Returns:
         Columns EDGE_SUM and EDGE_COUNT of the counts; how many samples are listed now.
@@ -53,10 +54,11 @@ def sample_side(  # type: ignore[no-untyped-def]
     pu, pv = pu + 0.5 * du, pv + 0.5 * dv
     u_end, v_end = width - 0.5, height - 0.5
     beside, squared, which = still.size > 0, rule.squared, rule.rule
+    listing = listed.shape[0] > 0
     qu, qv = pu + (samples - 1) * du, pv + (samples - 1) * dv
     border = abs(rule.step_px) + 1.0
     if (
-        listed is None
+        not listing
         and which != SIDES
         and min(pu, qu) >= border
         and min(pv, qv) >= border
@@ -95,7 +97,7 @@ def sample_side(  # type: ignore[no-untyped-def]
                     word |= still[np.uint64(start) + at]
                 if (word >> np.uint64(x & 63)) & np.uint64(1) != np.uint64(0):
                     continue
-                if listed is not None:
+                if listing:
                     listed[listed_count, 0] = np.int64(at) * 64 + (x & 63)
                     worth = _worth(edges[np.uint64(edge_start + row * width + column)], squared)
                     listed[listed_count, 1] = worth
@@ -148,8 +150,8 @@ def recount_still(view, still, bits):  # type: ignore[no-untyped-def]
     """EDGE_SUM and EDGE_COUNT of a view's still samples that the moving parts do not hide."""
     total, number = 0, 0
     for s in range(still.sample_start[view], still.sample_start[view + 1]):
-        at = np.uint64(still.sample_at[s])
+        at = np.uint64(still.samples[s, 0])
         if (bits[at >> np.uint64(6)] >> (at & np.uint64(63))) & np.uint64(1) == np.uint64(0):
-            total += still.sample_cost[s]
+            total += still.samples[s, 1]
             number += 1
     return total, number

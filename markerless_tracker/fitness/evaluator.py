@@ -144,7 +144,7 @@ class Fitness:
         )  # fmt: skip
         work_s = len(points) * len(views.names) * drawing.silhouette_cones.size * _CONE_S
         if not worth_waking(work_s, self.threads):
-            kernels.evaluate_serial(*args)
+            kernels.evaluate(*args, 0, 1)
         else:
             with ONE_CALLER:
                 numba.set_num_threads(self.threads)

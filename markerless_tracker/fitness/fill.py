@@ -6,8 +6,8 @@ with vector instructions. Rows are unsigned: an index that may be negative would
 
 import numpy as np
 
+from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.bits import ALL, popcount
-from markerless_tracker.fitness.compiled import kernel
 from markerless_tracker.fitness.outline import LANES
 
 

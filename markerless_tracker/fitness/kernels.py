@@ -13,7 +13,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from markerless_tracker.body.kinematics import node_transform
-from markerless_tracker.fitness.compiled import kernel
+from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.edge_samples import OUTLINE, VISIBLE, recount_still, sample_cone
 from markerless_tracker.fitness.fill import (
     clear_used,
@@ -64,7 +64,7 @@ class Still(NamedTuple):
         counts: (v, 4) the still parts' own, without edge samples that something may hide.
         sample_start: (v + 1,) view i's edge samples that something may hide begin at
             sample_start[i].
-        sample_at: (s,) word * 64 + bit that hides each; sample_cost: (s,) what it adds.
+        samples: (s, 2) word * 64 + bit that hides each, and what it adds.
         least: (v + 1,) what the views from i on cost together at least.
     """
 
@@ -73,8 +73,7 @@ class Still(NamedTuple):
     bits: NDArray[np.uint64]
     counts: FloatArray
     sample_start: NDArray[np.int64]
-    sample_at: NDArray[np.int64]
-    sample_cost: NDArray[np.int64]
+    samples: NDArray[np.int64]
     least: FloatArray
 
 
@@ -154,7 +153,7 @@ def compare_view(  # type: ignore[no-untyped-def]
             if rule.rule != OUTLINE:
                 more, number, _ = sample_cone(
                     c, count, edge_cones, out, bits, still.bits, start, views.edges, edge_start,
-                    width, height, rule, None, 0,
+                    width, height, rule, still.samples[:0], 0,
                 )  # fmt: skip
                 edge_sum, edge_count = edge_sum + more, edge_count + number
         if body_cones[c]:
@@ -164,7 +163,7 @@ def compare_view(  # type: ignore[no-untyped-def]
             if out.form[c] != HIDDEN and (edge_cones[c, 0] or edge_cones[c, 1]):
                 more, number, _ = sample_cone(
                     c, count, edge_cones, out, bits, still.bits, start, views.edges, edge_start,
-                    width, height, rule, None, 0,
+                    width, height, rule, still.samples[:0], 0,
                 )  # fmt: skip
                 edge_sum, edge_count = edge_sum + more, edge_count + number
     if not beside:
@@ -183,11 +182,25 @@ def compare_view(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _work(  # type: ignore[no-untyped-def]
+def evaluate(  # type: ignore[no-untyped-def]
     points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still, scratch,
     outlines, counts, costs, thread, threads,
 ):  # fmt: skip
-    """Evaluate every `threads`-th point, from point `thread` on."""
+    """Fill costs (n,) and counts (n, v, 4) of points (n, d), every `threads`-th
+    point, from point `thread` on, on the calling thread.
+
+    Args:
+        points: values of the active parameters.
+        active: (d,) their indices; the others are at centre (p,).
+        bars: (n,) costs that matter only if they are lower: an evaluation that cannot get below
+            its bar may end early, its cost is then a lower bound that is not below the bar, and
+            counts of the views it has not come to are not filled.
+        body: the moving cones, and all nodes.
+        body_cones, edge_cones: see `compare_view`.
+        rule, cost: see `EdgeRule` and `CostRule`.
+
+    NaN for points that are not finite.
+    """
     out = outlines_of(outlines, thread)
     pose = scratch.pose[thread]
     bits, used, order = scratch.bits[thread], scratch.used[thread], scratch.order[thread]
@@ -230,40 +243,15 @@ def _work(  # type: ignore[no-untyped-def]
         costs[n] = low
 
 
-@kernel
-def evaluate_serial(  # type: ignore[no-untyped-def]
-    points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still, scratch,
-    outlines, counts, costs,
-):  # fmt: skip
-    """Fill costs (n,) of points (n, d) and counts (n, v, 4) on the calling thread.
-
-    Args:
-        points: values of the active parameters.
-        active: (d,) their indices; the others are at centre (p,).
-        bars: (n,) costs that matter only if they are lower: an evaluation that cannot get below
-            its bar may end early, its cost is then a lower bound that is not below the bar, and
-            counts of the views it has not come to are not filled.
-        body: the moving cones, and all nodes.
-        body_cones, edge_cones: see `compare_view`.
-        rule, cost: see `EdgeRule` and `CostRule`.
-
-    NaN for points that are not finite.
-    """
-    _work(
-        points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still,
-        scratch, outlines, counts, costs, 0, 1,
-    )  # fmt: skip
-
-
 @njit(cache=True, nogil=True, parallel=True)  # type: ignore[misc]
 def evaluate_parallel(  # type: ignore[no-untyped-def]
     points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still, scratch,
     outlines, counts, costs,
 ):  # fmt: skip
-    """As `evaluate_serial`, on as many threads as the scratch memory is for."""
+    """As `evaluate`, on as many threads as the scratch memory is for."""
     threads = scratch.bits.shape[0]
     for thread in prange(threads):
-        _work(
+        evaluate(
             points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still,
             scratch, outlines, counts, costs, thread, threads,
         )  # fmt: skip

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.fitness.compiled import inlined, kernel
+from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.geometry import FloatArray
 
 LANES = 64

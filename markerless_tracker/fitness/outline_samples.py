@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.bits import is_set
-from markerless_tracker.fitness.compiled import inlined, kernel
 from markerless_tracker.fitness.fill import clear_used, fill_outline, wipe
 from markerless_tracker.fitness.outline import (
     HIDDEN,

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.kinematics import moving_nodes
 from markerless_tracker.body.model import IntArray
+from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.arrays import BodyArrays, ViewArrays
 from markerless_tracker.fitness.bits import popcount
-from markerless_tracker.fitness.compiled import kernel
 from markerless_tracker.fitness.edge_samples import OUTLINE, VISIBLE, EdgeRule, sample_cone
 from markerless_tracker.fitness.fill import clear_used, fill_outline
 from markerless_tracker.fitness.kernels import Scratch, Still, cone_ends
@@ -106,9 +106,7 @@ def divide(
             scratch.used[0], nodes, scratch.world[0], outlines, bits, counts, start, listed, least,
         )  # fmt: skip
     still = Still(
-        np.flatnonzero(moves), nodes, bits, counts, start,
-        np.ascontiguousarray(listed[: start[-1], 0]), np.ascontiguousarray(listed[: start[-1], 1]),
-        least,
+        np.flatnonzero(moves), nodes, bits, counts, start, listed[: start[-1]], least,
     )  # fmt: skip
     return Drawing(_some(arrays, drawn), silhouette_cones[drawn], sampled[drawn], still)
 

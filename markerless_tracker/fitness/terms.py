@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from markerless_tracker.fitness.compiled import kernel
+from markerless_tracker.compiled import kernel
 
 OVERLAP, PROJECTED, EDGE_SUM, EDGE_COUNT = 0, 1, 2, 3
 """Columns of the counts: Y, Y + B, sum over the edge samples of (255 - M)² or of M for a map M of

@@ -277,7 +277,7 @@ def sample(p, q, edges, rule: str, *, bits=None, outward=1.0, spacing=5.0, squar
     total, number, _ = sample_side(
         float(p[0]), float(p[1]), float(q[0]), float(q[1]), outward, rows.T.ravel(),
         np.empty(0, dtype=np.uint64), 0, edges.ravel(), 0, width, height,
-        EdgeRule(EDGE_RULES[rule], spacing, 2.0, squared), None, 0,
+        EdgeRule(EDGE_RULES[rule], spacing, 2.0, squared), np.empty((0, 2), dtype=np.int64), 0,
     )  # fmt: skip
     return number, total / EDGE_TOP ** (2 if squared else 1)
 

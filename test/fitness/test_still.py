@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.fitness import EDGE_RULES, Fitness
-from markerless_tracker.fitness.kernels import evaluate_serial
+from markerless_tracker.fitness.kernels import evaluate as evaluate_some
 from markerless_tracker.optim import Problem, Sppso
 from markerless_tracker.records import Stage
 
@@ -133,10 +133,10 @@ def test_an_early_end_spares_views(scene, body, rig):
     # Nothing is looked at where nothing can win.
     untouched = np.full((1, len(views.names), 4), -7.0)
     costs = np.empty(1)
-    evaluate_serial(
+    evaluate_some(
         point[None].copy(), body.root, pose, np.array([-np.inf]), evaluate._drawing.body,
         views.arrays, evaluate._drawing.silhouette_cones, evaluate._drawing.edge_cones,
         fitness._rule, evaluate._cost, evaluate._drawing.still, fitness._scratch,
-        fitness._outlines, untouched, costs,
+        fitness._outlines, untouched, costs, 0, 1,
     )  # fmt: skip
     assert (untouched == -7.0).all()
