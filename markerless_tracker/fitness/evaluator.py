@@ -1,4 +1,4 @@
-"""The fitness f = f_s + f_e of SPPSO over all views, and the evaluators that searches call."""
+"""The fitness f = f_s + f_e of SPPSO over all views, the costs, and the evaluators for searches."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +19,7 @@ from markerless_tracker.records import Observation, Stage
 
 EDGE_RULES = {"sides": kernels.SIDES, "visible": kernels.VISIBLE, "outline": kernels.OUTLINE}
 EDGE_TERMS = ("ssd", "mean")
+COSTS = ("overlap", "bidirectional", "one_sided")
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,11 @@ class Fitness:
         edge_term: 'ssd': f_e = 1 - mean (1 - M)²; 'mean': f_e = mean M.
         edge_spacing_px: distance between samples along a side (at least four a side).
         edge_step_px: how far outside a sample must be free of the body, for 'outline'.
+        cost: 'overlap': what f lacks (SPPSO); 'bidirectional', 'one_sided': H-MCPSO's costs, see
+            `Evaluator`.
 
     Raises:
-        ConfigError: an unknown rule or term.
+        ConfigError: an unknown rule, term or cost.
     """
 
     def __init__(
@@ -57,6 +60,7 @@ class Fitness:
         edge_term: str = "ssd",
         edge_spacing_px: float = 5.0,
         edge_step_px: float = 2.0,
+        cost: str = "overlap",
     ) -> None:
         if edge_rule not in EDGE_RULES:
             raise ConfigError(
@@ -66,12 +70,18 @@ class Fitness:
             raise ConfigError(
                 f"edge_term is {edge_term!r}, expected one of {', '.join(EDGE_TERMS)}"
             )
+        if cost not in COSTS:
+            raise ConfigError(f"cost is {cost!r}, expected one of {', '.join(COSTS)}")
         self.body = body
+        self.cost = cost
         self.cameras = tuple(cameras)
         self.threads = usable_threads(threads)
         self._body = body_arrays(body)
         self._rule = kernels.EdgeRule(
-            EDGE_RULES[edge_rule], float(edge_spacing_px), float(edge_step_px), edge_term == "ssd"
+            EDGE_RULES[edge_rule],
+            float(edge_spacing_px),
+            float(edge_step_px),
+            edge_term == "ssd" or cost != "overlap",
         )
         self._scratch = kernels.make_scratch(
             self.threads,
@@ -123,7 +133,13 @@ class Fitness:
 
 
 class Evaluator:
-    """Costs of one stage: weights' sum - f, hence 2 - f with both weights one.
+    """Costs of one stage, silhouettes and edges weighted as the stage says, averaged over the views.
+
+    'overlap': weights' sum - f, hence 2 - f with both weights one. H-MCPSO's costs (Saini et al.,
+    2015, Eq 9) always have the squared edge term, mean (1 - M)² (Eq 10). 'one_sided' adds Eq 13:
+    mean (1 - P)² over the body's pixels, with a foreground P of 0 and 1 the share B/(B+Y) of them
+    that is not observed. 'bidirectional' adds ½ B/(B+Y) + ½ R/(R+Y): no formula is printed; this
+    reading [R] is 1 - f_s, so that with the squared term it equals 'overlap'.
 
     Called with points (n, d) of the stage's active parameters, returns costs (n,); NaN for points
     that are not finite.
@@ -151,7 +167,7 @@ class Evaluator:
         costs = np.empty(len(points))
         _costs(
             counts, self._views.arrays.observed, fitness._rule.squared,
-            stage.silhouette_weight, stage.edge_weight, costs,
+            fitness.cost == "one_sided", stage.silhouette_weight, stage.edge_weight, costs,
         )  # fmt: skip
         return costs
 
@@ -182,8 +198,13 @@ def _view_terms(counts, observed, squared, parts):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def _costs(counts, observed, squared, silhouette_weight, edge_weight, costs):  # type: ignore[no-untyped-def]
-    """Fill costs (n,) from counts (n, v, 4): the terms are averaged over the views."""
+def _costs(  # type: ignore[no-untyped-def]
+    counts, observed, squared, one_sided, silhouette_weight, edge_weight, costs
+):
+    """Fill costs (n,) from counts (n, v, 4): the terms are averaged over the views.
+
+    One-sided, a view counts the share of the projected pixels that is observed.
+    """
     parts = np.empty((counts.shape[1], 3))
     for n in range(counts.shape[0]):
         if not np.isfinite(counts[n, 0, 0]):
@@ -192,5 +213,8 @@ def _costs(counts, observed, squared, silhouette_weight, edge_weight, costs):  #
         _view_terms(counts[n], observed, squared, parts)
         f = 0.0
         for v in range(counts.shape[1]):
+            projected = counts[n, v, kernels.PROJECTED]
+            if one_sided and projected > 0.0:
+                parts[v, 0] = counts[n, v, kernels.OVERLAP] / projected
             f += silhouette_weight * parts[v, 0] + edge_weight * parts[v, 1]
         costs[n] = silhouette_weight + edge_weight - f / counts.shape[1]

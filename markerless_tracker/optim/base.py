@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.errors import SearchError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim.problem import Problem
+from markerless_tracker.optim.problem import Cloud, Problem
 
 Evaluate = Callable[[FloatArray], FloatArray]
 """Costs (n,) of a batch of points (n, d)."""
@@ -37,6 +37,16 @@ class Optimizer(ABC):
         self.bad_costs = 0
         self._asked: FloatArray | None = None
         self._barred: NDArray[np.bool_] | None = None
+
+    @property
+    def estimate(self) -> FloatArray:
+        """(d,) what the search makes of all it saw: its best point, for most."""
+        return self.best_x
+
+    @property
+    def memory(self) -> Cloud | None:
+        """What the next frame's search may go on from; None for most."""
+        return None
 
     @property
     def finished(self) -> bool:
@@ -80,10 +90,10 @@ class Optimizer(ABC):
         self._tell(points, costs)
 
     def run(self, evaluate: Evaluate) -> FloatArray:
-        """Spend the budget; returns the best point (d,)."""
+        """Spend the budget; returns the estimate (d,)."""
         while not self.finished:
             self.tell(evaluate(self.ask()))
-        return self.best_x
+        return self.estimate
 
     @abstractmethod
     def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:

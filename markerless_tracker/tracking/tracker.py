@@ -99,6 +99,7 @@ class Tracker:
         self._velocity_per_ns = np.zeros(self._generic.size)
         self._stamp_ns = None
         self.state = TrackState.SEARCHING
+        self._searcher.forget()
         if self._fit_shape:
             self._shape_fitted = False
             self._searcher = self._searcher_for(self._generic)

@@ -29,13 +29,16 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
     parser = kinds.add_parser(
         "tables",
-        help="error in mm: presets x bodies x refinements x rates x seeds",
+        help="error in mm: presets x optimizers x bodies x refinements x rates x seeds",
         description="Error on recordings whose truth is known, mean and sd over seeds.",
         epilog="example: markerless_tracker benchmark tables RECORDING --truth-score -o out/tables",
     )
     parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
     parser.add_argument(
         "--preset", type=list_of(str), metavar="LIST", help="default: tuned,paper (or --config's)"
+    )
+    parser.add_argument(
+        "--optimizer", type=list_of(str), metavar="LIST", help="default: sppso (or --config's)"
     )
     parser.add_argument("--body", type=list_of(str), metavar="LIST", help="default: the preset's")
     parser.add_argument(
@@ -49,7 +52,12 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         help="rates; default: 60,20 as far as the recording has them",
     )  # fmt: skip
     parser.add_argument("--seeds", type=count, default=6, metavar="N", help="seeds 0..N-1 (6)")
-    parser.add_argument("--evaluations", type=count, metavar="N", help="evaluations per frame")
+    parser.add_argument(
+        "--evaluations",
+        type=count,
+        metavar="N",
+        help="evaluations per frame (default: each optimizer's own)",
+    )
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
     parser.add_argument(
         "--scale", type=float, default=1.0, metavar="S", help="factor for the images"
@@ -119,11 +127,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _configs(args: argparse.Namespace) -> tuple[TrackerConfig, ...]:
-    """A configuration per preset, body and refinement; what is not named keeps its value."""
+    """A configuration per preset, optimizer, body and refinement; what is not named keeps its value."""
     presets: tuple[str | None, ...] = args.preset or (
         tuple(PRESETS) if args.config is None else (None,)
     )
-    choices = itertools.product(presets, args.body or (None,), args.refinement or (None,))
+    choices = itertools.product(
+        presets, args.optimizer or (None,), args.body or (None,), args.refinement or (None,)
+    )
     return tuple(
         read_config(
             args.config,
@@ -131,6 +141,7 @@ def _configs(args: argparse.Namespace) -> tuple[TrackerConfig, ...]:
                 key: value
                 for key, value in (
                     ("preset", preset),
+                    ("optimizer", optimizer),
                     ("body", body),
                     ("refinement", refinement),
                     ("evaluations", args.evaluations),
@@ -138,7 +149,7 @@ def _configs(args: argparse.Namespace) -> tuple[TrackerConfig, ...]:
                 if value is not None
             },
         )
-        for preset, body, refinement in choices
+        for preset, optimizer, body, refinement in choices
     )
 
 
@@ -149,7 +160,7 @@ def _rendered(
     noise = f", start disturbed by {args.start_noise:g} mm" if args.start_noise else ""
     seeds = f"{args.seeds} seed{'s' if args.seeds > 1 else ''}"
     table = Table(title=f"{name}{size}, {seeds}{noise}")
-    for heading in ("preset", "body", "refinement"):
+    for heading in ("preset", "optimizer", "body", "refinement"):
         table.add_column(heading)
     headings = [
         "fps", "frames", "eval.", "iter.", "mean", "max frame", "worst joint", "limbs",
@@ -162,6 +173,7 @@ def _rendered(
     for row in rows:
         cells = [
             row["preset"],
+            row["optimizer"],
             Path(row["body"]).stem,
             row["refinement"],
             f"{row['fps']:g}",
