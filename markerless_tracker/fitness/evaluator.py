@@ -133,7 +133,7 @@ class Fitness:
 
 
 class Evaluator:
-    """Costs of one stage, silhouettes and edges weighted as the stage says, averaged over the views.
+    """Costs of one stage: silhouettes and edges weighted as it says, averaged over the views.
 
     'overlap': weights' sum - f, hence 2 - f with both weights one. H-MCPSO's costs (Saini et al.,
     2015, Eq 9) always have the squared edge term, mean (1 - M)² (Eq 10). 'one_sided' adds Eq 13:

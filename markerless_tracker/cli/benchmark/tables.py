@@ -127,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _configs(args: argparse.Namespace) -> tuple[TrackerConfig, ...]:
-    """A configuration per preset, optimizer, body and refinement; what is not named keeps its value."""
+    """A configuration per combination of the lists; what is not named keeps its value."""
     presets: tuple[str | None, ...] = args.preset or (
         tuple(PRESETS) if args.config is None else (None,)
     )
