@@ -112,6 +112,8 @@ def check_description(data: Any, where: str) -> None:
             raise BodyModelError(
                 f"{where}: subspaces: {name} is {members!r}, expected a list of parameters"
             )
+    if len(set(data["subspaces"].get("root", ()))) != 6:
+        raise BodyModelError(f"{where}: subspaces: root needs six parameters")
     for name, steps in _mapping(data.get("hierarchies", {}), f"{where}: hierarchies").items():
         here = f"{where}: hierarchies: {name}"
         if not isinstance(steps, list) or not steps or not all(_texts(s) and s for s in steps):
@@ -121,8 +123,6 @@ def check_description(data: Any, where: str) -> None:
         for subspace in sum(steps, []):
             if subspace not in data["subspaces"]:
                 raise BodyModelError(f"{here}: subspace {subspace!r} is not defined")
-    if len(set(data["subspaces"].get("root", ()))) != 6:
-        raise BodyModelError(f"{where}: subspaces: root needs six parameters")
 
 
 def _mapping(value: Any, where: str) -> Mapping[str, Any]:

@@ -77,6 +77,24 @@ def test_both_presets_unless_named(walk, capsys) -> None:
     assert rows[2]["evaluations"] == 1000
 
 
+def test_a_row_per_optimizer_and_nothing_is_repeated(walk, tmp_path: Path, capsys) -> None:
+    words = [
+        "tables", walk, "--preset", "paper", "--optimizer", "sppso,apf,hmcpso", "--seeds", "1",
+        "--frames", "1", "--fps", "60", "-o", str(tmp_path), "--jobs", "1",
+    ]  # fmt: skip
+    assert main(["benchmark", *words]) == 0
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in ("optimizer", "sppso", "apf", "hmcpso"))
+    kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()}
+    assert main(["benchmark", *words, "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [(row["optimizer"], row["body"], row["evaluations"]) for row in rows] == [
+        ("sppso", "balan31", 1000), ("apf", "humaneva34", 3600), ("hmcpso", "humaneva34", 3600)
+    ]  # fmt: skip
+    assert kept == {path.name: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()}
+    assert len(kept) == 3
+
+
 def test_speed_of_a_recording(walk, capsys) -> None:
     words = ["speed", walk, "--threads", "1", "--frames", "1", "--repeats", "1"]
     assert main(["benchmark", *words, "--json"]) == 0

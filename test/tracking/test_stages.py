@@ -9,16 +9,10 @@ from markerless_tracker.body import load_body
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.records import CONTOUR
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.stages import (
-    LIMB_SWARM,
-    SPPSO_STAGES,
-    STAGES,
-    SWARM_SHARE,
-    frame_stages,
-    scaled_particles,
-    sppso_stages,
-    translations,
-)
+from markerless_tracker.tracking.partitions import STAGES
+from markerless_tracker.tracking.partitions.budget import SWARM_SHARE, scaled_particles
+from markerless_tracker.tracking.partitions.sppso import SPPSO_STAGES, sppso_stages, translations
+from markerless_tracker.tracking.stages import LIMB_SWARM, frame_stages
 
 
 @pytest.fixture(scope="module")
