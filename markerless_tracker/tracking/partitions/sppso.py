@@ -19,6 +19,8 @@ from markerless_tracker.tracking.partitions.stage import swarm_stage
 
 SPPSO_STAGES = ((10, 20), (20, 40))
 """Particles and iterations of SPPSO's two stages at 1000 evaluations."""
+RESCUE_STAGES = ((40, 5), (80, 10))
+"""The same evaluations beside contour refinement: it homes in, so the swarm may look widely."""
 _TRANSLATION = 3
 
 
@@ -32,17 +34,20 @@ def sppso_stages(
     1's estimate; in the hard partition it varies the joints alone. Beside a refinement the swarm
     keeps `SWARM_SHARE` of the budget.
     """
-    share = Fraction(1) if config.refinement == "none" else SWARM_SHARE
-    first, second = scaled_particles(SPPSO_STAGES, config.evaluations, "sppso", share=share)
+    alone = config.refinement == "none"
+    published = SPPSO_STAGES if alone else RESCUE_STAGES
+    share = Fraction(1) if alone else SWARM_SHARE
+    first, second = scaled_particles(published, config.evaluations, "sppso", share=share)
+    (_, few), (_, many) = published
     settled = sigma.copy()
     settled[translations(body)] /= config.soft_factor
     moving = np.arange(body.size) if config.partition == "soft" else body.joints
     trunk = body.cone_node == body.frames[body.root_frame]
     return (
         swarm_stage(
-            body, config, "root", "sppso", body.root, centre, sigma, (first, 20), edge_cones=trunk
+            body, config, "root", "sppso", body.root, centre, sigma, (first, few), edge_cones=trunk
         ),
-        swarm_stage(body, config, "body", "sppso", moving, centre, settled, (second, 40)),
+        swarm_stage(body, config, "body", "sppso", moving, centre, settled, (second, many)),
     )
 
 
