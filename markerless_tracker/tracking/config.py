@@ -172,6 +172,12 @@ class TrackerConfig(ImagingSettings):
         "hard: it stays",
         choices=("soft", "hard"),
     )
+    sppso_stages: str = setting(
+        "two",
+        "steps of sppso: two (root, then everything, as published), three (root; torso and head; "
+        "everything) or global (everything at once)",
+        choices=("two", "three", "global"),
+    )
     hierarchy: str = setting(
         "six",
         "steps of hpso and hmcpso: six (root, torso and head, limbs), or twelve as HPSO's own",

@@ -190,3 +190,58 @@ def test_every_optimizer_has_its_stages_and_its_paper():
         assert config.body == ("balan31" if optimizer == "sppso" else "humaneva34")
         assert (config.cost == "overlap") == (optimizer == "sppso")
         assert TrackerConfig.from_mapping(config.as_mapping()) == config
+
+
+@pytest.mark.parametrize(
+    ("settings", "sizes", "shape"),
+    [
+        ({}, [6, 31], [(10, 20), (20, 40)]),
+        ({"partition": "hard"}, [6, 25], [(10, 20), (20, 40)]),
+        ({"sppso_stages": "three"}, [6, 11, 31], [(10, 20), (10, 20), (20, 30)]),
+        ({"sppso_stages": "three", "partition": "hard"}, [6, 5, 20], [(10, 20), (10, 20), (20, 30)]),
+        ({"sppso_stages": "global"}, [31], [(20, 50)]),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("factor", [1, 4])
+def test_sppsos_ablation_spends_the_same_evaluations(settings, sizes, shape, factor):
+    found = stages(optimizer="sppso", evaluations=1000 * factor, **settings)
+    assert [s.active.size for s in found] == sizes
+    assert [(s.particles, s.iterations) for s in found] == [(factor * n, k) for n, k in shape]
+    assert spent(found) == 1000 * factor
+    if settings.get("partition") == "hard":
+        assert sorted(np.concatenate([s.active for s in found])) == list(range(31))
+
+
+def test_what_earlier_stages_of_sppso_found_keeps_a_small_spread():
+    """Positions of the root, and all of torso and head, a tenth; the root's angles as they are."""
+    body = BODIES["balan31"]
+    at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
+    root, trunk, whole = stages(optimizer="sppso", sppso_stages="three")
+    np.testing.assert_array_equal(root.sigma, body.sigma)
+    expected = body.sigma.copy()
+    expected[at] /= 10.0
+    np.testing.assert_allclose(trunk.sigma, expected)
+    expected[body.subspaces["torso_head"]] /= 10.0
+    np.testing.assert_allclose(whole.sigma, expected)
+    (alone,) = stages(optimizer="sppso", sppso_stages="global")
+    np.testing.assert_array_equal(alone.sigma, body.sigma)
+    assert not root.edge_cones.all() and trunk.edge_cones.all() and alone.edge_cones.all()
+
+
+@pytest.mark.parametrize("kind", ["two", "three", "global"])
+def test_beside_a_refinement_the_ablation_looks_widely_for_its_share(kind):
+    found = stages(optimizer="sppso", sppso_stages=kind, preset="tuned")
+    swarms = found[1:-5]
+    assert spent(swarms) == 1000 * SWARM_SHARE
+    assert max(s.iterations for s in swarms) == 10
+
+
+def test_three_stages_need_a_subspace_for_the_second():
+    import dataclasses
+
+    whole = BODIES["balan31"]
+    bare = {name: part for name, part in whole.subspaces.items() if name != "torso_head"}
+    body = dataclasses.replace(whole, subspaces=bare)
+    config = TrackerConfig.from_mapping({"preset": "paper", "sppso_stages": "three"})
+    with pytest.raises(BodyModelError, match="'three': body balan31 has no subspace 'torso_head'"):
+        frame_stages(body, config, body.neutral, body.sigma)

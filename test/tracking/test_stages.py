@@ -29,8 +29,8 @@ def swarm(settings, **changes) -> TrackerConfig:
     [(1000, (10, 20)), (2000, (20, 40)), (4000, (40, 80)), (100, (1, 2)), (1100, (11, 22))],
 )
 def test_budgets_scale_the_particles_and_keep_the_iterations(evaluations, particles):
-    assert scaled_particles(SPPSO_STAGES, evaluations, "sppso") == particles
-    spent = sum(p * i for p, (_, i) in zip(particles, SPPSO_STAGES, strict=True))
+    assert scaled_particles(SPPSO_STAGES["two"], evaluations, "sppso") == particles
+    spent = sum(p * i for p, (_, i) in zip(particles, SPPSO_STAGES["two"], strict=True))
     assert spent == evaluations
 
 
@@ -39,7 +39,7 @@ def test_budgets_scale_the_particles_and_keep_the_iterations(evaluations, partic
 )
 def test_a_budget_that_cannot_be_met_names_the_nearest_two(evaluations, near):
     with pytest.raises(ConfigError) as caught:
-        scaled_particles(SPPSO_STAGES, evaluations, "sppso")
+        scaled_particles(SPPSO_STAGES["two"], evaluations, "sppso")
     assert str(caught.value) == (
         f"evaluations is {evaluations}, which sppso cannot spend exactly: nearest are {near}"
     )
@@ -47,10 +47,10 @@ def test_a_budget_that_cannot_be_met_names_the_nearest_two(evaluations, near):
 
 def test_a_share_of_a_budget_is_refused_in_terms_of_the_budget():
     share = Fraction(1, 5)
-    assert scaled_particles(SPPSO_STAGES, 1000, "sppso", share=share) == (2, 4)
-    assert scaled_particles(SPPSO_STAGES, 5000, "sppso", share=share) == (10, 20)
+    assert scaled_particles(SPPSO_STAGES["two"], 1000, "sppso", share=share) == (2, 4)
+    assert scaled_particles(SPPSO_STAGES["two"], 5000, "sppso", share=share) == (10, 20)
     with pytest.raises(ConfigError, match="evaluations is 1100, .*: nearest are 1000 or 1500"):
-        scaled_particles(SPPSO_STAGES, 1100, "sppso", share=share)
+        scaled_particles(SPPSO_STAGES["two"], 1100, "sppso", share=share)
 
 
 def test_published_stages_of_other_algorithms_scale_as_well():
