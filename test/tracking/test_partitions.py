@@ -198,7 +198,10 @@ def test_every_optimizer_has_its_stages_and_its_paper():
         ({}, [6, 31], [(10, 20), (20, 40)]),
         ({"partition": "hard"}, [6, 25], [(10, 20), (20, 40)]),
         ({"sppso_stages": "three"}, [6, 11, 31], [(10, 20), (10, 20), (20, 30)]),
-        ({"sppso_stages": "three", "partition": "hard"}, [6, 5, 20], [(10, 20), (10, 20), (20, 30)]),
+        (
+            {"sppso_stages": "three", "partition": "hard"}, [6, 5, 20],
+            [(10, 20), (10, 20), (20, 30)],
+        ),
         ({"sppso_stages": "global"}, [31], [(20, 50)]),
     ],
 )  # fmt: skip
