@@ -156,12 +156,14 @@ def test_the_table_of_speed(capsys) -> None:
     figures = {
         "view_evaluation_us": {"full": 6.6, "person31": 9.9, "reference": 198.0},
         "reference_ratio": 30.0, "person31_ratio": 1.5, "swarm_ms": {"sppso_1000": spread},
+        "swarm_ratio": {"hmcpso_3600": 3.21},
         "refine_ms": 0.345, "refine_setup_ms": 4.0, "thousand_evaluations_ms": spread,
         "frame_ms": dict.fromkeys(("background", "edges", "fitness", "total"), spread),
         "fit_vs_1000_evaluations": 0.5,
     }  # fmt: skip
     Console(width=100).print(speed_table(figures))
     out = capsys.readouterr().out
+    assert "hmcpso_3600 / sppso_1000" in out and "3.21" in out
     assert "198.0" in out and "0.345" in out and "1.25" in out
 
 
