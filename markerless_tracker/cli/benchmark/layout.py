@@ -60,7 +60,8 @@ def paper_table(
     truth_score: bool,
 ) -> Table:
     """Rows in a paper's layout: ours, then the figures that the paper prints of its own data."""
-    found = list(rows)
+    # As in the papers, the algorithms of one rate stand together.
+    found = sorted(rows, key=lambda pair: -pair[1]["fps"])
     table = Table(title=f"{paper.title}\n{title}", caption=_caption(paper))
     headings = ["optimizer", "body", "refinement"]
     if len({row["preset"] for _, row in found}) > 1:
