@@ -162,7 +162,7 @@ class TrackerConfig(ImagingSettings):
     )
     angle_sigma: float = setting(
         0.0,
-        "spread of every angle at 60 frames/s, rad; 0: each angle's own, of the body",
+        "least spread of every angle, rad, at any rate; 0: each angle has its own, of the body",
         least=0.0,
         most=3.0,
     )

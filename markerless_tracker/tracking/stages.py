@@ -68,11 +68,15 @@ def limb_stages(
 
 
 def swarm_sigma(body: BodyModel, config: TrackerConfig, sigma: FloatArray) -> FloatArray:
-    """Spreads (p,) of swarms: the body's scaled, or `angle_sigma` for every angle likewise."""
+    """Spreads (p,) of swarms: the body's, scaled; of an angle `angle_sigma` at least.
+
+    Saini et al. (2015) print one covariance of 0.01 for all joints and name no rate. Reading: its
+    root, 0.1 rad, is wider than what any joint moves between frames at 60 frames/s, so that it
+    stands at every rate, until a joint's own spread, which grows with the time, exceeds it.
+    """
     spread = config.sigma_scale * sigma
-    if config.angle_sigma > 0.0:
-        angles = np.setdiff1d(np.arange(body.size), translations(body))
-        spread[angles] *= config.angle_sigma / body.sigma[angles]
+    angles = np.setdiff1d(np.arange(body.size), translations(body))
+    spread[angles] = np.maximum(spread[angles], config.angle_sigma)
     return spread
 
 

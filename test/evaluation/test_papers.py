@@ -31,7 +31,7 @@ def test_the_papers_counts() -> None:
     assert counts("sppso_2") == [1000, 2000, 4000]
     assert counts("sppso_apf") == [1000, 1000]
     assert counts("hmcpso_3") == [3600, 7200, 10800]
-    for name in ("hmcpso_2", "hmcpso_4", "hmcpso_5", "hmcpso_6"):
+    for name in ("hmcpso_2", "hmcpso_4", "hmcpso_5", "hmcpso_6", "hmcpso_spread"):
         assert set(counts(name)) == {3600}
 
 
