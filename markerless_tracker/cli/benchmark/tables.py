@@ -42,7 +42,8 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     parser.add_argument(
         "--table", type=list_of(str), default=(), metavar="LIST",
         help="tables of the papers, with their figures beside ours: all, or names of "
-        "config/papers.yaml: sppso_2, sppso_apf, sppso_ablation, hmcpso_2 .. hmcpso_6, hmcpso_spread",
+        "config/papers.yaml: sppso_2, sppso_apf, sppso_ablation, hmcpso_2 .. hmcpso_6, "
+        "hmcpso_spread",
     )  # fmt: skip
     parser.add_argument(
         "--preset",
