@@ -38,7 +38,8 @@ PAPERS: Mapping[str, Mapping[str, Any]] = {
     "pf": {**_SAINI, "angle_sigma": 0.0},
 }
 """What the preset 'paper' sets besides for each optimiser: what is not SPPSO is set as in the
-comparison of Saini et al. (2015), whose swarms start with a variance of 0.01 rad² [R]."""
+comparison of Saini et al. (2015), whose swarms start with a variance of 0.01 rad² [R]. Of the
+filters' noise the paper says nothing: the body's own spreads, as in the filters' own papers."""
 
 OPTIMIZERS = tuple(PAPERS)
 """The search algorithms, by name."""

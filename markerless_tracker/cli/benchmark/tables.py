@@ -130,6 +130,7 @@ def run(args: argparse.Namespace) -> int:
         "machine": machine(),
         "versions": versions(),
         "jobs": args.jobs,
+        "scheduler": args.scheduler,
         "frames_limit": args.frames,
         "configurations": [config.as_mapping() for config in configs],
         "papers": [_published(group) for group in chosen if group.table is not None],
