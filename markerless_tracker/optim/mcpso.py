@@ -147,6 +147,13 @@ class Mcpso(Optimizer):
         self._subs_next = True
         self._phi = 0.5
 
+    @property
+    def bars(self) -> FloatArray:
+        """Own best cost of each particle that was asked for."""
+        if self._iteration == 1:
+            return np.concatenate([self._subs.bars, self._master.bars])
+        return (self._subs if self._subs_next else self._master).bars
+
     def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:
         if self._iteration == 1:
             x = np.concatenate([self._subs.x, self._master.x])

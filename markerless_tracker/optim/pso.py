@@ -104,6 +104,11 @@ class Pso(Optimizer):
         self._swarm = Swarm(x, problem.rng.uniform(-1.0, 1.0, x.shape) * problem.sigma)
         self._iteration = 1
 
+    @property
+    def bars(self) -> FloatArray:
+        """Each particle's own best cost."""
+        return self._swarm.bars
+
     def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:
         if self._iteration > 1:
             self._swarm.move(self.problem, self._step)

@@ -51,6 +51,11 @@ class Swarm:
         self.barred = np.zeros(len(x), dtype=np.bool_)
         self.barred[todo] = True
 
+    @property
+    def bars(self) -> FloatArray:
+        """(n,) own best costs; one that broke a constraint cannot win at all."""
+        return np.where(self.barred, -np.inf, self.best_costs)
+
     def learn(self, costs: FloatArray) -> None:
         """Update the own bests by the costs (n,) of the positions."""
         better = costs < self.best_costs

@@ -152,12 +152,12 @@ class FrameSearch:
             sigma=stage.sigma[stage.active],
             particles=stage.particles,
             iterations=stage.iterations,
-            feasible=lambda points: searcher.feasible(evaluator.poses(points)),
+            feasible=searcher.feasible.around(stage.active, stage.centre),
             rng=keyed_generator(searcher.config.seed, self._stamp_ns, stage.name),
             memory=searcher.clouds.get(stage.name),
         )
         optimizer = ALGORITHMS[stage.algorithm](problem, **stage.options)
-        best = optimizer.run(evaluator)
+        best = optimizer.run(evaluator, early=True)
         self.evaluations += optimizer.evaluations
         if optimizer.memory is not None:
             searcher.clouds[stage.name] = optimizer.memory

@@ -326,7 +326,7 @@ def test_h_mcpsos_costs_by_counted_pixels(body, rig, pose, observations):
     counts = plain.count(views, pose[None], every, every)[0]
     projected, overlap = counts[:, kernels.PROJECTED], counts[:, kernels.OVERLAP]
     seen = np.array(views.arrays.observed, dtype=float)
-    edges = counts[:, kernels.EDGE_SUM] / counts[:, kernels.EDGE_COUNT]
+    edges = counts[:, kernels.EDGE_SUM] / counts[:, kernels.EDGE_COUNT] / 255.0**2
     one_sided = np.mean(1 - overlap / projected + 0.5 * edges)
     both = np.mean(1 - 0.5 * overlap / projected - 0.5 * overlap / seen + 0.5 * edges)
     assert costs["one_sided"] == pytest.approx(one_sided, abs=1e-12)

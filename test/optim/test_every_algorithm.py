@@ -147,3 +147,25 @@ def test_what_it_remembers_fits_the_next_search(name):
         )
     )  # fmt: skip
     assert inside(following.run(sphere)[None])[0]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_costs_that_stop_at_a_particles_bar_change_nothing(name):
+    """Whatever lies between the bar and the cost, for a point that does not get below its bar."""
+    spared = 0
+
+    def stopping(points, bars=None):
+        nonlocal spared
+        costs = sphere(points)
+        if bars is None:
+            return costs
+        assert bars.shape == costs.shape
+        loses = costs >= bars
+        spared += int(loses.sum())
+        return np.where(loses, np.maximum(bars, 0.3 * np.maximum(bars, 0.0) + 0.7 * costs), costs)
+
+    searches = [ALGORITHMS[name](problem(particles=20, iterations=15)) for _ in range(2)]
+    full, early = searches[0].run(sphere), searches[1].run(stopping, early=True)
+    assert full.tobytes() == early.tobytes()
+    assert searches[0].best_cost == searches[1].best_cost
+    assert (spared > 0) == (name not in ("apf", "pf"))

@@ -7,8 +7,8 @@ Algorithm 1, are `optim.mcpso`.
 
 Readings [R]: the soft variation is not quantified; the root joins the torso's and the legs' steps,
 the torso joins the arms' steps, with spreads divided by 10 (SPPSO's factor); other limbs stay. The
-body's description says who joins. "Covariance 0.01" is a variance in rad² and the least one at every
-rate (`stages.swarm_sigma`); positions have the body's own spreads.
+body's description says who joins. "Covariance 0.01" is a variance in rad², the least at every rate
+(`stages.swarm_sigma`); positions have the body's own spreads.
 """
 
 from markerless_tracker.body import BodyModel
