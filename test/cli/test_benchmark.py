@@ -139,6 +139,16 @@ def test_without_matplotlib_the_table_is_complete(walk, tmp_path, capsys, monkey
     assert (tmp_path / "table.json").is_file() and not (tmp_path / "plots").exists()
 
 
+def test_a_cluster_without_dask_says_what_is_missing(walk, capsys, monkeypatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    words = ["tables", walk, "--seeds", "1", "--frames", "1", "--scheduler", "tcp://here:8786"]
+    assert main(["benchmark", *words]) == 1
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "scheduler tcp://here:8786" in last and "[cluster]" in last
+
+
 def test_speed_of_a_recording(walk, capsys) -> None:
     words = ["speed", walk, "--threads", "1", "--frames", "1", "--repeats", "1"]
     assert main(["benchmark", *words, "--json"]) == 0
