@@ -46,11 +46,18 @@ def node_transforms(pose, parent, fixed, kind, sign, parameter, out):  # type: i
 
 def moving_nodes(body: BodyModel, active: IntArray) -> NDArray[np.bool_]:
     """Mask (m,) of the nodes whose transforms depend on any of the active parameters."""
-    moves = np.isin(body.node_parameter, active)
-    for node, above in enumerate(body.node_parent.tolist()):
-        if above >= 0 and moves[above]:
-            moves[node] = True
+    moves = np.zeros(body.node_parent.size, dtype=np.bool_)
+    _find_moving(body.node_parent, body.node_parameter, np.asarray(active, dtype=np.int64), moves)
     return moves
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def _find_moving(parent, parameter, active, moves):  # type: ignore[no-untyped-def]
+    for n in range(parent.size):
+        moves[n] = parent[n] >= 0 and moves[parent[n]]
+        for a in active:
+            if parameter[n] == a:
+                moves[n] = True
 
 
 def transforms(body: BodyModel, pose: FloatArray) -> FloatArray:

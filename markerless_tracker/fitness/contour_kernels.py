@@ -23,6 +23,9 @@ from markerless_tracker.geometry import FloatArray
 BAND_PX = 8
 """Rows of a frame whose outline points are looked through together for the nearest."""
 
+_SMOOTH = (1.0, 4.0, 6.0, 4.0, 1.0)
+_RISE = (-1.0, -2.0, 0.0, 2.0, 1.0)
+
 
 class ContourViews(NamedTuple):
     """The silhouettes' edges of v views.
@@ -105,6 +108,21 @@ def make_contour_scratch(
         np.empty((parameters, parameters)),
         np.empty(parameters),
     )
+
+
+@kernel
+def steepest(distance, pixels, out):  # type: ignore[no-untyped-def]
+    """Fill out (n, 2): where distances (h, w) rise at pixels (n, 2), by Sobel's 5x5 px."""
+    height, width = distance.shape
+    for n in range(pixels.shape[0]):
+        along_u, along_v = 0.0, 0.0
+        for i in range(5):
+            v = min(max(pixels[n, 1] + i - 2, 0), height - 1)
+            for j in range(5):
+                u = min(max(pixels[n, 0] + j - 2, 0), width - 1)
+                along_u += _SMOOTH[i] * _RISE[j] * distance[v, u]
+                along_v += _RISE[i] * _SMOOTH[j] * distance[v, u]
+        out[n, 0], out[n, 1] = along_u, along_v
 
 
 @kernel
@@ -198,7 +216,7 @@ def _nearest(u, v, nu, nv, bands, pixel, normal, start, order):  # type: ignore[
                 gap = du * du + dv * dv
                 if gap < best and normal[s, 0] * nu + normal[s, 1] * nv > 0.5:
                     best = gap
-                    nearest = np.int64(s)
+                    nearest = order[i]
     return nearest
 
 

@@ -48,10 +48,36 @@ def sample_side(  # type: ignore[no-untyped-def]
     samples = np.int64(max(4.0, length / rule.spacing_px))
     step = outward * rule.step_px / length
     out_u, out_v = -step * dv + 0.5, step * du + 0.5
-    du, dv = du / samples, dv / samples
+    share = 1.0 / samples
+    du, dv = du * share, dv * share
     pu, pv = pu + 0.5 * du, pv + 0.5 * dv
     u_end, v_end = width - 0.5, height - 0.5
     beside, squared, which = still.size > 0, rule.squared, rule.rule
+    qu, qv = pu + (samples - 1) * du, pv + (samples - 1) * dv
+    border = abs(rule.step_px) + 1.0
+    if (
+        listed is None
+        and which != SIDES
+        and min(pu, qu) >= border
+        and min(pv, qv) >= border
+        and max(pu, qu) <= width - 1.0 - border
+        and max(pv, qv) <= height - 1.0 - border
+    ):
+        # The same as below where nothing is near the frame's border: without any branch.
+        if which == VISIBLE:
+            out_u, out_v = 0.5, 0.5
+        for i in range(samples):
+            u, v = pu + i * du, pv + i * dv
+            far_u, far_v = np.uint64(np.int64(u + out_u)), np.uint64(np.int64(v + out_v))
+            there = (far_u >> np.uint64(6)) * np.uint64(height) + far_v
+            hiding = bits[there]
+            if beside:
+                hiding |= still[np.uint64(start) + there]
+            free = int(~(hiding >> (far_u & np.uint64(63))) & np.uint64(1))
+            pixel = np.int64(v + 0.5) * width + np.int64(u + 0.5)
+            total += free * _worth(edges[np.uint64(edge_start + pixel)], squared)
+            number += free
+        return total, number, listed_count
     for i in range(samples):
         u, v = pu + i * du, pv + i * dv
         if not (u >= -0.5 and v >= -0.5 and u < u_end and v < v_end):

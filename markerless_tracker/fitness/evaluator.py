@@ -23,7 +23,7 @@ from markerless_tracker.records import Observation, Stage
 EDGE_RULES = {"sides": SIDES, "visible": VISIBLE, "outline": OUTLINE}
 EDGE_TERMS = ("ssd", "mean")
 COSTS = ("overlap", "bidirectional", "one_sided")
-_CONE_S = 0.35e-6
+_CONE_S = 0.4e-6
 """About how long one cone in one view takes one thread."""
 
 
@@ -119,7 +119,7 @@ class Fitness:
         cost = CostRule(1.0, 1.0, self._rule.squared, False)
         drawing = divide(
             self.body, self._arrays, views.arrays, everything, self.body.neutral, silhouette_cones,
-            edge_cones, self._rule, cost,
+            edge_cones, self._rule, cost, self._scratch, self._outlines,
         )  # fmt: skip
         bars = np.full(len(poses), np.inf)
         return self._run(views, drawing, poses, everything, self.body.neutral, bars, cost)[0]
@@ -189,7 +189,7 @@ class Evaluator:
             fitness.body, fitness._arrays, views.arrays, stage.active, stage.centre,
             # A term without weight is not looked at.
             stage.silhouette_cones, stage.edge_cones & (stage.edge_weight != 0.0),
-            fitness._rule, self._cost,
+            fitness._rule, self._cost, fitness._scratch, fitness._outlines,
         )  # fmt: skip
 
     def poses(self, points: FloatArray) -> FloatArray:

@@ -78,7 +78,7 @@ def _shows(pu, pv, nu, nv, step_px, width, height, bits):  # type: ignore[no-unt
         u = np.int64(np.floor(pu + step_px * nu + 0.5))
         v = np.int64(np.floor(pv + step_px * nv + 0.5))
         outside = u < 0 or v < 0 or u >= width or v >= height
-        seen = outside or not is_set(bits, height, u, v)
+        seen = True if outside else not is_set(bits, height, u, v)
     return seen
 
 

@@ -14,12 +14,11 @@ from markerless_tracker.fitness.bits import popcount
 from markerless_tracker.fitness.compiled import kernel
 from markerless_tracker.fitness.edge_samples import OUTLINE, VISIBLE, EdgeRule, sample_cone
 from markerless_tracker.fitness.fill import clear_used, fill_outline
-from markerless_tracker.fitness.kernels import Still, cone_ends
+from markerless_tracker.fitness.kernels import Scratch, Still, cone_ends
 from markerless_tracker.fitness.outline import (
     HIDDEN,
-    LANES,
+    Outlines,
     find_outlines,
-    make_outlines,
     outlines_of,
 )
 from markerless_tracker.fitness.terms import (
@@ -63,6 +62,8 @@ def divide(
     edge_cones: NDArray[np.bool_],
     rule: EdgeRule,
     cost: CostRule,
+    scratch: Scratch,
+    outlines: Outlines,
 ) -> Drawing:
     """Draw the cones that do not depend on the active parameters (d,), at a centre (p,).
 
@@ -78,6 +79,7 @@ def divide(
         silhouette_cones: (c,) cones that make the silhouette.
         edge_cones: (c,) cones whose edges are sampled.
         rule, cost: how edges are sampled and what terms cost.
+        scratch, outlines: working memory.
     """
     sampled = body.cone_edges & edge_cones[:, None]
     needed = silhouette_cones | sampled.any(axis=1)
@@ -88,7 +90,7 @@ def divide(
     rest = np.flatnonzero(needed & ~moves[body.cone_node])
     count = len(views.size)
     nodes = np.empty((body.node_parent.size, 3, 4))
-    cone_ends(centre, arrays, nodes, np.empty(18 * LANES))
+    cone_ends(centre, arrays, nodes, scratch.world[0])
     counts = np.zeros((count, 4))
     least = np.zeros(count + 1)
     start = np.zeros(count + 1, dtype=np.int64)
@@ -99,11 +101,9 @@ def divide(
         longest = ceil(int(views.size.sum(axis=1).max()) / rule.spacing_px) + _SPARE
         sides = int(sampled[rest].sum()) * _SIDES if rule.rule == OUTLINE else 0
         listed = np.empty((count * sides * longest, 2), dtype=np.int64)
-        height = int(views.size[:, 1].max())
         _draw_still(
             centre, _some(arrays, rest), views, silhouette_cones[rest], sampled[rest], rule, cost,
-            np.empty((int(views.words.max()), 2), dtype=np.int64), nodes, np.ones(18 * LANES),
-            make_outlines(1, height), bits, counts, start, listed, least,
+            scratch.used[0], nodes, scratch.world[0], outlines, bits, counts, start, listed, least,
         )  # fmt: skip
     still = Still(
         np.flatnonzero(moves), nodes, bits, counts, start,
