@@ -56,6 +56,8 @@ setup(
         "scipy>=1.11",
     ],
     extras_require={
+        "cluster": ["distributed>=2024.1"],
+        "plots": ["matplotlib>=3.8"],
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
             "hypothesis",

@@ -125,6 +125,7 @@ class Stage:
         silhouette_weight, edge_weight: weights of f_s and f_e.
         silhouette_cones, edge_cones: (c,) cones that each term uses.
         gain: where stages compete, f must rise by more than this for the result to be taken.
+        options: the algorithm's own settings by name.
     """
 
     name: str
@@ -139,6 +140,7 @@ class Stage:
     silhouette_cones: NDArray[np.bool_]
     edge_cones: NDArray[np.bool_]
     gain: float = 0.0
+    options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, dtype in (

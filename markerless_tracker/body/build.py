@@ -174,6 +174,7 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
             name: np.array([_look(index, p, f"subspace {name}") for p in members], dtype=np.int64)
             for name, members in d.subspaces.items()
         },
+        hierarchies=d.hierarchies,
         lengths_m=lengths,
     )
 

@@ -41,6 +41,7 @@ class BodyDescription:
     cones: Mapping[str, Mapping[str, Any]]
     collisions: tuple[tuple[str, str], ...]
     subspaces: Mapping[str, tuple[str, ...]]
+    hierarchies: Mapping[str, tuple[tuple[str, ...], ...]]
 
 
 def parse_chain(text: str, where: str) -> tuple[Move, ...]:
@@ -85,6 +86,9 @@ def read_description(path: Path) -> BodyDescription:
         cones=data["cones"],
         collisions=tuple((a, b) for a, b in data["collisions"]),
         subspaces={name: tuple(members) for name, members in data["subspaces"].items()},
+        hierarchies={
+            name: tuple(map(tuple, steps)) for name, steps in data.get("hierarchies", {}).items()
+        },
     )
 
 

@@ -53,6 +53,8 @@ class BodyModel:
         cone_edges: (c, 2) whether the sides, and whether the end's edge, count as edges.
         collisions: (k, 2) pairs of cones that must not inter-penetrate.
         subspaces: named groups of parameter indices.
+        hierarchies: named lists of steps in which a body may be searched; each step names the
+            subspace that varies, then those that join softly.
         lengths_m: the subject's named lengths.
     """
 
@@ -80,6 +82,7 @@ class BodyModel:
     cone_edges: NDArray[np.bool_]
     collisions: IntArray
     subspaces: Mapping[str, IntArray]
+    hierarchies: Mapping[str, tuple[tuple[str, ...], ...]]
     lengths_m: Mapping[str, float]
 
     def __post_init__(self) -> None:
@@ -98,6 +101,26 @@ class BodyModel:
     def root(self) -> IntArray:
         """(6,) indices of the parameters that place the root frame in the world."""
         return self.subspaces["root"]
+
+    @property
+    def limbs(self) -> tuple[str, ...]:
+        """Subspaces of the limbs: the steps of hierarchy 'six' after root, torso and head."""
+        return tuple(step[0] for step in self.steps("six")[2:])
+
+    def steps(self, hierarchy: str) -> tuple[tuple[str, ...], ...]:
+        """The steps of a hierarchy; 'six' is the subspaces one by one where nothing is declared.
+
+        Raises:
+            BodyModelError: there is no such hierarchy.
+        """
+        if hierarchy == "six" and not self.hierarchies:
+            return tuple((name,) for name in self.subspaces)
+        if hierarchy not in self.hierarchies:
+            raise BodyModelError(
+                f"body {self.name} has no hierarchy {hierarchy!r}, "
+                f"expected one of {', '.join(self.hierarchies) or 'six'}"
+            )
+        return self.hierarchies[hierarchy]
 
     @cached_property
     def joints(self) -> IntArray:

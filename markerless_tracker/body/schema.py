@@ -74,6 +74,7 @@ _ENTRIES: Mapping[str, tuple[Mapping[str, tuple[str, Check]], Mapping[str, tuple
         {"factor": _POSITIVE, "placement": _TEXT, "edges": _EDGES},
     ),
 }
+OPTIONAL = ("hierarchies",)
 SECTIONS = ("name", *_ENTRIES, "root", "collisions", "subspaces")
 
 
@@ -90,7 +91,7 @@ def check_description(data: Any, where: str) -> None:
     """
     if not isinstance(data, dict):
         raise BodyModelError(f"{where}: expected a mapping with {', '.join(SECTIONS)}")
-    _keys(data, SECTIONS, (), where)
+    _keys(data, SECTIONS, OPTIONAL, where)
     if not isinstance(data["name"], str):
         raise BodyModelError(f"{where}: name is {data['name']!r}, expected text")
     for section, (required, optional) in _ENTRIES.items():
@@ -113,6 +114,15 @@ def check_description(data: Any, where: str) -> None:
             )
     if len(set(data["subspaces"].get("root", ()))) != 6:
         raise BodyModelError(f"{where}: subspaces: root needs six parameters")
+    for name, steps in _mapping(data.get("hierarchies", {}), f"{where}: hierarchies").items():
+        here = f"{where}: hierarchies: {name}"
+        if not isinstance(steps, list) or not steps or not all(_texts(s) and s for s in steps):
+            raise BodyModelError(
+                f"{here} is {steps!r}, expected steps [subspace, subspaces that join softly ...]"
+            )
+        for subspace in sum(steps, []):
+            if subspace not in data["subspaces"]:
+                raise BodyModelError(f"{here}: subspace {subspace!r} is not defined")
 
 
 def _mapping(value: Any, where: str) -> Mapping[str, Any]:

@@ -16,7 +16,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.evaluation.result import ResultWriter
 from markerless_tracker.evaluation.run import recording_backgrounds, track_recording
 from markerless_tracker.records import TrackState
-from markerless_tracker.tracking import PRESETS, TrackerConfig, build_tracker
+from markerless_tracker.tracking import OPTIMIZERS, PRESETS, TrackerConfig, build_tracker
 from markerless_tracker.viewing.debug_images import DebugImages
 
 HELP = (
@@ -42,9 +42,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--stature", type=float, metavar="M", help="a generic person of that height"
     )
-    parser.add_argument("--optimizer", help="search algorithm (default sppso)")
+    parser.add_argument(
+        "--optimizer",
+        metavar="NAME",
+        help=f"search algorithm: {', '.join(OPTIMIZERS)} (default sppso)",
+    )
     parser.add_argument("--body", metavar="NAME|FILE", help="body description")
-    parser.add_argument("--evaluations", type=int, metavar="N", help="evaluations per frame")
+    parser.add_argument(
+        "--evaluations",
+        type=int,
+        metavar="N",
+        help="evaluations per frame (default: the optimizer's own)",
+    )
     parser.add_argument("--preset", choices=tuple(PRESETS), help="tuned (default) or paper")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
     parser.add_argument(

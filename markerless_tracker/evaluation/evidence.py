@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.datasets import FrameSet, Recording
+from markerless_tracker.datasets import FrameSet, Recording, open_recording
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.evaluation.run import recording_backgrounds
 from markerless_tracker.imaging import ImagingSettings, Segmenter
@@ -72,6 +72,47 @@ class Evidence:
                     for camera in self.rig
                 },
             )
+
+
+@dataclass(frozen=True)
+class EvidenceOrder:
+    """Which evidence to make, as a value that may travel to another machine.
+
+    Attributes:
+        source: the recording.
+        scale: factor for its images.
+        settings: of the imaging.
+        start, every, frames: as for `make_evidence`.
+    """
+
+    source: Path
+    scale: float
+    settings: ImagingSettings
+    start: int
+    every: int
+    frames: int | None
+
+    def make(
+        self,
+        folder: Path,
+        *,
+        recording: Recording | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> Evidence:
+        """Make it in an existing, empty folder; the recording is opened unless it is given.
+
+        Raises:
+            TrackerError: as `make_evidence`, or there is no such recording.
+        """
+        return make_evidence(
+            recording or open_recording(self.source, scale=self.scale),
+            self.settings,
+            folder,
+            start=self.start,
+            every=self.every,
+            frames=self.frames,
+            progress=progress,
+        )
 
 
 def make_evidence(

@@ -47,9 +47,10 @@ class Run:
 def execute(run: Run, evidence: Evidence) -> dict[str, Any]:
     """Track and score; returns plain values for JSON.
 
-    Keys: those of `Score.as_dict`, and `last_joint_mm` (largest joint error in the last frame),
-    `lost_run` (longest run of frames with any joint more than `LOST_LIMB_MM` off), `lost_frames`
-    (frames in the state LOST), `evaluations` and `refinements` (means per frame), `frames_per_s`
+    Keys: those of `Score.as_dict`, and `stamps_s` (of `frame_mm`), `last_joint_mm` (largest joint
+    error in the last frame), `lost_run` (longest run of frames with any joint more than
+    `LOST_LIMB_MM` off), `lost_frames` (frames in the state LOST), `evaluations` and `refinements`
+    (means per frame), `frames_per_s`
     (of `Tracker.step` with the evidence ready, without the first frame, which fits the shape),
     `truth_difference` (None unless asked for).
 
@@ -80,6 +81,7 @@ def execute(run: Run, evidence: Evidence) -> dict[str, Any]:
     figures = score(_track(results), reference)
     return {
         **figures.as_dict(),
+        "stamps_s": (figures.stamps_ns * 1e-9).round(6).tolist(),
         "last_joint_mm": float(np.nanmax(figures.joint_mm[-1])),
         "lost_run": lost_run(figures),
         "lost_frames": sum(result.state is TrackState.LOST for result in results),

@@ -31,6 +31,13 @@ from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.stages import contour_stage, frame_stages
 
 THOUSAND = 1000
+_ALONE = {"body": "balan31", "refinement": "none", "fit_shape": False, "edge_weight": 1.0}
+SWARMS: Mapping[str, Mapping[str, Any]] = {
+    "sppso_1000": {"optimizer": "sppso", "evaluations": 1000},
+    "hmcpso_3600": {"optimizer": "hmcpso", "evaluations": 3600},
+    "hmcpso_3600_hard": {"optimizer": "hmcpso", "evaluations": 3600, "partition": "hard"},
+}
+"""Swarms alone whose time per frame is told, all with the published body."""
 _REFERENCE_POSES, _POSES = 16, 256
 _SHORT, _LONG = 2, 42
 _HARD = ("l_clavicle_x", "l_clavicle_y", "l_shoulder_x", "l_shoulder_y", "l_shoulder_z", "l_elbow")
@@ -60,19 +67,17 @@ def measure(
     """
     threads = threads or usable_cores()
     tuned = TrackerConfig.from_mapping({"threads": threads})
-    paper_body = TrackerConfig.from_mapping(
-        {
-            "threads": threads,
-            "body": "balan31",
-            "refinement": "none",
-            "fit_shape": False,
-            "edge_weight": 1.0,
-        }
-    )
+    swarms = {
+        name: TrackerConfig.from_mapping({**_ALONE, **settings, "threads": threads})
+        for name, settings in SWARMS.items()
+    }
     backgrounds = {name: learn_background(images, tuned) for name, images in scene.empty.items()}
     observed = _observations(scene, tuned, backgrounds)
     views = _view_evaluations(scene, observed[0], repeats, progress)
-    swarm = _swarm(scene, paper_body, observed, repeats, progress)
+    swarm = {
+        name: _spread(_swarm(scene, config, observed, repeats, progress, name))
+        for name, config in swarms.items()
+    }
     refine, contours = _refinement(scene, tuned, observed[0], repeats, progress)
     frames = _frames(scene, tuned, backgrounds, observed, repeats, progress)
     fit, thousand = np.array(frames["fitness"]), np.array(frames["thousand"])
@@ -89,7 +94,12 @@ def measure(
         "limb_ratio": views["limb"] / views["full"],
         "limb_soft_ratio": views["limb_soft"] / views["full"],
         "person31_ratio": views["person31"] / views["full"],
-        "swarm_ms": {"sppso_1000": _spread(swarm)},
+        "swarm_ms": swarm,
+        "swarm_ratio": {
+            name: figures["median"] / swarm["sppso_1000"]["median"]
+            for name, figures in swarm.items()
+            if name != "sppso_1000"
+        },
         "refine_ms": refine,
         "refine_setup_ms": contours,
         "frame_ms": {
@@ -149,6 +159,7 @@ def _swarm(
     observed: Sequence[Mapping[str, Observation]],
     repeats: int,
     progress: Report,
+    name: str,
 ) -> FloatArray:
     """ms of fitness and swarm per frame (n,): the evidence is ready, the pose is found."""
     body = scene.body(config.body)
@@ -163,7 +174,7 @@ def _swarm(
                 pose = search.run(stages)
                 if turn:
                     best[i] = min(best[i], (time.perf_counter() - started) * 1e3)
-            progress("swarm", turn + 1, repeats + 1)
+            progress(f"swarm {name}", turn + 1, repeats + 1)
     return best
 
 

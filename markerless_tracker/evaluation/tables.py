@@ -14,19 +14,22 @@ from typing import Any
 from markerless_tracker.body import load_description
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.evaluation.evidence import Evidence, make_evidence
+from markerless_tracker.evaluation.cluster import run_all_on
+from markerless_tracker.evaluation.evidence import EvidenceOrder
 from markerless_tracker.evaluation.fingerprint import file_key, recording_key, run_key
 from markerless_tracker.evaluation.pool import run_all
 from markerless_tracker.evaluation.runs import Run, describe
+from markerless_tracker.evaluation.variants import variants
 from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.setup import first_row
 
 TRUTH = "ground_truth.trc"
 COLUMNS = (
-    "recording", "optimizer", "preset", "body", "refinement", "fps", "start_noise_mm", "seeds",
-    "evaluations", "refinements", "mean_mm", "sd_mm", "max_mm", "worst_joint_mm", "limbs_mm",
-    "limbs_sd_mm", "last_joint_mm", "lost_run", "truth_difference", "frames_per_s", "frames",
+    "recording", "optimizer", "preset", "body", "refinement", "variant", "fps",
+    "start_noise_mm", "seeds", "evaluations", "refinements", "mean_mm", "sd_mm", "max_mm",
+    "worst_joint_mm", "limbs_mm", "limbs_sd_mm", "last_joint_mm", "lost_run", "truth_difference",
+    "frames_per_s", "ms_per_evaluation", "frames",
 )  # fmt: skip
 
 
@@ -44,6 +47,7 @@ class Plan:
         truth_score: also f(truth) - f(result).
         frames: only that many frames of a recording from its start on; None = all.
         jobs: processes side by side.
+        scheduler: address of a Dask scheduler whose workers run everything; None = here.
     """
 
     configs: tuple[TrackerConfig, ...]
@@ -54,6 +58,7 @@ class Plan:
     truth_score: bool = False
     frames: int | None = None
     jobs: int = 1
+    scheduler: str | None = None
 
 
 class Progress:
@@ -110,15 +115,12 @@ def make_table(
             missing = [number for number in numbers if number not in found]
             if not missing:
                 continue
-            with tempfile.TemporaryDirectory(prefix="markerless_tracker_") as folder:
-                evidence = piece.observe(missing, Path(folder), progress)
-                jobs = [piece.runs[number] for number in missing]
-                for index, figures in run_all(jobs, evidence, processes=plan.jobs):
-                    number = missing[index]
-                    found[number] = figures
-                    _store(store, piece, number, figures)
-                    done += 1
-                    progress.running(done, total)
+            for index, figures in piece.run(missing, progress):
+                number = missing[index]
+                found[number] = figures
+                _store(store, piece, number, figures)
+                done += 1
+                progress.running(done, total)
         for warning in piece.recording.warnings:
             progress.warn(warning)
         rows.extend(piece.rows(found))
@@ -133,7 +135,7 @@ class _Piece:
         self.source = source
         self.recording: Recording = open_recording(source, scale=plan.scale)
         folder = source if source.is_dir() else source.parent
-        self.reference = folder / TRUTH
+        self.reference = folder.resolve() / TRUTH
         if not self.reference.is_file():
             raise DatasetError(f"{source}: no {TRUTH}, expected one to judge by")
         self.start = self.recording.start_index(first_row(self.reference).stamp_ns)
@@ -172,26 +174,40 @@ class _Piece:
             groups.setdefault(_imaging(run.config), []).append(number)
         return groups.values()
 
-    def observe(self, numbers: Sequence[int], folder: Path, progress: Progress) -> Evidence:
-        every = math.gcd(*(self.runs[number].every for number in numbers))
+    def run(
+        self, numbers: Sequence[int], progress: Progress
+    ) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Places in `numbers` and figures of runs that share evidence, as they finish."""
+        runs = [self.runs[number] for number in numbers]
+        order = EvidenceOrder(
+            # Workers have working folders of their own.
+            self.source.resolve(),
+            self.plan.scale,
+            runs[0].config,
+            self.start,
+            math.gcd(*(run.every for run in runs)),
+            self.plan.frames,
+        )
+        if self.plan.scheduler is not None:
+            yield from run_all_on(self.plan.scheduler, runs, order)
+            return
         total = None
         if self.recording.frame_count is not None:
             left = self.recording.frame_count - self.start
-            total = -(-min(left, self.plan.frames or left) // every)
+            total = -(-min(left, self.plan.frames or left) // order.every)
         name = self.recording.name
-        return make_evidence(
-            self.recording,
-            self.runs[numbers[0]].config,
-            folder,
-            start=self.start,
-            every=every,
-            frames=self.plan.frames,
-            progress=lambda count: progress.observing(name, count, total),
-        )
+        with tempfile.TemporaryDirectory(prefix="markerless_tracker_") as folder:
+            evidence = order.make(
+                Path(folder),
+                recording=self.recording,
+                progress=lambda count: progress.observing(name, count, total),
+            )
+            yield from run_all(runs, evidence, processes=self.plan.jobs)
 
     def rows(self, found: Mapping[int, dict[str, Any]]) -> Iterator[dict[str, Any]]:
         numbers = iter(range(len(self.runs)))
-        for config in self.plan.configs:
+        told = variants(self.plan.configs)
+        for place, config in enumerate(self.plan.configs):
             for rate in self.rates:
                 figures = [found[next(numbers)] for _ in range(self.plan.seeds)]
                 yield {
@@ -202,6 +218,8 @@ class _Piece:
                     "preset": config.preset,
                     "body": config.body,
                     "refinement": config.refinement,
+                    "variant": told[place],
+                    "configuration": place,
                     "fps": rate,
                     "start_noise_mm": self.plan.start_noise_mm,
                     **summarise(figures),
@@ -214,7 +232,9 @@ def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     Means over the seeds: `mean_mm`, `limbs_mm` (with the sd between seeds, None for one seed),
     `evaluations`, `refinements`, `truth_difference`, `joints`. Worst of the seeds: `max_mm`
     (largest frame mean), `worst_joint_mm`, `last_joint_mm`, `lost_run`, `lost_frames`.
-    `frames_per_s` is the median. `runs` holds each seed's `mean_mm`.
+    `frames_per_s` is the median, and `ms_per_evaluation` what that makes of a swarm alone (None
+    beside refinement). `runs` holds each seed's `mean_mm`, `curve` the error over time: the stamps
+    that all seeds share (s) and the mean over the seeds (mm).
     """
     row: dict[str, Any] = {"seeds": len(runs)}
     for name in ("evaluations", "refinements", "mean_mm", "limbs_mm", "truth_difference"):
@@ -226,6 +246,8 @@ def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     for name in ("max_mm", "worst_joint_mm", "last_joint_mm", "lost_run", "lost_frames"):
         row[name] = max(run[name] for run in runs)
     row["frames_per_s"] = median(run["frames_per_s"] for run in runs)
+    alone = not row["refinements"] and row["evaluations"]
+    row["ms_per_evaluation"] = 1e3 / (row["frames_per_s"] * row["evaluations"]) if alone else None
     row["frames"] = min(run["frames"] for run in runs)
     row["joints"] = {
         name: fmean(run["joints"][name] for run in runs)
@@ -233,7 +255,14 @@ def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         if value is not None
     }
     row["runs"] = [run["mean_mm"] for run in runs]
+    row["curve"] = _curve(runs)
     return row
+
+
+def _curve(runs: Sequence[Mapping[str, Any]]) -> dict[str, list[float]]:
+    errors = [dict(zip(run["stamps_s"], run["frame_mm"], strict=True)) for run in runs]
+    shared = sorted(set.intersection(*map(set, errors)))
+    return {"s": shared, "mean_mm": [fmean(error[s] for error in errors) for s in shared]}
 
 
 def write_table(folder: Path, table: Mapping[str, Any]) -> None:

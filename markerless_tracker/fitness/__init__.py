@@ -2,6 +2,7 @@
 
 from markerless_tracker.fitness.arrays import Views, lay_out_views
 from markerless_tracker.fitness.evaluator import (
+    COSTS,
     EDGE_RULES,
     EDGE_TERMS,
     Evaluator,
@@ -10,6 +11,7 @@ from markerless_tracker.fitness.evaluator import (
 )
 
 __all__ = [
+    "COSTS",
     "EDGE_RULES",
     "EDGE_TERMS",
     "Evaluator",

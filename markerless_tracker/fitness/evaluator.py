@@ -1,4 +1,4 @@
-"""The fitness f = f_s + f_e of SPPSO over all views, and the evaluators that searches call."""
+"""The fitness f = f_s + f_e of SPPSO over all views, the costs, and the evaluators for searches."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +22,7 @@ from markerless_tracker.records import Observation, Stage
 
 EDGE_RULES = {"sides": SIDES, "visible": VISIBLE, "outline": OUTLINE}
 EDGE_TERMS = ("ssd", "mean")
+COSTS = ("overlap", "bidirectional", "one_sided")
 _CONE_S = 0.4e-6
 """About how long one cone in one view takes one thread."""
 
@@ -47,9 +48,11 @@ class Fitness:
         edge_term: 'ssd': f_e = 1 - mean (1 - M)²; 'mean': f_e = mean M.
         edge_spacing_px: distance between samples along a side (at least four a side).
         edge_step_px: how far outside a sample must be free of the body, for 'outline'.
+        cost: 'overlap': what f lacks (SPPSO); 'bidirectional', 'one_sided': H-MCPSO's costs, see
+            `Evaluator`.
 
     Raises:
-        ConfigError: an unknown rule or term.
+        ConfigError: an unknown rule, term or cost.
     """
 
     def __init__(
@@ -62,6 +65,7 @@ class Fitness:
         edge_term: str = "ssd",
         edge_spacing_px: float = 5.0,
         edge_step_px: float = 2.0,
+        cost: str = "overlap",
     ) -> None:
         if edge_rule not in EDGE_RULES:
             raise ConfigError(
@@ -71,12 +75,18 @@ class Fitness:
             raise ConfigError(
                 f"edge_term is {edge_term!r}, expected one of {', '.join(EDGE_TERMS)}"
             )
+        if cost not in COSTS:
+            raise ConfigError(f"cost is {cost!r}, expected one of {', '.join(COSTS)}")
         self.body = body
+        self.cost = cost
         self.cameras = tuple(cameras)
         self.threads = usable_threads(threads)
         self._arrays = body_arrays(body)
         self._rule = EdgeRule(
-            EDGE_RULES[edge_rule], float(edge_spacing_px), float(edge_step_px), edge_term == "ssd"
+            EDGE_RULES[edge_rule],
+            float(edge_spacing_px),
+            float(edge_step_px),
+            edge_term == "ssd" or cost != "overlap",
         )
         height = max(camera.size_px[1] for camera in cameras)
         self._outlines = make_outlines(self.threads, height)
@@ -153,7 +163,13 @@ class Fitness:
 
 
 class Evaluator:
-    """Costs of one stage: weights' sum - f, hence 2 - f with both weights one.
+    """Costs of one stage: silhouettes and edges weighted as it says, averaged over the views.
+
+    'overlap': weights' sum - f, hence 2 - f with both weights one. H-MCPSO's costs (Saini et al.,
+    2015, Eq 9) always have the squared edge term, mean (1 - M)² (Eq 10). 'one_sided' adds Eq 13:
+    mean (1 - P)² over the body's pixels, with a foreground P of 0 and 1 the share B/(B+Y) of them
+    that is not observed. 'bidirectional' adds ½ B/(B+Y) + ½ R/(R+Y): no formula is printed; this
+    reading [R] is 1 - f_s, so that with the squared term it equals 'overlap'.
 
     Called with points (n, d) of the stage's active parameters, returns costs (n,); NaN for points
     that are not finite. What the stage does not move is drawn when the evaluator is made.
@@ -164,7 +180,10 @@ class Evaluator:
         self._views = views
         self._stage = stage
         self._cost = CostRule(
-            float(stage.silhouette_weight), float(stage.edge_weight), fitness._rule.squared, False
+            float(stage.silhouette_weight),
+            float(stage.edge_weight),
+            fitness._rule.squared,
+            fitness.cost == "one_sided",
         )
         self._drawing = divide(
             fitness.body, fitness._arrays, views.arrays, stage.active, stage.centre,

@@ -1,20 +1,34 @@
 """Optimisers: they know bounds, draws, costs and feasibility, and no body or image."""
 
+from markerless_tracker.optim.apf import ESTIMATES, Apf
 from markerless_tracker.optim.base import Evaluate, Optimizer
 from markerless_tracker.optim.draws import keyed_generator
 from markerless_tracker.optim.levenberg import Prior, refine
-from markerless_tracker.optim.problem import Feasible, Problem, everything_feasible
+from markerless_tracker.optim.mcpso import MASTER_TERMS, Mcpso, swarm_sizes
+from markerless_tracker.optim.pf import Pf
+from markerless_tracker.optim.problem import Cloud, Feasible, Problem, everything_feasible
+from markerless_tracker.optim.pso import Pso
+from markerless_tracker.optim.registry import ALGORITHMS
 from markerless_tracker.optim.sppso import UPDATES, Sppso
 
 __all__ = [
+    "ALGORITHMS",
+    "ESTIMATES",
+    "MASTER_TERMS",
     "UPDATES",
+    "Apf",
+    "Cloud",
     "Evaluate",
     "Feasible",
+    "Mcpso",
     "Optimizer",
+    "Pf",
     "Prior",
     "Problem",
+    "Pso",
     "Sppso",
     "everything_feasible",
     "keyed_generator",
     "refine",
+    "swarm_sizes",
 ]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.errors import SearchError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim.problem import Problem
+from markerless_tracker.optim.problem import Cloud, Problem
 
 Evaluate = Callable[..., FloatArray]
 """Costs (n,) of a batch of points (n, d); may take bars (n,), see `Optimizer.run`."""
@@ -37,6 +37,16 @@ class Optimizer(ABC):
         self.bad_costs = 0
         self._asked: FloatArray | None = None
         self._barred: NDArray[np.bool_] | None = None
+
+    @property
+    def estimate(self) -> FloatArray:
+        """(d,) what the search makes of all it saw: its best point, for most."""
+        return self.best_x
+
+    @property
+    def memory(self) -> Cloud | None:
+        """What the next frame's search may go on from; None for most."""
+        return None
 
     @property
     def finished(self) -> bool:
@@ -88,7 +98,7 @@ class Optimizer(ABC):
         return None
 
     def run(self, evaluate: Evaluate, *, early: bool = False) -> FloatArray:
-        """Spend the budget; returns the best point (d,).
+        """Spend the budget; returns the estimate (d,).
 
         Args:
             evaluate: costs of points.
@@ -99,7 +109,7 @@ class Optimizer(ABC):
             points = self.ask()
             bars = self.bars if early else None
             self.tell(evaluate(points) if bars is None else evaluate(points, bars))
-        return self.best_x
+        return self.estimate
 
     @abstractmethod
     def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:

@@ -14,6 +14,19 @@ Feasible = Callable[[FloatArray], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
+class Cloud:
+    """Weighted particles about an estimate, as particle filters keep them between frames.
+
+    Attributes:
+        offsets: (n, d) particles minus the estimate that was made of them.
+        weights: (n,) not negative, their sum is 1.
+    """
+
+    offsets: FloatArray
+    weights: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """A search of d parameters.
 
@@ -24,6 +37,7 @@ class Problem:
         particles, iterations: the budget is their product, the first sample being an iteration.
         feasible: constraints, bounds included.
         rng: the source of all random draws.
+        memory: what the same search left in the last frame, for algorithms that go on from it.
     """
 
     bounds: FloatArray
@@ -33,6 +47,7 @@ class Problem:
     iterations: int
     feasible: Feasible
     rng: np.random.Generator
+    memory: Cloud | None = None
 
     def __post_init__(self) -> None:
         d = self.centre.size
@@ -40,6 +55,11 @@ class Problem:
             raise SearchError(
                 f"bounds {self.bounds.shape} and sigma {self.sigma.shape} "
                 f"do not fit a centre of {d}"
+            )
+        if self.memory is not None and self.memory.offsets.shape != (self.memory.weights.size, d):
+            raise SearchError(
+                f"memory of shape {self.memory.offsets.shape} with {self.memory.weights.size} "
+                f"weights does not fit a centre of {d}"
             )
         if np.any(self.bounds[0] > self.bounds[1]) or not np.all(self.sigma >= 0.0):
             raise SearchError("bounds must not cross and sigma must not be negative")

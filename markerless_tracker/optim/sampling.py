@@ -9,17 +9,23 @@ ATTEMPTS = 10
 """How often a particle that breaks a constraint is drawn or moved anew (SPPSO, section 3)."""
 
 
-def gaussian_sample(problem: Problem) -> FloatArray:
+def gaussian_sample(problem: Problem, *, confined: bool = False) -> FloatArray:
     """Positions (n, d) drawn from N(centre, diag(sigma²)) (SPPSO Eq 1).
 
     A particle that breaks a constraint is drawn again, at most `ATTEMPTS` times in all, then put
     at the centre.
+
+    Args:
+        problem: the search.
+        confined: draws beyond the bounds are put on them first.
     """
     n, d = problem.particles, problem.centre.size
     x = np.empty((n, d))
     todo = np.arange(n)
     for _ in range(ATTEMPTS):
         x[todo] = problem.centre + problem.sigma * problem.rng.standard_normal((todo.size, d))
+        if confined:
+            x[todo] = np.clip(x[todo], *problem.bounds)
         todo = todo[~problem.feasible(x[todo])]
         if todo.size == 0:
             return x

@@ -1,7 +1,15 @@
 """The tracker: configuration, stages of a frame, state, `Tracker.step`."""
 
-from markerless_tracker.tracking.config import PRESETS, Setting, TrackerConfig
+from markerless_tracker.tracking.config import OPTIMIZERS, PRESETS, Setting, TrackerConfig
 from markerless_tracker.tracking.setup import TrackerSetup, build_tracker
 from markerless_tracker.tracking.tracker import Tracker
 
-__all__ = ["PRESETS", "Setting", "Tracker", "TrackerConfig", "TrackerSetup", "build_tracker"]
+__all__ = [
+    "OPTIMIZERS",
+    "PRESETS",
+    "Setting",
+    "Tracker",
+    "TrackerConfig",
+    "TrackerSetup",
+    "build_tracker",
+]

@@ -6,9 +6,9 @@ from typing import Any, Self
 
 from markerless_tracker.body import RULES
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.fitness import EDGE_RULES, EDGE_TERMS
+from markerless_tracker.fitness import COSTS, EDGE_RULES, EDGE_TERMS
 from markerless_tracker.imaging import ImagingSettings
-from markerless_tracker.optim import UPDATES
+from markerless_tracker.optim import ESTIMATES, MASTER_TERMS, UPDATES
 from markerless_tracker.settings import setting
 
 PRESETS: Mapping[str, Mapping[str, Any]] = {
@@ -25,6 +25,29 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
     },
 }
 """What each preset sets; everything else keeps its default."""
+
+_SAINI: Mapping[str, Any] = {"body": "humaneva34", "cost": "bidirectional", "angle_sigma": 0.1}
+PAPERS: Mapping[str, Mapping[str, Any]] = {
+    "sppso": {},
+    "hmcpso": _SAINI,
+    "hpso": _SAINI,
+    "mcpso": _SAINI,
+    "pso": _SAINI,
+    "glpso": _SAINI,
+    "apf": {**_SAINI, "angle_sigma": 0.0},
+    "pf": {**_SAINI, "angle_sigma": 0.0},
+}
+"""What the preset 'paper' sets besides for each optimiser: what is not SPPSO is set as in the
+comparison of Saini et al. (2015), whose swarms start with a variance of 0.01 rad² [R]. Of the
+filters' noise the paper says nothing: the body's own spreads, as in the filters' own papers."""
+
+OPTIMIZERS = tuple(PAPERS)
+"""The search algorithms, by name."""
+
+
+def own_evaluations(optimizer: str) -> int:
+    """Evaluations per frame that an optimiser was published with."""
+    return 1000 if optimizer == "sppso" else 3600
 
 
 @dataclass(frozen=True)
@@ -51,12 +74,13 @@ class TrackerConfig(ImagingSettings):
         "tuned: what measures best; paper: every setting as published",
         choices=tuple(PRESETS),
     )
-    optimizer: str = setting("sppso", "search algorithm", choices=("sppso",))
+    optimizer: str = setting("sppso", "search algorithm", choices=OPTIMIZERS)
     body: str = setting("person31", "body: a shipped one's name, or a YAML file")
     evaluations: int = setting(
         1000,
         "budget per frame, in evaluations of the fitness: exactly that many without refinement; "
-        "with it the time that swarm and refinement may take together",
+        "with it the time that swarm and refinement may take together; unless given, the "
+        "optimiser's own: sppso 1000, others 3600",
         least=1,
         most=10**7,
     )
@@ -137,6 +161,69 @@ class TrackerConfig(ImagingSettings):
         least=1.0,
         most=1000.0,
     )
+    angle_sigma: float = setting(
+        0.0,
+        "least spread of every angle, rad, at any rate; 0: each angle has its own, of the body",
+        least=0.0,
+        most=3.0,
+    )
+    partition: str = setting(
+        "soft",
+        "of sppso's and hmcpso's steps; soft: what earlier steps found joins with a small spread; "
+        "hard: it stays",
+        choices=("soft", "hard"),
+    )
+    sppso_stages: str = setting(
+        "two",
+        "steps of sppso: two (root, then everything, as published), three (root; torso and head; "
+        "everything) or global (everything at once)",
+        choices=("two", "three", "global"),
+    )
+    hierarchy: str = setting(
+        "six",
+        "steps of hpso and hmcpso: six (root, torso and head, limbs), or twelve as HPSO's own",
+        choices=("six", "twelve"),
+    )
+    soft_factor: float = setting(
+        10.0, "soft partition: spreads of what joins are divided by this", least=1.0, most=1e6
+    )
+    sub_swarms: int = setting(3, "hmcpso, mcpso: sub-swarms beside the master", least=1, most=1000)
+    inertia_max: float = setting(
+        2.0, "inertia of the first move, of every swarm but sppso's", least=0.01, most=10.0
+    )
+    inertia_min: float = setting(0.1, "inertia of the last move", least=0.001, most=10.0)
+    acceleration: float = setting(
+        2.05, "pull of a particle's own best and of its swarm's best", least=0.0, most=10.0
+    )
+    migration: float = setting(
+        2.0, "hmcpso, mcpso: pull of the sub-swarms' best on the master", least=0.0, most=10.0
+    )
+    master_term: str = setting(
+        "printed",
+        "hmcpso, mcpso: pull of the master's best; weighted: times the migration factor",
+        choices=MASTER_TERMS,
+    )
+    layers: int = setting(
+        0, "apf: layers; 0: six if they share the budget out evenly, else five", least=0, most=100
+    )
+    survival: float = setting(
+        0.5, "apf: share of the particles that survives a layer", least=0.01, most=1.0
+    )
+    layer_shrink: float = setting(
+        0.5, "apf: factor of the noise's variance from layer to layer", least=0.01, most=1.0
+    )
+    sharpness: float = setting(
+        200.0, "pf: likelihood is exp(-sharpness cost)", least=0.01, most=1e6
+    )
+    estimate: str = setting(
+        "mean", "apf, pf: weighted mean of the particles, or the best one", choices=ESTIMATES
+    )
+    cost: str = setting(
+        "overlap",
+        "overlap: what f = f_s + f_e lacks; H-MCPSO's costs: one_sided: body pixels that are not "
+        "observed; bidirectional: these and observed pixels without body",
+        choices=COSTS,
+    )
     edge_weight: float = setting(0.0, "weight of f_e beside f_s", least=0.0, most=100.0)
     edge_rule: str = setting(
         "outline",
@@ -159,6 +246,14 @@ class TrackerConfig(ImagingSettings):
         least=0,
         most=10000,
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.inertia_min > self.inertia_max:
+            raise ConfigError(
+                f"inertia_min: got {self.inertia_min:g}, expected at most inertia_max, "
+                f"{self.inertia_max:g}"
+            )
 
     @classmethod
     def settings(cls) -> tuple[Setting, ...]:
@@ -188,7 +283,14 @@ class TrackerConfig(ImagingSettings):
         name = values.get("preset", preset or "tuned")
         if not isinstance(name, str) or name not in PRESETS:
             raise ConfigError(f"preset is {name!r}, expected one of {', '.join(PRESETS)}")
-        return cls(**{**PRESETS[name], **values, "preset": name})
+        optimizer = values.get("optimizer", "sppso")
+        own: dict[str, Any] = {}
+        # Anything else is refused with the other values.
+        if isinstance(optimizer, str) and optimizer in PAPERS:
+            own = {"evaluations": own_evaluations(optimizer)}
+            if name == "paper":
+                own.update(PAPERS[optimizer])
+        return cls(**{**PRESETS[name], **own, **values, "preset": name})
 
     def as_mapping(self) -> dict[str, Any]:
         """All settings by name, as `from_mapping` takes them."""

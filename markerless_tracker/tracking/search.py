@@ -12,7 +12,7 @@ from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.fitness.evaluator import ViewTerms
 from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim import Prior, Problem, Sppso, keyed_generator, refine
+from markerless_tracker.optim import ALGORITHMS, Cloud, Prior, Problem, keyed_generator, refine
 from markerless_tracker.records import CONTOUR, Observation, Stage
 from markerless_tracker.tracking.config import TrackerConfig
 
@@ -56,7 +56,14 @@ class Searcher:
             edge_term=config.edge_term,
             edge_spacing_px=config.edge_spacing_px,
             edge_step_px=config.edge_step_px,
+            cost=config.cost,
         )
+        self.clouds: dict[str, Cloud] = {}
+        """What each stage left in the last frame, where its algorithm goes on from that."""
+
+    def forget(self) -> None:
+        """Forget the last frame."""
+        self.clouds.clear()
 
     def frame(
         self, observations: Mapping[str, Observation], stamp_ns: int, predicted: FloatArray
@@ -147,10 +154,13 @@ class FrameSearch:
             iterations=stage.iterations,
             feasible=searcher.feasible.around(stage.active, stage.centre),
             rng=keyed_generator(searcher.config.seed, self._stamp_ns, stage.name),
+            memory=searcher.clouds.get(stage.name),
         )
-        optimizer = Sppso(problem, update=searcher.config.update)
+        optimizer = ALGORITHMS[stage.algorithm](problem, **stage.options)
         best = optimizer.run(evaluator, early=True)
         self.evaluations += optimizer.evaluations
+        if optimizer.memory is not None:
+            searcher.clouds[stage.name] = optimizer.memory
         return np.asarray(evaluator.poses(best[None])[0])
 
     def _refine(self, stage: Stage) -> FloatArray:

@@ -27,6 +27,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.first_frame import StartMarkers, start_noise_m
+from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.tracker import Tracker
 
 
@@ -96,7 +97,7 @@ def build_tracker(
         )
     body = build_body(description, subject)
     if start is not None:
-        pose = pose_from_markers(body, start.markers_m, limits=_limits(body, config))
+        pose = pose_from_markers(body, start.markers_m, limits=joint_limits(body, config))
     else:
         pose = read_pose(start_file, body)
     tracker = Tracker(
@@ -144,7 +145,3 @@ def _start_markers(
         start_noise_m(measured_lengths(description, start.markers_m)),
         resized,
     )
-
-
-def _limits(body: BodyModel, config: TrackerConfig) -> FloatArray:
-    return body.walking_limits if config.limits == "bt_walking" else body.limits

@@ -16,6 +16,7 @@ from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
 from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first_frame
+from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.loss import next_state
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.stages import frame_stages
@@ -99,6 +100,7 @@ class Tracker:
         self._velocity_per_ns = np.zeros(self._generic.size)
         self._stamp_ns = None
         self.state = TrackState.SEARCHING
+        self._searcher.forget()
         if self._fit_shape:
             self._shape_fitted = False
             self._searcher = self._searcher_for(self._generic)
@@ -212,7 +214,7 @@ class Tracker:
             self.rig,
             body,
             self.config,
-            limits=body.walking_limits if self.config.limits == "bt_walking" else body.limits,
+            limits=joint_limits(body, self.config),
             threads=self._threads,
             mapper=self._pool.map,
         )

@@ -91,6 +91,9 @@ def test_unknown_body_lists_those_there_are() -> None:
         (("collisions", 0), ["torso"], "collisions is .* expected a list of pairs"),
         (("collisions", 0), ["torso", "tail"], "collisions: 'tail' is not defined"),
         (("subspaces", "root"), GONE, "subspaces: root needs six parameters"),
+        (("hierarchies", "six"), [], r"hierarchies: six is \[\], expected steps"),
+        (("hierarchies", "six"), ["root"], "hierarchies: six is .* expected steps"),
+        (("hierarchies", "six"), [["tail"]], "hierarchies: six: subspace 'tail' is not defined"),
         (("subspaces", "l_leg"), ["l_toe"], "subspace l_leg: 'l_toe' is not defined"),
     ],
 )

@@ -77,6 +77,78 @@ def test_both_presets_unless_named(walk, capsys) -> None:
     assert rows[2]["evaluations"] == 1000
 
 
+def test_a_row_per_optimizer_and_nothing_is_repeated(walk, tmp_path: Path, capsys) -> None:
+    words = [
+        "tables", walk, "--preset", "paper", "--optimizer", "sppso,apf,hmcpso", "--seeds", "1",
+        "--frames", "1", "--fps", "60", "-o", str(tmp_path), "--jobs", "1",
+    ]  # fmt: skip
+    assert main(["benchmark", *words]) == 0
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in ("optimizer", "sppso", "apf", "hmcpso"))
+    kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()}
+    assert main(["benchmark", *words, "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [(row["optimizer"], row["body"], row["evaluations"]) for row in rows] == [
+        ("sppso", "balan31", 1000), ("apf", "humaneva34", 3600), ("hmcpso", "humaneva34", 3600)
+    ]  # fmt: skip
+    assert kept == {path.name: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()}
+    assert len(kept) == 3
+
+
+def test_a_papers_table_with_its_figures_beside_ours(walk, tmp_path: Path, capsys) -> None:
+    words = [
+        "tables", walk, "--table", "sppso_2,sppso_ablation", "--seeds", "1", "--frames", "1",
+        "--fps", "60", "--jobs", "1", "--truth-score", "-o", str(tmp_path),
+    ]  # fmt: skip
+    assert main(["benchmark", *words]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "SPPSO, Table 2" in shown and "theirs:" in shown and "Lee walk" in shown
+    assert "38, max 86.4" in shown and "ACIVS 2012" in shown and "f truth-result" in shown
+    assert "sppso_stages=global" in shown and "partition=hard" in shown
+    table = json.loads((tmp_path / "table.json").read_text())
+    # The published row is in both tables and runs once.
+    assert [row["evaluations"] for row in table["rows"]] == [1000, 2000, 4000] + [1000] * 4
+    assert len(list((tmp_path / "runs").iterdir())) == 7
+    assert [paper["table"] for paper in table["papers"]] == ["sppso_2", "sppso_ablation"]
+    assert table["configurations"][5]["partition"] == "hard"
+    with (tmp_path / "table.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert rows[5]["variant"] == "partition=hard" and float(rows[5]["ms_per_evaluation"]) > 0
+
+
+def test_pictures_lie_beside_the_table(walk, tmp_path: Path, capsys) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed (extra [plots])")
+    words = [
+        "tables", walk, "--preset", "paper", "--vary", "partition=soft,hard", "--vary",
+        "prediction=0.5", "--seeds", "1", "--frames", "4", "--jobs", "1", "-o", str(tmp_path),
+    ]  # fmt: skip
+    assert main(["benchmark", *words]) == 0
+    out = capsys.readouterr().out
+    assert "variant" in out and "partition=hard" in out and "prediction" not in out
+    found = sorted(path.name for path in (tmp_path / "plots").iterdir())
+    assert found == ["walk_20fps.png", "walk_60fps.png"]
+
+
+def test_without_matplotlib_the_table_is_complete(walk, tmp_path, capsys, monkeypatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    words = ["tables", walk, "--preset", "paper", "--seeds", "1", "--frames", "1", "--fps", "60"]
+    assert main(["benchmark", *words, "--jobs", "1", "-o", str(tmp_path)]) == 0
+    assert "warning: plots: matplotlib is not installed" in capsys.readouterr().err
+    assert (tmp_path / "table.json").is_file() and not (tmp_path / "plots").exists()
+
+
+def test_a_cluster_without_dask_says_what_is_missing(walk, capsys, monkeypatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    words = ["tables", walk, "--seeds", "1", "--frames", "1", "--scheduler", "tcp://here:8786"]
+    assert main(["benchmark", *words]) == 1
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "scheduler tcp://here:8786" in last and "[cluster]" in last
+
+
 def test_speed_of_a_recording(walk, capsys) -> None:
     words = ["speed", walk, "--threads", "1", "--frames", "1", "--repeats", "1"]
     assert main(["benchmark", *words, "--json"]) == 0
@@ -97,12 +169,14 @@ def test_the_table_of_speed(capsys) -> None:
         },
         "reference_ratio": 30.0, "person31_ratio": 1.5, "limb_ratio": 0.33,
         "limb_soft_ratio": 0.66, "swarm_ms": {"sppso_1000": spread},
+        "swarm_ratio": {"hmcpso_3600": 3.21},
         "refine_ms": 0.345, "refine_setup_ms": 4.0, "thousand_evaluations_ms": spread,
         "frame_ms": dict.fromkeys(("background", "edges", "fitness", "total"), spread),
         "fit_vs_1000_evaluations": 0.5,
     }  # fmt: skip
     Console(width=100).print(speed_table(figures))
     out = capsys.readouterr().out
+    assert "hmcpso_3600 / sppso_1000" in out and "3.21" in out
     assert "198.0" in out and "0.345" in out and "1.25" in out
 
 
@@ -115,6 +189,12 @@ def test_the_table_of_speed(capsys) -> None:
         (["tables", "x", "--fps", "60,,20"], "no list with commas", 2),
         (["tables", "x", "--fps", "0"], "expected a number above 0", 2),
         (["tables", "x", "--start-noise", "nan"], "expected a number from 0", 2),
+        (["tables", "x", "--vary", "partition"], "expected KEY=VALUE,VALUE...", 2),
+        (["tables", "x", "--vary", "a={"], "a value cannot be read", 2),
+        (["tables", "x", "--vary", "partitions=soft"], "did you mean 'partition'?", 1),
+        (["tables", "x", "--vary", "seed=1", "--vary", "seed=2"], "seed stands twice", 1),
+        (["tables", "x", "--table", "hmcpso_1"], "table 'hmcpso_1' is unknown", 1),
+        (["tables", "x", "--table", "all", "--optimizer", "apf"], "does not go with", 1),
         (["tables", "nowhere"], "nowhere: no such file or folder", 1),
         (["tables", "nowhere", "--preset", "best"], "preset is 'best'", 1),
         (["tables", "nowhere", "--refinement", "magic"], "refinement: got 'magic'", 1),

@@ -80,7 +80,8 @@ def test_every_figure_is_there(scene) -> None:
     )
     parts = {"full", "limb", "limb_soft", "person31", "reference"}
     assert set(figures["view_evaluation_us"]) == parts
-    assert set(figures["swarm_ms"]) == {"sppso_1000"}
+    assert list(figures["swarm_ms"]) == ["sppso_1000", "hmcpso_3600", "hmcpso_3600_hard"]
+    assert all(ratio > 0.0 for ratio in figures["swarm_ratio"].values())
     assert set(figures["frame_ms"]) == {"background", "edges", "fitness", "total"}
     for spread in (*figures["swarm_ms"].values(), *figures["frame_ms"].values()):
         assert spread["p95"] >= spread["median"] > 0.0
@@ -94,7 +95,8 @@ def test_every_figure_is_there(scene) -> None:
     timed = ("view_evaluation_us", "swarm_ms", "frame_ms", "thousand_evaluations_ms")
     assert all(np.isfinite(numbers({key: figures[key] for key in timed})))
     assert figures["fit_vs_1000_evaluations"] > 0.0 and np.isfinite(figures["refine_ms"])
-    assert set(reports) == {"view-evaluations", "swarm", "refinement", "frames"}
+    swarms = {f"swarm {name}" for name in figures["swarm_ms"]}
+    assert set(reports) == {"view-evaluations", *swarms, "refinement", "frames"}
 
 
 def test_a_recording_as_the_scene(tmp_path: Path, make_recording) -> None:

@@ -137,7 +137,8 @@ def figures(**changed) -> dict:
         "mean_mm": 10.0, "max_mm": 20.0, "worst_joint_mm": 50.0, "limbs_mm": 12.0,
         "last_joint_mm": 30.0, "lost_run": 0, "lost_frames": 0, "evaluations": 200.0,
         "refinements": 8.0, "frames_per_s": 30.0, "frames": 7, "truth_difference": None,
-        "joints": {"Head": 5.0, "Nose": None}, **changed,
+        "joints": {"Head": 5.0, "Nose": None}, "stamps_s": [0.0, 0.5], "frame_mm": [4.0, 16.0],
+        **changed,
     }  # fmt: skip
 
 
@@ -156,6 +157,16 @@ def test_a_row_by_hand() -> None:
     assert row["joints"] == {"Head": 6.0} and row["truth_difference"] == 0.5
     assert summarise([figures(limbs_mm=None)])["limbs_mm"] is None
     assert summarise([figures()])["sd_mm"] is None
+
+
+def test_time_per_evaluation_is_that_of_a_swarm_alone() -> None:
+    assert summarise([figures(refinements=0.0)])["ms_per_evaluation"] == pytest.approx(1 / 6)
+    assert summarise([figures()])["ms_per_evaluation"] is None
+
+
+def test_error_over_time_is_that_of_the_frames_all_seeds_have() -> None:
+    row = summarise([figures(), figures(stamps_s=[0.5, 1.0], frame_mm=[20.0, 99.0])])
+    assert row["curve"] == {"s": [0.5], "mean_mm": [18.0]}
 
 
 def test_an_interrupted_table_resumes(walk, tmp_path, monkeypatch) -> None:
@@ -189,7 +200,7 @@ def test_processes_do_not_change_the_figures(walk) -> None:
     plan = Plan(configs=(SWARM,), rates=(60.0,), seeds=2, frames=2)
     alone, together = (make_table([walk], replace(plan, jobs=jobs)) for jobs in (1, 2))
     for row in (*alone, *together):
-        row.pop("frames_per_s")
+        row.pop("frames_per_s"), row.pop("ms_per_evaluation")
     assert alone == together
 
 

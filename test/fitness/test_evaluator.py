@@ -9,7 +9,7 @@ import pytest
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.errors import ConfigError, ImageError
-from markerless_tracker.fitness import EDGE_RULES, EDGE_TERMS, Fitness
+from markerless_tracker.fitness import COSTS, EDGE_RULES, EDGE_TERMS, Fitness, kernels
 from markerless_tracker.geometry import rotation_from_rodrigues, transform
 from markerless_tracker.records import Observation, Stage
 
@@ -312,3 +312,45 @@ def test_unknown_rules_and_terms_are_refused(body, rig):
         Fitness(body, rig.cameras, edge_rule="all")
     with pytest.raises(ConfigError, match="edge_term is 'median', expected one of ssd, mean"):
         Fitness(body, rig.cameras, edge_term="median")
+
+
+def test_h_mcpsos_costs_by_counted_pixels(body, rig, pose, observations):
+    """B/(B+Y) one-sided, ½ B/(B+Y) + ½ R/(R+Y) both ways, beside mean (1 - M)²; view by view."""
+    every = np.ones(len(body.cone_names), dtype=bool)
+    costs = {}
+    for cost in COSTS:
+        fitness = Fitness(body, rig.cameras, cost=cost, edge_term="mean")
+        views = fitness.lay_out(observations)
+        costs[cost] = fitness.prepare(views, stage(body, pose, edge_weight=0.5))(pose[None])[0]
+    plain = Fitness(body, rig.cameras)
+    counts = plain.count(views, pose[None], every, every)[0]
+    projected, overlap = counts[:, kernels.PROJECTED], counts[:, kernels.OVERLAP]
+    seen = np.array(views.arrays.observed, dtype=float)
+    edges = counts[:, kernels.EDGE_SUM] / counts[:, kernels.EDGE_COUNT] / 255.0**2
+    one_sided = np.mean(1 - overlap / projected + 0.5 * edges)
+    both = np.mean(1 - 0.5 * overlap / projected - 0.5 * overlap / seen + 0.5 * edges)
+    assert costs["one_sided"] == pytest.approx(one_sided, abs=1e-12)
+    assert costs["bidirectional"] == pytest.approx(both, abs=1e-12)
+    # SPPSO's cost with the squared edge term is the bidirectional one; with another it is not.
+    squared = plain.prepare(views, stage(body, pose, edge_weight=0.5))(pose[None])[0]
+    assert squared == pytest.approx(both, abs=1e-12)
+    assert abs(costs["overlap"] - both) > 1e-3
+
+
+def test_one_sided_a_body_within_the_observed_costs_nothing_outside_everything(
+    twin, make_observation, body, rig, pose
+):
+    fitness = Fitness(body, rig.cameras, cost="one_sided")
+    full = {c.name: make_observation(c, np.ones(c.size_px[::-1], dtype=bool)) for c in rig}
+    away = pose.copy()
+    away[body.index("pelvis_tx")] = FAR_M
+    silhouettes = stage(body, pose, edge_weight=0.0)
+    inside = fitness.prepare(fitness.lay_out(full), silhouettes)
+    assert inside(np.stack([pose, away])).tolist() == [0.0, 1.0]
+    nothing = fitness.prepare(fitness.lay_out(black(rig, make_observation)), silhouettes)
+    assert nothing(np.stack([pose, away])).tolist() == [1.0, 0.0]
+
+
+def test_an_unknown_cost_is_refused(body, rig):
+    with pytest.raises(ConfigError, match="cost is 'none', expected one of overlap, bidirectional"):
+        Fitness(body, rig.cameras, cost="none")

@@ -10,11 +10,13 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import Sppso
 from markerless_tracker.records import CONTOUR, Observation
 from markerless_tracker.synthesis import ring_rig
 from markerless_tracker.tracking import TrackerConfig, search
+from markerless_tracker.tracking.partitions.sppso import sppso_stages
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.stages import contour_stage, frame_stages, sppso_stages
+from markerless_tracker.tracking.stages import contour_stage, frame_stages
 
 BODY = load_body("person31", 1.75)
 RIG = ring_rig(4, (320, 240))
@@ -77,7 +79,7 @@ def person() -> Person:
 def found(monkeypatch) -> list[tuple[str, FloatArray]]:
     """Every stage's own result, in order: poses of refinements, points of swarms."""
     results: list[tuple[str, FloatArray]] = []
-    plain_refine, plain_run = search.refine, search.Sppso.run
+    plain_refine, plain_run = search.refine, Sppso.run
 
     def refine(*args, **kwargs):
         results.append((CONTOUR, plain_refine(*args, **kwargs)))
@@ -89,7 +91,7 @@ def found(monkeypatch) -> list[tuple[str, FloatArray]]:
         return best
 
     monkeypatch.setattr(search, "refine", refine)
-    monkeypatch.setattr(search.Sppso, "run", run)
+    monkeypatch.setattr(Sppso, "run", run)
     return results
 
 
@@ -186,13 +188,13 @@ def test_a_refinement_that_hits_is_not_spoilt_by_the_swarm(person, monkeypatch) 
 
 def test_each_stage_starts_from_the_estimate_so_far(person, monkeypatch) -> None:
     config, centres = settings(), []
-    plain = search.Sppso.__init__
+    plain = Sppso.__init__
 
     def watched(self, problem, **kwargs):
         centres.append(problem.centre.copy())
         plain(self, problem, **kwargs)
 
-    monkeypatch.setattr(search.Sppso, "__init__", watched)
+    monkeypatch.setattr(Sppso, "__init__", watched)
     monkeypatch.setattr(search, "refine", lambda *_, **__: person.pose.copy())
     searched(person, config)
     np.testing.assert_array_equal(centres[0], person.pose[person.body.root])

@@ -9,16 +9,10 @@ from markerless_tracker.body import load_body
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.records import CONTOUR
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.stages import (
-    LIMB_SWARM,
-    SPPSO_STAGES,
-    STAGES,
-    SWARM_SHARE,
-    frame_stages,
-    scaled_particles,
-    sppso_stages,
-    translations,
-)
+from markerless_tracker.tracking.partitions import STAGES
+from markerless_tracker.tracking.partitions.budget import SWARM_SHARE, scaled_particles
+from markerless_tracker.tracking.partitions.sppso import SPPSO_STAGES, sppso_stages, translations
+from markerless_tracker.tracking.stages import LIMB_SWARM, frame_stages
 
 
 @pytest.fixture(scope="module")
@@ -35,8 +29,8 @@ def swarm(settings, **changes) -> TrackerConfig:
     [(1000, (10, 20)), (2000, (20, 40)), (4000, (40, 80)), (100, (1, 2)), (1100, (11, 22))],
 )
 def test_budgets_scale_the_particles_and_keep_the_iterations(evaluations, particles):
-    assert scaled_particles(SPPSO_STAGES, evaluations, "sppso") == particles
-    spent = sum(p * i for p, (_, i) in zip(particles, SPPSO_STAGES, strict=True))
+    assert scaled_particles(SPPSO_STAGES["two"], evaluations, "sppso") == particles
+    spent = sum(p * i for p, (_, i) in zip(particles, SPPSO_STAGES["two"], strict=True))
     assert spent == evaluations
 
 
@@ -45,7 +39,7 @@ def test_budgets_scale_the_particles_and_keep_the_iterations(evaluations, partic
 )
 def test_a_budget_that_cannot_be_met_names_the_nearest_two(evaluations, near):
     with pytest.raises(ConfigError) as caught:
-        scaled_particles(SPPSO_STAGES, evaluations, "sppso")
+        scaled_particles(SPPSO_STAGES["two"], evaluations, "sppso")
     assert str(caught.value) == (
         f"evaluations is {evaluations}, which sppso cannot spend exactly: nearest are {near}"
     )
@@ -53,10 +47,10 @@ def test_a_budget_that_cannot_be_met_names_the_nearest_two(evaluations, near):
 
 def test_a_share_of_a_budget_is_refused_in_terms_of_the_budget():
     share = Fraction(1, 5)
-    assert scaled_particles(SPPSO_STAGES, 1000, "sppso", share=share) == (2, 4)
-    assert scaled_particles(SPPSO_STAGES, 5000, "sppso", share=share) == (10, 20)
+    assert scaled_particles(SPPSO_STAGES["two"], 1000, "sppso", share=share) == (2, 4)
+    assert scaled_particles(SPPSO_STAGES["two"], 5000, "sppso", share=share) == (10, 20)
     with pytest.raises(ConfigError, match="evaluations is 1100, .*: nearest are 1000 or 1500"):
-        scaled_particles(SPPSO_STAGES, 1100, "sppso", share=share)
+        scaled_particles(SPPSO_STAGES["two"], 1100, "sppso", share=share)
 
 
 def test_published_stages_of_other_algorithms_scale_as_well():

@@ -364,3 +364,15 @@ def test_warming_up_meets_the_most_and_the_least_work(
     monkeypatch.setattr(contours, "worth_waking", lambda work_s, threads: asked.add(work_s))
     make_tracker(refined_settings).warm_up()
     assert min(asked) * len(frames[0].images) == pytest.approx(max(asked))
+
+
+@pytest.mark.parametrize(
+    ("optimizer", "evaluations"),
+    [("sppso", 1000), ("apf", 1000), ("hmcpso", 3600), ("hmcpso", 7200), ("hmcpso", 10800)],
+)
+def test_the_preset_paper_spends_the_papers_counts_to_the_unit(
+    make_tracker, frames, optimizer, evaluations
+):
+    settings = {"preset": "paper", "optimizer": optimizer, "evaluations": evaluations, "threads": 1}
+    result = make_tracker(settings).step(frames[0].observations, frames[0].stamp_ns)
+    assert (result.evaluations, result.refinements) == (evaluations, 0)

@@ -98,7 +98,7 @@ def speed_table(figures: Mapping[str, Any]) -> Table:
     )
     frame = figures["frame_ms"]
     for label, spread in (
-        ("fitness and swarm, balan31, 1000 evaluations", figures["swarm_ms"]["sppso_1000"]),
+        *((f"swarm alone, balan31: {name}", ms) for name, ms in figures["swarm_ms"].items()),
         ("frame: background", frame["background"]),
         ("frame: edges", frame["edges"]),
         ("frame: evidence to pose, tuned", frame["fitness"]),
@@ -106,6 +106,8 @@ def speed_table(figures: Mapping[str, Any]) -> Table:
         ("1000 evaluations of the tuned body", figures["thousand_evaluations_ms"]),
     ):
         table.add_row(label, "ms", f"{spread['median']:.2f}", f"{spread['p95']:.2f}")
+    for name, ratio in figures["swarm_ratio"].items():
+        table.add_row(f"{name} / sppso_1000", "ratio", f"{ratio:.2f}", "")
     table.add_row("contour refinement, one iteration", "ms", f"{figures['refine_ms']:.3f}", "")
     table.add_row("contours of a frame", "ms", f"{figures['refine_setup_ms']:.2f}", "")
     ratio = figures["fit_vs_1000_evaluations"]

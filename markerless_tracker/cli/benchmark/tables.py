@@ -1,9 +1,9 @@
 """`benchmark tables`: error in mm on recordings whose truth is known."""
 
 import argparse
-import itertools
 import json
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,25 +17,42 @@ from markerless_tracker.cli.benchmark.arguments import (
     positive,
     progress_bars,
 )
-from markerless_tracker.cli.track import read_config
+from markerless_tracker.cli.benchmark.choices import Group, every_config, groups, varied
+from markerless_tracker.cli.benchmark.layout import LEGEND, full_table, legend_of, paper_table
+from markerless_tracker.errors import ConfigError
 from markerless_tracker.evaluation import tables
 from markerless_tracker.evaluation.machine import machine, usable_cores
+from markerless_tracker.evaluation.papers import PaperRow, choose, read_papers
+from markerless_tracker.evaluation.plots import write_plot
 from markerless_tracker.evaluation.result import versions
-from markerless_tracker.evaluation.runs import LOST_LIMB_MM
-from markerless_tracker.tracking import PRESETS, TrackerConfig
+from markerless_tracker.evaluation.variants import variants
+from markerless_tracker.tracking import TrackerConfig
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
     parser = kinds.add_parser(
         "tables",
-        help="error in mm: presets x bodies x refinements x rates x seeds",
+        help="error in mm: presets x optimizers x bodies x refinements x rates x seeds",
         description="Error on recordings whose truth is known, mean and sd over seeds.",
-        epilog="example: markerless_tracker benchmark tables RECORDING --truth-score -o out/tables",
+        epilog="examples: markerless_tracker benchmark tables RECORDING --truth-score -o out/all; "
+        "markerless_tracker benchmark tables RECORDING --table all -o out/papers",
     )
     parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
     parser.add_argument(
-        "--preset", type=list_of(str), metavar="LIST", help="default: tuned,paper (or --config's)"
+        "--table", type=list_of(str), default=(), metavar="LIST",
+        help="tables of the papers, with their figures beside ours: all, or names of "
+        "config/papers.yaml: sppso_2, sppso_apf, sppso_ablation, hmcpso_2 .. hmcpso_6, "
+        "hmcpso_spread",
+    )  # fmt: skip
+    parser.add_argument(
+        "--preset",
+        type=list_of(str),
+        metavar="LIST",
+        help="default: tuned,paper (with --table: paper; or --config's)",
+    )
+    parser.add_argument(
+        "--optimizer", type=list_of(str), metavar="LIST", help="default: sppso (or --config's)"
     )
     parser.add_argument("--body", type=list_of(str), metavar="LIST", help="default: the preset's")
     parser.add_argument(
@@ -49,7 +66,16 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         help="rates; default: 60,20 as far as the recording has them",
     )  # fmt: skip
     parser.add_argument("--seeds", type=count, default=6, metavar="N", help="seeds 0..N-1 (6)")
-    parser.add_argument("--evaluations", type=count, metavar="N", help="evaluations per frame")
+    parser.add_argument(
+        "--evaluations",
+        type=list_of(count),
+        metavar="LIST",
+        help="evaluations per frame (default: each optimizer's own)",
+    )
+    parser.add_argument(
+        "--vary", type=varied, action="append", default=[], metavar="KEY=LIST",
+        help="rows for several values of any setting; may be given again",
+    )  # fmt: skip
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
     parser.add_argument(
         "--scale", type=float, default=1.0, metavar="S", help="factor for the images"
@@ -69,16 +95,24 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         help="runs side by side (default: one per core)",
     )  # fmt: skip
     parser.add_argument(
+        "--scheduler", metavar="ADDRESS",
+        help="run on the workers of a Dask cluster, such as tcp://host:8786 (extra [cluster]); the "
+        "recordings must lie at the same paths there",
+    )  # fmt: skip
+    parser.add_argument(
         "-o", dest="out", type=Path, metavar="DIR",
-        help="write table.csv, table.json and a file per run, which is not repeated next time",
+        help="write table.csv, table.json, plots of the error over time (extra [plots]) and a file "
+        "per run, which is not repeated next time",
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Make the tables, print and write them; returns the exit status."""
+    chosen = groups(args, choose(read_papers(), args.table) if args.table else ())
+    configs = every_config(chosen)
     plan = tables.Plan(
-        configs=_configs(args),
+        configs=configs,
         rates=args.fps,
         seeds=args.seeds,
         scale=args.scale,
@@ -86,6 +120,7 @@ def run(args: argparse.Namespace) -> int:
         truth_score=args.truth_score,
         frames=args.frames,
         jobs=args.jobs,
+        scheduler=args.scheduler,
     )
     if args.out is not None:
         args.out.mkdir(parents=True, exist_ok=True)
@@ -95,98 +130,101 @@ def run(args: argparse.Namespace) -> int:
         "machine": machine(),
         "versions": versions(),
         "jobs": args.jobs,
+        "scheduler": args.scheduler,
         "frames_limit": args.frames,
+        "configurations": [config.as_mapping() for config in configs],
+        "papers": [_published(group) for group in chosen if group.table is not None],
         "rows": rows,
     }
+    parts = list(_pieces(args, chosen, configs, rows))
     if args.out is not None:
         tables.write_table(args.out, table)
+        _plot(args.out / "plots", parts)
     if args.json:
         json.dump(table, sys.stdout, indent=2, allow_nan=False)
         sys.stdout.write("\n")
         return 0
     console = Console(width=None if sys.stdout.isatty() else 200)
-    for recording in dict.fromkeys((row["recording"], row["scale"]) for row in rows):
-        own = [row for row in rows if (row["recording"], row["scale"]) == recording]
-        console.print(_rendered(*recording, own, args))
-    console.print(
-        "mm; mean and limbs: mean ± sd over the seeds; largest frame mean, worst joint, worst "
-        "joint of the last frame and frames in a row with a joint more than "
-        f"{LOST_LIMB_MM:g} mm off: the worst seed's. Evaluations of the swarm and "
-        "iterations of refinement are per frame; frames/s: one thread, evidence ready.",
-        highlight=False,
-    )
+    for title, part in parts:
+        console.print(part.rendered(title, truth_score=args.truth_score))
+    console.print(LEGEND, highlight=False)
     return 0
 
 
-def _configs(args: argparse.Namespace) -> tuple[TrackerConfig, ...]:
-    """A configuration per preset, body and refinement; what is not named keeps its value."""
-    presets: tuple[str | None, ...] = args.preset or (
-        tuple(PRESETS) if args.config is None else (None,)
-    )
-    choices = itertools.product(presets, args.body or (None,), args.refinement or (None,))
-    return tuple(
-        read_config(
-            args.config,
-            {
-                key: value
-                for key, value in (
-                    ("preset", preset),
-                    ("body", body),
-                    ("refinement", refinement),
-                    ("evaluations", args.evaluations),
-                )
-                if value is not None
-            },
-        )
-        for preset, body, refinement in choices
-    )
+def _plot(folder: Path, parts: Sequence[tuple[str, "_Part"]]) -> None:
+    """Pictures, if they can be drawn: tables are complete without."""
+    try:
+        for title, part in parts:
+            part.plot(folder, title)
+    except ConfigError as error:
+        print(f"warning: {error}", file=sys.stderr)
 
 
-def _rendered(
-    name: str, scale: float, rows: list[dict[str, Any]], args: argparse.Namespace
-) -> Table:
-    size = "" if scale == 1.0 else f" at scale {scale:g}"
-    noise = f", start disturbed by {args.start_noise:g} mm" if args.start_noise else ""
-    seeds = f"{args.seeds} seed{'s' if args.seeds > 1 else ''}"
-    table = Table(title=f"{name}{size}, {seeds}{noise}")
-    for heading in ("preset", "body", "refinement"):
-        table.add_column(heading)
-    headings = [
-        "fps", "frames", "eval.", "iter.", "mean", "max frame", "worst joint", "limbs",
-        "last frame", f"> {LOST_LIMB_MM:g} mm", "frames/s",
-    ]  # fmt: skip
-    if args.truth_score:
-        headings.append("f truth-result")
-    for heading in headings:
-        table.add_column(heading, justify="right")
-    for row in rows:
-        cells = [
-            row["preset"],
-            Path(row["body"]).stem,
-            row["refinement"],
-            f"{row['fps']:g}",
-            str(row["frames"]),
-            f"{row['evaluations']:.0f}",
-            f"{row['refinements']:.1f}",
-            _spread(row["mean_mm"], row["sd_mm"]),
-            f"{row['max_mm']:.1f}",
-            f"{row['worst_joint_mm']:.0f}",
-            _spread(row["limbs_mm"], row["limbs_sd_mm"]),
-            f"{row['last_joint_mm']:.0f}",
-            str(row["lost_run"]),
-            f"{row['frames_per_s']:.1f}",
-        ]
-        if args.truth_score:
-            difference = row["truth_difference"]
-            cells.append("-" if difference is None else f"{difference:+.4f}")
-        table.add_row(*cells)
-    return table
+def _published(group: Group) -> dict[str, Any]:
+    """A paper's table as it is written beside our rows."""
+    table = group.table
+    assert table is not None
+    return {
+        "table": table.name,
+        "title": table.title,
+        "source": table.source,
+        "note": table.note,
+        "fps": list(table.rates),
+        "rows": [{"settings": row.settings, "theirs": row.theirs} for row in table.rows],
+    }
 
 
-def _spread(mean: float | None, sd: float | None) -> str:
-    if mean is None:
-        return "-"
-    return f"{mean:.1f}" if sd is None else f"{mean:.1f} ± {sd:.1f}"
+class _Part:
+    """A group's rows on one recording."""
+
+    def __init__(self, group: Group, rows: list[tuple[PaperRow | None, dict[str, Any]]]) -> None:
+        self.group = group
+        self.rows = rows
+
+    def rendered(self, title: str, *, truth_score: bool) -> Table:
+        if self.group.table is None:
+            return full_table(title, [row for _, row in self.rows], truth_score=truth_score)
+        return paper_table(title, self.group.table, self.rows, truth_score=truth_score)
+
+    def plot(self, folder: Path, title: str) -> None:
+        """A picture per rate into a folder."""
+        table = self.group.table
+        for rate in dict.fromkeys(row["fps"] for _, row in self.rows):
+            own = [row for _, row in self.rows if row["fps"] == rate]
+            words = [own[0]["recording"], table.name if table else "", f"{rate:g}fps"]
+            write_plot(
+                folder / f"{'_'.join(filter(None, words))}.png",
+                f"{table.title if table else title}\n{own[0]['recording']}, {rate:g} frames/s",
+                [(legend_of(row), row) for row in own],
+            )
+
+
+def _pieces(
+    args: argparse.Namespace,
+    chosen: Sequence[Group],
+    configs: Sequence[TrackerConfig],
+    rows: Sequence[dict[str, Any]],
+) -> Iterator[tuple[str, _Part]]:
+    """Title and rows of every group on every recording."""
+    places = {config: place for place, config in enumerate(configs)}
+    for name, source, scale in dict.fromkeys(
+        (row["recording"], row["source"], row["scale"]) for row in rows
+    ):
+        found: dict[int, list[dict[str, Any]]] = {}
+        for row in rows:
+            if row["source"] == source:
+                found.setdefault(row["configuration"], []).append(row)
+        size = "" if scale == 1.0 else f" at scale {scale:g}"
+        noise = f", start disturbed by {args.start_noise:g} mm" if args.start_noise else ""
+        seeds = f"{args.seeds} seed{'s' if args.seeds > 1 else ''}"
+        for group in chosen:
+            told = variants(group.configs)
+            own = [
+                (paper, {**row, "variant": words})
+                for (paper, config), words in zip(group.rows, told, strict=True)
+                for row in found[places[config]]
+            ]
+            yield f"{name}{size}, {seeds}{noise}", _Part(group, own)
 
 
 class _Bars(tables.Progress):

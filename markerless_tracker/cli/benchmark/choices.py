@@ -1,0 +1,103 @@
+"""`benchmark tables`: the configurations that lists of choices, or the papers' tables, name."""
+
+import argparse
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from markerless_tracker.cli.track import read_config
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.evaluation.papers import PaperRow, PaperTable
+from markerless_tracker.tracking import PRESETS, TrackerConfig
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rows that are printed together.
+
+    Attributes:
+        table: the paper's table they remake; None = what the lists of choices make.
+        rows: the paper's row, if any, and the configuration.
+    """
+
+    table: PaperTable | None
+    rows: tuple[tuple[PaperRow | None, TrackerConfig], ...]
+
+    @property
+    def configs(self) -> tuple[TrackerConfig, ...]:
+        """The configurations, in order."""
+        return tuple(config for _, config in self.rows)
+
+
+def varied(text: str) -> tuple[str, tuple[Any, ...]]:
+    """Parser of KEY=V,V...; values as in YAML."""
+    key, equals, values = text.partition("=")
+    words = [word.strip() for word in values.split(",")]
+    if not (key.strip() and equals and all(words)):
+        raise argparse.ArgumentTypeError(f"{text!r}, expected KEY=VALUE,VALUE...")
+    try:
+        return key.strip(), tuple(yaml.safe_load(word) for word in words)
+    except yaml.YAMLError as error:
+        raise argparse.ArgumentTypeError(f"{text!r}: a value cannot be read") from error
+
+
+def groups(args: argparse.Namespace, papers: Sequence[PaperTable]) -> tuple[Group, ...]:
+    """The papers' tables that were asked for, else one group of all choices' combinations.
+
+    What the command line names is put in place of a table's own settings.
+
+    Raises:
+        ConfigError: an unknown setting or an impossible value.
+    """
+    vary: dict[str, tuple[Any, ...]] = {}
+    for key, values in args.vary:
+        if key in vary:
+            raise ConfigError(f"--vary: {key} stands twice")
+        vary[key] = values
+    named: dict[str, Sequence[Any] | None] = {
+        "preset": args.preset,
+        "optimizer": args.optimizer,
+        "body": args.body,
+        "refinement": args.refinement,
+        "evaluations": args.evaluations,
+        **vary,
+    }
+    choices = {key: values for key, values in named.items() if values}
+    if not papers:
+        if args.config is None:
+            choices = {"preset": tuple(PRESETS), **choices}
+        return (Group(None, tuple((None, c) for c in _configs(args.config, {}, choices))),)
+    if "optimizer" in choices:
+        raise ConfigError("--table names the optimizers itself, it does not go with --optimizer")
+    if args.config is None:
+        choices = {"preset": ("paper",), **choices}
+    return tuple(
+        Group(
+            table,
+            tuple(
+                (row, config)
+                for row in table.rows
+                for config in _configs(args.config, row.settings, choices)
+            ),
+        )
+        for table in papers
+    )
+
+
+def every_config(found: Iterable[Group]) -> tuple[TrackerConfig, ...]:
+    """The configurations of all groups, each once."""
+    return tuple(dict.fromkeys(config for group in found for config in group.configs))
+
+
+def _configs(
+    file: Path | None, base: Mapping[str, Any], choices: Mapping[str, Sequence[Any]]
+) -> list[TrackerConfig]:
+    found = [
+        read_config(file, {**base, **dict(zip(choices, values, strict=True))})
+        for values in itertools.product(*choices.values())
+    ]
+    return list(dict.fromkeys(found))

@@ -1,0 +1,22 @@
+"""The algorithms that search one stage, by name."""
+
+from collections.abc import Callable, Mapping
+
+from markerless_tracker.optim.apf import Apf
+from markerless_tracker.optim.base import Optimizer
+from markerless_tracker.optim.mcpso import Mcpso
+from markerless_tracker.optim.pf import Pf
+from markerless_tracker.optim.pso import Pso
+from markerless_tracker.optim.sppso import Sppso
+
+ALGORITHMS: Mapping[str, Callable[..., Optimizer]] = {
+    "sppso": Sppso,
+    "pso": Pso,
+    "mcpso": Mcpso,
+    "apf": Apf,
+    "pf": Pf,
+}
+"""What `Stage.algorithm` may name; `Stage.options` are the class' keyword arguments.
+
+HPSO, H-MCPSO and GLPSO are stages of these: see `tracking.partitions`.
+"""

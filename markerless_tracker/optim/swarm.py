@@ -1,0 +1,67 @@
+"""Particles with velocities and own bests, moved under constraints: the state of a swarm."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim.problem import Problem
+from markerless_tracker.optim.sampling import ATTEMPTS
+
+Rows = NDArray[np.int64]
+Step = Callable[[Rows], tuple[FloatArray, FloatArray]]
+"""New positions and velocities of some particles, with fresh draws at each call."""
+
+
+def confine(x: FloatArray, v: FloatArray, bounds: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Put positions (n, d) that left the bounds (2, d) on them, where they stop (v = 0)."""
+    inside = np.clip(x, bounds[0], bounds[1])
+    return inside, np.where(inside == x, v, 0.0)
+
+
+class Swarm:
+    """Positions, velocities and own bests of n particles.
+
+    Attributes:
+        x, v, best: (n, d) positions, velocities, best positions so far.
+        best_costs: (n,) their costs; infinite until one is known.
+        barred: (n,) particles whose last move broke a constraint.
+    """
+
+    def __init__(self, x: FloatArray, v: FloatArray) -> None:
+        self.x, self.v, self.best = x.copy(), v.copy(), x.copy()
+        self.best_costs = np.full(len(x), np.inf)
+        self.barred = np.zeros(len(x), dtype=np.bool_)
+
+    def move(self, problem: Problem, step: Step) -> None:
+        """Move all particles, confined to the bounds.
+
+        A move that breaks a constraint is tried again from where the particle was, with fresh
+        draws, at most `ATTEMPTS` times; after the last it moves all the same and is barred.
+        """
+        x, v = self.x.copy(), self.v.copy()
+        todo = np.arange(len(x))
+        for _ in range(ATTEMPTS):
+            x[todo], v[todo] = confine(*step(todo), problem.bounds)
+            todo = todo[~problem.feasible(x[todo])]
+            if todo.size == 0:
+                break
+        self.x, self.v = x, v
+        self.barred = np.zeros(len(x), dtype=np.bool_)
+        self.barred[todo] = True
+
+    @property
+    def bars(self) -> FloatArray:
+        """(n,) own best costs; one that broke a constraint cannot win at all."""
+        return np.where(self.barred, -np.inf, self.best_costs)
+
+    def learn(self, costs: FloatArray) -> None:
+        """Update the own bests by the costs (n,) of the positions."""
+        better = costs < self.best_costs
+        self.best[better] = self.x[better]
+        self.best_costs[better] = costs[better]
+
+    def leader(self, start: int = 0, stop: int | None = None) -> int:
+        """Index of the particle with the best own best, of those from start to stop."""
+        return start + int(np.argmin(self.best_costs[start:stop]))

@@ -1,0 +1,42 @@
+"""Particle filters over the whole body: APF in layers, PF in one.
+
+APF: 600 particles x 6 layers, 3600 evaluations, in Saini et al. (2015); 200 x 5, 1000 evaluations,
+as HumanEva's baseline (Sigal, Balan and Black, 2010) and SPPSO's comparison have it [R].
+"""
+
+from fractions import Fraction
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Stage
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.partitions.budget import SWARM_SHARE, scaled_particles
+from markerless_tracker.tracking.partitions.stage import swarm_stage
+
+
+def filter_stages(
+    body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
+) -> tuple[Stage, ...]:
+    """One stage; beside a refinement with `SWARM_SHARE` of the particles.
+
+    Raises:
+        ConfigError: the layers cannot share the budget out evenly.
+    """
+    layers = 1 if config.optimizer == "pf" else layers_for(config)
+    share = Fraction(1) if config.refinement == "none" else SWARM_SHARE
+    (particles,) = scaled_particles(
+        ((1, layers),), config.evaluations, config.optimizer, share=share
+    )
+    every = np.arange(body.size)
+    return (
+        swarm_stage(
+            body, config, "body", config.optimizer, every, centre, sigma, (particles, layers)
+        ),
+    )
+
+
+def layers_for(config: TrackerConfig) -> int:
+    """Layers of APF: those asked for, else six where the budget is a multiple of six, else five."""
+    return config.layers or (6 if config.evaluations % 6 == 0 else 5)

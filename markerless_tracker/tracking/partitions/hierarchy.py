@@ -1,0 +1,49 @@
+"""Searching a body step by step, as its description declares the steps."""
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Stage
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.partitions.budget import shared_out
+from markerless_tracker.tracking.partitions.stage import swarm_stage
+
+
+def hierarchical_stages(
+    body: BodyModel,
+    config: TrackerConfig,
+    centre: FloatArray,
+    sigma: FloatArray,
+    *,
+    algorithm: str,
+    budget: tuple[int, int],
+    soft: bool,
+) -> tuple[Stage, ...]:
+    """A stage per step of the hierarchy that is named, all of one size.
+
+    Args:
+        body, config, centre, sigma: as for `frame_stages`.
+        algorithm: what searches each step.
+        budget: published particles and iterations per step.
+        soft: whether the subspaces that a step names after its own join, with their spreads divided
+            by `soft_factor`.
+
+    Raises:
+        ConfigError: the budget cannot be spent exactly.
+        BodyModelError: the body has no such hierarchy.
+    """
+    steps = body.steps(config.hierarchy)
+    stages = []
+    for step, shares in zip(steps, shared_out((budget,) * len(steps), config), strict=True):
+        own = body.subspaces[step[0]]
+        joining = [body.subspaces[name] for name in step[1:]] if soft else []
+        spread = sigma.copy()
+        for members in joining:
+            spread[members] /= config.soft_factor
+        spread[own] = sigma[own]
+        active = np.unique(np.concatenate([own, *joining]))
+        stages.append(
+            swarm_stage(body, config, f"step {step[0]}", algorithm, active, centre, spread, shares)
+        )
+    return tuple(stages)

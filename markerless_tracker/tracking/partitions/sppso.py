@@ -1,0 +1,95 @@
+"""SPPSO: the root first, then everything with the root nearly fixed; and what it was compared with.
+
+Fleischmann, Austvoll, Kwolek: "Particle Swarm Optimization with Soft Search Space Partitioning for
+Video-Based Markerless Pose Tracking", ACIVS 2012, section 3: 10 particles x 20 iterations, then 20
+x 40, 1000 evaluations. The paper compares this soft partition in two steps with one in three, with
+a global search and with a hard partition, whose budgets and steps it does not give: ours spend as
+many evaluations, and the step in between varies torso and head.
+"""
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.body.model import IntArray
+from markerless_tracker.errors import BodyModelError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Stage
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.partitions.budget import SWARM_SHARE, scaled_particles
+from markerless_tracker.tracking.partitions.stage import swarm_stage
+
+SPPSO_STAGES: Mapping[str, tuple[tuple[int, int], ...]] = {
+    "two": ((10, 20), (20, 40)),
+    "three": ((10, 20), (10, 20), (20, 30)),
+    "global": ((20, 50),),
+}
+"""Particles and iterations of each stage at 1000 evaluations, by `sppso_stages`."""
+RESCUE_STAGES: Mapping[str, tuple[tuple[int, int], ...]] = {
+    "two": ((40, 5), (80, 10)),
+    "three": ((40, 5), (40, 5), (60, 10)),
+    "global": ((100, 10),),
+}
+"""The same evaluations beside contour refinement: it homes in, so the swarm may look widely."""
+_TRANSLATION = 3
+
+
+def sppso_stages(
+    body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
+) -> tuple[Stage, ...]:
+    """SPPSO's soft partition (section 3): the root first, then everything, the root nearly fixed.
+
+    Stage 1 varies the root's six parameters and samples edges on the cones that are rigid with it;
+    the last stage varies all from stage 1's estimate, with the root's position spread, and that of
+    a step in between, divided by `soft_factor`. In the hard partition every stage varies its own
+    parameters alone. Beside a refinement the swarm keeps `SWARM_SHARE` of the budget.
+
+    Raises:
+        ConfigError: the budget cannot be spent exactly.
+        BodyModelError: three stages, and the body has no subspace 'torso_head'.
+    """
+    alone = config.refinement == "none"
+    published = (SPPSO_STAGES if alone else RESCUE_STAGES)[config.sppso_stages]
+    share = Fraction(1) if alone else SWARM_SHARE
+    particles = scaled_particles(published, config.evaluations, "sppso", share=share)
+    trunk = body.cone_node == body.frames[body.root_frame]
+    stages: list[Stage] = []
+    earlier = np.empty(0, dtype=np.int64)
+    spread = sigma.copy()
+    for (name, own), count, (_, iterations) in zip(
+        _parts(body, config.sppso_stages).items(), particles, published, strict=True
+    ):
+        active = own if config.partition == "hard" else np.union1d(earlier, own)
+        budget = (count, iterations)
+        changes = {"edge_cones": trunk} if name == "root" else {}
+        stages.append(
+            swarm_stage(
+                body, config, name, "sppso", active, centre, spread.copy(), budget, **changes
+            )
+        )
+        settled = translations(body) if name == "root" else own
+        spread[settled] /= config.soft_factor
+        earlier = active
+    return tuple(stages)
+
+
+def _parts(body: BodyModel, stages: str) -> dict[str, IntArray]:
+    """Stages' names to the parameters that they add to those of the stages before."""
+    if stages == "global":
+        return {"body": np.arange(body.size)}
+    if stages == "two":
+        return {"root": body.root, "body": body.joints}
+    if "torso_head" not in body.subspaces:
+        raise BodyModelError(
+            f"sppso_stages is 'three': body {body.name} has no subspace 'torso_head'"
+        )
+    trunk = body.subspaces["torso_head"]
+    return {"root": body.root, "trunk": trunk, "body": np.setdiff1d(body.joints, trunk)}
+
+
+def translations(body: BodyModel) -> IntArray:
+    """Indices of the parameters that are translations."""
+    moving = body.node_kind >= _TRANSLATION
+    return np.sort(body.node_parameter[moving])
