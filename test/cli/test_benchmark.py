@@ -128,3 +128,14 @@ def test_what_cannot_be_done_says_so_in_one_line(words, said, status, capsys) ->
     assert code == status and not captured.out
     last = captured.err.strip().splitlines()[-1]
     assert said in last and "Traceback" not in captured.err
+
+
+def test_silhouettes_of_a_recording(walk, tmp_path: Path, capsys) -> None:
+    words = ["silhouettes", walk, "--pictures", str(tmp_path), "--json"]
+    assert main(["benchmark", *words]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["exact"] and figures["frames"] == [0]
+    assert figures["iou_mean"] > 0.8 and set(figures["opencv"]) == {"mog2", "knn"}
+    assert len(list(tmp_path.glob("walk-cam*-000000.png"))) == 3
+    assert main(["benchmark", "silhouettes", walk, walk]) == 0
+    assert capsys.readouterr().out.count("OpenCV MOG2") == 2
