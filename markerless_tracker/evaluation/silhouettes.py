@@ -225,9 +225,13 @@ def _selected(
 
 
 def _timed(judge: Judge, image: Image) -> tuple[Mask, float]:
-    start = time.perf_counter()
-    mask = judge(image)
-    return mask, (time.perf_counter() - start) * 1e3
+    """The mask, and the lesser of two times: the first run meets cold caches."""
+    times = []
+    for _ in range(2):
+        start = time.perf_counter()
+        mask = judge(image)
+        times.append((time.perf_counter() - start) * 1e3)
+    return mask, min(times)
 
 
 @contextmanager

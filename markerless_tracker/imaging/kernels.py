@@ -52,46 +52,64 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def label_colour(image, mean, scale, rule, labels):  # type: ignore[no-untyped-def]
+def label_colour(image, mean, scale, gain, rule, labels):  # type: ignore[no-untyped-def]
     """Label every pixel of a colour image: 0 background, 127 shadow, 255 foreground.
 
     Args:
         image: (h, w, 3) uint8, BGR.
-        mean: (h, w, 3) float32, grey levels.
-        scale: (h, w, 3) float32, 1 / (sigma * sqrt(limit)): the foreground test is |.|^2 > 1.
+        mean: (k, h, w, 3) float32, grey levels, of the k Gaussians of each pixel.
+        scale: (k, h, w, 3) float32, 1 / (sigma * sqrt(limit)): the foreground test is |.|^2 > 1.
+        gain: (3,) float32, brightness of the image relative to the background's.
         rule: of `shadow.shadow_rule`.
         labels: (h, w) uint8, written.
     """
     one = np.float32(1.0)
+    white = np.float32(255.0)
+    modes = mean.shape[0]
     height, width = labels.shape
+    gain_b, gain_g, gain_r = gain[0], gain[1], gain[2]
     for v in range(height):
         for u in range(width):
             b = np.float32(image[v, u, 0])
             g = np.float32(image[v, u, 1])
             r = np.float32(image[v, u, 2])
-            x = (b - mean[v, u, 0]) * scale[v, u, 0]
-            y = (g - mean[v, u, 1]) * scale[v, u, 1]
-            z = (r - mean[v, u, 2]) * scale[v, u, 2]
-            label = 0
-            if x * x + y * y + z * z > one:
-                label = 255
-                if is_shadow(b, g, r, mean[v, u, 0], mean[v, u, 1], mean[v, u, 2], rule):
+            label = 255
+            for k in range(modes):
+                mean_b = min(gain_b * mean[k, v, u, 0], white)
+                mean_g = min(gain_g * mean[k, v, u, 1], white)
+                mean_r = min(gain_r * mean[k, v, u, 2], white)
+                x = (b - mean_b) * scale[k, v, u, 0]
+                y = (g - mean_g) * scale[k, v, u, 1]
+                z = (r - mean_r) * scale[k, v, u, 2]
+                if x * x + y * y + z * z <= one:
+                    label = 0
+                    break
+                if label == 255 and is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):
                     label = 127
             labels[v, u] = label
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def label_grey(image, mean, scale, rule, labels):  # type: ignore[no-untyped-def]
-    """As `label_colour`, everything (h, w); the ratio of brightness alone tells a shadow."""
+def label_grey(image, mean, scale, gain, rule, labels):  # type: ignore[no-untyped-def]
+    """As `label_colour` with one channel: image (h, w), mean and scale (k, h, w), gain (1,).
+
+    The ratio of brightness alone tells a shadow.
+    """
     one = np.float32(1.0)
+    white = np.float32(255.0)
+    modes = mean.shape[0]
     height, width = labels.shape
+    gain_v = gain[0]
     for v in range(height):
         for u in range(width):
             value = np.float32(image[v, u])
-            x = (value - mean[v, u]) * scale[v, u]
-            label = 0
-            if x * x > one:
-                label = 255
-                if rule[0] * mean[v, u] <= value and value <= rule[1] * mean[v, u]:
+            label = 255
+            for k in range(modes):
+                expected = min(gain_v * mean[k, v, u], white)
+                x = (value - expected) * scale[k, v, u]
+                if x * x <= one:
+                    label = 0
+                    break
+                if rule[0] * expected <= value and value <= rule[1] * expected:
                     label = 127
             labels[v, u] = label

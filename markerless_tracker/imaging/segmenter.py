@@ -4,8 +4,15 @@ import numpy as np
 
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging import kernels
-from markerless_tracker.imaging.background import BackgroundModel, foreground_limit
+from markerless_tracker.imaging.adapt import Adaptation
+from markerless_tracker.imaging.background import (
+    BackgroundModel,
+    FloatImage,
+    foreground_limit,
+    risk_of,
+)
 from markerless_tracker.imaging.edges import edge_map
+from markerless_tracker.imaging.exposure import exposure_gain
 from markerless_tracker.imaging.images import Image, check_image, grey_of
 from markerless_tracker.imaging.morphology import Mask, clean_mask, foreground_mask
 from markerless_tracker.imaging.settings import ImagingSettings
@@ -14,6 +21,8 @@ from markerless_tracker.records import Observation
 
 # Largest difference of a background's channels, grey levels, that still is a grey camera's.
 _GREY_TOLERANCE = 0.5
+# Mean of a mode that a pixel lacks: nothing is near it, or in its shadow.
+_NOWHERE = np.float32(-1e6)
 
 
 class Segmenter:
@@ -42,24 +51,63 @@ class Segmenter:
         self.camera = camera
         self.background = background
         self.settings = settings or ImagingSettings()
-        mean, variance = background.mean, background.variance
         # Three equal channels are a grey camera's: one carries all there is to know.
-        spread = mean.max(axis=2) - mean.min(axis=2)
+        spread = background.mean.max(axis=2) - background.mean.min(axis=2)
         self._grey = background.channels == 1 or bool(spread.max() <= _GREY_TOLERANCE)
-        if self._grey:
-            mean, variance = mean[:, :, :1], variance[:, :, :1]
-        limit = foreground_limit(variance, self.settings.background_risk)
-        scale = 1.0 / np.sqrt(variance * limit[:, :, None])
-        if self._grey:
-            mean, scale = mean[:, :, 0], scale[:, :, 0]
-        self._mean = np.ascontiguousarray(mean, dtype=np.float32)
-        self._scale = np.ascontiguousarray(scale, dtype=np.float32)
-        self._rule = shadow_rule(self.settings, grey=self._grey)
-        self._labels = np.empty(self._mean.shape[:2], dtype=np.uint8)
-        self._mask = np.empty_like(self._labels)
+        self._mean, self._scale = self._gaussians()
+        # The same memory with channels last, for what takes grey and colour alike.
+        width, height = background.size_px
+        shape = (len(self._mean), height, width, 1 if self._grey else 3)
+        self._means_by_channel = self._mean.reshape(shape)
+        self._scales_by_channel = self._scale.reshape(shape)
+        self._gain = np.ones(shape[3], dtype=np.float32)
         options = self.settings
+        self._adaptation = (
+            Adaptation(options.background_follow_s, options.background_follow_margin_px)
+            if options.background_follow_s > 0.0
+            else None
+        )
+        self._rule = shadow_rule(self.settings, grey=self._grey)
+        self._labels = np.empty((height, width), dtype=np.uint8)
+        self._mask = np.empty_like(self._labels)
         share = options.shadow_grey_blob_share if self._grey else options.shadow_blob_share
         self._least_shadow_px = share * self._mask.size
+
+    @property
+    def gain(self) -> tuple[float, ...]:
+        """Brightness of the last image relative to the background's, by channel."""
+        return tuple(float(value) for value in self._gain)
+
+    def reset(self) -> None:
+        """Back to the background that was given; what was learned since is forgotten."""
+        if self._adaptation is not None:
+            self._adaptation.reset()
+            self._mean[...] = self._gaussians()[0]
+        self._gain[:] = 1.0
+
+    def _gaussians(self) -> tuple[FloatImage, FloatImage]:
+        """Means and 1 / (sigma sqrt(limit)) of all modes, (k, h, w, c) or grey (k, h, w)."""
+        background = self.background
+        channels = slice(0, 1) if self._grey else slice(None)
+        rest = np.ones(background.mean.shape[:2], dtype=np.float32)
+        for mode in background.modes:
+            rest -= mode.weight
+        modes = [(rest, background.mean, background.variance)]
+        modes += [(mode.weight, mode.mean, mode.variance) for mode in background.modes]
+        risk = risk_of(self.camera, self.settings)
+        means, scales = [], []
+        for weight, mean, variance in modes:
+            mean, variance = mean[:, :, channels], variance[:, :, channels]
+            there = weight[:, :, None] > 0.0
+            variance = np.where(there, variance, np.float32(1.0))
+            limit = foreground_limit(variance, risk, weight=weight)
+            means.append(np.where(there, mean, _NOWHERE))
+            scales.append(1.0 / np.sqrt(variance * limit[:, :, None]))
+        shape = (len(modes), *rest.shape) if self._grey else (len(modes), *background.mean.shape)
+        return (
+            np.ascontiguousarray(means, dtype=np.float32).reshape(shape),
+            np.ascontiguousarray(scales, dtype=np.float32).reshape(shape),
+        )
 
     def labels(self, image: Image) -> Mask:
         """(h, w) uint8: 0 background, 127 shadow, 255 foreground, before any repair.
@@ -78,9 +126,13 @@ class Segmenter:
                 f"{kind[self.background.channels]}; expected the same"
             )
         if self._grey:
-            kernels.label_grey(grey_of(image), self._mean, self._scale, self._rule, self._labels)
+            image, label = grey_of(image), kernels.label_grey
         else:
-            kernels.label_colour(image, self._mean, self._scale, self._rule, self._labels)
+            label = kernels.label_colour
+        if self.settings.exposure_compensation:
+            by_channel = image.reshape(*self._labels.shape, -1)
+            self._gain[:] = exposure_gain(by_channel, self._means_by_channel[0])
+        label(image, self._mean, self._scale, self._gain, self._rule, self._labels)
         return self._labels
 
     def mask(self, image: Image) -> Mask:
@@ -91,6 +143,9 @@ class Segmenter:
     def observe(self, image: Image, stamp_ns: int) -> Observation:
         """Silhouette and edge map of the whole frame.
 
+        They depend on this image alone, unless `background_follow_s` lets the background follow
+        slow changes: then on the images before as well, in the order of the calls.
+
         Args:
             image: (h, w, 3) BGR or (h, w) grey, uint8, of the background's size and channels.
             stamp_ns: capture time, goes into the observation.
@@ -100,4 +155,9 @@ class Segmenter:
         """
         mask = self.mask(image)
         edges = edge_map(image, mask, self.settings)
+        if self._adaptation is not None:
+            values = (grey_of(image) if self._grey else image).reshape(*mask.shape, -1)
+            self._adaptation.follow(
+                values, mask, stamp_ns, self._gain, self._means_by_channel, self._scales_by_channel
+            )
         return Observation.from_mask(self.camera, stamp_ns, mask, edges)

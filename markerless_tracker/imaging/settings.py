@@ -24,6 +24,19 @@ class ImagingSettings:
         least=-6.0,
         most=200.0,
     )
+    background_risks: str = setting(
+        "same",
+        "same: background_risk for every camera; humaneva: that dataset's own for cameras 1 to 4 "
+        "(80, 60, 30, 80), by the number at the end of the name",
+        choices=("same", "humaneva"),
+    )
+    background_modes: int = setting(
+        1,
+        "Gaussians per pixel of a background learned from several images: 1 = mean and variance, "
+        "more = a mixture, for scenes that show things by turns",
+        least=1,
+        most=8,
+    )
     background_sigma_min: float = setting(
         2.0, "smallest noise believed of a background pixel, grey levels", least=0.1, most=50.0
     )
@@ -32,6 +45,21 @@ class ImagingSettings:
         "noise assumed where the background is a single still, grey levels",
         least=0.1,
         most=50.0,
+    )
+    exposure_compensation: bool = setting(
+        True,
+        "find in every image how much brighter it is than the background (exposure steps, "
+        "flicker), by channel, and compare with the background as bright",
+    )
+    background_follow_s: float = setting(
+        0.0,
+        "time constant with which the background follows slow changes of light away from the "
+        "silhouette; 0 = never: evidence then depends on each image alone",
+        least=0.0,
+        most=1e6,
+    )
+    background_follow_margin_px: int = setting(
+        12, "distance from the silhouette that does not follow", least=0, most=500
     )
     shadow_removal: bool = setting(True, "take pixels that look like a shadow for background")
     shadow_value_min: float = setting(
