@@ -1,5 +1,6 @@
 """One camera's image to evidence: silhouette and edge map."""
 
+import cv2
 import numpy as np
 
 from markerless_tracker.errors import ImageError
@@ -17,10 +18,15 @@ from markerless_tracker.imaging.images import Image, check_image, grey_of
 from markerless_tracker.imaging.morphology import Mask, clean_mask, foreground_mask
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.imaging.shadow import shadow_rule
+from markerless_tracker.imaging.texture import correct_labels
 from markerless_tracker.records import Observation
 
 # Largest difference of a background's channels, grey levels, that still is a grey camera's.
 _GREY_TOLERANCE = 0.5
+_LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
+# Window of the Gaussian blur that noisy images get.
+_SMOOTH_PX = (5, 5)
+_SOLID = np.ones((3, 3), dtype=np.uint8)
 # Mean of a mode that a pixel lacks: nothing is near it, or in its shadow.
 _NOWHERE = np.float32(-1e6)
 
@@ -54,7 +60,16 @@ class Segmenter:
         # Three equal channels are a grey camera's: one carries all there is to know.
         spread = background.mean.max(axis=2) - background.mean.min(axis=2)
         self._grey = background.channels == 1 or bool(spread.max() <= _GREY_TOLERANCE)
+        sigma = float(np.sqrt(np.median(background.variance)))
+        self._smooth = sigma > self.settings.denoise_sigma
         self._mean, self._scale = self._gaussians()
+        mean, variance = self._steady(background.mean, background.variance)
+        if self._grey:
+            self._grey_mean = np.ascontiguousarray(mean[:, :, 0])
+            self._sigma = float(np.sqrt(np.median(variance[:, :, 0])))
+        else:
+            self._grey_mean = np.ascontiguousarray(mean @ _LUMA, dtype=np.float32)
+            self._sigma = float(np.sqrt(np.median(variance @ _LUMA**2)))
         # The same memory with channels last, for what takes grey and colour alike.
         width, height = background.size_px
         shape = (len(self._mean), height, width, 1 if self._grey else 3)
@@ -85,6 +100,17 @@ class Segmenter:
             self._mean[...] = self._gaussians()[0]
         self._gain[:] = 1.0
 
+    def _steady(self, mean: FloatImage, variance: FloatImage) -> tuple[FloatImage, FloatImage]:
+        """Mean and variance (h, w, c) of images as they are compared: smoothed if too noisy."""
+        if not self._smooth:
+            return mean, variance
+        smooth = np.asarray(cv2.GaussianBlur(mean, _SMOOTH_PX, 0.0), dtype=np.float32)
+        row = cv2.getGaussianKernel(_SMOOTH_PX[0], 0.0, cv2.CV_64F)
+        less = np.maximum(
+            variance * float((row**2).sum() ** 2), self.settings.background_sigma_min**2
+        )
+        return smooth.reshape(mean.shape), less.astype(np.float32)
+
     def _gaussians(self) -> tuple[FloatImage, FloatImage]:
         """Means and 1 / (sigma sqrt(limit)) of all modes, (k, h, w, c) or grey (k, h, w)."""
         background = self.background
@@ -97,7 +123,8 @@ class Segmenter:
         risk = risk_of(self.camera, self.settings)
         means, scales = [], []
         for weight, mean, variance in modes:
-            mean, variance = mean[:, :, channels], variance[:, :, channels]
+            mean, variance = self._steady(mean[:, :, channels], variance[:, :, channels])
+            mean, variance = (a.reshape(*rest.shape, -1) for a in (mean, variance))
             there = weight[:, :, None] > 0.0
             variance = np.where(there, variance, np.float32(1.0))
             limit = foreground_limit(variance, risk, weight=weight)
@@ -125,6 +152,8 @@ class Segmenter:
                 f"{self.camera}: got a {kind[channels]} image, its background is "
                 f"{kind[self.background.channels]}; expected the same"
             )
+        if self._smooth:
+            image = np.asarray(cv2.GaussianBlur(image, _SMOOTH_PX, 0.0), dtype=np.uint8)
         if self._grey:
             image, label = grey_of(image), kernels.label_grey
         else:
@@ -133,7 +162,33 @@ class Segmenter:
             by_channel = image.reshape(*self._labels.shape, -1)
             self._gain[:] = exposure_gain(by_channel, self._means_by_channel[0])
         label(image, self._mean, self._scale, self._gain, self._rule, self._labels)
+        self._look_at_texture(image)
         return self._labels
+
+    def _look_at_texture(self, image: Image) -> None:
+        options = self.settings
+        if options.texture_radius_px == 0 or not options.shadow_removal:
+            return
+        reveal = self._grey and options.texture_reveal
+        if reveal:
+            region = (0, 0, self._labels.shape[1], self._labels.shape[0])
+        else:
+            # Specks would stretch it over the whole image.
+            solid = cv2.morphologyEx(self._labels, cv2.MORPH_OPEN, _SOLID)
+            left, top, width, height = cv2.boundingRect(solid)
+            region = (left, top, width, height)
+        correct_labels(
+            grey_of(image),
+            self._grey_mean,
+            float(self._gain.mean()),
+            self._sigma,
+            self._labels,
+            region,
+            radius=options.texture_radius_px,
+            light=(options.texture_light_min, options.shadow_value_max + 0.03),
+            protect=self._grey,
+            reveal=reveal,
+        )
 
     def mask(self, image: Image) -> Mask:
         """The silhouette (h, w) uint8, 0 or 255; overwritten by the next call."""

@@ -46,6 +46,12 @@ class ImagingSettings:
         least=0.1,
         most=50.0,
     )
+    denoise_sigma: float = setting(
+        5.0,
+        "images of cameras whose background is noisier than this, grey levels, are smoothed first",
+        least=0.0,
+        most=1000.0,
+    )
     exposure_compensation: bool = setting(
         True,
         "find in every image how much brighter it is than the background (exposure steps, "
@@ -110,6 +116,24 @@ class ImagingSettings:
         "shadow_blob_share of grey cameras; the patches are opened first",
         least=0.0,
         most=1.0,
+    )
+    texture_radius_px: int = setting(
+        3,
+        "radius of the windows in which the background's pattern is looked for: what shows it in "
+        "any light is shadow, what hides it is none; 0 = do not look",
+        least=0,
+        most=50,
+    )
+    texture_light_min: float = setting(
+        0.15,
+        "darkest shadow that its pattern can give away, as a ratio of its brightness to the "
+        "background's",
+        least=0.0,
+        most=1.0,
+    )
+    texture_reveal: bool = setting(
+        True,
+        "grey cameras: what is as bright as the background but hides its pattern is foreground",
     )
     mask_open_px: int = setting(
         3, "side of the opening that removes specks; 0 or 1 = none", least=0, most=101

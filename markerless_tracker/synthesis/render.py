@@ -77,7 +77,8 @@ class Renderer:
     ) -> tuple[Image, Mask]:
         """The picture (h, w, 3) BGR or (h, w) grey at a pose (p,), and the mask (h, w) of the body.
 
-        All brightness is multiplied by `light`, as a change of exposure does. A pixel belongs to the mask if the body covers at least half of it.
+        All brightness is multiplied by `light`, as a change of exposure does. A pixel belongs to
+        the mask if the body covers at least half of it.
         """
         vertices, normals = self.mesh.posed(self.body, pose)
         shade = AMBIENT + (1.0 - AMBIENT) * np.maximum(normals @ LIGHT, 0.0)

@@ -121,7 +121,7 @@ class SyntheticScene:
         return markers(self.body, self.pose(index))
 
     def frame(self, index: int) -> tuple[dict[str, Image], dict[str, Mask], FloatArray]:
-        """Images (h, w, 3) BGR or (h, w) and exact masks (h, w) by camera, and the true pose (p,)."""
+        """Images (h, w, 3) or (h, w) and exact masks (h, w) by camera, and the true pose (p,)."""
         pose = self.pose(index)
         images, masks = {}, {}
         for number, (name, renderer) in enumerate(self._renderers.items()):
