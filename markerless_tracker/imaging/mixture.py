@@ -42,16 +42,17 @@ def add_frame(image, reach, count, mean, moment):  # type: ignore[no-untyped-def
                     nearest = furthest
                     best = k
             if best < 0:
-                for k in range(modes):
-                    if count[k, v, u] <= 1.0:
-                        best = k
-                        count[k, v, u] = 0.0
-                        for c in range(channels):
-                            mean[k, v, u, c] = 0.0
-                            moment[k, v, u, c] = 0.0
-                        break
-                if best < 0:
+                rarest = 0
+                for k in range(1, modes):
+                    if count[k, v, u] < count[rarest, v, u]:
+                        rarest = k
+                if count[rarest, v, u] > 1.0:
                     continue
+                best = rarest
+                count[best, v, u] = 0.0
+                for c in range(channels):
+                    mean[best, v, u, c] = 0.0
+                    moment[best, v, u, c] = 0.0
             count[best, v, u] += np.float32(1.0)
             for c in range(channels):
                 value = np.float32(image[v, u, c])

@@ -52,7 +52,7 @@ def read_background_model(path: Path) -> BackgroundModel:
                     f"{path}: background model of version {int(data['version'])}, "
                     f"expected {_VERSION}"
                 )
-            modes = []
+            modes: list[Mode] = []
             while f"weight_{len(modes)}" in data:
                 k = len(modes)
                 modes.append(Mode(data[f"weight_{k}"], data[f"mean_{k}"], data[f"variance_{k}"]))

@@ -114,6 +114,7 @@ class Tracker:
                 channels = segmenter.background.channels
                 shape = (height, width) if channels == 1 else (height, width, channels)
                 segmenter.observe(np.zeros(shape, dtype=np.uint8), 0)
+                segmenter.reset()
             nothing[height // 4 : height // 2, width // 4 : width // 2] = 1
             blank[camera.name] = Observation.from_mask(camera.name, 0, nothing, nothing)
         self.step(blank, 0)
