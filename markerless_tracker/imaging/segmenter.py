@@ -167,7 +167,8 @@ class Segmenter:
 
     def _look_at_texture(self, image: Image) -> None:
         options = self.settings
-        if options.texture_radius_px == 0 or not options.shadow_removal:
+        # A pixel that shows things by turns has no one pattern.
+        if options.texture_radius_px == 0 or not options.shadow_removal or self.background.modes:
             return
         reveal = self._grey and options.texture_reveal
         if reveal:

@@ -31,9 +31,9 @@ def test_both_things_that_a_screen_shows_are_background(channels: int) -> None:
     options = ImagingSettings(background_modes=3, exposure_compensation=False)
     for frame in frames[:2]:
         assert not Segmenter("cam01", model, options).observe(frame, 0).mask.any()
-    between = frames[0].copy()
-    between[10:30, 20:50] = 120
-    assert Segmenter("cam01", model, options).observe(between, 0).mask[12:28, 22:48].all()
+    brighter = frames[0].copy()
+    brighter[10:30, 20:50] = 240
+    assert Segmenter("cam01", model, options).observe(brighter, 0).mask[12:28, 22:48].all()
     single = learn_background(frames[:1])
     assert Segmenter("cam01", single).observe(frames[1], 0).mask[20, 30]
 
