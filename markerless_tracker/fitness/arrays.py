@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
-from markerless_tracker.errors import ImageError
+from markerless_tracker.errors import BodyModelError, ImageError
 from markerless_tracker.fitness.bits import count_bits
+from markerless_tracker.fitness.outline import LANES
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, pack_mask
 
@@ -38,7 +39,8 @@ class ViewArrays(NamedTuple):
         distortion: (v, 5) k1 k2 p1 p2 k3.
         size: (v, 2) width and height in px.
         words: (v,) words per row.
-        mask: observed silhouettes, flat; view i starts at mask_start[i].
+        mask: observed silhouettes, flat, column after column of words (see `fitness.bits`); view i
+            starts at mask_start[i].
         edges: edge maps, flat; view i starts at edge_start[i].
         observed: (v,) silhouette pixels.
     """
@@ -65,7 +67,15 @@ class Views:
 
 
 def body_arrays(body: BodyModel) -> BodyArrays:
-    """The kernels' arrays of a body."""
+    """The kernels' arrays of a body.
+
+    Raises:
+        BodyModelError: more cones than the kernels have room for.
+    """
+    if len(body.cone_names) > LANES:
+        raise BodyModelError(
+            f"body {body.name}: {len(body.cone_names)} cones, expected {LANES} at the most"
+        )
     return BodyArrays(
         body.node_parent,
         body.node_fixed,
@@ -110,7 +120,7 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
         distortion=np.array([camera.distortion for camera in seen]),
         size=np.array([camera.size_px for camera in seen], dtype=np.int64),
         words=np.array([mask.shape[1] for mask in masks], dtype=np.int64),
-        mask=np.concatenate([mask.ravel() for mask in masks]),
+        mask=np.concatenate([mask.T.ravel() for mask in masks]),
         mask_start=_starts(masks),
         edges=np.concatenate([edge.ravel() for edge in edges]),
         edge_start=_starts(edges),

@@ -1,4 +1,7 @@
-"""Rows of bits: 64 pixels a word, least significant first (as `records.pack_mask`)."""
+"""Bits: 64 neighbouring pixels of a row in a word, least significant first.
+
+Word w of row v of a frame lies at w * height + v: column after column of words.
+"""
 
 from typing import Any
 
@@ -20,25 +23,9 @@ def popcount(typingctx: Any, word: Any) -> Any:
 
 
 @njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
-def set_span(row, low, high):  # type: ignore[no-untyped-def]
-    """Set bits low .. high (inclusive, 0 <= low <= high) of a row of words."""
-    first = np.uint64(low >> 6)
-    last = np.uint64(high >> 6)
-    head = ALL << np.uint64(low & 63)
-    tail = ALL >> np.uint64(63 - (high & 63))
-    if first == last:
-        row[first] |= head & tail
-        return
-    row[first] |= head
-    for k in range(first + np.uint64(1), last):
-        row[np.uint64(k)] = ALL
-    row[last] |= tail
-
-
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
-def is_set(rows, u, v):  # type: ignore[no-untyped-def]
-    """Whether the bit of column u in row v is set; both must lie inside."""
-    word = rows[np.uint64(v), np.uint64(u >> 6)]
+def is_set(bits, height, u, v):  # type: ignore[no-untyped-def]
+    """Whether the bit of column u in row v is set; both must lie inside the frame."""
+    word = bits[np.uint64((u >> 6) * height + v)]
     return (word >> np.uint64(u & 63)) & np.uint64(1) != np.uint64(0)
 
 

@@ -13,21 +13,14 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from markerless_tracker.fitness.bits import is_set
-from markerless_tracker.fitness.kernels import cone_ends, fill_outline, to_camera
-from markerless_tracker.fitness.outline import (
-    HIDDEN,
-    MAX_POINTS,
-    ONLY_END,
-    TAPERED,
-    cone_outline,
-    cone_tangents,
-    project_point,
-)
+from markerless_tracker.fitness.chain_kernels import SUMS, add_wrench, sum_chain
+from markerless_tracker.fitness.kernels import cone_ends
+from markerless_tracker.fitness.outline import LANES
+from markerless_tracker.fitness.outline_samples import MAX_SAMPLES, sample_outline
 from markerless_tracker.geometry import FloatArray
 
-MAX_SAMPLES = 2048
-"""Most outline points of the model in one view; later ones are not looked at."""
+BAND_PX = 8
+"""Rows of a frame whose outline points are looked through together for the nearest."""
 
 
 class ContourViews(NamedTuple):
@@ -51,30 +44,6 @@ class ContourViews(NamedTuple):
     normals: FloatArray
     spacing: FloatArray
     point_start: NDArray[np.int64]
-
-
-class Samples(NamedTuple):
-    """Outline points of the model in v views, at most s each.
-
-    Attributes:
-        pixel, normal: (v, s, 2) where, and outward, px.
-        world: (v, s, 3) the point on the cone's surface, m.
-        depth: (v, s) its depth, m.
-        length: (v, s) outline that it stands for, m.
-        cone: (v, s).
-        shape: (v, s, 5) cos and sin on end 0, cos and sin on end 1, share of end 1: the point is
-            (1 - t) (centre_0 + cos a_0 + sin b_0) + t (centre_1 + cos a_1 + sin b_1).
-        count: (v,).
-    """
-
-    pixel: FloatArray
-    normal: FloatArray
-    world: FloatArray
-    depth: FloatArray
-    length: FloatArray
-    cone: NDArray[np.int64]
-    shape: FloatArray
-    count: NDArray[np.int64]  # type: ignore[assignment]
 
 
 class Residuals(NamedTuple):
@@ -101,23 +70,14 @@ class ContourScratch(NamedTuple):
     """Working memory, per view: m nodes (once), c cones, frames of h rows of w words."""
 
     nodes: FloatArray  # (m, 3, 4)
-    world: FloatArray  # (c, 2, 3, 3)
-    local: FloatArray  # (v, c, 2, 3, 3)
-    rows: NDArray[np.uint64]  # (v, h, w), zero between calls
-    left: FloatArray  # (v, h)
-    right: FloatArray  # (v, h)
-    points: FloatArray  # (v, MAX_POINTS, 2)
-    hessian: FloatArray  # (v, p, p)
-    slope: FloatArray  # (v, p)
-
-
-def make_samples(views: int) -> Samples:
-    """Allocate room for outline points."""
-    s = (views, MAX_SAMPLES)
-    return Samples(
-        np.empty((*s, 2)), np.empty((*s, 2)), np.empty((*s, 3)), np.empty(s), np.empty(s),
-        np.empty(s, dtype=np.int64), np.empty((*s, 5)), np.zeros(views, dtype=np.int64),
-    )  # fmt: skip
+    world: FloatArray  # (18 * LANES,), rows as of Outlines.ends
+    bits: NDArray[np.uint64]  # (v, w * h), zero between calls
+    used: NDArray[np.int64]  # (v, w, 2)
+    start: NDArray[np.int64]  # (v, h / BAND_PX + 2)
+    order: NDArray[np.int64]  # (v, MAX_SAMPLES)
+    sums: FloatArray  # (v, m, SUMS)
+    hessian: FloatArray  # (p, p)
+    slope: FloatArray  # (p,)
 
 
 def make_residuals(views: int, points: int) -> Residuals:
@@ -130,172 +90,20 @@ def make_residuals(views: int, points: int) -> Residuals:
 
 
 def make_contour_scratch(
-    views: int, nodes: int, cones: int, parameters: int, height: int, words: int
+    views: int, nodes: int, parameters: int, height: int, words: int
 ) -> ContourScratch:
     """Allocate working memory."""
     return ContourScratch(
         np.empty((nodes, 3, 4)),
-        np.empty((cones, 2, 3, 3)),
-        np.empty((views, cones, 2, 3, 3)),
-        np.zeros((views, height, words), dtype=np.uint64),
-        np.empty((views, height)),
-        np.empty((views, height)),
-        np.empty((views, MAX_POINTS, 2)),
-        np.empty((views, parameters, parameters)),
-        np.empty((views, parameters)),
+        np.ones(18 * LANES),
+        np.zeros((views, words * height), dtype=np.uint64),
+        np.empty((views, words, 2), dtype=np.int64),
+        np.empty((views, height // BAND_PX + 2), dtype=np.int64),
+        np.empty((views, MAX_SAMPLES), dtype=np.int64),
+        np.empty((views, nodes, SUMS)),
+        np.empty((parameters, parameters)),
+        np.empty(parameters),
     )
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _surface(ends, shape, out):  # type: ignore[no-untyped-def]
-    """The surface point (3,) that a sample's shape (5,) stands for."""
-    t = shape[4]
-    for i in range(3):
-        a = ends[0, 0, i] + shape[0] * ends[0, 1, i] + shape[1] * ends[0, 2, i]
-        b = ends[1, 0, i] + shape[2] * ends[1, 1, i] + shape[3] * ends[1, 2, i]
-        out[i] = (1.0 - t) * a + t * b
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _add_sample(  # type: ignore[no-untyped-def]
-    view,
-    cone,
-    world,
-    local,
-    k,
-    distortion,
-    distorted,
-    nu,
-    nv,
-    length_px,
-    step_px,
-    width,
-    height,
-    rows,
-    shape,
-    samples,
-):
-    """Keep a point of one cone's outline if the pixel `step_px` outside it is free of the body."""
-    n = samples.count[view]
-    if n >= samples.cone.shape[1]:
-        return
-    p = np.empty(3)
-    uv = np.empty((1, 2))
-    _surface(local, shape, p)
-    project_point(p[0], p[1], p[2], k, distortion, distorted, uv, 0)
-    norm = np.sqrt(nu * nu + nv * nv)
-    if not norm > 0.0:
-        return
-    nu, nv = nu / norm, nv / norm
-    # Points outside the frame have no evidence.
-    if not (
-        uv[0, 0] >= 0.0 and uv[0, 1] >= 0.0 and uv[0, 0] <= width - 1.0 and uv[0, 1] <= height - 1.0
-    ):
-        return
-    u = np.int64(np.floor(uv[0, 0] + step_px * nu + 0.5))
-    v = np.int64(np.floor(uv[0, 1] + step_px * nv + 0.5))
-    if 0 <= u < width and 0 <= v < height and is_set(rows, u, v):
-        return
-    samples.pixel[view, n, 0], samples.pixel[view, n, 1] = uv[0, 0], uv[0, 1]
-    samples.normal[view, n, 0], samples.normal[view, n, 1] = nu, nv
-    _surface(world, shape, samples.world[view, n])
-    samples.depth[view, n] = p[2]
-    samples.length[view, n] = length_px * p[2] / k[0]
-    samples.cone[view, n] = cone
-    for i in range(5):
-        samples.shape[view, n, i] = shape[i]
-    samples.count[view] = n + 1
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def sample_outline(view, views, spacing_px, step_px, scratch, samples):  # type: ignore[no-untyped-def]
-    """Fill samples with the points of one view's outline of the whole body, `spacing_px` apart."""
-    k = views.intrinsics[view]
-    distortion = views.distortion[view]
-    distorted = False
-    for i in range(5):
-        distorted = distorted or distortion[i] != 0.0
-    width, height = views.size[view, 0], views.size[view, 1]
-    local, rows, points = scratch.local[view], scratch.rows[view], scratch.points[view]
-    used = np.empty(4, np.int64)
-    used[0], used[1], used[2], used[3] = height, -1, rows.shape[1], -1
-    sides = np.empty((3, 2, 2))
-    flat = np.empty((2, 3, 2))
-    arcs = np.empty((2, 5))
-    to_camera(scratch.world, views.rotation[view], views.translation[view], local)
-    for c in range(local.shape[0]):
-        count = cone_outline(local[c], k, distortion, distorted, points, sides, flat, arcs)
-        if count > 0:
-            fill_outline(
-                points, count, width, height, rows, scratch.left[view], scratch.right[view], used
-            )
-
-    shape = np.empty(5)
-    p = np.empty(3)
-    pair = np.empty((2, 2))
-    samples.count[view] = 0
-    for c in range(local.shape[0]):
-        form = cone_tangents(local[c], flat, arcs)
-        if form == HIDDEN:
-            continue
-        for e in range(2):
-            if form != TAPERED and form != ONLY_END + e:
-                continue
-            radius = 0.0
-            for m in range(1, 3):
-                radius = max(radius, np.sqrt(flat[e, m, 0] ** 2 + flat[e, m, 1] ** 2))
-            arc_px = radius * k[0] * abs(arcs[e, 4])
-            n = np.int64(min(max(3.0, np.ceil(arc_px / spacing_px)), 200.0))
-            shape[4] = e
-            begin = np.arctan2(arcs[e, 1], arcs[e, 0])
-            for i in range(n):
-                angle = begin + arcs[e, 4] * (i + 0.5) / n
-                cos, sin = np.cos(angle), np.sin(angle)
-                shape[0], shape[1], shape[2], shape[3] = cos, sin, cos, sin
-                # Along the arc, in the image; outward is across it, away from the middle.
-                tu = k[0] * (cos * flat[e, 2, 0] - sin * flat[e, 1, 0])
-                tv = k[3] * (cos * flat[e, 2, 1] - sin * flat[e, 1, 1])
-                mu = k[0] * (cos * flat[e, 1, 0] + sin * flat[e, 2, 0])
-                mv = k[3] * (cos * flat[e, 1, 1] + sin * flat[e, 2, 1])
-                length = np.sqrt(tu * tu + tv * tv) * abs(arcs[e, 4]) / n
-                nu, nv = tv, -tu
-                if nu * mu + nv * mv < 0.0:
-                    nu, nv = -nu, -nv
-                _add_sample(
-                    view, c, scratch.world[c], local[c], k, distortion, distorted, nu, nv, length,
-                    step_px, width, height, rows, shape, samples,
-                )  # fmt: skip
-        if form != TAPERED:
-            continue
-        for side in range(2):
-            # Side 0 ends end 0's arc and begins end 1's; side 1 the other way.
-            at_0 = 2 if side == 0 else 0
-            at_1 = 2 - at_0
-            shape[0], shape[1] = arcs[0, at_0], arcs[0, at_0 + 1]
-            shape[2], shape[3] = arcs[1, at_1], arcs[1, at_1 + 1]
-            shape[4] = 0.0
-            _surface(local[c], shape, p)
-            z0 = p[2]
-            project_point(p[0], p[1], p[2], k, distortion, distorted, pair, 0)
-            shape[4] = 1.0
-            _surface(local[c], shape, p)
-            z1 = p[2]
-            project_point(p[0], p[1], p[2], k, distortion, distorted, pair, 1)
-            du, dv = pair[1, 0] - pair[0, 0], pair[1, 1] - pair[0, 1]
-            length = np.sqrt(du * du + dv * dv)
-            n = np.int64(min(max(1.0, np.ceil(length / spacing_px)), 400.0))
-            nu, nv = (-dv, du) if side == 0 else (dv, -du)
-            for i in range(n):
-                s = (i + 0.5) / n
-                # Equal steps in the image are not equal steps along the cone.
-                shape[4] = s * z0 / (z1 * (1.0 - s) + s * z0)
-                _add_sample(
-                    view, c, scratch.world[c], local[c], k, distortion, distorted, nu, nv,
-                    length / n, step_px, width, height, rows, shape, samples,
-                )  # fmt: skip
-    for v in range(used[0], used[1] + 1):
-        for w in range(used[2], used[3] + 1):
-            rows[v, w] = np.uint64(0)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
@@ -342,7 +150,58 @@ def _world_gradient(views, view, point, du, dv, out):  # type: ignore[no-untyped
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def collect_residuals(view, views, contours, reach_m, samples, residuals):  # type: ignore[no-untyped-def]
+def sort_into_bands(view, height, samples, start, order):  # type: ignore[no-untyped-def]
+    """Sort one view's outline points into bands of BAND_PX rows; returns the number of bands.
+
+    Band b holds the points order[start[b] : start[b + 1]].
+    """
+    bands = height // BAND_PX + 1
+    start[: bands + 1] = 0
+    for s in range(samples.count[view]):
+        start[int(samples.pixel[view, s, 1]) // BAND_PX + 1] += 1
+    for b in range(bands):
+        start[b + 1] += start[b]
+    for s in range(samples.count[view] - 1, -1, -1):
+        b = int(samples.pixel[view, s, 1]) // BAND_PX + 1
+        start[b] -= 1
+        order[start[b]] = s
+    # Each start has moved down to where its band begins, one place too far to the right.
+    for b in range(bands):
+        start[b] = start[b + 1]
+    start[bands] = samples.count[view]
+    return bands
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def _nearest(view, u, v, nu, nv, bands, samples, start, order):  # type: ignore[no-untyped-def]
+    """The outline point nearest to a pixel among those that face as (nu, nv) does; -1: none."""
+    best = np.inf
+    nearest = -1
+    home = min(max(np.int64(v) // BAND_PX, 0), bands - 1)
+    for away in range(bands):
+        # No point of a band that is `away` bands off is nearer than this many rows.
+        if away > 0:
+            rows = min(v - (home - away + 1) * BAND_PX, (home + away) * BAND_PX - v)
+            if rows > 0 and rows * rows >= best:
+                break
+        for turn in range(2 if away > 0 else 1):
+            band = home - away if turn == 0 else home + away
+            if band < 0 or band >= bands:
+                continue
+            for i in range(start[band], start[band + 1]):
+                s = order[i]
+                du, dv = samples.pixel[view, s, 0] - u, samples.pixel[view, s, 1] - v
+                gap = du * du + dv * dv
+                if gap < best:
+                    facing = samples.normal[view, s, 0] * nu + samples.normal[view, s, 1] * nv
+                    if facing > 0.5:
+                        best = gap
+                        nearest = s
+    return nearest
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def collect_residuals(view, views, contours, reach_m, samples, start, order, residuals):  # type: ignore[no-untyped-def]
     """Fill the residuals of one view, both ways.
 
     Robust weights are Tukey's, (1 - (r / reach)²)², and cost reach² / 6 (1 - (1 - (r / reach)²)³).
@@ -376,19 +235,11 @@ def collect_residuals(view, views, contours, reach_m, samples, residuals):  # ty
             residuals.gradient[view, n],
         )  # fmt: skip
         n += 1
+    bands = sort_into_bands(view, views.size[view, 1], samples, start, order)
     for m in range(contours.point_start[view], contours.point_start[view + 1]):
         u, v = contours.points[m, 0], contours.points[m, 1]
         nu, nv = contours.normals[m, 0], contours.normals[m, 1]
-        best = np.inf
-        nearest = -1
-        for s in range(samples.count[view]):
-            du, dv = samples.pixel[view, s, 0] - u, samples.pixel[view, s, 1] - v
-            gap = du * du + dv * dv
-            if gap < best:
-                facing = samples.normal[view, s, 0] * nu + samples.normal[view, s, 1] * nv
-                if facing > 0.5:
-                    best = gap
-                    nearest = s
+        nearest = _nearest(view, u, v, nu, nv, bands, samples, start, order)
         metres = 0.0
         if nearest >= 0:
             metres = samples.depth[view, nearest] / k[0]
@@ -396,12 +247,15 @@ def collect_residuals(view, views, contours, reach_m, samples, residuals):  # ty
             metres = samples.depth[view, 0] / k[0]
         length = contours.spacing[m] * metres
         cost += length * limit
-        if nearest < 0 or np.sqrt(best) * metres >= reach_m:
+        if nearest < 0:
             continue
         du = samples.pixel[view, nearest, 0] - u
         dv = samples.pixel[view, nearest, 1] - v
+        gap = du * du + dv * dv
+        if np.sqrt(gap) * metres >= reach_m:
+            continue
         value = (du * nu + dv * nv) * metres
-        share = 1.0 - best * metres * metres / (reach_m * reach_m)
+        share = 1.0 - gap * metres * metres / (reach_m * reach_m)
         cost -= length * limit * share**3
         residuals.value[view, n] = value
         residuals.weight[view, n] = length * share * share
@@ -416,91 +270,69 @@ def collect_residuals(view, views, contours, reach_m, samples, residuals):  # ty
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def pose_row(point, gradient, node, body, nodes, index, row):  # type: ignore[no-untyped-def]
-    """Derivatives of a residual by the parameters that move its point; returns how many.
-
-    index and row (m,) are filled with the parameters and the derivatives: along the chain from the
-    node up, a rotation about an axis w through o moves the point by w x (point - o).
-    """
-    n = 0
-    while node >= 0:
-        kind = body.kind[node]
-        if kind >= 3:
-            axis = kind - 3
-            value = 0.0
-            for i in range(3):
-                value += nodes[node, i, axis] * gradient[i]
-            index[n], row[n] = body.parameter[node], body.sign[node] * value
-            n += 1
-        elif kind >= 0:
-            x = point[0] - nodes[node, 0, 3]
-            y = point[1] - nodes[node, 1, 3]
-            z = point[2] - nodes[node, 2, 3]
-            value = (
-                nodes[node, 0, kind] * (y * gradient[2] - z * gradient[1])
-                + nodes[node, 1, kind] * (z * gradient[0] - x * gradient[2])
-                + nodes[node, 2, kind] * (x * gradient[1] - y * gradient[0])
-            )
-            index[n], row[n] = body.parameter[node], body.sign[node] * value
-            n += 1
-        node = body.parent[node]
-    return n
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _accumulate(view, body, samples, residuals, scratch):  # type: ignore[no-untyped-def]
-    """Sum one view's JᵀWJ and JᵀWr."""
-    hessian, slope = scratch.hessian[view], scratch.slope[view]
-    hessian[:] = 0.0
-    slope[:] = 0.0
-    index = np.empty(body.parent.size, np.int64)
-    row = np.empty(body.parent.size)
+def _accumulate(view, body, samples, residuals, sums):  # type: ignore[no-untyped-def]
+    """Sum one view's residuals per node of the body, into sums (m, SUMS)."""
+    sums[:] = 0.0
+    wrench = np.empty(6)
     for n in range(residuals.count[view]):
         s = residuals.sample[view, n]
-        moved = pose_row(
-            samples.world[view, s], residuals.gradient[view, n],
-            body.cone_node[samples.cone[view, s]], body, scratch.nodes, index, row,
+        add_wrench(
+            samples.world[view, s], residuals.gradient[view, n], residuals.weight[view, n],
+            residuals.value[view, n], sums, body.cone_node[samples.cone[view, s]], wrench,
         )  # fmt: skip
-        weight, value = residuals.weight[view, n], residuals.value[view, n]
-        for i in range(moved):
-            scaled = weight * row[i]
-            slope[index[i]] += scaled * value
-            for j in range(moved):
-                hessian[index[i], index[j]] += scaled * row[j]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
 def _one_view(  # type: ignore[no-untyped-def]
-    view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
+    view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch, outlines
 ):
-    root = scratch.world[0, 0, 0]
+    root = scratch.world[: 2 * LANES + 1 : LANES]
     r, t = views.rotation[view], views.translation[view]
     depth = r[2, 0] * root[0] + r[2, 1] * root[1] + r[2, 2] * root[2] + t[2]
     spacing_px = max(1.0, spacing_m * views.intrinsics[view, 0] / max(depth, 0.5))
-    sample_outline(view, views, spacing_px, step_px, scratch, samples)
-    collect_residuals(view, views, contours, reach_m, samples, residuals)
-    _accumulate(view, body, samples, residuals, scratch)
+    sample_outline(
+        view, views, body.cone_node.size, spacing_px, step_px, scratch, outlines, samples
+    )
+    collect_residuals(
+        view, views, contours, reach_m, samples, scratch.start[view], scratch.order[view], residuals
+    )
+    _accumulate(view, body, samples, residuals, scratch.sums[view])
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def _total(body, views, scratch):  # type: ignore[no-untyped-def]
+    """Add up the views' sums, always in the same order, and fill the normal equations."""
+    sums = scratch.sums[0]
+    for view in range(1, views):
+        for m in range(sums.shape[0]):
+            for k in range(SUMS):
+                sums[m, k] += scratch.sums[view, m, k]
+    sum_chain(body, scratch.nodes, sums, scratch.hessian, scratch.slope)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
 def equations_serial(  # type: ignore[no-untyped-def]
-    pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
+    pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch, outlines
 ):
     """Residuals and per-view normal equations at a pose (p,), on the calling thread."""
     cone_ends(pose, body, scratch.nodes, scratch.world)
     for view in range(views.size.shape[0]):
         _one_view(
-            view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
-        )
+            view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch,
+            outlines,
+        )  # fmt: skip
+    _total(body, views.size.shape[0], scratch)
 
 
 @njit(cache=True, nogil=True, parallel=True)  # type: ignore[misc]
 def equations_parallel(  # type: ignore[no-untyped-def]
-    pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
+    pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch, outlines
 ):
     """As `equations_serial`, a thread a view; each view sums for itself, so nothing changes."""
     cone_ends(pose, body, scratch.nodes, scratch.world)
     for view in prange(views.size.shape[0]):
         _one_view(
-            view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch
-        )
+            view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch,
+            outlines,
+        )  # fmt: skip
+    _total(body, views.size.shape[0], scratch)

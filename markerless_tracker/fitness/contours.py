@@ -12,13 +12,17 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.fitness import contour_kernels as kernels
 from markerless_tracker.fitness.arrays import BodyArrays, Views, body_arrays
-from markerless_tracker.fitness.contour_kernels import ContourViews, Residuals, Samples
-from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads
+from markerless_tracker.fitness.contour_kernels import ContourViews, Residuals
+from markerless_tracker.fitness.outline import Outlines, make_outlines
+from markerless_tracker.fitness.outline_samples import Samples, make_samples
+from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
 SPACING_M = 0.02
 """Distance of outline points along the body's outline."""
+_VIEW_S = 0.17e-3
+"""About how long the equations of one view take one thread."""
 _SMALLEST_EDGE_PX = 12
 _LEAST_MARGIN_PX = 24
 
@@ -178,14 +182,15 @@ class ContourFrame:
         self.contours = join_edges(list(mapper(edge, views.names)))  # type: ignore[call-overload]
         count = len(views.names)
         most = int(np.diff(self.contours.point_start).max())
-        self.samples: Samples = kernels.make_samples(count)
+        self.samples: Samples = make_samples(count)
         self.residuals: Residuals = kernels.make_residuals(count, most)
+        height = int(views.arrays.size[:, 1].max())
+        self._outlines: Outlines = make_outlines(count, height)
         self._scratch = kernels.make_contour_scratch(
             count,
             body.node_parent.size,
-            len(body.cone_names),
             body.size,
-            int(views.arrays.size[:, 1].max()),
+            height,
             int(views.arrays.words.max()),
         )
 
@@ -193,9 +198,7 @@ class ContourFrame:
         """Normal equations at a pose (p,); residuals beyond `reach_m` are outliers."""
         self.collect(pose, reach_m)
         s = self._scratch
-        return NormalEquations(
-            s.hessian.sum(axis=0), s.slope.sum(axis=0), float(self.residuals.cost.sum())
-        )
+        return NormalEquations(s.hessian.copy(), s.slope.copy(), float(self.residuals.cost.sum()))
 
     def collect(self, pose: FloatArray, reach_m: float, body: BodyModel | None = None) -> None:
         """Fill `samples` and `residuals` at a pose (p,), of another body's shape if given."""
@@ -203,8 +206,9 @@ class ContourFrame:
         args = (
             np.ascontiguousarray(pose, dtype=np.float64), arrays, self.views.arrays, self.contours,
             SPACING_M, self._step_px, reach_m, self.samples, self.residuals, self._scratch,
+            self._outlines,
         )  # fmt: skip
-        if self._threads == 1:
+        if not worth_waking(len(self.views.names) * _VIEW_S, self._threads):
             kernels.equations_serial(*args)
             return
         with ONE_CALLER:

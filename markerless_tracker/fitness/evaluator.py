@@ -13,12 +13,15 @@ from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.fitness import kernels
 from markerless_tracker.fitness.arrays import Views, body_arrays, lay_out_views
-from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads
+from markerless_tracker.fitness.outline import make_outlines
+from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, Stage
 
 EDGE_RULES = {"sides": kernels.SIDES, "visible": kernels.VISIBLE, "outline": kernels.OUTLINE}
 EDGE_TERMS = ("ssd", "mean")
+_CONE_S = 0.35e-6
+"""About how long one cone in one view takes one thread."""
 
 
 @dataclass(frozen=True)
@@ -73,11 +76,13 @@ class Fitness:
         self._rule = kernels.EdgeRule(
             EDGE_RULES[edge_rule], float(edge_spacing_px), float(edge_step_px), edge_term == "ssd"
         )
+        height = max(camera.size_px[1] for camera in cameras)
+        self._outlines = make_outlines(self.threads, height)
         self._scratch = kernels.make_scratch(
             self.threads,
             body.node_parent.size,
             len(body.cone_names),
-            max(camera.size_px[1] for camera in cameras),
+            height,
             max((camera.size_px[0] + 63) // 64 for camera in cameras),
         )
 
@@ -101,9 +106,10 @@ class Fitness:
         sampled = self.body.cone_edges & edge_cones[:, None]
         args = (
             poses, self._body, views.arrays, silhouette_cones, sampled,
-            self._rule, self._scratch, counts,
+            self._rule, self._scratch, self._outlines, counts,
         )  # fmt: skip
-        if self.threads == 1:
+        work_s = len(poses) * len(views.names) * len(self.body.cone_names) * _CONE_S
+        if not worth_waking(work_s, self.threads):
             kernels.count_serial(*args)
         else:
             with ONE_CALLER:

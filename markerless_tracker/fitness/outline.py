@@ -1,217 +1,373 @@
-"""Outline of one projected cone: the convex hull of its two projected end ellipses.
+"""Outlines of all cones that one view sees: convex hulls of their two projected end ellipses.
 
-An outline is a closed polygon: up one side, around the far end, down the other side, around the
-near end. Sides touch the end ellipses at their common tangents; ends are sampled.
+An outline is a closed polygon: around the far end, down one side, around the near end, up the
+other side. Sides touch the end ellipses at their common tangents; ends are sampled. All cones are
+worked on side by side: a quantity is a row of `LANES` numbers, one a cone, and each loop over the
+cones is one that the compiler turns into vector instructions.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+from markerless_tracker.geometry import FloatArray
+
+LANES = 64
+"""Numbers in a row, and the most cones of a body."""
 ARC_POINTS = 7
 """Points of an end's arc between the two tangents, both included."""
-SIDE_SEGMENTS = 3
-"""Segments of a side seen through a distorting lens; one otherwise."""
-MAX_POINTS = 2 * ARC_POINTS + 2 * SIDE_SEGMENTS
+SIDE_POINTS = 2
+"""Points inside a side that is seen through a distorting lens; none otherwise."""
+MAX_POINTS = 2 * (ARC_POINTS + SIDE_POINTS)
 NEAR_M = 0.1
 """Cones that come nearer to a camera's plane than this are not drawn in it."""
 HIDDEN, TAPERED, ONLY_END = 0, 1, 2
-"""Forms of an outline; see `cone_tangents`."""
+"""Forms of an outline: not drawn; both ends show; ONLY_END + e: end e hides all the rest."""
+
+_VECTOR = 8
+"""Loops run over a multiple of this many lanes, so that none is left over."""
+_TINY = 1e-300
+# 2 cos(h / 3) as a line in cos h, exact for arcs of no turn and of half a turn.
+_THIRD_0, _THIRD_1 = np.sqrt(3.0), 2.0 - np.sqrt(3.0)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def project_point(x, y, z, k, distortion, distorted, out, row):  # type: ignore[no-untyped-def]
-    """Pixel (u, v) of a point of the camera's frame in front of it, into a row of out (n, 2)."""
-    a = x / z
-    b = y / z
-    if distorted:
-        k1, k2, k3 = distortion[0], distortion[1], distortion[4]
-        p1, p2 = distortion[2], distortion[3]
-        r2 = a * a + b * b
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        ab = a * b
-        da = a * radial + 2.0 * p1 * ab + p2 * (r2 + 2.0 * a * a)
-        b = b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * ab
-        a = da
-    out[row, 0] = k[0] * a + k[1] * b + k[2]
-    out[row, 1] = k[3] * b + k[4]
+class Outlines(NamedTuple):
+    """Working memory of one view's outlines: rows of `LANES` numbers, one after the other.
 
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def cone_tangents(ends, flat, arcs):  # type: ignore[no-untyped-def]
-    """Where the outline of a cone given in the camera's frame runs along its end ellipses.
-
-    Args:
-        ends: (2, 3, 3) per end its centre and its two radius vectors, m, camera frame.
-        flat: (2, 3, 2) filled with their images to first order, at focal length 1.
-        arcs: (2, 5) filled per end with cos and sin of the angle at which its arc begins, those of
-            the angle at which it ends, and the angle it sweeps, rad. End 1's arc leads from the
-            first side to the second, end 0's back. The sides join the end of one arc to the
-            beginning of the other; side 0 lies to the right of the
-            way from end 0 to end 1 as the camera sees it (y down), side 1 to the left.
-
-    Returns:
-        HIDDEN if the cone comes too near to the camera's plane, TAPERED, or, where one end's
-        ellipse hides all the rest, ONLY_END + that end, whose arc is then a full turn.
+    Attributes:
+        ends: 18 rows: row 9 e + 3 m + i holds coordinate i (m, camera frame) of end e's centre
+            (m = 0) and of its two radius vectors (m = 1, 2).
+        flat: 12 rows: row 6 e + 2 m + i holds their images to first order, at focal length 1.
+        arcs: 8 rows: from row 4 e on cos and sin of the angle at which end e's arc begins and of
+            that at which it ends. End 1's arc leads from side 0 to side 1, end 0's back. Side 0
+            lies to the right of the way from end 0 to end 1 as the camera sees it (y down).
+        form: one row: HIDDEN, TAPERED, or ONLY_END + e, whose arc is then a full turn.
+        u, v: MAX_POINTS rows each, the polygons' points, px.
+        first: MAX_POINTS rows, the first pixel row at or below each point, 0 .. height.
+        slope: MAX_POINTS rows, du/dv of the edge that leads to each point.
+        box: 4 rows, least and largest u (px), least and largest `first`.
+        left, right: where the polygon that is being filled begins and ends in each row of the
+            frame, px.
     """
-    for e in range(2):
-        depth = ends[e, 0, 2]
-        reach = abs(ends[e, 1, 2]) + abs(ends[e, 2, 2])
-        if not depth - reach > NEAR_M:
-            return HIDDEN
-        x, y = ends[e, 0, 0] / depth, ends[e, 0, 1] / depth
-        flat[e, 0, 0], flat[e, 0, 1] = x, y
-        for m in range(1, 3):
-            flat[e, m, 0] = (ends[e, m, 0] - x * ends[e, m, 2]) / depth
-            flat[e, m, 1] = (ends[e, m, 1] - y * ends[e, m, 2]) / depth
-    turn = 2.0 * np.pi
-    gap_x = flat[1, 0, 0] - flat[0, 0, 0]
-    gap_y = flat[1, 0, 1] - flat[0, 0, 1]
-    gap = np.sqrt(gap_x * gap_x + gap_y * gap_y)
-    outer = -1
-    dx, dy = 1.0, 0.0
-    if gap >= 1e-9:
-        dx, dy = gap_x / gap, gap_y / gap
-        if gap + _support(flat, 1, dx, dy) <= _support(flat, 0, dx, dy):
-            outer = 0
-        elif gap + _support(flat, 0, dx, dy) <= _support(flat, 1, dx, dy):
-            outer = 1
-    else:
-        outer = 0 if _support(flat, 0, dx, dy) >= _support(flat, 1, dx, dy) else 1
-    if outer >= 0:
-        arcs[outer, 0], arcs[outer, 1] = 1.0, 0.0
-        arcs[outer, 2], arcs[outer, 3] = 1.0, 0.0
-        arcs[outer, 4] = turn
-        return ONLY_END + outer
 
+    ends: FloatArray
+    flat: FloatArray
+    arcs: FloatArray
+    form: NDArray[np.int64]
+    u: FloatArray
+    v: FloatArray
+    first: NDArray[np.int32]
+    slope: FloatArray
+    box: FloatArray
+    left: FloatArray
+    right: FloatArray
+
+
+def make_outlines(threads: int, height: int) -> Outlines:
+    """Allocate working memory for some threads and frames of at most `height` rows.
+
+    Every attribute gets a first axis, the thread.
+    """
+
+    def rows(count: int) -> FloatArray:
+        # Lanes without a cone are worked on too; ones keep them harmless.
+        return np.ones((threads, count * LANES))
+
+    return Outlines(
+        rows(18), rows(12), rows(8), np.zeros((threads, LANES), dtype=np.int64),
+        rows(MAX_POINTS), rows(MAX_POINTS),
+        np.zeros((threads, MAX_POINTS * LANES), dtype=np.int32), rows(MAX_POINTS), rows(4),
+        np.zeros((threads, height)), np.zeros((threads, height)),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def outlines_of(all_threads, i):  # type: ignore[no-untyped-def]
+    """Thread i's part of `make_outlines`."""
+    a = all_threads
+    return Outlines(
+        a.ends[i], a.flat[i], a.arcs[i], a.form[i], a.u[i], a.v[i], a.first[i], a.slope[i],
+        a.box[i], a.left[i], a.right[i],
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+def lens(a, b, distortion):  # type: ignore[no-untyped-def]
+    """Where a lens (5,) k1 k2 p1 p2 k3 moves a point of the plane at focal length 1."""
+    k1, k2, k3 = distortion[0], distortion[1], distortion[4]
+    p1, p2 = distortion[2], distortion[3]
+    r2 = a * a + b * b
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    ab = a * b
+    return (
+        a * radial + 2.0 * p1 * ab + p2 * (r2 + 2.0 * a * a),
+        b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * ab,
+    )
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def distorts(distortion):  # type: ignore[no-untyped-def]
+    """Whether any coefficient (5,) of a lens is not zero."""
+    for i in range(5):
+        if distortion[i] != 0.0:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+def to_camera(cones, world, rotation, translation, ends):  # type: ignore[no-untyped-def]
+    """Cone ends (18 rows) of the world in a camera's frame."""
+    n = (cones + _VECTOR - 1) // _VECTOR * _VECTOR
+    for e in range(2):
+        for i in range(3):
+            r0, r1, r2 = rotation[i, 0], rotation[i, 1], rotation[i, 2]
+            t = translation[i]
+            for m in range(3):
+                at = (9 * e + 3 * m) * LANES
+                to = at + i * LANES
+                for c in range(n):
+                    ends[to + c] = (
+                        r0 * world[at + c]
+                        + r1 * world[at + LANES + c]
+                        + r2 * world[at + 2 * LANES + c]
+                        + t
+                    )
+                t = 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+def find_forms(cones, ends, flat, form):  # type: ignore[no-untyped-def]
+    """Fill flat and form from ends."""
+    n = (cones + _VECTOR - 1) // _VECTOR * _VECTOR
+    for e in range(2):
+        p, q = 9 * e * LANES, 6 * e * LANES
+        for c in range(n):
+            inverse = 1.0 / ends[p + 2 * LANES + c]
+            x, y = ends[p + c] * inverse, ends[p + LANES + c] * inverse
+            za, zb = ends[p + 5 * LANES + c], ends[p + 8 * LANES + c]
+            flat[q + c], flat[q + LANES + c] = x, y
+            flat[q + 2 * LANES + c] = (ends[p + 3 * LANES + c] - x * za) * inverse
+            flat[q + 3 * LANES + c] = (ends[p + 4 * LANES + c] - y * za) * inverse
+            flat[q + 4 * LANES + c] = (ends[p + 6 * LANES + c] - x * zb) * inverse
+            flat[q + 5 * LANES + c] = (ends[p + 7 * LANES + c] - y * zb) * inverse
+    for c in range(n):
+        gu, gv = flat[6 * LANES + c] - flat[c], flat[7 * LANES + c] - flat[LANES + c]
+        apart = gu * gu + gv * gv > 1e-18
+        du, dv = (gu if apart else 1.0), (gv if apart else 0.0)
+        # How far each end reaches from its centre along the way between them, times its length.
+        pa = flat[2 * LANES + c] * du + flat[3 * LANES + c] * dv
+        pb = flat[4 * LANES + c] * du + flat[5 * LANES + c] * dv
+        qa = flat[8 * LANES + c] * du + flat[9 * LANES + c] * dv
+        qb = flat[10 * LANES + c] * du + flat[11 * LANES + c] * dv
+        reach = np.sqrt(qa * qa + qb * qb) - np.sqrt(pa * pa + pb * pb)
+        gap = gu * du + gv * dv
+        only = ONLY_END if gap + reach <= 0.0 else (ONLY_END + 1 if gap - reach <= 0.0 else TAPERED)
+        near_0 = ends[2 * LANES + c] - abs(ends[5 * LANES + c]) - abs(ends[8 * LANES + c])
+        near_1 = ends[11 * LANES + c] - abs(ends[14 * LANES + c]) - abs(ends[17 * LANES + c])
+        near = near_0 if near_0 < near_1 else near_1
+        form[c] = only if near > NEAR_M else HIDDEN
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+def find_tangents(cones, flat, form, arcs):  # type: ignore[no-untyped-def]
+    """Fill arcs: where the common tangents touch the ends.
+
+    The line through the two points that reach farthest along its normal gives a better normal.
+    """
+    n = (cones + _VECTOR - 1) // _VECTOR * _VECTOR
     for side in range(2):
         sense = 1.0 if side == 0 else -1.0
-        nx, ny = -dy * sense, dx * sense
-        for _ in range(2):
-            # The line through the two points that reach farthest along n gives a better n.
-            tx, ty = gap_x, gap_y
-            for e in range(2):
-                s = 1.0 if e == 1 else -1.0
-                pa = flat[e, 1, 0] * nx + flat[e, 1, 1] * ny
-                pb = flat[e, 2, 0] * nx + flat[e, 2, 1] * ny
-                scale = s / (np.sqrt(pa * pa + pb * pb) + 1e-300)
-                tx += scale * (flat[e, 1, 0] * pa + flat[e, 2, 0] * pb)
-                ty += scale * (flat[e, 1, 1] * pa + flat[e, 2, 1] * pb)
-            scale = sense / (np.sqrt(tx * tx + ty * ty) + 1e-300)
-            nx, ny = -ty * scale, tx * scale
-        for e in range(2):
-            pa = flat[e, 1, 0] * nx + flat[e, 1, 1] * ny
-            pb = flat[e, 2, 0] * nx + flat[e, 2, 1] * ny
-            scale = 1.0 / (np.sqrt(pa * pa + pb * pb) + 1e-300)
-            # Side 0 begins end 1's arc and ends end 0's.
-            at = 0 if side != e else 2
-            arcs[e, at], arcs[e, at + 1] = pa * scale, pb * scale
-    for e in range(2):
-        sweep = np.arctan2(
-            arcs[e, 0] * arcs[e, 3] - arcs[e, 1] * arcs[e, 2],
-            arcs[e, 0] * arcs[e, 2] + arcs[e, 1] * arcs[e, 3],
-        )
-        # Which way round leads over the outside depends on how the camera sees the ellipse.
-        seen = flat[e, 1, 0] * flat[e, 2, 1] - flat[e, 1, 1] * flat[e, 2, 0]
-        if seen > 0.0:
-            if sweep > 0.0:
-                sweep -= turn
-        elif sweep < 0.0:
-            sweep += turn
-        arcs[e, 4] = sweep
-    return TAPERED
+        # Side 0 begins end 1's arc and ends end 0's.
+        to_0, to_1 = (2 * LANES, 4 * LANES) if side == 0 else (0, 6 * LANES)
+        for c in range(n):
+            gu, gv = flat[6 * LANES + c] - flat[c], flat[7 * LANES + c] - flat[LANES + c]
+            au, av = flat[2 * LANES + c], flat[3 * LANES + c]
+            bu, bv = flat[4 * LANES + c], flat[5 * LANES + c]
+            cu, cv = flat[8 * LANES + c], flat[9 * LANES + c]
+            du, dv = flat[10 * LANES + c], flat[11 * LANES + c]
+            nu, nv = -gv * sense, gu * sense
+            for _ in range(2):
+                pa, pb = au * nu + av * nv, bu * nu + bv * nv
+                qa, qb = cu * nu + cv * nv, du * nu + dv * nv
+                p = 1.0 / np.sqrt(pa * pa + pb * pb + _TINY)
+                q = 1.0 / np.sqrt(qa * qa + qb * qb + _TINY)
+                tu = gu + q * (cu * qa + du * qb) - p * (au * pa + bu * pb)
+                tv = gv + q * (cv * qa + dv * qb) - p * (av * pa + bv * pb)
+                nu, nv = -tv * sense, tu * sense
+            pa, pb = au * nu + av * nv, bu * nu + bv * nv
+            qa, qb = cu * nu + cv * nv, du * nu + dv * nv
+            p = 1.0 / np.sqrt(pa * pa + pb * pb + _TINY)
+            q = 1.0 / np.sqrt(qa * qa + qb * qb + _TINY)
+            arcs[to_0 + c], arcs[to_0 + LANES + c] = pa * p, pb * p
+            arcs[to_1 + c], arcs[to_1 + LANES + c] = qa * q, qb * q
+    for c in range(cones):
+        if form[c] >= ONLY_END:
+            at = 4 * (form[c] - ONLY_END) * LANES + c
+            arcs[at], arcs[at + LANES] = 1.0, 0.0
+            arcs[at + 2 * LANES], arcs[at + 3 * LANES] = 1.0, 0.0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def cone_outline(ends, k, distortion, distorted, points, sides, flat, arcs):  # type: ignore[no-untyped-def]
-    """Outline of a cone given in the camera's frame.
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+def arc_sweep(e, c, flat, form, arcs):  # type: ignore[no-untyped-def]
+    """The angle (rad) that end e's arc of cone c sweeps, by the way that leads over the outside."""
+    if form[c] == ONLY_END + e:
+        return 2.0 * np.pi
+    at = 4 * e * LANES + c
+    ca, sa = arcs[at], arcs[at + LANES]
+    cb, sb = arcs[at + 2 * LANES], arcs[at + 3 * LANES]
+    sweep = np.arctan2(ca * sb - sa * cb, ca * cb + sa * sb)
+    if clockwise(6 * e * LANES + c, flat):
+        return sweep - 2.0 * np.pi if sweep > 0.0 else sweep
+    return sweep + 2.0 * np.pi if sweep < 0.0 else sweep
 
-    Args:
-        ends: (2, 3, 3) per end its centre and its two radius vectors, m, camera frame.
-        k: (5,) fx, skew, cx, fy, cy.
-        distortion, distorted: (5,) and whether any of it matters.
-        points: (MAX_POINTS, 2) px, filled with the polygon.
-        sides: (3, 2, 2) px, filled with the two sides' and the far end's first and last point;
-            NaN where the cone has none.
-        flat, arcs: (2, 3, 2) and (2, 5), working memory; see `cone_tangents`.
+
+@njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
+def clockwise(at, flat):  # type: ignore[no-untyped-def]
+    """Whether arcs of the end whose rows of flat begin at `at` run towards smaller angles."""
+    return flat[at + 2 * LANES] * flat[at + 5 * LANES] > flat[at + 3 * LANES] * flat[at + 4 * LANES]
+
+
+@njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
+def _place(cos, sin, at, to, ends, u, v):  # type: ignore[no-untyped-def]
+    """Image at focal length 1 of the point at an angle of an end, into u and v at `to`."""
+    inverse = 1.0 / (ends[at + 2 * LANES] + cos * ends[at + 5 * LANES] + sin * ends[at + 8 * LANES])
+    u[to] = (ends[at] + cos * ends[at + 3 * LANES] + sin * ends[at + 6 * LANES]) * inverse
+    v[to] = (ends[at + LANES] + cos * ends[at + 4 * LANES] + sin * ends[at + 7 * LANES]) * inverse
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+def _arc(cones, e, row, ends, flat, arcs, u, v):  # type: ignore[no-untyped-def]
+    """Place the points of end e's arc, from a row on.
+
+    The middle halves the arc; points nearly at the thirds of either half are found from its ends
+    a, b as the directions of w a + b and a + w b, without any angle.
+    """
+    n = (cones + _VECTOR - 1) // _VECTOR * _VECTOR
+    at, way, to = 9 * e * LANES, 4 * e * LANES, row * LANES
+    for c in range(n):
+        ca, sa = arcs[way + c], arcs[way + LANES + c]
+        cb, sb = arcs[way + 2 * LANES + c], arcs[way + 3 * LANES + c]
+        sense = -1.0 if clockwise(6 * e * LANES + c, flat) else 1.0
+        # The middle lies across the chord and along the sum; the longer of the two is sure.
+        hc, hs = cb - ca, sb - sa
+        mc, ms = ca + cb, sa + sb
+        across = hc * hc + hs * hs > mc * mc + ms * ms
+        flip = 1.0 if (ca * sb - sa * cb) * sense > 0.0 else -1.0
+        mc, ms = (sense * hs if across else flip * mc), (-sense * hc if across else flip * ms)
+        scale = 1.0 / np.sqrt(mc * mc + ms * ms + _TINY)
+        mc, ms = mc * scale, ms * scale
+        w = _THIRD_0 + _THIRD_1 * (ca * mc + sa * ms)
+        _place(ca, sa, at + c, to + c, ends, u, v)
+        pc, ps = w * ca + mc, w * sa + ms
+        scale = 1.0 / np.sqrt(pc * pc + ps * ps + _TINY)
+        _place(pc * scale, ps * scale, at + c, to + LANES + c, ends, u, v)
+        pc, ps = ca + w * mc, sa + w * ms
+        scale = 1.0 / np.sqrt(pc * pc + ps * ps + _TINY)
+        _place(pc * scale, ps * scale, at + c, to + 2 * LANES + c, ends, u, v)
+        _place(mc, ms, at + c, to + 3 * LANES + c, ends, u, v)
+        pc, ps = cb + w * mc, sb + w * ms
+        scale = 1.0 / np.sqrt(pc * pc + ps * ps + _TINY)
+        _place(pc * scale, ps * scale, at + c, to + 4 * LANES + c, ends, u, v)
+        pc, ps = w * cb + mc, w * sb + ms
+        scale = 1.0 / np.sqrt(pc * pc + ps * ps + _TINY)
+        _place(pc * scale, ps * scale, at + c, to + 5 * LANES + c, ends, u, v)
+        _place(cb, sb, at + c, to + 6 * LANES + c, ends, u, v)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+def _side(cones, e, row, ends, arcs, u, v):  # type: ignore[no-untyped-def]
+    """Place the inner points of the side that leaves end e, from a row on.
+
+    Equal steps along the cone are not equal steps in the image.
+    """
+    o = 1 - e
+    at, to = (4 * e + 2) * LANES, 4 * o * LANES
+    for c in range(cones):
+        z0 = _depth(e, c, arcs[at + c], arcs[at + LANES + c], ends)
+        z1 = _depth(o, c, arcs[to + c], arcs[to + LANES + c], ends)
+        begin, end = (row - 1) * LANES + c, ((row + SIDE_POINTS) % MAX_POINTS) * LANES + c
+        for i in range(SIDE_POINTS):
+            t = (i + 1.0) / (SIDE_POINTS + 1.0)
+            w0, w1 = (1.0 - t) * z0, t * z1
+            inverse = 1.0 / (w0 + w1)
+            u[(row + i) * LANES + c] = (w0 * u[begin] + w1 * u[end]) * inverse
+            v[(row + i) * LANES + c] = (w0 * v[begin] + w1 * v[end]) * inverse
+
+
+@njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
+def _depth(e, c, cos, sin, ends):  # type: ignore[no-untyped-def]
+    at = 9 * e * LANES + c
+    return ends[at + 2 * LANES] + cos * ends[at + 5 * LANES] + sin * ends[at + 8 * LANES]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+def _to_pixels(cones, count, k, distortion, distorted, u, v):  # type: ignore[no-untyped-def]
+    """Turn points at focal length 1 into pixels."""
+    n = (cones + _VECTOR - 1) // _VECTOR * _VECTOR
+    fx, skew, cx, fy, cy = k[0], k[1], k[2], k[3], k[4]
+    for i in range(count):
+        if distorted:
+            for c in range(n):
+                u[i * LANES + c], v[i * LANES + c] = lens(
+                    u[i * LANES + c], v[i * LANES + c], distortion
+                )
+        for c in range(n):
+            b = v[i * LANES + c]
+            u[i * LANES + c] = fx * u[i * LANES + c] + skew * b + cx
+            v[i * LANES + c] = fy * b + cy
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+def scan_edges(cones, count, height, u, v, first, slope, box):  # type: ignore[no-untyped-def]
+    """Fill first, slope and box from polygons of `count` points in a frame of `height` rows."""
+    n = (cones + _VECTOR - 1) // _VECTOR * _VECTOR
+    limit = np.float64(height)
+    for c in range(n):
+        box[c], box[LANES + c] = np.inf, -np.inf
+        box[2 * LANES + c], box[3 * LANES + c] = np.inf, -np.inf
+    for i in range(count):
+        before = (i - 1 if i > 0 else count - 1) * LANES
+        for c in range(n):
+            x, y = u[i * LANES + c], v[i * LANES + c]
+            slope[i * LANES + c] = (x - u[before + c]) / (y - v[before + c])
+            # Comparisons with NaN are false: it comes out as the frame's border.
+            row = np.ceil(y) if y > 0.0 else 0.0
+            row = row if row < limit else limit
+            first[i * LANES + c] = np.int32(row)
+            box[c] = x if x < box[c] else box[c]
+            box[LANES + c] = x if x > box[LANES + c] else box[LANES + c]
+            box[2 * LANES + c] = row if row < box[2 * LANES + c] else box[2 * LANES + c]
+            box[3 * LANES + c] = row if row > box[3 * LANES + c] else box[3 * LANES + c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+def find_outlines(cones, views, view, world, out):  # type: ignore[no-untyped-def]
+    """Fill `out`, one thread's `Outlines`, for cones whose ends lie at world (18 rows).
 
     Returns:
-        Number of polygon points; 0 if the cone comes too near to the camera's plane.
+        Number of points of every polygon.
     """
-    form = cone_tangents(ends, flat, arcs)
-    if form != TAPERED:
-        for s in range(3):
-            for i in range(2):
-                sides[s, 0, i] = np.nan
-                sides[s, 1, i] = np.nan
-        if form == HIDDEN:
-            return 0
-        count = 2 * ARC_POINTS - 2
-        sweep = 2.0 * np.pi * (1.0 - 1.0 / count)
-        _arc(ends, form - ONLY_END, 1.0, 0.0, sweep, count, k, distortion, distorted, points, 0)
-        return count
-
-    steps = SIDE_SEGMENTS if distorted else 1
-    n = 0
-    # Around the far end (end 1) from side 0 to side 1, down side 1, around end 0, up side 0.
-    for e in (1, 0):
-        _arc(
-            ends, e, arcs[e, 0], arcs[e, 1], arcs[e, 4], ARC_POINTS, k, distortion, distorted,
-            points, n,
-        )  # fmt: skip
-        n += ARC_POINTS
-        if steps > 1:
-            _side(ends, e, arcs, steps, k, distortion, distorted, points, n)
-            n += steps - 1
-    far = ARC_POINTS + steps - 1
-    for i in range(2):
-        sides[0, 0, i] = points[far + ARC_POINTS - 1, i]
-        sides[0, 1, i] = points[0, i]
-        sides[1, 0, i] = points[far, i]
-        sides[1, 1, i] = points[ARC_POINTS - 1, i]
-        sides[2, 0, i] = points[0, i]
-        sides[2, 1, i] = points[ARC_POINTS - 1, i]
-    return n
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _support(flat, e, nx, ny):  # type: ignore[no-untyped-def]
-    """How far end e reaches from its centre in a direction."""
-    pa = flat[e, 1, 0] * nx + flat[e, 1, 1] * ny
-    pb = flat[e, 2, 0] * nx + flat[e, 2, 1] * ny
-    return np.sqrt(pa * pa + pb * pb)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _arc(ends, e, cos, sin, sweep, count, k, distortion, distorted, points, n):  # type: ignore[no-untyped-def]
-    """Project `count` points of an end's ellipse, from an angle's cos, sin on, into points[n:]."""
-    step = sweep / (count - 1)
-    turn_cos, turn_sin = np.cos(step), np.sin(step)
-    for i in range(count):
-        project_point(
-            ends[e, 0, 0] + cos * ends[e, 1, 0] + sin * ends[e, 2, 0],
-            ends[e, 0, 1] + cos * ends[e, 1, 1] + sin * ends[e, 2, 1],
-            ends[e, 0, 2] + cos * ends[e, 1, 2] + sin * ends[e, 2, 2],
-            k, distortion, distorted, points, n + i,
-        )  # fmt: skip
-        cos, sin = cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _side(ends, e, arcs, steps, k, distortion, distorted, points, n):  # type: ignore[no-untyped-def]
-    """Project the inner points of the side from end e to the other end into points[n:]."""
-    o = 1 - e
-    ca, sa, cb, sb = arcs[e, 2], arcs[e, 3], arcs[o, 0], arcs[o, 1]
-    for i in range(1, steps):
-        t = i / steps
-        x = _between(ends, e, o, ca, sa, cb, sb, t, 0)
-        y = _between(ends, e, o, ca, sa, cb, sb, t, 1)
-        z = _between(ends, e, o, ca, sa, cb, sb, t, 2)
-        project_point(x, y, z, k, distortion, distorted, points, n + i - 1)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _between(ends, e, o, ca, sa, cb, sb, t, m):  # type: ignore[no-untyped-def]
-    """Coordinate m of the point a share t of the way from end e to end o."""
-    a = ends[e, 0, m] + ca * ends[e, 1, m] + sa * ends[e, 2, m]
-    b = ends[o, 0, m] + cb * ends[o, 1, m] + sb * ends[o, 2, m]
-    return a + t * (b - a)
+    distortion = views.distortion[view]
+    distorted = distorts(distortion)
+    to_camera(cones, world, views.rotation[view], views.translation[view], out.ends)
+    find_forms(cones, out.ends, out.flat, out.form)
+    find_tangents(cones, out.flat, out.form, out.arcs)
+    between = SIDE_POINTS if distorted else 0
+    count = 2 * (ARC_POINTS + between)
+    near = ARC_POINTS + between
+    _arc(cones, 1, 0, out.ends, out.flat, out.arcs, out.u, out.v)
+    _arc(cones, 0, near, out.ends, out.flat, out.arcs, out.u, out.v)
+    if distorted:
+        _side(cones, 1, ARC_POINTS, out.ends, out.arcs, out.u, out.v)
+        _side(cones, 0, near + ARC_POINTS, out.ends, out.arcs, out.u, out.v)
+    for c in range(cones):
+        if out.form[c] >= ONLY_END:
+            for i in range(count):
+                angle = 2.0 * np.pi * i / count
+                at = 9 * (out.form[c] - ONLY_END) * LANES + c
+                _place(np.cos(angle), np.sin(angle), at, i * LANES + c, out.ends, out.u, out.v)
+    _to_pixels(cones, count, views.intrinsics[view], distortion, distorted, out.u, out.v)
+    scan_edges(cones, count, views.size[view, 1], out.u, out.v, out.first, out.slope, out.box)
+    return count

@@ -1,15 +1,55 @@
 """The one way into numba's parallel loops."""
 
 import threading
+import time
+from functools import cache
 
 import numba
+import numpy as np
+from numba import njit, prange
 
 # The only threading layer without a library to install. It takes one caller at a time.
 numba.config.THREADING_LAYER = "workqueue"
 ONE_CALLER = threading.Lock()
 """Held while a parallel kernel runs."""
 
+_LAUNCHES = 30
+_MARGIN = 3.0
+"""Beside a busy interpreter waking takes longer than when it is measured."""
+
 
 def usable_threads(wanted: int) -> int:
     """At least one thread, at most as many as numba started with."""
     return max(1, min(wanted, int(numba.config.NUMBA_NUM_THREADS)))
+
+
+def worth_waking(work_s: float, threads: int) -> bool:
+    """Whether some threads finish work that takes one of them `work_s` sooner than one alone.
+
+    Waking threads costs between some 10 and some 100 µs, so small batches are better off without.
+    Results do not depend on the number of threads: the answer may differ between machines.
+    """
+    return threads > 1 and work_s * (1.0 - 1.0 / threads) > _MARGIN * launch_cost_s(threads)
+
+
+@cache
+def launch_cost_s(threads: int) -> float:
+    """What waking some threads costs on this machine; measured once."""
+    ticks = np.zeros(threads)
+    costs = []
+    with ONE_CALLER:
+        numba.set_num_threads(threads)
+        _nothing(ticks)
+        for _ in range(_LAUNCHES):
+            # Workers fall asleep between the swarm's steps.
+            time.sleep(0.0002)
+            begin = time.perf_counter()
+            _nothing(ticks)
+            costs.append(time.perf_counter() - begin)
+    return float(np.median(costs))
+
+
+@njit(cache=True, nogil=True, parallel=True)  # type: ignore[misc]
+def _nothing(ticks):  # type: ignore[no-untyped-def]
+    for thread in prange(ticks.size):
+        ticks[thread] += 1.0

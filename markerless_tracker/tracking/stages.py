@@ -19,6 +19,8 @@ SPPSO_STAGES = ((10, 20), (20, 40))
 """Particles and iterations of SPPSO's two stages at 1000 evaluations."""
 SWARM_SHARE = Fraction(2, 10)
 """Share of the budget that the swarm keeps beside contour refinement."""
+RESCUE_STAGES = ((40, 5), (80, 10))
+"""The same evaluations beside contour refinement: it homes in, so the swarm may look widely."""
 LIMB_SWARM = (10, 5)
 """Particles and iterations of each limb's own swarm at a budget of 1000."""
 _TRUNK = ("root", "torso_head")
@@ -133,8 +135,11 @@ def sppso_stages(
     it; stage 2 varies all, with the root's position spread divided by 10, from stage 1's estimate.
     Beside a refinement the swarm keeps `SWARM_SHARE` of the budget.
     """
-    share = Fraction(1) if config.refinement == "none" else SWARM_SHARE
-    first, second = scaled_particles(SPPSO_STAGES, config.evaluations, "sppso", share=share)
+    alone = config.refinement == "none"
+    published = SPPSO_STAGES if alone else RESCUE_STAGES
+    share = Fraction(1) if alone else SWARM_SHARE
+    first, second = scaled_particles(published, config.evaluations, "sppso", share=share)
+    steps = {"root": (first, published[0][1]), "body": (second, published[1][1])}
     every_cone = np.ones(len(body.cone_names), dtype=np.bool_)
     settled = sigma.copy()
     settled[translations(body)] /= _SOFT
@@ -142,7 +147,7 @@ def sppso_stages(
     def stage(
         name: str, active: IntArray, spread: FloatArray, edge_cones: NDArray[np.bool_]
     ) -> Stage:
-        particles, iterations = {"root": (first, 20), "body": (second, 40)}[name]
+        particles, iterations = steps[name]
         return Stage(
             name=name,
             algorithm="sppso",

@@ -117,8 +117,10 @@ class Tracker:
                 segmenter.reset()
             nothing[height // 4 : height // 2, width // 4 : width // 2] = 1
             blank[camera.name] = Observation.from_mask(camera.name, 0, nothing, nothing)
-        self.step(blank, 0)
-        self.reset()
+        # The most work and the least: whether threads are woken depends on it.
+        for views in (blank, dict(list(blank.items())[:1])):
+            self.step(views, 0)
+            self.reset()
 
     def step(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> TrackResult:
         """Find the pose that explains the views of one time.

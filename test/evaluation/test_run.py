@@ -58,8 +58,12 @@ def test_the_same_bytes_with_any_threads_from_folder_and_from_bag(walk, bag, sea
     one = result_bytes(walk, truth, tmp_path / "one", search, threads=1)
     assert one == result_bytes(walk, truth, tmp_path / "elsewhere" / "two", search, threads=2)
     assert one == result_bytes(bag, truth, tmp_path / "bag", search, threads=2)
-    other = result_bytes(walk, truth, tmp_path / "other", search, seed=2)
-    assert one != other
+    # Swarms alone end elsewhere with each seed; beside a refinement few of them decide.
+    swarms = [
+        result_bytes(walk, truth, tmp_path / str(seed), search, seed=seed, refinement="none")
+        for seed in (1, 2)
+    ]
+    assert swarms[0] != swarms[1]
     found = score(read_trc(tmp_path / "one.trc"), read_trc(truth))
     assert (found.frames, found.reference_frames) == (6, 6)
     assert found.mean_mm < 30.0

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from markerless_tracker.camera import CameraModel, CameraRig
-from markerless_tracker.errors import ImageError
+from markerless_tracker.errors import BodyModelError, ImageError
 from markerless_tracker.fitness import lay_out_views
+from markerless_tracker.fitness.arrays import body_arrays
+from markerless_tracker.fitness.outline import LANES
 from markerless_tracker.records import Observation, pack_mask, unpack_mask
 
 
@@ -37,9 +39,11 @@ def test_views_stand_in_the_cameras_order_one_after_the_other(cameras):
         width, height = camera.size_px
         assert tuple(arrays.size[i]) == (width, height)
         words = int(arrays.words[i])
-        mask = arrays.mask[arrays.mask_start[i] :][: words * height].reshape(height, words)
+        mask = arrays.mask[arrays.mask_start[i] :][: words * height].reshape(words, height)
         edges = arrays.edges[arrays.edge_start[i] :][: width * height].reshape(height, width)
-        np.testing.assert_array_equal(unpack_mask(mask, width), seen[camera.name].mask)
+        np.testing.assert_array_equal(
+            unpack_mask(np.ascontiguousarray(mask.T), width), seen[camera.name].mask
+        )
         np.testing.assert_array_equal(edges, seen[camera.name].edges)
         assert arrays.observed[i] == seen[camera.name].mask.sum()
         k = camera.matrix
@@ -70,7 +74,7 @@ def test_a_region_lands_where_it_was_cut_out(cameras):
         "a", 0, mask[2:8, 5:69], edges[2:8, 5:69], size_px=camera.size_px, offset_px=(5, 2)
     )
     views = lay_out_views(cameras, {"a": region}).arrays
-    np.testing.assert_array_equal(views.mask, pack_mask(mask).ravel())
+    np.testing.assert_array_equal(views.mask, pack_mask(mask).T.ravel())
     np.testing.assert_array_equal(views.edges, edges.ravel())
     assert views.observed[0] == mask.sum()
 
@@ -86,3 +90,11 @@ def test_a_frame_of_another_size_is_refused_naming_the_camera(cameras):
     wrong = observation(cameras[1], 0)
     with pytest.raises(ImageError, match=r"^a: observation of a 33x20 px frame.*says 70x9 px$"):
         lay_out_views(CameraRig(cameras).cameras, {"a": wrong})
+
+
+def test_a_body_of_too_many_cones_is_refused_naming_it(body):
+    many = replace(body, cone_names=tuple(f"c{i}" for i in range(LANES + 1)))
+    with pytest.raises(
+        BodyModelError, match=rf"body {body.name}: 65 cones, expected 64 at the most"
+    ):
+        body_arrays(many)

@@ -17,10 +17,11 @@ from markerless_tracker.body import (
 )
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.drawing import outlines, silhouette
-from markerless_tracker.fitness import Fitness
+from markerless_tracker.fitness import Fitness, threads
 from markerless_tracker.fitness.arrays import body_arrays
-from markerless_tracker.fitness.contour_kernels import MAX_SAMPLES, pose_row
+from markerless_tracker.fitness.chain_kernels import SUMS, add_wrench, sum_chain
 from markerless_tracker.fitness.contours import SPACING_M, ContourFrame, EdgeOfMask, edge_of_mask
+from markerless_tracker.fitness.outline_samples import MAX_SAMPLES
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
@@ -465,7 +466,7 @@ def numeric_jacobian(function, pose, h=1e-5):
     return np.stack(columns, axis=-1)
 
 
-def test_pose_rows(posed) -> None:
+def test_slopes_along_the_chain(posed) -> None:
     """The chain's derivatives of gradient . point, for points on every cone."""
     body, rng = posed.body, np.random.default_rng(2)
     pose = disturbed(posed)
@@ -477,17 +478,16 @@ def test_pose_rows(posed) -> None:
     slow = np.einsum(
         "nip,ni->np", numeric_jacobian(attached(body, pose, cone, world), pose), gradient
     )
-    index, row = np.empty(nodes.shape[0], np.int64), np.empty(nodes.shape[0])
     arrays = body_arrays(body)
     reached = set()
+    hessian, fast = np.empty((body.size, body.size)), np.empty(body.size)
     for i, c in enumerate(cone):
-        n = pose_row(
-            world[i], gradient[i], body.cone_node[c], arrays, nodes, index, row
-        )  # fmt: skip
-        fast = np.zeros(body.size)
-        np.add.at(fast, index[:n], row[:n])
+        sums = np.zeros((nodes.shape[0], SUMS))
+        add_wrench(world[i], gradient[i], 2.0, 0.5, sums, body.cone_node[c], np.empty(6))
+        sum_chain(arrays, nodes, sums, hessian, fast)
         np.testing.assert_allclose(fast, slow[i], atol=1e-7)
-        reached.update(index[:n])
+        np.testing.assert_allclose(hessian, 2.0 * np.outer(slow[i], slow[i]), atol=1e-6)
+        reached.update(np.flatnonzero(fast))
     assert reached == set(range(31))
 
 
@@ -530,7 +530,8 @@ def test_the_slope_points_downhill(posed) -> None:
 # --- threads and memory -----------------------------------------------------------------------
 
 
-def test_threads_and_earlier_calls_change_nothing(make_pose) -> None:
+def test_threads_and_earlier_calls_change_nothing(monkeypatch, make_pose) -> None:
+    monkeypatch.setattr(threads, "launch_cost_s", lambda count: 0.0)
     one = scene("person31", 9, make_pose, lens=LENS, threads=1)
     two = scene("person31", 9, make_pose, lens=LENS, threads=2)
     pose = disturbed(one)

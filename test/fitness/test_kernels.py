@@ -10,26 +10,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.fitness import EDGE_RULES, Fitness
+from markerless_tracker.fitness.fill import clear_used, fill_outline
 from markerless_tracker.fitness.kernels import (
     EDGE_COUNT,
     EDGE_SUM,
     OVERLAP,
     PROJECTED,
     EdgeRule,
-    fill_outline,
     sample_side,
 )
+from markerless_tracker.fitness.outline import LANES, make_outlines, outlines_of, scan_edges
 from markerless_tracker.records import Observation, unpack_mask
 from markerless_tracker.synthesis import look_at
 
 STRIP_PX = 0.06
 END_ON_STRIP_PX = 0.1
+LANE = 3
+"""Which of the polygons that are worked on side by side the tests fill."""
 
 
 def check_silhouettes(
@@ -195,14 +198,20 @@ def test_silhouette_cones_choose_what_is_drawn(twin, make_pose, make_observation
 
 
 def fill(points, width: int, height: int):
-    """Words and mask (h, w) that `fill_outline` sets, and the rows and words it says it used."""
-    rows = np.zeros((height, (width + 63) // 64), dtype=np.uint64)
-    used = np.array([height, -1, rows.shape[1], -1])
+    """Words (w, h) and mask (h, w) that `fill_outline` sets, and the rows it says it used."""
+    words = (width + 63) // 64
+    bits = np.zeros(words * height, dtype=np.uint64)
+    used = np.empty((words, 2), dtype=np.int64)
+    clear_used(words, height, used)
+    out = outlines_of(make_outlines(1, height), 0)
+    for i, (u, v) in enumerate(np.asarray(points, dtype=np.float64)):
+        out.u[i * LANES + LANE], out.v[i * LANES + LANE] = u, v
     # Whatever an earlier polygon left behind must not matter.
-    left, right = np.full(height, 7.0), np.full(height, 20.0)
-    points = np.ascontiguousarray(points, dtype=np.float64)
-    fill_outline(points, len(points), width, height, rows, left, right, used)
-    return rows, unpack_mask(rows, width), used
+    out.left[:], out.right[:] = 7.0, 20.0
+    scan_edges(LANE + 1, len(points), height, out.u, out.v, out.first, out.slope, out.box)
+    fill_outline(LANE, len(points), out, width, height, bits, used)
+    frame = bits.reshape(words, height)
+    return frame, unpack_mask(np.ascontiguousarray(frame.T), width), used
 
 
 def inside_convex(points, width: int, height: int):
@@ -218,6 +227,7 @@ def inside_convex(points, width: int, height: int):
     return least > 1e-6, np.abs(least) <= 1e-6
 
 
+@settings(deadline=None)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(3, 14),
@@ -238,9 +248,8 @@ def test_convex_polygons_fill_exactly_the_pixel_centres_inside(seed, corners, si
     inside, undecided = inside_convex(points, width, height)
     np.testing.assert_array_equal(filled[~undecided], inside[~undecided])
     # Only what is said to be used is wiped afterwards.
-    outside = words.copy()
-    outside[used[0] : used[1] + 1, used[2] : used[3] + 1] = 0
-    assert not outside.any()
+    for column, (first, last) in zip(words, used, strict=True):
+        assert not column[:first].any() and not column[last + 1 :].any()
 
 
 def test_two_polygons_that_share_an_edge_leave_no_gap():
@@ -263,7 +272,7 @@ def test_two_polygons_that_share_an_edge_leave_no_gap():
 )
 def test_polygons_that_are_none_stay_inside_the_frame(points):
     words, _, _ = fill(np.array(points), 70, 30)
-    padding = unpack_mask(words, 128)[:, 70:]
+    padding = unpack_mask(np.ascontiguousarray(words.T), 128)[:, 70:]
     assert not padding.any()
 
 
@@ -272,7 +281,7 @@ def sample(p, q, edges, rule: str, *, bits=None, outward=1.0, spacing=5.0, squar
     rows = np.zeros((height, (width + 63) // 64), dtype=np.uint64) if bits is None else bits
     counts = np.zeros(4)
     sample_side(
-        np.array(p, dtype=float), np.array(q, dtype=float), outward, rows, edges.ravel(),
+        float(p[0]), float(p[1]), float(q[0]), float(q[1]), outward, rows.T.ravel(), edges.ravel(),
         width, height, EdgeRule(EDGE_RULES[rule], spacing, 2.0, squared), counts,
     )  # fmt: skip
     return counts[EDGE_COUNT], counts[EDGE_SUM]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.errors import BodyModelError, CalibrationError, ImageError
+from markerless_tracker.fitness import contours
 from markerless_tracker.imaging import Segmenter
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.tracking import Tracker, TrackerConfig
@@ -353,3 +354,13 @@ def test_a_start_outside_the_limits_is_refused_by_name(scene, swarm_settings) ->
     pose[scene.body.index("l_knee")] = 1.0
     with pytest.raises(BodyModelError, match=r"start pose: l_knee is 1, its limits are -2\.7"):
         Tracker(scene.rig, scene.body, TrackerConfig.from_mapping(swarm_settings), start_pose=pose)
+
+
+def test_warming_up_meets_the_most_and_the_least_work(
+    make_tracker, refined_settings, frames, monkeypatch
+):
+    """Else the kernel for few views would be compiled when a camera fails."""
+    asked = set()
+    monkeypatch.setattr(contours, "worth_waking", lambda work_s, threads: asked.add(work_s))
+    make_tracker(refined_settings).warm_up()
+    assert min(asked) * len(frames[0].images) == pytest.approx(max(asked))

@@ -1,0 +1,96 @@
+"""Normal equations along the kinematic chain, from sums over each part of the body.
+
+A residual r moves with a point X of a rigid part by its gradient g = dr/dX. A joint that turns
+about an axis w through o moves it by w . (X x g) + (o x w) . g, one that slides along w by w . g:
+both are the product of the joint's twist (a vector of 6) and the residual's wrench (g, X x g).
+So JᵀWJ needs no row per residual: the wrenches' outer products are summed per part, then up the
+tree, and each pair of joints on one chain reads its entry off the sum of what both move (as the
+composite-rigid-body algorithm does for inertia: Featherstone, Rigid Body Dynamics Algorithms,
+2008, chapter 6).
+"""
+
+import numpy as np
+from numba import njit
+
+SUMS = 27
+"""Per part: the upper triangle of the 6x6 sum of weighted outer products, then the 6 of W r."""
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def add_wrench(point, gradient, weight, value, sums, node, wrench):  # type: ignore[no-untyped-def]
+    """Add a residual's wrench to row `node` of sums (m, SUMS); wrench (6,) is working memory."""
+    x, y, z = point[0], point[1], point[2]
+    gx, gy, gz = gradient[0], gradient[1], gradient[2]
+    wrench[0], wrench[1], wrench[2] = gx, gy, gz
+    wrench[3], wrench[4], wrench[5] = y * gz - z * gy, z * gx - x * gz, x * gy - y * gx
+    k = 0
+    for i in range(6):
+        scaled = weight * wrench[i]
+        for j in range(i, 6):
+            sums[node, k] += scaled * wrench[j]
+            k += 1
+    for i in range(6):
+        sums[node, 21 + i] += weight * value * wrench[i]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def twist_of(node, body, nodes, twist):  # type: ignore[no-untyped-def]
+    """Fill twist (6,) of a node's joint; returns whether it has one."""
+    kind = body.kind[node]
+    if kind < 0:
+        return False
+    axis = kind % 3
+    sign = body.sign[node]
+    wx, wy, wz = (
+        sign * nodes[node, 0, axis],
+        sign * nodes[node, 1, axis],
+        sign * nodes[node, 2, axis],
+    )
+    if kind >= 3:
+        twist[0], twist[1], twist[2] = wx, wy, wz
+        twist[3], twist[4], twist[5] = 0.0, 0.0, 0.0
+        return True
+    x, y, z = nodes[node, 0, 3], nodes[node, 1, 3], nodes[node, 2, 3]
+    twist[0], twist[1], twist[2] = y * wz - z * wy, z * wx - x * wz, x * wy - y * wx
+    twist[3], twist[4], twist[5] = wx, wy, wz
+    return True
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def sum_chain(body, nodes, sums, hessian, slope):  # type: ignore[no-untyped-def]
+    """Fill hessian (p, p) and slope (p,) from the parts' sums (m, SUMS), which become the trees'.
+
+    Parents come before their children.
+    """
+    hessian[:] = 0.0
+    slope[:] = 0.0
+    twist, other, force = np.empty(6), np.empty(6), np.empty(6)
+    for node in range(body.parent.size - 1, -1, -1):
+        above = body.parent[node]
+        if above >= 0:
+            for k in range(SUMS):
+                sums[above, k] += sums[node, k]
+        if not twist_of(node, body, nodes, twist):
+            continue
+        force[:] = 0.0
+        k = 0
+        for i in range(6):
+            force[i] += sums[node, k] * twist[i]
+            k += 1
+            for j in range(i + 1, 6):
+                force[i] += sums[node, k] * twist[j]
+                force[j] += sums[node, k] * twist[i]
+                k += 1
+        p = body.parameter[node]
+        for i in range(6):
+            slope[p] += twist[i] * sums[node, 21 + i]
+            hessian[p, p] += twist[i] * force[i]
+        while above >= 0:
+            if twist_of(above, body, nodes, other):
+                entry = 0.0
+                for i in range(6):
+                    entry += other[i] * force[i]
+                q = body.parameter[above]
+                hessian[p, q] += entry
+                hessian[q, p] += entry
+            above = body.parent[above]
