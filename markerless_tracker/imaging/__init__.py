@@ -5,6 +5,7 @@ from markerless_tracker.imaging.images import Image, check_image, scale_image
 from markerless_tracker.imaging.model_file import read_background_model, write_background_model
 from markerless_tracker.imaging.plate import Plate, background_plate
 from markerless_tracker.imaging.recording import learn_from_recording
+from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmenter import Segmenter
 from markerless_tracker.imaging.settings import ImagingSettings
 
@@ -14,6 +15,7 @@ __all__ = [
     "ImagingSettings",
     "Mode",
     "Plate",
+    "Region",
     "Segmenter",
     "background_plate",
     "check_image",

@@ -8,6 +8,11 @@ from markerless_tracker.imaging.morphology import Mask
 from markerless_tracker.imaging.settings import ImagingSettings
 
 
+def edge_reach(settings: ImagingSettings) -> int:
+    """How far from a pixel its edge strength looks at the mask and the image, px."""
+    return settings.edge_margin_px + settings.edge_blur_px // 2 + 1
+
+
 def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
     """Edge strength (h, w) uint8, 255 = 1: gradient -> threshold -> dilated silhouette -> blur.
 

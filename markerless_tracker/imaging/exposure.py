@@ -28,22 +28,84 @@ _LEAST_SAMPLES = 200
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def count_ratios(image, mean, step, first_bin, per_log, counts, sums):  # type: ignore[no-untyped-def]
-    """Count log(image / mean) of (h, w, c) on a grid; counts and sums (of the logs): (c, bins)."""
-    height, width, channels = mean.shape
-    bins = counts.shape[1]
-    for v in range(step // 2, height, step):
-        for u in range(step // 2, width, step):
-            for c in range(channels):
-                value = np.float32(image[v, u, c])
-                base = mean[v, u, c]
-                if value < _DARK or value > _BRIGHT or base < _DARK or base > _BRIGHT:
-                    continue
-                ratio = math.log(value / base)
-                place = int(math.floor((ratio - first_bin) * per_log))
-                if 0 <= place < bins:
-                    counts[c, place] += 1
-                    sums[c, place] += ratio
+def crowded_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-untyped-def]
+    """Fill gain (c,) from the pixels where (n, 2) = (v, u) of an image (h, w, c).
+
+    base_logs: (n, c) log of the background there, NaN where it says nothing; value_logs: (256,) log
+    of each grey level, NaN where it says nothing.
+    """
+    per_log = _BINS / (2.0 * _REACH)
+    counts = np.empty(_BINS, dtype=np.int64)
+    sums = np.empty(_BINS, dtype=np.float64)
+    for c in range(gain.size):
+        counts[:] = 0
+        sums[:] = 0.0
+        total = 0
+        for i in range(where.shape[0]):
+            ratio = value_logs[image[where[i, 0], where[i, 1], c]] - base_logs[i, c]
+            if abs(ratio) < _REACH:  # not for NaN either
+                place = min(int((ratio + _REACH) * per_log), _BINS - 1)
+                counts[place] += 1
+                sums[place] += ratio
+                total += 1
+        gain[c] = 1.0
+        inside = 0
+        for place in range(_CROWD):
+            inside += counts[place]
+        most = inside
+        first = 0
+        equals = 1
+        for place in range(1, _BINS - _CROWD + 1):
+            inside += counts[place + _CROWD - 1] - counts[place - 1]
+            if inside > most:
+                most = inside
+                first = place
+                equals = 1
+            elif inside == most:
+                equals += 1
+        if most < max(_LEAST_SAMPLES, _LEAST_SHARE * total):
+            continue
+        # Of equal crowds the middle one: a flat top has no bias then.
+        inside = most
+        place = first
+        seen = 1
+        while seen <= equals // 2:
+            inside += counts[place + _CROWD] - counts[place]
+            place += 1
+            if inside == most:
+                seen += 1
+        middle = 0.0
+        for k in range(place, place + _CROWD):
+            middle += sums[k]
+        gain[c] = math.exp(middle / most)
+
+
+class ExposureMeter:
+    """Compares images with one background.
+
+    Args:
+        mean: (h, w, c) float32, the background.
+    """
+
+    def __init__(self, mean: NDArray[np.float32]) -> None:
+        height, width, channels = mean.shape
+        step = max(1, math.isqrt(height * width // _SAMPLES))
+        v, u = np.mgrid[step // 2 : height : step, step // 2 : width : step]
+        self._where = np.column_stack([v.ravel(), u.ravel()])
+        self._base_logs = _logs(mean[v.ravel(), u.ravel()].astype(np.float64))
+        self._value_logs = _logs(np.arange(256.0))
+        self._channels = channels
+
+    def gain(self, image: Image) -> NDArray[np.float32]:
+        """(c,) float32: brightness of an image (h, w, c) uint8; 1 where it cannot tell."""
+        gain = np.empty(self._channels, dtype=np.float32)
+        crowded_ratio(image, self._where, self._base_logs, self._value_logs, gain)
+        return gain
+
+
+def _logs(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    usable = (values >= _DARK) & (values <= _BRIGHT)
+    return np.where(usable, np.log(np.where(usable, values, 1.0)), np.nan)
 
 
 def exposure_gain(image: Image, mean: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -53,20 +115,4 @@ def exposure_gain(image: Image, mean: NDArray[np.float32]) -> NDArray[np.float32
         image: (h, w, c) uint8.
         mean: (h, w, c) float32, the background.
     """
-    height, width, channels = mean.shape
-    counts = np.zeros((channels, _BINS), dtype=np.int64)
-    sums = np.zeros((channels, _BINS), dtype=np.float64)
-    step = max(1, math.isqrt(height * width // _SAMPLES))
-    count_ratios(image, mean, step, -_REACH, _BINS / (2.0 * _REACH), counts, sums)
-    gain = np.ones(channels, dtype=np.float32)
-    for c in range(channels):
-        before = np.concatenate([[0], np.cumsum(counts[c])])
-        crowd = before[_CROWD:] - before[:-_CROWD]
-        # Of equal crowds the middle one: a flat top has no bias then.
-        best = np.flatnonzero(crowd == crowd.max())
-        first = int(best[len(best) // 2])
-        inside = int(crowd[first])
-        if inside < max(_LEAST_SAMPLES, _LEAST_SHARE * int(before[-1])):
-            continue
-        gain[c] = math.exp(sums[c, first : first + _CROWD].sum() / inside)
-    return gain
+    return ExposureMeter(mean).gain(image)

@@ -52,64 +52,96 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def label_colour(image, mean, scale, gain, rule, labels):  # type: ignore[no-untyped-def]
-    """Label every pixel of a colour image: 0 background, 127 shadow, 255 foreground.
+def label_colour(image, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
+    """Label a part of a colour image: 0 background, 127 shadow, 255 foreground.
 
     Args:
-        image: (h, w, 3) uint8, BGR.
-        mean: (k, h, w, 3) float32, grey levels, of the k Gaussians of each pixel.
-        scale: (k, h, w, 3) float32, 1 / (sigma * sqrt(limit)): the foreground test is |.|^2 > 1.
+        image: (a, b, 3) uint8, BGR: the part alone.
+        mean: (k, 3, h, w) float32, grey levels, of the k Gaussians of each pixel.
+        scale: (k, 3, h, w) float32, 1 / (sigma * sqrt(limit)): the foreground test is |.|^2 > 1.
         gain: (3,) float32, brightness of the image relative to the background's.
         rule: of `shadow.shadow_rule`.
-        labels: (h, w) uint8, written.
+        left, top: where the part begins in the image.
+        labels: (a, b) uint8, written.
     """
     one = np.float32(1.0)
     white = np.float32(255.0)
     modes = mean.shape[0]
-    height, width = labels.shape
+    rows, columns = labels.shape
     gain_b, gain_g, gain_r = gain[0], gain[1], gain[2]
-    for v in range(height):
-        for u in range(width):
-            b = np.float32(image[v, u, 0])
-            g = np.float32(image[v, u, 1])
-            r = np.float32(image[v, u, 2])
+    distance = np.empty(columns, dtype=np.float32)
+    for i in range(rows):
+        v = top + i
+        # Whole rows first, without a branch: most pixels are background of the first Gaussian.
+        pixel = image[i]
+        base_b = mean[0, 0, v, left : left + columns]
+        base_g = mean[0, 1, v, left : left + columns]
+        base_r = mean[0, 2, v, left : left + columns]
+        scale_b = scale[0, 0, v, left : left + columns]
+        scale_g = scale[0, 1, v, left : left + columns]
+        scale_r = scale[0, 2, v, left : left + columns]
+        for j in range(columns):
+            x = (np.float32(pixel[j, 0]) - min(gain_b * base_b[j], white)) * scale_b[j]
+            y = (np.float32(pixel[j, 1]) - min(gain_g * base_g[j], white)) * scale_g[j]
+            z = (np.float32(pixel[j, 2]) - min(gain_r * base_r[j], white)) * scale_r[j]
+            distance[j] = x * x + y * y + z * z
+        row = labels[i]
+        for j in range(columns):
+            if distance[j] <= one:
+                row[j] = 0
+                continue
+            b = np.float32(pixel[j, 0])
+            g = np.float32(pixel[j, 1])
+            r = np.float32(pixel[j, 2])
             label = 255
             for k in range(modes):
-                mean_b = min(gain_b * mean[k, v, u, 0], white)
-                mean_g = min(gain_g * mean[k, v, u, 1], white)
-                mean_r = min(gain_r * mean[k, v, u, 2], white)
-                x = (b - mean_b) * scale[k, v, u, 0]
-                y = (g - mean_g) * scale[k, v, u, 1]
-                z = (r - mean_r) * scale[k, v, u, 2]
-                if x * x + y * y + z * z <= one:
+                mean_b = min(gain_b * mean[k, 0, v, left + j], white)
+                mean_g = min(gain_g * mean[k, 1, v, left + j], white)
+                mean_r = min(gain_r * mean[k, 2, v, left + j], white)
+                x = (b - mean_b) * scale[k, 0, v, left + j]
+                y = (g - mean_g) * scale[k, 1, v, left + j]
+                z = (r - mean_r) * scale[k, 2, v, left + j]
+                if k > 0 and x * x + y * y + z * z <= one:
                     label = 0
                     break
                 if label == 255 and is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):
                     label = 127
-            labels[v, u] = label
+            row[j] = label
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def label_grey(image, mean, scale, gain, rule, labels):  # type: ignore[no-untyped-def]
-    """As `label_colour` with one channel: image (h, w), mean and scale (k, h, w), gain (1,).
+def label_grey(image, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
+    """As `label_colour` with one channel: image (a, b), mean and scale (k, 1, h, w), gain (1,).
 
     The ratio of brightness alone tells a shadow.
     """
     one = np.float32(1.0)
     white = np.float32(255.0)
     modes = mean.shape[0]
-    height, width = labels.shape
+    rows, columns = labels.shape
     gain_v = gain[0]
-    for v in range(height):
-        for u in range(width):
-            value = np.float32(image[v, u])
+    distance = np.empty(columns, dtype=np.float32)
+    for i in range(rows):
+        v = top + i
+        pixel = image[i]
+        base = mean[0, 0, v, left : left + columns]
+        narrow = scale[0, 0, v, left : left + columns]
+        for j in range(columns):
+            x = (np.float32(pixel[j]) - min(gain_v * base[j], white)) * narrow[j]
+            distance[j] = x * x
+        row = labels[i]
+        for j in range(columns):
+            if distance[j] <= one:
+                row[j] = 0
+                continue
+            value = np.float32(pixel[j])
             label = 255
             for k in range(modes):
-                expected = min(gain_v * mean[k, v, u], white)
-                x = (value - expected) * scale[k, v, u]
-                if x * x <= one:
+                expected = min(gain_v * mean[k, 0, v, left + j], white)
+                x = (value - expected) * scale[k, 0, v, left + j]
+                if k > 0 and x * x <= one:
                     label = 0
                     break
                 if rule[0] * expected <= value and value <= rule[1] * expected:
                     label = 127
-            labels[v, u] = label
+            row[j] = label

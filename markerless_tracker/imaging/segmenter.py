@@ -12,13 +12,29 @@ from markerless_tracker.imaging.background import (
     foreground_limit,
     risk_of,
 )
-from markerless_tracker.imaging.edges import edge_map
-from markerless_tracker.imaging.exposure import exposure_gain
+from markerless_tracker.imaging.blobs import (
+    BOTTOM,
+    LEFT,
+    RIGHT,
+    TOP,
+    clear_small,
+    fill_small,
+    occupied,
+)
+from markerless_tracker.imaging.edges import edge_map, edge_reach
+from markerless_tracker.imaging.exposure import ExposureMeter
 from markerless_tracker.imaging.images import Image, check_image, grey_of
-from markerless_tracker.imaging.morphology import Mask, clean_mask, foreground_mask
+from markerless_tracker.imaging.morphology import (
+    Mask,
+    foreground_mask,
+    open_and_close,
+    patch_reach,
+    repair_reach,
+)
+from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.imaging.shadow import shadow_rule
-from markerless_tracker.imaging.texture import correct_labels
+from markerless_tracker.imaging.texture import correct_labels, texture_reach
 from markerless_tracker.records import Observation
 
 # Largest difference of a background's channels, grey levels, that still is a grey camera's.
@@ -27,6 +43,10 @@ _LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
 # Window of the Gaussian blur that noisy images get.
 _SMOOTH_PX = (5, 5)
 _SOLID = np.ones((3, 3), dtype=np.uint8)
+# How far the choice of pixels whose texture is looked at reaches.
+_LOOK_PX = 3
+# How much more than needed is looked at, at first, for patches that go on there.
+_SLACK_PX = 8
 # Mean of a mode that a pixel lacks: nothing is near it, or in its shadow.
 _NOWHERE = np.float32(-1e6)
 
@@ -70,12 +90,12 @@ class Segmenter:
         else:
             self._grey_mean = np.ascontiguousarray(mean @ _LUMA, dtype=np.float32)
             self._sigma = float(np.sqrt(np.median(variance @ _LUMA**2)))
-        # The same memory with channels last, for what takes grey and colour alike.
         width, height = background.size_px
-        shape = (len(self._mean), height, width, 1 if self._grey else 3)
-        self._means_by_channel = self._mean.reshape(shape)
-        self._scales_by_channel = self._scale.reshape(shape)
-        self._gain = np.ones(shape[3], dtype=np.float32)
+        # The same memory with channels last.
+        self._means_by_channel = self._mean.transpose(0, 2, 3, 1)
+        self._scales_by_channel = self._scale.transpose(0, 2, 3, 1)
+        self._gain = np.ones(self._mean.shape[1], dtype=np.float32)
+        self._meter = ExposureMeter(self._means_by_channel[0])
         options = self.settings
         self._adaptation = (
             Adaptation(options.background_follow_s, options.background_follow_margin_px)
@@ -83,10 +103,11 @@ class Segmenter:
             else None
         )
         self._rule = shadow_rule(self.settings, grey=self._grey)
-        self._labels = np.empty((height, width), dtype=np.uint8)
-        self._mask = np.empty_like(self._labels)
+        self._size_px = (width, height)
+        self._whole = Region.whole(self._size_px)
+        self._memory = np.empty((2, height * width), dtype=np.uint8)
         share = options.shadow_grey_blob_share if self._grey else options.shadow_blob_share
-        self._least_shadow_px = share * self._mask.size
+        self._least_shadow_px = share * height * width
 
     @property
     def gain(self) -> tuple[float, ...]:
@@ -112,7 +133,7 @@ class Segmenter:
         return smooth.reshape(mean.shape), less.astype(np.float32)
 
     def _gaussians(self) -> tuple[FloatImage, FloatImage]:
-        """Means and 1 / (sigma sqrt(limit)) of all modes, (k, h, w, c) or grey (k, h, w)."""
+        """Means and 1 / (sigma sqrt(limit)) of all modes, (k, c, h, w) each."""
         background = self.background
         channels = slice(0, 1) if self._grey else slice(None)
         rest = np.ones(background.mean.shape[:2], dtype=np.float32)
@@ -130,21 +151,65 @@ class Segmenter:
             limit = foreground_limit(variance, risk, weight=weight)
             means.append(np.where(there, mean, _NOWHERE))
             scales.append(1.0 / np.sqrt(variance * limit[:, :, None]))
-        shape = (len(modes), *rest.shape) if self._grey else (len(modes), *background.mean.shape)
-        return (
-            np.ascontiguousarray(means, dtype=np.float32).reshape(shape),
-            np.ascontiguousarray(scales, dtype=np.float32).reshape(shape),
-        )
+        return _planar(means), _planar(scales)
 
-    def labels(self, image: Image) -> Mask:
-        """(h, w) uint8: 0 background, 127 shadow, 255 foreground, before any repair.
+    def mask(self, image: Image, region: Region | None = None) -> Mask:
+        """The silhouette (h, w) uint8, 0 or 255, of a region or the whole frame.
 
         The array is overwritten by the next call.
 
         Raises:
             ImageError: not an image of the background's size and channels; names the camera.
         """
-        check_image(image, self.camera, size_px=self.background.size_px)
+        self._check(image)
+        region = region or self._whole
+        mask, zone = self._silhouette(image, region, 0)
+        return mask[region.within(zone).slices]
+
+    def observe(
+        self, image: Image, stamp_ns: int, region: Region | None = None
+    ) -> Observation:
+        """Silhouette and edge map of a region, or of the whole frame.
+
+        They depend on this image alone, unless `background_follow_s` lets the background follow
+        slow changes: then on the images before as well, in the order of the calls. Inside a region
+        they are what they would be in the whole frame.
+
+        Args:
+            image: (h, w, 3) BGR or (h, w) grey, uint8, of the background's size and channels.
+            stamp_ns: capture time, goes into the observation.
+            region: the part of the image to work in; all of it if None. The background follows
+                only where the whole frame is looked at.
+
+        Raises:
+            ImageError: another kind of image came, or a region outside it; names the camera.
+        """
+        self._check(image)
+        region = region or self._whole
+        if region.width <= 0 or region.height <= 0 or region.grown(0, self._size_px) != region:
+            raise ImageError(
+                f"{self.camera}: got a region of {tuple(region)}, expected one inside the image of "
+                f"{self._size_px[0]}x{self._size_px[1]} px"
+            )
+        mask, zone = self._silhouette(image, region, edge_reach(self.settings))
+        inside = region.within(zone).slices
+        edges = edge_map(image[zone.slices], mask, self.settings)[inside]
+        if self._adaptation is not None and region == self._whole:
+            values = (grey_of(image) if self._grey else image).reshape(*mask.shape, -1)
+            self._adaptation.follow(
+                values, mask, stamp_ns, self._gain, self._means_by_channel, self._scales_by_channel
+            )
+        return Observation.from_mask(
+            self.camera,
+            stamp_ns,
+            mask[inside],
+            edges,
+            size_px=self._size_px,
+            offset_px=(region.left, region.top),
+        )
+
+    def _check(self, image: Image) -> None:
+        check_image(image, self.camera, size_px=self._size_px)
         channels = 1 if image.ndim == 2 else 3
         if channels != self.background.channels:
             kind = {1: "grey", 3: "colour"}
@@ -152,68 +217,116 @@ class Segmenter:
                 f"{self.camera}: got a {kind[channels]} image, its background is "
                 f"{kind[self.background.channels]}; expected the same"
             )
-        if self._smooth:
-            image = np.asarray(cv2.GaussianBlur(image, _SMOOTH_PX, 0.0), dtype=np.uint8)
-        if self._grey:
-            image, label = grey_of(image), kernels.label_grey
-        else:
-            label = kernels.label_colour
-        if self.settings.exposure_compensation:
-            by_channel = image.reshape(*self._labels.shape, -1)
-            self._gain[:] = exposure_gain(by_channel, self._means_by_channel[0])
-        label(image, self._mean, self._scale, self._gain, self._rule, self._labels)
-        self._look_at_texture(image)
-        return self._labels
 
-    def _look_at_texture(self, image: Image) -> None:
+    def _silhouette(self, image: Image, region: Region, reach: int) -> tuple[Mask, Region]:
+        """Mask of a zone that holds the region and `reach` px around it, and that zone.
+
+        What is decided by the size of a patch needs all of the patch: more is looked at until none
+        that is too small to tell goes on outside.
+        """
+        if self.settings.exposure_compensation:
+            by_channel = image.reshape(image.shape[0], image.shape[1], -1)
+            self._gain[:] = self._meter.gain(by_channel)
+        slack = _SLACK_PX
+        while True:
+            found = self._try_silhouette(image, region.grown(reach, self._size_px), slack)
+            if found is not None:
+                return found
+            slack *= 4
+
+    def _try_silhouette(
+        self, image: Image, need: Region, slack: int
+    ) -> tuple[Mask, Region] | None:
+        """`_silhouette` with so much more around what is needed; None if that is too little."""
+        size_px, options = self._size_px, self.settings
+        zone = need.grown(slack, size_px)
+        unknown = _open_sides(zone, size_px)
+        repair = repair_reach(options)
+        patches = zone.grown(repair, size_px)
+        window = patches.grown(_LOOK_PX + patch_reach(options, grey=self._grey), size_px)
+        labels = self._labels(image, window)
+        self._look_at_texture(image, labels, window, patches)
+        mask = self._scratch(1, window)
+        asked = foreground_mask(
+            labels, mask, self._least_shadow_px, grey=self._grey, zone=patches.within(window),
+            need=need.grown(repair, size_px).within(window), unknown=unknown,
+        )  # fmt: skip
+        if asked:
+            return None
+        # Outside of `patches` the mask is wrong, but opening and closing reach no further.
+        open_and_close(mask, options)
+        inner = {"zone": zone.within(window), "need": need.within(window)}
+        frame_px = size_px[0] * size_px[1]
+        least, largest = options.mask_blob_share * frame_px, options.mask_hole_share * frame_px
+        if clear_small(mask, least, connectivity=8, unknown=unknown, **inner):
+            return None
+        if fill_small(mask, largest, unknown=unknown, **inner):
+            return None
+        return mask[zone.within(window).slices], zone
+
+    def _labels(self, image: Image, window: Region) -> Mask:
+        """0 background, 127 shadow, 255 foreground of a window, before any repair."""
+        wide = window.grown(_SMOOTH_PX[0] // 2 if self._smooth else 0, self._size_px)
+        part = image[wide.slices]
+        if self._smooth:
+            part = np.asarray(cv2.GaussianBlur(part, _SMOOTH_PX, 0.0), dtype=np.uint8)
+        part = np.ascontiguousarray(part[window.within(wide).slices])
+        labels = self._scratch(0, window)
+        label = kernels.label_grey if self._grey else kernels.label_colour
+        label(
+            grey_of(part) if self._grey else part, self._mean, self._scale, self._gain, self._rule,
+            window.left, window.top, labels,
+        )  # fmt: skip
+        return labels
+
+    def _look_at_texture(
+        self, image: Image, labels: Mask, window: Region, patches: Region
+    ) -> None:
         options = self.settings
         # A pixel that shows things by turns has no one pattern.
         if options.texture_radius_px == 0 or not options.shadow_removal or self.background.modes:
             return
-        reveal = self._grey and options.texture_reveal
-        if reveal:
-            region = (0, 0, self._labels.shape[1], self._labels.shape[0])
-        else:
-            # Specks would stretch it over the whole image.
-            solid = cv2.morphologyEx(self._labels, cv2.MORPH_OPEN, _SOLID)
-            left, top, width, height = cv2.boundingRect(solid)
-            region = (left, top, width, height)
+        part, looked_at = window, labels
+        if not self._grey:
+            # Specks are not worth the look.
+            solid = cv2.threshold(labels, kernels.SHADOW, 255, cv2.THRESH_BINARY)[1]
+            cv2.morphologyEx(solid, cv2.MORPH_OPEN, _SOLID, dst=solid)
+            looked_at = np.asarray(cv2.dilate(solid, _SOLID), dtype=np.uint8)
+            part = occupied(looked_at, patches.within(window)).moved(window.left, window.top)
+        if self._smooth:
+            seen = part.grown(texture_reach(options.texture_radius_px) + 2, self._size_px)
+            image = image.copy()
+            image[seen.slices] = cv2.GaussianBlur(image[seen.slices], _SMOOTH_PX, 0.0)
         correct_labels(
-            grey_of(image),
+            image,
             self._grey_mean,
             float(self._gain.mean()),
             self._sigma,
-            self._labels,
-            region,
+            labels,
+            window,
+            part,
+            looked_at=looked_at,
             radius=options.texture_radius_px,
             light=(options.texture_light_min, options.shadow_value_max + 0.03),
             protect=self._grey,
-            reveal=reveal,
+            reveal=self._grey and options.texture_reveal,
         )
 
-    def mask(self, image: Image) -> Mask:
-        """The silhouette (h, w) uint8, 0 or 255; overwritten by the next call."""
-        foreground_mask(self.labels(image), self._mask, self._least_shadow_px, grey=self._grey)
-        return clean_mask(self._mask, self.settings)
+    def _scratch(self, which: int, window: Region) -> Mask:
+        count = window.width * window.height
+        return self._memory[which, :count].reshape(window.height, window.width)
 
-    def observe(self, image: Image, stamp_ns: int) -> Observation:
-        """Silhouette and edge map of the whole frame.
 
-        They depend on this image alone, unless `background_follow_s` lets the background follow
-        slow changes: then on the images before as well, in the order of the calls.
+def _planar(images: list[FloatImage]) -> FloatImage:
+    """Images (h, w, c) as one array (k, c, h, w)."""
+    return np.ascontiguousarray(np.moveaxis(np.stack(images), -1, 1), dtype=np.float32)
 
-        Args:
-            image: (h, w, 3) BGR or (h, w) grey, uint8, of the background's size and channels.
-            stamp_ns: capture time, goes into the observation.
 
-        Raises:
-            ImageError: another kind of image came; names the camera.
-        """
-        mask = self.mask(image)
-        edges = edge_map(image, mask, self.settings)
-        if self._adaptation is not None:
-            values = (grey_of(image) if self._grey else image).reshape(*mask.shape, -1)
-            self._adaptation.follow(
-                values, mask, stamp_ns, self._gain, self._means_by_channel, self._scales_by_channel
-            )
-        return Observation.from_mask(self.camera, stamp_ns, mask, edges)
+def _open_sides(zone: Region, size_px: tuple[int, int]) -> int:
+    """Sides of a zone beyond which the image goes on."""
+    return (
+        LEFT * (zone.left > 0)
+        | TOP * (zone.top > 0)
+        | RIGHT * (zone.right < size_px[0])
+        | BOTTOM * (zone.bottom < size_px[1])
+    )

@@ -7,11 +7,13 @@ the background in any light, and larger by p^2 var(B) where something covers it.
 something only where p^2 var(B), the pattern, stands out from the noise.
 """
 
+import cv2
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.imaging.images import Image
+from markerless_tracker.imaging.images import Image, grey_of
+from markerless_tracker.imaging.region import Region
 
 # The pattern's variance, in those of the noise, from which on a window can show that the pattern is
 # there, and from which on that it is hidden.
@@ -20,159 +22,244 @@ SURE, TOLD = 6.0, 6.0
 SAME, OTHER = 0.15, 0.85
 # Windows without a pattern: this plus their light.
 UNKNOWN = 100.0
-# Change of light from one pixel to the next that may be the same shadow.
+# Change of light from one pixel to the next that may be the same shadow, and how far along a row and
+# then along a column windows without a pattern take it over, px.
 STEP = 0.006
+SPREAD_PX = 24
 # Deviations of the noise within which a pixel agrees with a window's light.
 _AGREE = 3.5
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def window_light(image, mean, gain, noise, radius, top, left, light):  # type: ignore[no-untyped-def]
-    """Light of windows on a part of a grey image: p > 0 where they show the background in light p.
+def window_light(image, mean, gain, noise, radius, left, top, light):  # type: ignore[no-untyped-def]
+    """Light of the windows on a part of an image: p > 0 where they show the background in light p.
 
-    image (h, w) uint8; mean (h, w) float32; gain, noise (variance) of the image; light (a, b)
-    float32 is filled for the part that begins at (top, left): p; -1 where something else covers
-    the background; UNKNOWN + p where there is no pattern; 0 where the window says nothing.
+    image (a, b) uint8, the part alone; mean (h, w) float32, the part begins at (left, top) of it;
+    gain, noise (variance) of the image; light (a, b) float32: p; -1 where something else covers the
+    background; UNKNOWN + p where there is no pattern; 0 where the window says nothing. Windows end
+    at the part's border.
     """
-    height, width = image.shape
     rows, columns = light.shape
-    # Sums of whole numbers: the same whatever the order.
-    sums = np.zeros((5, width), dtype=np.int64)
-    first_u = max(left - radius, 0)
-    end_u = min(left + columns + radius, width)
-    low = 0
-    high = 0
-    for i in range(rows):
-        v = top + i
-        next_low = max(v - radius, 0)
-        next_high = min(v + radius + 1, height)
-        if i == 0:
-            low = next_low
-            high = next_low
-        while high < next_high:
-            for u in range(first_u, end_u):
-                a = np.int64(image[high, u])
-                b = np.int64(mean[high, u] * gain + np.float32(0.5))
-                sums[0, u] += a
-                sums[1, u] += b
-                sums[2, u] += a * a
-                sums[3, u] += a * b
-                sums[4, u] += b * b
-            high += 1
-        while low < next_low:
-            for u in range(first_u, end_u):
-                a = np.int64(image[low, u])
-                b = np.int64(mean[low, u] * gain + np.float32(0.5))
-                sums[0, u] -= a
-                sums[1, u] -= b
-                sums[2, u] -= a * a
-                sums[3, u] -= a * b
-                sums[4, u] -= b * b
-            low += 1
-        a_sum = b_sum = aa = ab = bb = np.int64(0)
-        start = first_u
-        stop = first_u
+    side = 2 * radius + 1
+    one = np.float32(1.0)
+    # Column sums of whole numbers, the same whatever the order, with room for windows at the sides.
+    sums = np.zeros((5, columns + 2 * radius), dtype=np.int32)
+    window = np.empty((5, columns), dtype=np.int32)
+    grey = np.zeros((side, columns), dtype=np.int32)
+    base = np.zeros((side, columns), dtype=np.int32)
+    across = np.empty(columns, dtype=np.float32)
+    for j in range(columns):
+        across[j] = min(j + radius, columns - 1) - max(j - radius, 0) + 1
+    for v in range(rows + radius):
+        slot = v % side
+        a_row = grey[slot]
+        b_row = base[slot]
+        if v >= side:
+            for j in range(columns):
+                a = a_row[j]
+                b = b_row[j]
+                sums[0, radius + j] -= a
+                sums[1, radius + j] -= b
+                sums[2, radius + j] -= a * a
+                sums[3, radius + j] -= a * b
+                sums[4, radius + j] -= b * b
+        if v < rows:
+            source = image[v]
+            expected = mean[top + v, left : left + columns]
+            for j in range(columns):
+                a = np.int32(source[j])
+                b = np.int32(expected[j] * gain + np.float32(0.5))
+                a_row[j] = a
+                b_row[j] = b
+                sums[0, radius + j] += a
+                sums[1, radius + j] += b
+                sums[2, radius + j] += a * a
+                sums[3, radius + j] += a * b
+                sums[4, radius + j] += b * b
+        else:
+            # Below the part there is nothing to take away later.
+            for j in range(columns):
+                a_row[j] = 0
+                b_row[j] = 0
+        i = v - radius
+        if i < 0:
+            continue
+        down = np.float32(min(i + radius, rows - 1) - max(i - radius, 0) + 1)
+        for k in range(5):
+            total = window[k]
+            part = sums[k]
+            for j in range(columns):
+                total[j] = part[j]
+            for shift in range(1, side):
+                moved = part[shift : shift + columns]
+                for j in range(columns):
+                    total[j] += moved[j]
+        out = light[i]
         for j in range(columns):
-            u = left + j
-            next_start = max(u - radius, 0)
-            next_stop = min(u + radius + 1, width)
-            while stop < next_stop:
-                a_sum += sums[0, stop]
-                b_sum += sums[1, stop]
-                aa += sums[2, stop]
-                ab += sums[3, stop]
-                bb += sums[4, stop]
-                stop += 1
-            while start < next_start:
-                a_sum -= sums[0, start]
-                b_sum -= sums[1, start]
-                aa -= sums[2, start]
-                ab -= sums[3, start]
-                bb -= sums[4, start]
-                start += 1
-            light[i, j] = 0.0
-            if a_sum <= 0 or b_sum <= 0:
-                continue
-            n = float((high - low) * (stop - start))
-            p = a_sum / b_sum
-            var_b = bb / n - (b_sum / n) ** 2
+            share = one / (down * across[j])
+            a_mean = np.float32(window[0, j]) * share
+            b_mean = np.float32(window[1, j]) * share
+            known = window[0, j] > 0 and window[1, j] > 0
+            p = a_mean / max(b_mean, np.float32(1e-6))
+            n = np.float64(down * across[j])
+            a_sum = np.float64(window[0, j])
+            b_sum = np.float64(window[1, j])
+            # Differences of large whole numbers: exact in float64.
+            var_a = np.float32(n * window[2, j] - a_sum * a_sum) * share * share
+            cov = np.float32(n * window[3, j] - a_sum * b_sum) * share * share
+            var_b = np.float32(n * window[4, j] - b_sum * b_sum) * share * share
             pattern = p * p * var_b
-            var_a = aa / n - (a_sum / n) ** 2
-            cov = ab / n - a_sum / n * (b_sum / n)
-            rest = var_a - 2.0 * p * cov + pattern - noise
-            if pattern >= SURE * noise and rest < SAME * pattern:
-                light[i, j] = p
-            elif pattern >= TOLD * noise and rest > OTHER * pattern:
-                light[i, j] = -1.0
-            elif rest < noise:
-                light[i, j] = UNKNOWN + p
+            rest = var_a - np.float32(2.0) * p * cov + pattern - noise
+            found = np.float32(0.0)
+            if rest < noise:
+                found = np.float32(UNKNOWN) + p
+            if pattern >= np.float32(TOLD) * noise and rest > np.float32(OTHER) * pattern:
+                found = np.float32(-1.0)
+            if pattern >= np.float32(SURE) * noise and rest < np.float32(SAME) * pattern:
+                found = p
+            out[j] = found if known else np.float32(0.0)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def spread_light(light):  # type: ignore[no-untyped-def]
-    """Let plain windows take part in the light next to them if theirs is the same; in place."""
+def _same_light(light, near, steps):  # type: ignore[no-untyped-def]
+    """Whether a window without a pattern takes over the light next to it, `steps` from its source.
+
+    near: the neighbour's light, 0 if none.
+    """
+    return (
+        light >= UNKNOWN
+        and near > 0.0
+        and steps < SPREAD_PX
+        and abs(light - np.float32(UNKNOWN) - near) <= STEP
+    )
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def spread_light(light, spread):  # type: ignore[no-untyped-def]
+    """Let plain windows take part in the light next to them if theirs is the same.
+
+    First along rows, then along columns, `SPREAD_PX` each: whatever part of an image is looked at,
+    what lies further away has no influence. light (a, b) is changed; spread (a, b) is written.
+    """
     rows, columns = light.shape
-    for turn in range(4):
-        forward = turn % 2 == 0
-        for i in range(rows):
-            y = i if forward else rows - 1 - i
-            near_y = y - 1 if forward else y + 1
+    for i in range(rows):
+        row = light[i]
+        out = spread[i]
+        near = np.float32(0.0)
+        steps = 0
+        for j in range(columns):
+            p = row[j]
+            out[j] = p
+            if p < UNKNOWN:
+                near = max(p, np.float32(0.0))
+                steps = 0
+            elif _same_light(p, near, steps):
+                near = p - np.float32(UNKNOWN)
+                steps += 1
+                out[j] = near
+            else:
+                near = np.float32(0.0)
+        near = np.float32(0.0)
+        for j in range(columns - 1, -1, -1):
+            p = row[j]
+            if p < UNKNOWN:
+                near = max(p, np.float32(0.0))
+                steps = 0
+            elif _same_light(p, near, steps):
+                near = p - np.float32(UNKNOWN)
+                steps += 1
+                out[j] = near
+            else:
+                near = np.float32(0.0)
+    light[:] = spread
+    nears = np.zeros(columns, dtype=np.float32)
+    steps_of = np.zeros(columns, dtype=np.int32)
+    for turn in range(2):
+        nears[:] = 0.0
+        for k in range(rows):
+            i = k if turn == 0 else rows - 1 - k
+            row = light[i]
+            out = spread[i]
             for j in range(columns):
-                x = j if forward else columns - 1 - j
-                if light[y, x] < UNKNOWN:
-                    continue
-                p = light[y, x] - UNKNOWN
-                near_x = x - 1 if forward else x + 1
-                if 0 <= near_y < rows:
-                    q = light[near_y, x]
-                    if q > 0.0 and q < UNKNOWN and abs(p - q) <= STEP:
-                        light[y, x] = p
-                        continue
-                if 0 <= near_x < columns:
-                    q = light[y, near_x]
-                    if q > 0.0 and q < UNKNOWN and abs(p - q) <= STEP:
-                        light[y, x] = p
+                p = row[j]
+                if p < UNKNOWN:
+                    nears[j] = max(p, np.float32(0.0))
+                    steps_of[j] = 0
+                elif _same_light(p, nears[j], steps_of[j]):
+                    nears[j] = p - np.float32(UNKNOWN)
+                    steps_of[j] += 1
+                    out[j] = nears[j]
+                else:
+                    nears[j] = 0.0
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def lit(light, least, most, valid):  # type: ignore[no-untyped-def]
+    """Drop light that is not between least and most; valid (a, b) uint8 is 1 where any is left."""
+    for i in range(light.shape[0]):
+        row = light[i]
+        out = valid[i]
+        for j in range(row.size):
+            p = row[j]
+            good = (p >= least) & (p <= most)
+            out[j] = good
+            row[j] = p if good else min(p, np.float32(0.0))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def apply_light(  # type: ignore[no-untyped-def]
-    image, mean, gain, agree, radius, least, most, protect, reveal, top, left, light, labels
-):
-    """Correct labels (h, w) by the light (a, b) of the windows around each pixel, in place.
+    image, mean, gain, agree, radius, protect, reveal, left, top, light, near_valid, part, corner,
+    looked_at, labels,
+):  # fmt: skip
+    """Correct labels by the light of the windows around each pixel, in place.
 
-    A pixel that agrees with the light, from ``least`` to ``most``, of any window that holds it is
-    background, or shadow if it was not background before. Else, if its own window is covered, with
-    ``protect`` shadow becomes foreground, and with ``reveal`` background too.
+    A pixel that agrees with the light of any valid window that holds it is background, or shadow
+    if it was not background before. Else, if its own window is covered, with ``protect`` shadow
+    becomes foreground, and with ``reveal`` background too.
+
+    Args:
+        image, mean, gain, left, top, light: as in `window_light`; light is 0 where not valid,
+            below 0 where covered.
+        agree: grey levels within which a pixel agrees.
+        near_valid: (a, b), not 0 where a window within the radius is valid.
+        part: (left, top, right, bottom) of the light's array to correct.
+        corner: column and row of the labels' array where that array begins.
+        looked_at: (c, d) labels that are not background are corrected only where this is not 0.
+        labels: (c, d).
     """
     rows, columns = light.shape
-    for i in range(rows):
-        for j in range(columns):
-            v = top + i
-            u = left + j
-            label = labels[v, u]
-            own = light[i, j]
-            if label == 0 and (not reveal or own >= 0.0):
-                continue
-            value = np.float32(image[v, u])
-            base = mean[v, u] * gain
-            explained = False
-            for di in range(-radius, radius + 1):
-                y = i + di
-                if y < 0 or y >= rows or explained:
+    for i in range(part[1], part[3]):
+        for j in range(part[0], part[2]):
+            y = corner[1] + i
+            x = corner[0] + j
+            label = labels[y, x]
+            if label == 0:
+                if not reveal or light[i, j] >= 0.0:
                     continue
-                for dj in range(-radius, radius + 1):
-                    x = j + dj
-                    if x < 0 or x >= columns:
-                        continue
-                    p = light[y, x]
-                    if p >= least and p <= most and abs(value - p * base) <= agree:
-                        explained = True
+            elif looked_at[y, x] == 0 or (label == 127 and not protect):
+                continue
+            explained = False
+            if near_valid[i, j] != 0:
+                value = np.float32(image[i, j])
+                base = mean[top + i, left + j] * gain
+                for di in range(max(i - radius, 0), min(i + radius + 1, rows)):
+                    for dj in range(max(j - radius, 0), min(j + radius + 1, columns)):
+                        p = light[di, dj]
+                        if p > 0.0 and abs(value - p * base) <= agree:
+                            explained = True
+                            break
+                    if explained:
                         break
             if explained:
                 if label != 0:
-                    labels[v, u] = 127
-            elif own < 0.0 and protect:
-                labels[v, u] = 255
+                    labels[y, x] = 127
+            elif light[i, j] < 0.0 and protect:
+                labels[y, x] = 255
+
+
+def texture_reach(radius: int) -> int:
+    """How far from a pixel its correction looks, px."""
+    return SPREAD_PX + 2 * radius
 
 
 def correct_labels(
@@ -181,35 +268,46 @@ def correct_labels(
     gain: float,
     sigma: float,
     labels: NDArray[np.uint8],
-    region: tuple[int, int, int, int],
+    window: Region,
+    part: Region,
     *,
+    looked_at: NDArray[np.uint8],
     radius: int,
     light: tuple[float, float],
     protect: bool,
     reveal: bool,
 ) -> None:
-    """Correct labels (h, w) of `kernels` by texture, in place.
+    """Correct labels of `kernels` by texture, in place.
 
     Args:
-        image: (h, w) grey.
+        image: (h, w) or (h, w, 3) uint8.
         mean: (h, w) grey background.
         gain: brightness of the image relative to the background's.
         sigma: the sensor's noise, grey levels.
-        labels: 0 background, 127 shadow, 255 foreground.
-        region: (left, top, width, height) to look at.
+        labels: (a, b) of a window: 0 background, 127 shadow, 255 foreground.
+        window: the window's place in the image.
+        part: what is corrected, inside the window.
+        looked_at: (a, b), 0 where shadow and foreground are left as they are.
         radius: of the windows, px.
         light: least and largest light of a shadow.
         protect: whether shadow may become foreground.
         reveal: whether background may become foreground.
     """
-    left, top, width, height = region
-    if width == 0 or height == 0:
+    if part.width <= 0 or part.height <= 0:
         return
-    found = np.empty((height, width), dtype=np.float32)
+    seen = part.grown(texture_reach(radius), (mean.shape[1], mean.shape[0]))
+    grey = grey_of(np.ascontiguousarray(image[seen.slices]))
+    found = np.empty((2, *grey.shape), dtype=np.float32)
     one = np.float32(gain)
-    window_light(image, mean, one, float(sigma) ** 2, radius, top, left, found)
-    spread_light(found)
+    noise = np.float32(sigma**2)
+    window_light(grey, mean, one, noise, radius, seen.left, seen.top, found[0])
+    spread_light(found[0], found[1])
+    valid = np.empty(grey.shape, dtype=np.uint8)
+    lit(found[1], np.float32(light[0]), np.float32(light[1]), valid)
+    square = np.ones((2 * radius + 1, 2 * radius + 1), dtype=np.uint8)
+    near_valid = np.asarray(cv2.dilate(valid, square), dtype=np.uint8)
+    corner = (seen.left - window.left, seen.top - window.top)
     apply_light(
-        image, mean, one, np.float32(_AGREE * sigma), radius,
-        np.float32(light[0]), np.float32(light[1]), protect, reveal, top, left, found, labels,
+        grey, mean, one, np.float32(_AGREE * sigma), radius, protect, reveal, seen.left, seen.top,
+        found[1], near_valid, part.within(seen), corner, looked_at, labels,
     )  # fmt: skip

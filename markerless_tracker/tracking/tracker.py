@@ -22,6 +22,8 @@ from markerless_tracker.tracking.stages import frame_stages
 
 TRAINING_RATE_HZ = 60.0
 """The published spreads are changes between frames at this rate."""
+LIMB_SPEED_M_S = 3.0
+"""How fast a hand or foot may move against its prediction; it is looked for that far away."""
 
 
 class Tracker:
@@ -135,8 +137,9 @@ class Tracker:
                 fit its calibration or background; names the camera.
         """
         predicted = self._predict(stamp_ns)
-        observed = self._evidence.observe(views, stamp_ns)
-        observations, warnings = self._evidence.select(observed, self.body, predicted)
+        observations, warnings = self._evidence.gather(
+            views, stamp_ns, self.body, predicted, margin_m=self._region_margin(stamp_ns)
+        )
         if not self._shape_fitted:
             self._shape_fitted = True
             predicted = self._take_shape(observations, stamp_ns)
@@ -200,6 +203,17 @@ class Tracker:
         )
         moved = self._pose + self.config.prediction * elapsed_ns * self._velocity_per_ns
         return np.asarray(np.clip(moved, *self._searcher.limits))
+
+    def _region_margin(self, stamp_ns: int) -> float | None:
+        """How far around the predicted body to look, m; None for the whole images."""
+        if (
+            self.state is not TrackState.TRACKING
+            or self._stamp_ns is None
+            or stamp_ns <= self._stamp_ns
+        ):
+            return None
+        elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
+        return self.config.region_margin_m + LIMB_SPEED_M_S * elapsed_s
 
     def _rate_factor(self, stamp_ns: int) -> float:
         """How much wider than at the training rate to search, by the time since the last step."""
