@@ -51,6 +51,25 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
     return min(turn, np.float32(360.0) - turn) <= rule[3]
 
 
+# Loops over one row with few arrays each: what the compiler turns into vector instructions.
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _split_row(pixel, blue, green, red):  # type: ignore[no-untyped-def]
+    for j in range(blue.size):
+        blue[j] = pixel[3 * j]
+    for j in range(blue.size):
+        green[j] = pixel[3 * j + 1]
+    for j in range(blue.size):
+        red[j] = pixel[3 * j + 2]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _add_square(value, mean, scale, gain, distance):  # type: ignore[no-untyped-def]
+    white = np.float32(255.0)
+    for j in range(distance.size):
+        x = (np.float32(value[j]) - min(gain * mean[j], white)) * scale[j]
+        distance[j] += x * x
+
+
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def label_colour(image, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
     """Label a part of a colour image: 0 background, 127 shadow, 255 foreground.
@@ -70,29 +89,24 @@ def label_colour(image, mean, scale, gain, rule, left, top, labels):  # type: ig
     rows, columns = labels.shape
     gain_b, gain_g, gain_r = gain[0], gain[1], gain[2]
     distance = np.empty(columns, dtype=np.float32)
+    split = np.empty((3, columns), dtype=np.uint8)
     for i in range(rows):
         v = top + i
         # Whole rows first, without a branch: most pixels are background of the first Gaussian.
-        pixel = image[i]
-        base_b = mean[0, 0, v, left : left + columns]
-        base_g = mean[0, 1, v, left : left + columns]
-        base_r = mean[0, 2, v, left : left + columns]
-        scale_b = scale[0, 0, v, left : left + columns]
-        scale_g = scale[0, 1, v, left : left + columns]
-        scale_r = scale[0, 2, v, left : left + columns]
-        for j in range(columns):
-            x = (np.float32(pixel[j, 0]) - min(gain_b * base_b[j], white)) * scale_b[j]
-            y = (np.float32(pixel[j, 1]) - min(gain_g * base_g[j], white)) * scale_g[j]
-            z = (np.float32(pixel[j, 2]) - min(gain_r * base_r[j], white)) * scale_r[j]
-            distance[j] = x * x + y * y + z * z
+        _split_row(image[i].ravel(), split[0], split[1], split[2])
+        distance[:] = 0.0
+        for c in range(3):
+            base = mean[0, c, v, left : left + columns]
+            narrow = scale[0, c, v, left : left + columns]
+            _add_square(split[c], base, narrow, gain[c], distance)
         row = labels[i]
         for j in range(columns):
             if distance[j] <= one:
                 row[j] = 0
                 continue
-            b = np.float32(pixel[j, 0])
-            g = np.float32(pixel[j, 1])
-            r = np.float32(pixel[j, 2])
+            b = np.float32(split[0, j])
+            g = np.float32(split[1, j])
+            r = np.float32(split[2, j])
             label = 255
             for k in range(modes):
                 mean_b = min(gain_b * mean[k, 0, v, left + j], white)
@@ -126,9 +140,8 @@ def label_grey(image, mean, scale, gain, rule, left, top, labels):  # type: igno
         pixel = image[i]
         base = mean[0, 0, v, left : left + columns]
         narrow = scale[0, 0, v, left : left + columns]
-        for j in range(columns):
-            x = (np.float32(pixel[j]) - min(gain_v * base[j], white)) * narrow[j]
-            distance[j] = x * x
+        distance[:] = 0.0
+        _add_square(pixel, base, narrow, gain_v, distance)
         row = labels[i]
         for j in range(columns):
             if distance[j] <= one:

@@ -166,9 +166,7 @@ class Segmenter:
         mask, zone = self._silhouette(image, region, 0)
         return mask[region.within(zone).slices]
 
-    def observe(
-        self, image: Image, stamp_ns: int, region: Region | None = None
-    ) -> Observation:
+    def observe(self, image: Image, stamp_ns: int, region: Region | None = None) -> Observation:
         """Silhouette and edge map of a region, or of the whole frame.
 
         They depend on this image alone, unless `background_follow_s` lets the background follow
@@ -234,9 +232,7 @@ class Segmenter:
                 return found
             slack *= 4
 
-    def _try_silhouette(
-        self, image: Image, need: Region, slack: int
-    ) -> tuple[Mask, Region] | None:
+    def _try_silhouette(self, image: Image, need: Region, slack: int) -> tuple[Mask, Region] | None:
         """`_silhouette` with so much more around what is needed; None if that is too little."""
         size_px, options = self._size_px, self.settings
         zone = need.grown(slack, size_px)
@@ -279,9 +275,7 @@ class Segmenter:
         )  # fmt: skip
         return labels
 
-    def _look_at_texture(
-        self, image: Image, labels: Mask, window: Region, patches: Region
-    ) -> None:
+    def _look_at_texture(self, image: Image, labels: Mask, window: Region, patches: Region) -> None:
         options = self.settings
         # A pixel that shows things by turns has no one pattern.
         if options.texture_radius_px == 0 or not options.shadow_removal or self.background.modes:

@@ -22,12 +22,68 @@ SURE, TOLD = 6.0, 6.0
 SAME, OTHER = 0.15, 0.85
 # Windows without a pattern: this plus their light.
 UNKNOWN = 100.0
-# Change of light from one pixel to the next that may be the same shadow, and how far along a row and
-# then along a column windows without a pattern take it over, px.
+# Change of light from one pixel to the next that may be the same shadow, and how far windows
+# without a pattern take it over along a row and then along a column, px.
 STEP = 0.006
 SPREAD_PX = 24
 # Deviations of the noise within which a pixel agrees with a window's light.
 _AGREE = 3.5
+
+
+# Loops over one row with few arrays each: what the compiler turns into vector instructions.
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _slide(total, came, gone):  # type: ignore[no-untyped-def]
+    for j in range(came.size):
+        total[j] += came[j] - gone[j]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _slide_product(total, came_x, came_y, gone_x, gone_y):  # type: ignore[no-untyped-def]
+    for j in range(came_x.size):
+        total[j] += came_x[j] * came_y[j] - gone_x[j] * gone_y[j]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _sum_across(part, side, total):  # type: ignore[no-untyped-def]
+    """total[j] = part[j] + ... + part[j + side - 1], side odd."""
+    for j in range(total.size):
+        total[j] = part[j]
+    for shift in range(1, side, 2):
+        one = part[shift : shift + total.size]
+        other = part[shift + 1 : shift + 1 + total.size]
+        for j in range(total.size):
+            total[j] += one[j] + other[j]
+
+
+# Division as in NumPy: a test for zero would be a branch in the loop.
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[no-untyped-def]
+    for j in range(out.size):
+        n = down * across[j]
+        a_sum = np.float64(a[j])
+        b_sum = np.float64(b[j])
+        share = np.float32(1.0) / np.float32(n)
+        # Differences of large whole numbers: exact in float64.
+        var_a = np.float32(n * aa[j] - a_sum * a_sum) * share * share
+        cov = np.float32(n * ab[j] - a_sum * b_sum) * share * share
+        var_b = np.float32(n * bb[j] - b_sum * b_sum) * share * share
+        p = np.float32(a[j]) / max(np.float32(b[j]), np.float32(1e-6))
+        pattern = p * p * var_b
+        rest = var_a - np.float32(2.0) * p * cov + pattern - noise
+        found = np.float32(UNKNOWN) + p if rest < noise else np.float32(0.0)
+        hidden = (pattern >= np.float32(TOLD) * noise) & (rest > np.float32(OTHER) * pattern)
+        found = np.float32(-1.0) if hidden else found
+        shown = (pattern >= np.float32(SURE) * noise) & (rest < np.float32(SAME) * pattern)
+        found = p if shown else found
+        out[j] = found if (a[j] > 0) & (b[j] > 0) else np.float32(0.0)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _whole_levels(image, mean, gain, a, b):  # type: ignore[no-untyped-def]
+    for j in range(a.size):
+        a[j] = np.int32(image[j])
+    for j in range(b.size):
+        b[j] = np.int32(mean[j] * gain + np.float32(0.5))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -41,83 +97,40 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
     """
     rows, columns = light.shape
     side = 2 * radius + 1
-    one = np.float32(1.0)
     # Column sums of whole numbers, the same whatever the order, with room for windows at the sides.
     sums = np.zeros((5, columns + 2 * radius), dtype=np.int32)
     window = np.empty((5, columns), dtype=np.int32)
-    grey = np.zeros((side, columns), dtype=np.int32)
-    base = np.zeros((side, columns), dtype=np.int32)
-    across = np.empty(columns, dtype=np.float32)
+    # The rows of the window, in turns; rows beyond the part are 0.
+    grey = np.zeros((side + 1, columns), dtype=np.int32)
+    base = np.zeros((side + 1, columns), dtype=np.int32)
+    across = np.empty(columns, dtype=np.float64)
     for j in range(columns):
         across[j] = min(j + radius, columns - 1) - max(j - radius, 0) + 1
     for v in range(rows + radius):
-        slot = v % side
-        a_row = grey[slot]
-        b_row = base[slot]
-        if v >= side:
-            for j in range(columns):
-                a = a_row[j]
-                b = b_row[j]
-                sums[0, radius + j] -= a
-                sums[1, radius + j] -= b
-                sums[2, radius + j] -= a * a
-                sums[3, radius + j] -= a * b
-                sums[4, radius + j] -= b * b
+        # The row that leaves the window lies just after the one that comes.
+        came = v % (side + 1)
+        gone = (v + 1) % (side + 1)
+        a, b = grey[came], base[came]
+        old_a, old_b = grey[gone], base[gone]
         if v < rows:
-            source = image[v]
-            expected = mean[top + v, left : left + columns]
-            for j in range(columns):
-                a = np.int32(source[j])
-                b = np.int32(expected[j] * gain + np.float32(0.5))
-                a_row[j] = a
-                b_row[j] = b
-                sums[0, radius + j] += a
-                sums[1, radius + j] += b
-                sums[2, radius + j] += a * a
-                sums[3, radius + j] += a * b
-                sums[4, radius + j] += b * b
+            _whole_levels(image[v], mean[top + v, left : left + columns], gain, a, b)
         else:
-            # Below the part there is nothing to take away later.
-            for j in range(columns):
-                a_row[j] = 0
-                b_row[j] = 0
+            a[:] = 0
+            b[:] = 0
+        _slide(sums[0, radius : radius + columns], a, old_a)
+        _slide(sums[1, radius : radius + columns], b, old_b)
+        _slide_product(sums[2, radius : radius + columns], a, a, old_a, old_a)
+        _slide_product(sums[3, radius : radius + columns], a, b, old_a, old_b)
+        _slide_product(sums[4, radius : radius + columns], b, b, old_b, old_b)
         i = v - radius
         if i < 0:
             continue
-        down = np.float32(min(i + radius, rows - 1) - max(i - radius, 0) + 1)
         for k in range(5):
-            total = window[k]
-            part = sums[k]
-            for j in range(columns):
-                total[j] = part[j]
-            for shift in range(1, side):
-                moved = part[shift : shift + columns]
-                for j in range(columns):
-                    total[j] += moved[j]
-        out = light[i]
-        for j in range(columns):
-            share = one / (down * across[j])
-            a_mean = np.float32(window[0, j]) * share
-            b_mean = np.float32(window[1, j]) * share
-            known = window[0, j] > 0 and window[1, j] > 0
-            p = a_mean / max(b_mean, np.float32(1e-6))
-            n = np.float64(down * across[j])
-            a_sum = np.float64(window[0, j])
-            b_sum = np.float64(window[1, j])
-            # Differences of large whole numbers: exact in float64.
-            var_a = np.float32(n * window[2, j] - a_sum * a_sum) * share * share
-            cov = np.float32(n * window[3, j] - a_sum * b_sum) * share * share
-            var_b = np.float32(n * window[4, j] - b_sum * b_sum) * share * share
-            pattern = p * p * var_b
-            rest = var_a - np.float32(2.0) * p * cov + pattern - noise
-            found = np.float32(0.0)
-            if rest < noise:
-                found = np.float32(UNKNOWN) + p
-            if pattern >= np.float32(TOLD) * noise and rest > np.float32(OTHER) * pattern:
-                found = np.float32(-1.0)
-            if pattern >= np.float32(SURE) * noise and rest < np.float32(SAME) * pattern:
-                found = p
-            out[j] = found if known else np.float32(0.0)
+            _sum_across(sums[k], side, window[k])
+        down = np.float64(min(i + radius, rows - 1) - max(i - radius, 0) + 1)
+        _light_of_sums(
+            window[0], window[1], window[2], window[3], window[4], across, down, noise, light[i]
+        )
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -178,19 +191,22 @@ def spread_light(light, spread):  # type: ignore[no-untyped-def]
         nears[:] = 0.0
         for k in range(rows):
             i = k if turn == 0 else rows - 1 - k
-            row = light[i]
-            out = spread[i]
-            for j in range(columns):
-                p = row[j]
-                if p < UNKNOWN:
-                    nears[j] = max(p, np.float32(0.0))
-                    steps_of[j] = 0
-                elif _same_light(p, nears[j], steps_of[j]):
-                    nears[j] = p - np.float32(UNKNOWN)
-                    steps_of[j] += 1
-                    out[j] = nears[j]
-                else:
-                    nears[j] = 0.0
+            _spread_row(light[i], nears, steps_of, spread[i])
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
+    """One row of light takes over what comes from the row before; as `_same_light`, branchless."""
+    for j in range(row.size):
+        p = row[j]
+        own = p - np.float32(UNKNOWN)
+        plain = p >= np.float32(UNKNOWN)
+        same = abs(own - near[j]) <= np.float32(STEP)
+        taken = plain & same & (near[j] > np.float32(0.0)) & (steps[j] < np.int32(SPREAD_PX))
+        out[j] = own if taken else out[j]
+        passed_on = own if taken else np.float32(0.0)
+        near[j] = passed_on if plain else max(p, np.float32(0.0))
+        steps[j] = steps[j] + np.int32(1) if taken else np.int32(0)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

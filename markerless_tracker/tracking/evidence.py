@@ -7,7 +7,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import ImageError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import BackgroundModel, Image, Segmenter
+from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
 from markerless_tracker.imaging.edges import edge_reach
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
@@ -78,6 +78,8 @@ class EvidenceMaker:
             self._rig[name]
         self._turn += 1
 
+        regions = self.regions(body, predicted, margin_m)
+
         def evidence(item: tuple[str, Image | Observation]) -> tuple[Observation, int]:
             name, view = item
             camera = self._rig[name]
@@ -87,15 +89,14 @@ class EvidenceMaker:
                         f"{name}: an image came, but no background to tell the person from"
                     )
                 segmenter = self.segmenters[name]
-                if margin_m is not None and not self._whole_frame_is_due(name):
-                    region = body_region(camera, body, predicted, margin_m, self._clear_px)
-                    if region is not None:
-                        seen = segmenter.observe(view, stamp_ns, region)
-                        found = explained_in_region(
-                            seen, camera, body, predicted, self._margin_px, self._clear_px
-                        )
-                        if found is not None:
-                            return found
+                region = regions[name]
+                if region is not None and not self._whole_frame_is_due(name):
+                    seen = segmenter.observe(view, stamp_ns, region)
+                    found = explained_in_region(
+                        seen, camera, body, predicted, self._margin_px, self._clear_px
+                    )
+                    if found is not None:
+                        return found
                 view = segmenter.observe(view, stamp_ns)
             return explained_part(view, camera, body, predicted, self._margin_px)
 
@@ -106,6 +107,17 @@ class EvidenceMaker:
             if left_out
         )
         return {name: kept for name, (kept, _) in parts.items()}, warnings
+
+    def regions(
+        self, body: BodyModel, predicted: FloatArray, margin_m: float | None
+    ) -> dict[str, Region | None]:
+        """Where each camera looks at a body at a pose (p,), and a margin around it; None = all."""
+        if margin_m is None:
+            return dict.fromkeys(self._rig.names)
+        return {
+            camera.name: body_region(camera, body, predicted, margin_m, self._clear_px)
+            for camera in self._rig
+        }
 
     def _whole_frame_is_due(self, name: str) -> bool:
         """Cameras take turns, so that no frame costs much more than others."""

@@ -1,7 +1,5 @@
 """Which parts of a silhouette are the tracked body's: the components that the prediction meets."""
 
-from collections.abc import Iterator
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -82,16 +80,13 @@ def body_region(
         None if the camera does not see the body well enough to tell.
     """
     focal = float(camera.matrix[0, 0])
-    low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    nearest_m = np.inf
-    for pixels, depth_m, radius_m in _cone_lines(camera, body, pose):
-        if not np.isfinite(pixels).all() or depth_m <= 0.0:
-            return None
-        radius_px = focal * radius_m / depth_m
-        low = np.minimum(low, pixels.min(axis=0) - radius_px)
-        high = np.maximum(high, pixels.max(axis=0) + radius_px)
-        nearest_m = min(nearest_m, depth_m)
-    margin = max(focal * margin_m / nearest_m, float(least_px))
+    pixels, depths_m, radii_m = _cone_lines(camera, body, pose)
+    if not np.isfinite(pixels).all() or depths_m.min() <= 0.0:
+        return None
+    radii_px = (focal * radii_m / depths_m)[:, None]
+    low = (pixels.min(axis=1) - radii_px).min(axis=0)
+    high = (pixels.max(axis=1) + radii_px).max(axis=0)
+    margin = max(focal * margin_m / float(depths_m.min()), float(least_px))
     left, top = np.floor(np.maximum(low - margin, 0.0))
     right, bottom = np.ceil(np.minimum(high + margin, np.asarray(camera.size_px, dtype=float)))
     if right <= left or bottom <= top:
@@ -145,31 +140,28 @@ def _thick_body(
     """Mask (h, w) of the region's pixels within a margin of the body."""
     out = np.zeros((observation.height, observation.width), dtype=np.uint8)
     focal = float(camera.matrix[0, 0])
-    for at, depth_m, radius_m in _cone_lines(camera, body, pose):
-        pixels = at - observation.offset_px
+    lines, depths_m, radii_m = _cone_lines(camera, body, pose)
+    for line, depth_m, radius_m in zip(lines, depths_m, radii_m, strict=True):
+        pixels = line - observation.offset_px
         if not np.isfinite(pixels).all() or np.abs(pixels).max() > 1e4:
             continue
         thickness = max(1, min(2 * (round(focal * radius_m / depth_m) + margin_px), 255))
-        line = np.round(pixels).astype(np.int32).reshape(-1, 1, 2)
-        cv2.polylines(out, [line], False, 1, thickness)
+        points = np.round(pixels).astype(np.int32).reshape(-1, 1, 2)
+        cv2.polylines(out, [points], False, 1, thickness)
     return out.view(np.bool_)
 
 
 def _cone_lines(
     camera: CameraModel, body: BodyModel, pose: FloatArray
-) -> Iterator[tuple[FloatArray, float, float]]:
-    """Per cone: points (n, 2) px along its axis, their least depth and its largest radius, m."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Per cone: points (c, n, 2) px along its axis, their least depth and its largest radius, m."""
     t = np.linspace(0.0, 1.0, _POINTS_PER_CONE)
     placed = cone_transforms(body, pose)
-    count = len(placed)
-    points = np.empty((count, t.size, 3))
-    for i, (place, length, shape) in enumerate(
-        zip(placed, body.cone_length, body.cone_shape, strict=True)
-    ):
-        centre = (1.0 - t)[:, None] * shape[0, 2:] + t[:, None] * shape[1, 2:]
-        points[i] = np.column_stack([centre, t * length]) @ place[:, :3].T + place[:, 3]
-    depths = points @ camera.T_cam_world[2, :3] + camera.T_cam_world[2, 3]
-    pixels = project_camera(points.reshape(-1, 3), camera).reshape(count, t.size, 2)
-    radii = body.cone_shape[:, :, :2].max(axis=(1, 2))
-    for i in range(count):
-        yield pixels[i], float(depths[i].min()), float(radii[i])
+    ends, shape = body.cone_shape[:, :, 2:], body.cone_shape
+    local = np.empty((len(placed), t.size, 3))
+    local[:, :, :2] = (1.0 - t)[:, None] * ends[:, None, 0] + t[:, None] * ends[:, None, 1]
+    local[:, :, 2] = t * body.cone_length[:, None]
+    points = local @ placed[:, :3, :3].transpose(0, 2, 1) + placed[:, None, :3, 3]
+    depths_m = points @ camera.T_cam_world[2, :3] + camera.T_cam_world[2, 3]
+    pixels = project_camera(points.reshape(-1, 3), camera).reshape(*points.shape[:2], 2)
+    return pixels, depths_m.min(axis=1), shape[:, :, :2].max(axis=(1, 2))

@@ -11,7 +11,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import BackgroundModel, Image
+from markerless_tracker.imaging import BackgroundModel, Image, Region
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
@@ -123,6 +123,14 @@ class Tracker:
         for views in (blank, dict(list(blank.items())[:1])):
             self.step(views, 0)
             self.reset()
+
+    def regions(self, stamp_ns: int) -> dict[str, Region | None]:
+        """Where in each camera's image `step` would look at a time; None for all of it.
+
+        Each camera's turn to be looked at whole comes besides (`full_frame_every`).
+        """
+        margin_m = self._region_margin(stamp_ns)
+        return self._evidence.regions(self.body, self._predict(stamp_ns), margin_m)
 
     def step(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> TrackResult:
         """Find the pose that explains the views of one time.

@@ -95,6 +95,7 @@ def speed_table(figures: Mapping[str, Any]) -> Table:
         ("fitness and swarm, balan31, 1000 evaluations", figures["swarm_ms"]["sppso_1000"]),
         ("frame: background", frame["background"]),
         ("frame: edges", frame["edges"]),
+        ("frame: images to evidence", frame["imaging"]),
         ("frame: evidence to pose, tuned", frame["fitness"]),
         ("frame: images to pose, tuned", frame["total"]),
         ("1000 evaluations of the tuned body", figures["thousand_evaluations_ms"]),
