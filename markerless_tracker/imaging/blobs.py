@@ -29,10 +29,28 @@ def _count_runs(mask, part, target):  # type: ignore[no-untyped-def]
     count = 0
     for v in range(part[1], part[3]):
         row = mask[v, part[0] : part[2]]
-        count += row[0] == target
-        for u in range(1, row.size):
-            count += (row[u] == target) & (row[u - 1] != target)
+        before = row[: row.size - 1]
+        after = row[1:]
+        changes = np.int32(row[0] == target)
+        for u in range(after.size):
+            changes += np.int32((after[u] == target) & (before[u] != target))
+        count += changes
     return count
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _same_until(values, words, u, value):  # type: ignore[no-untyped-def]
+    """First place from u on whose value differs; eight at a time, ``value`` is 0 or 255."""
+    n = values.size
+    whole = np.uint64(0) if value == 0 else np.uint64(0xFFFFFFFFFFFFFFFF)
+    while u < n:
+        if u & 7 == 0 and words[u >> 3] == whole:
+            u += 8
+            continue
+        if values[u] != value:
+            return u
+        u += 1
+    return n
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -60,20 +78,21 @@ def flip_small(mask, part, need, target, least, reach, spared, unknown):  # type
     rows = part[3] - part[1]
     first = np.empty(rows + 1, dtype=np.int32)
     n = 0
+    columns = part[2] - part[0]
+    # Filled up with what is not looked for: a run never ends in the filling.
+    values = np.full((columns + 7) // 8 * 8, 255 - target, dtype=np.uint8)
+    words = values.view(np.uint64)
     for i in range(rows):
         first[i] = n
-        row = mask[part[1] + i]
-        u = part[0]
-        while u < part[2]:
-            if row[u] != target:
-                u += 1
-                continue
-            begin[n] = u
-            while u < part[2] and row[u] == target:
-                u += 1
-            end[n] = u
+        values[:columns] = mask[part[1] + i, part[0] : part[2]]
+        u = _same_until(values, words, 0, 255 - target)
+        while u < columns:
+            begin[n] = part[0] + u
+            u = _same_until(values, words, u, target)
+            end[n] = part[0] + min(u, columns)
             parent[n] = n
             n += 1
+            u = _same_until(values, words, u, 255 - target)
         if i == 0:
             continue
         a = first[i - 1]

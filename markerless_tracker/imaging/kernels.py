@@ -71,6 +71,14 @@ def _add_square(value, mean, scale, gain, distance):  # type: ignore[no-untyped-
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _beyond(distance, row, marks):  # type: ignore[no-untyped-def]
+    for j in range(distance.size):
+        marks[j] = np.uint8(255) if distance[j] > np.float32(1.0) else np.uint8(0)
+    for j in range(distance.size):
+        row[j] = marks[j]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def label_colour(image, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
     """Label a part of a colour image: 0 background, 127 shadow, 255 foreground.
 
@@ -89,6 +97,9 @@ def label_colour(image, mean, scale, gain, rule, left, top, labels):  # type: ig
     rows, columns = labels.shape
     gain_b, gain_g, gain_r = gain[0], gain[1], gain[2]
     distance = np.empty(columns, dtype=np.float32)
+    # Eight pixels are passed over at a time where all are background.
+    marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
+    words = marks.view(np.uint64)
     split = np.empty((3, columns), dtype=np.uint8)
     for i in range(rows):
         v = top + i
@@ -100,27 +111,30 @@ def label_colour(image, mean, scale, gain, rule, left, top, labels):  # type: ig
             narrow = scale[0, c, v, left : left + columns]
             _add_square(split[c], base, narrow, gain[c], distance)
         row = labels[i]
-        for j in range(columns):
-            if distance[j] <= one:
-                row[j] = 0
+        _beyond(distance, row, marks)
+        for word in range(words.size):
+            if words[word] == 0:
                 continue
-            b = np.float32(split[0, j])
-            g = np.float32(split[1, j])
-            r = np.float32(split[2, j])
-            label = 255
-            for k in range(modes):
-                mean_b = min(gain_b * mean[k, 0, v, left + j], white)
-                mean_g = min(gain_g * mean[k, 1, v, left + j], white)
-                mean_r = min(gain_r * mean[k, 2, v, left + j], white)
-                x = (b - mean_b) * scale[k, 0, v, left + j]
-                y = (g - mean_g) * scale[k, 1, v, left + j]
-                z = (r - mean_r) * scale[k, 2, v, left + j]
-                if k > 0 and x * x + y * y + z * z <= one:
-                    label = 0
-                    break
-                if label == 255 and is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):
-                    label = 127
-            row[j] = label
+            for j in range(8 * word, min(8 * word + 8, columns)):
+                if marks[j] == 0:
+                    continue
+                b = np.float32(split[0, j])
+                g = np.float32(split[1, j])
+                r = np.float32(split[2, j])
+                label = 255
+                for k in range(modes):
+                    mean_b = min(gain_b * mean[k, 0, v, left + j], white)
+                    mean_g = min(gain_g * mean[k, 1, v, left + j], white)
+                    mean_r = min(gain_r * mean[k, 2, v, left + j], white)
+                    x = (b - mean_b) * scale[k, 0, v, left + j]
+                    y = (g - mean_g) * scale[k, 1, v, left + j]
+                    z = (r - mean_r) * scale[k, 2, v, left + j]
+                    if k > 0 and x * x + y * y + z * z <= one:
+                        label = 0
+                        break
+                    if label == 255 and is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):
+                        label = 127
+                row[j] = label
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -135,6 +149,9 @@ def label_grey(image, mean, scale, gain, rule, left, top, labels):  # type: igno
     rows, columns = labels.shape
     gain_v = gain[0]
     distance = np.empty(columns, dtype=np.float32)
+    # Eight pixels are passed over at a time where all are background.
+    marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
+    words = marks.view(np.uint64)
     for i in range(rows):
         v = top + i
         pixel = image[i]
@@ -143,18 +160,21 @@ def label_grey(image, mean, scale, gain, rule, left, top, labels):  # type: igno
         distance[:] = 0.0
         _add_square(pixel, base, narrow, gain_v, distance)
         row = labels[i]
-        for j in range(columns):
-            if distance[j] <= one:
-                row[j] = 0
+        _beyond(distance, row, marks)
+        for word in range(words.size):
+            if words[word] == 0:
                 continue
-            value = np.float32(pixel[j])
-            label = 255
-            for k in range(modes):
-                expected = min(gain_v * mean[k, 0, v, left + j], white)
-                x = (value - expected) * scale[k, 0, v, left + j]
-                if k > 0 and x * x <= one:
-                    label = 0
-                    break
-                if rule[0] * expected <= value and value <= rule[1] * expected:
-                    label = 127
-            row[j] = label
+            for j in range(8 * word, min(8 * word + 8, columns)):
+                if marks[j] == 0:
+                    continue
+                value = np.float32(pixel[j])
+                label = 255
+                for k in range(modes):
+                    expected = min(gain_v * mean[k, 0, v, left + j], white)
+                    x = (value - expected) * scale[k, 0, v, left + j]
+                    if k > 0 and x * x <= one:
+                        label = 0
+                        break
+                    if rule[0] * expected <= value and value <= rule[1] * expected:
+                        label = 127
+                row[j] = label

@@ -122,7 +122,7 @@ class ImagingSettings:
         "radius of the windows in which the background's pattern is looked for: what shows it in "
         "any light is shadow, what hides it is none; 0 = do not look",
         least=0,
-        most=50,
+        most=6,
     )
     texture_light_min: float = setting(
         0.15,

@@ -26,6 +26,8 @@ UNKNOWN = 100.0
 # without a pattern take it over along a row and then along a column, px.
 STEP = 0.006
 SPREAD_PX = 24
+# Largest radius of a window.
+MOST_RADIUS = 6
 # Deviations of the noise within which a pixel agrees with a window's light.
 _AGREE = 3.5
 
@@ -46,12 +48,18 @@ def _slide_product(total, came_x, came_y, gone_x, gone_y):  # type: ignore[no-un
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _sum_across(part, side, total):  # type: ignore[no-untyped-def]
     """total[j] = part[j] + ... + part[j + side - 1], side odd."""
-    for j in range(total.size):
+    n = total.size
+    if side == 7:
+        for j in range(n):
+            left = part[j] + part[j + 1] + part[j + 2]
+            total[j] = left + part[j + 3] + part[j + 4] + part[j + 5] + part[j + 6]
+        return
+    for j in range(n):
         total[j] = part[j]
     for shift in range(1, side, 2):
-        one = part[shift : shift + total.size]
-        other = part[shift + 1 : shift + 1 + total.size]
-        for j in range(total.size):
+        one = part[shift : shift + n]
+        other = part[shift + 1 : shift + 1 + n]
+        for j in range(n):
             total[j] += one[j] + other[j]
 
 
@@ -60,13 +68,11 @@ def _sum_across(part, side, total):  # type: ignore[no-untyped-def]
 def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[no-untyped-def]
     for j in range(out.size):
         n = down * across[j]
-        a_sum = np.float64(a[j])
-        b_sum = np.float64(b[j])
         share = np.float32(1.0) / np.float32(n)
-        # Differences of large whole numbers: exact in float64.
-        var_a = np.float32(n * aa[j] - a_sum * a_sum) * share * share
-        cov = np.float32(n * ab[j] - a_sum * b_sum) * share * share
-        var_b = np.float32(n * bb[j] - b_sum * b_sum) * share * share
+        # n times sums of squares fits 31 bits up to a radius of `MOST_RADIUS`.
+        var_a = np.float32(n * aa[j] - a[j] * a[j]) * share * share
+        cov = np.float32(n * ab[j] - a[j] * b[j]) * share * share
+        var_b = np.float32(n * bb[j] - b[j] * b[j]) * share * share
         p = np.float32(a[j]) / max(np.float32(b[j]), np.float32(1e-6))
         pattern = p * p * var_b
         rest = var_a - np.float32(2.0) * p * cov + pattern - noise
@@ -103,7 +109,7 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
     # The rows of the window, in turns; rows beyond the part are 0.
     grey = np.zeros((side + 1, columns), dtype=np.int32)
     base = np.zeros((side + 1, columns), dtype=np.int32)
-    across = np.empty(columns, dtype=np.float64)
+    across = np.empty(columns, dtype=np.int32)
     for j in range(columns):
         across[j] = min(j + radius, columns - 1) - max(j - radius, 0) + 1
     for v in range(rows + radius):
@@ -127,24 +133,26 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
             continue
         for k in range(5):
             _sum_across(sums[k], side, window[k])
-        down = np.float64(min(i + radius, rows - 1) - max(i - radius, 0) + 1)
+        down = np.int32(min(i + radius, rows - 1) - max(i - radius, 0) + 1)
         _light_of_sums(
             window[0], window[1], window[2], window[3], window[4], across, down, noise, light[i]
         )
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _same_light(light, near, steps):  # type: ignore[no-untyped-def]
-    """Whether a window without a pattern takes over the light next to it, `steps` from its source.
-
-    near: the neighbour's light, 0 if none.
-    """
-    return (
-        light >= UNKNOWN
-        and near > 0.0
-        and steps < SPREAD_PX
-        and abs(light - np.float32(UNKNOWN) - near) <= STEP
-    )
+def _spread_run(row, start, stop, step, out):  # type: ignore[no-untyped-def]
+    """Along a row of light from a window on, windows without a pattern take over its light."""
+    near = row[start]
+    j = start + step
+    taken = 0
+    while j != stop and taken < SPREAD_PX:
+        own = row[j] - np.float32(UNKNOWN)
+        if abs(own - near) > np.float32(STEP):
+            return
+        out[j] = own
+        near = own
+        taken += 1
+        j += step
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -155,35 +163,21 @@ def spread_light(light, spread):  # type: ignore[no-untyped-def]
     what lies further away has no influence. light (a, b) is changed; spread (a, b) is written.
     """
     rows, columns = light.shape
+    spread[:] = light
     for i in range(rows):
         row = light[i]
-        out = spread[i]
-        near = np.float32(0.0)
-        steps = 0
-        for j in range(columns):
-            p = row[j]
-            out[j] = p
-            if p < UNKNOWN:
-                near = max(p, np.float32(0.0))
-                steps = 0
-            elif _same_light(p, near, steps):
-                near = p - np.float32(UNKNOWN)
-                steps += 1
-                out[j] = near
-            else:
-                near = np.float32(0.0)
-        near = np.float32(0.0)
-        for j in range(columns - 1, -1, -1):
-            p = row[j]
-            if p < UNKNOWN:
-                near = max(p, np.float32(0.0))
-                steps = 0
-            elif _same_light(p, near, steps):
-                near = p - np.float32(UNKNOWN)
-                steps += 1
-                out[j] = near
-            else:
-                near = np.float32(0.0)
+        j = 0
+        while j < columns:
+            if row[j] < np.float32(UNKNOWN):
+                j += 1
+                continue
+            begin = j
+            while j < columns and row[j] >= np.float32(UNKNOWN):
+                j += 1
+            if begin > 0 and row[begin - 1] > np.float32(0.0):
+                _spread_run(row, begin - 1, j, 1, spread[i])
+            if j < columns and row[j] > np.float32(0.0):
+                _spread_run(row, j, begin - 1, -1, spread[i])
     light[:] = spread
     nears = np.zeros(columns, dtype=np.float32)
     steps_of = np.zeros(columns, dtype=np.int32)
@@ -196,7 +190,7 @@ def spread_light(light, spread):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
-    """One row of light takes over what comes from the row before; as `_same_light`, branchless."""
+    """One row of light takes over what comes from the row before; as `_spread_run`, branchless."""
     for j in range(row.size):
         p = row[j]
         own = p - np.float32(UNKNOWN)
