@@ -93,7 +93,7 @@ def _steep(smooth, slope, low, gain, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def gradient_strength(grey, low, gain, strength):  # type: ignore[no-untyped-def]
-    """Fill strength (h, w) uint8 with (Sobel gradient - low) * gain of grey (h, w) uint8, 0..255."""
+    """Fill strength (h, w) uint8 with (Sobel gradient - low) gain of grey (h, w) uint8, to 255."""
     rows, columns = grey.shape
     smooth = np.empty(columns + 2, dtype=np.int32)
     slope = np.empty(columns + 2, dtype=np.int32)

@@ -21,6 +21,7 @@ from markerless_tracker.imaging.blobs import (
     fill_small,
     occupied,
 )
+from markerless_tracker.imaging.border import border_reach, trim_border
 from markerless_tracker.imaging.edges import edge_map, edge_reach
 from markerless_tracker.imaging.exposure import ExposureMeter
 from markerless_tracker.imaging.images import Image, check_image, grey_of
@@ -47,6 +48,8 @@ _SOLID = np.ones((3, 3), dtype=np.uint8)
 _LOOK_PX = 3
 # How much more than needed is looked at, at first, for patches that go on there.
 _SLACK_PX = 8
+# Difference of body and background, in deviations of the noise, from which on their mixture tells.
+_LEAST_CONTRAST = 5.0
 # Mean of a mode that a pixel lacks: nothing is near it, or in its shadow.
 _NOWHERE = np.float32(-1e6)
 
@@ -235,7 +238,8 @@ class Segmenter:
     def _try_silhouette(self, image: Image, need: Region, slack: int) -> tuple[Mask, Region] | None:
         """`_silhouette` with so much more around what is needed; None if that is too little."""
         size_px, options = self._size_px, self.settings
-        zone = need.grown(slack, size_px)
+        whole = need.grown(border_reach(options.mask_trim_px), size_px)
+        zone = whole.grown(slack, size_px)
         unknown = _open_sides(zone, size_px)
         repair = repair_reach(options)
         patches = zone.grown(repair, size_px)
@@ -245,32 +249,58 @@ class Segmenter:
         mask = self._scratch(1, window)
         asked = foreground_mask(
             labels, mask, self._least_shadow_px, grey=self._grey, zone=patches.within(window),
-            need=need.grown(repair, size_px).within(window), unknown=unknown,
+            need=whole.grown(repair, size_px).within(window), unknown=unknown,
         )  # fmt: skip
         if asked:
             return None
         # Outside of `patches` the mask is wrong, but opening and closing reach no further.
         open_and_close(mask, options)
-        inner = {"zone": zone.within(window), "need": need.within(window)}
+        inner = zone.within(window)
+        wanted = whole.within(window)
         frame_px = size_px[0] * size_px[1]
         least, largest = options.mask_blob_share * frame_px, options.mask_hole_share * frame_px
-        if clear_small(mask, least, connectivity=8, unknown=unknown, **inner):
+        if clear_small(mask, least, connectivity=8, zone=inner, need=wanted, unknown=unknown):
             return None
-        if fill_small(mask, largest, unknown=unknown, **inner):
+        if fill_small(mask, largest, zone=inner, need=wanted, unknown=unknown):
             return None
-        return mask[zone.within(window).slices], zone
+        self._trim(image, mask, inner, window)
+        return mask[inner.slices], zone
 
-    def _labels(self, image: Image, window: Region) -> Mask:
-        """0 background, 127 shadow, 255 foreground of a window, before any repair."""
-        wide = window.grown(_SMOOTH_PX[0] // 2 if self._smooth else 0, self._size_px)
+    def _trim(self, image: Image, mask: Mask, inner: Region, window: Region) -> None:
+        """Take what the body covers by less than half from the mask's border, in place."""
+        layers = self.settings.mask_trim_px
+        body = occupied(mask, inner)
+        if layers == 0 or body.width <= 0:
+            return
+        # One pixel more, so that the body ends inside; but it goes on beyond the image.
+        box = body.grown(1, (mask.shape[1], mask.shape[0]))
+        part = np.ascontiguousarray(mask[box.slices])
+        place = box.moved(window.left, window.top)
+        trim_border(
+            self._pixels(image, place), self._mean[0], self._gain, part, place, layers=layers,
+            least=_LEAST_CONTRAST * self._sigma,
+        )  # fmt: skip
+        mask[box.slices] = part
+
+    def _pixels(self, image: Image, region: Region) -> Image:
+        """(h, w, c) of a region as it is compared: smoothed if too noisy, one channel if grey."""
+        wide = region.grown(_SMOOTH_PX[0] // 2 if self._smooth else 0, self._size_px)
         part = image[wide.slices]
         if self._smooth:
             part = np.asarray(cv2.GaussianBlur(part, _SMOOTH_PX, 0.0), dtype=np.uint8)
-        part = np.ascontiguousarray(part[window.within(wide).slices])
+            part = part[region.within(wide).slices]
+        part = np.ascontiguousarray(part)
+        if self._grey:
+            part = grey_of(part)
+        return part.reshape(region.height, region.width, -1)
+
+    def _labels(self, image: Image, window: Region) -> Mask:
+        """0 background, 127 shadow, 255 foreground of a window, before any repair."""
+        part = self._pixels(image, window)
         labels = self._scratch(0, window)
         label = kernels.label_grey if self._grey else kernels.label_colour
         label(
-            grey_of(part) if self._grey else part, self._mean, self._scale, self._gain, self._rule,
+            part[:, :, 0] if self._grey else part, self._mean, self._scale, self._gain, self._rule,
             window.left, window.top, labels,
         )  # fmt: skip
         return labels
@@ -287,18 +317,18 @@ class Segmenter:
             cv2.morphologyEx(solid, cv2.MORPH_OPEN, _SOLID, dst=solid)
             looked_at = np.asarray(cv2.dilate(solid, _SOLID), dtype=np.uint8)
             part = occupied(looked_at, patches.within(window)).moved(window.left, window.top)
-        if self._smooth:
-            seen = part.grown(texture_reach(options.texture_radius_px) + 2, self._size_px)
-            image = image.copy()
-            image[seen.slices] = cv2.GaussianBlur(image[seen.slices], _SMOOTH_PX, 0.0)
+        if part.width <= 0:
+            return
+        seen = part.grown(texture_reach(options.texture_radius_px), self._size_px)
         correct_labels(
-            image,
+            grey_of(self._pixels(image, seen)),
             self._grey_mean,
             float(self._gain.mean()),
             self._sigma,
             labels,
             window,
             part,
+            seen,
             looked_at=looked_at,
             radius=options.texture_radius_px,
             light=(options.texture_light_min, options.shadow_value_max + 0.03),

@@ -141,6 +141,13 @@ class ImagingSettings:
     mask_close_px: int = setting(
         5, "side of the closing that mends cracks; 0 or 1 = none", least=0, most=101
     )
+    mask_trim_px: int = setting(
+        2,
+        "layers of pixels that may be taken from the silhouette's border where the body, by the "
+        "colours beside them, covers less than half of them; 0 = none",
+        least=0,
+        most=20,
+    )
     mask_hole_share: float = setting(
         2e-4, "holes up to this share of the image are filled", least=0.0, most=1.0
     )

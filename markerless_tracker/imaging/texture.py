@@ -12,7 +12,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.imaging.images import Image, grey_of
+from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.region import Region
 
 # The pattern's variance, in those of the noise, from which on a window can show that the pattern is
@@ -273,13 +273,14 @@ def texture_reach(radius: int) -> int:
 
 
 def correct_labels(
-    image: Image,
+    grey: Image,
     mean: NDArray[np.float32],
     gain: float,
     sigma: float,
     labels: NDArray[np.uint8],
     window: Region,
     part: Region,
+    seen: Region,
     *,
     looked_at: NDArray[np.uint8],
     radius: int,
@@ -290,23 +291,20 @@ def correct_labels(
     """Correct labels of `kernels` by texture, in place.
 
     Args:
-        image: (h, w) or (h, w, 3) uint8.
-        mean: (h, w) grey background.
+        grey: what is seen of the image, (c, d) uint8.
+        mean: (h, w) grey background of the whole image.
         gain: brightness of the image relative to the background's.
         sigma: the sensor's noise, grey levels.
         labels: (a, b) of a window: 0 background, 127 shadow, 255 foreground.
         window: the window's place in the image.
         part: what is corrected, inside the window.
+        seen: place of ``grey``: the part and `texture_reach` around it, as far as the image goes.
         looked_at: (a, b), 0 where shadow and foreground are left as they are.
         radius: of the windows, px.
         light: least and largest light of a shadow.
         protect: whether shadow may become foreground.
         reveal: whether background may become foreground.
     """
-    if part.width <= 0 or part.height <= 0:
-        return
-    seen = part.grown(texture_reach(radius), (mean.shape[1], mean.shape[0]))
-    grey = grey_of(np.ascontiguousarray(image[seen.slices]))
     found = np.empty((2, *grey.shape), dtype=np.float32)
     one = np.float32(gain)
     noise = np.float32(sigma**2)
