@@ -31,10 +31,9 @@ def _count_runs(mask, part, target):  # type: ignore[no-untyped-def]
         row = mask[v, part[0] : part[2]]
         before = row[: row.size - 1]
         after = row[1:]
-        changes = np.int32(row[0] == target)
+        count += row[0] == target
         for u in range(after.size):
-            changes += np.int32((after[u] == target) & (before[u] != target))
-        count += changes
+            count += (after[u] == target) & (before[u] != target)
     return count
 
 

@@ -1,5 +1,7 @@
 """Small repairs of a silhouette: specks, cracks, holes and blobs."""
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,9 @@ from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.settings import ImagingSettings
 
 Mask = NDArray[np.uint8]
+
+# From this size of the images on, lengths set in pixels are meant as they are.
+_FULL_FRAME_PX = 640 * 480
 
 
 def disc(side_px: int) -> Mask:
@@ -60,22 +65,29 @@ def foreground_mask(
     return asked
 
 
-def repair_reach(settings: ImagingSettings) -> int:
+def closing_px(settings: ImagingSettings, frame_px: int) -> int:
+    """Side of the closing in a frame of that many pixels, odd; `mask_close_px` says how."""
+    side = settings.mask_close_px * min(1.0, math.sqrt(frame_px / _FULL_FRAME_PX))
+    return 2 * round((side - 1.0) / 2.0) + 1 if side > 1.0 else 1
+
+
+def repair_reach(settings: ImagingSettings, frame_px: int) -> int:
     """How far from a pixel opening and closing look, px."""
-    return 2 * (settings.mask_open_px // 2) + 2 * (settings.mask_close_px // 2)
+    return 2 * (settings.mask_open_px // 2) + 2 * (closing_px(settings, frame_px) // 2)
 
 
-def open_and_close(mask: Mask, settings: ImagingSettings) -> None:
-    """Remove specks and mend cracks of a mask (h, w), in place."""
+def open_and_close(mask: Mask, settings: ImagingSettings, frame_px: int) -> None:
+    """Remove specks and mend cracks of a mask (h, w) of a frame of that many pixels, in place."""
     if settings.mask_open_px > 1:
         cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc(settings.mask_open_px), dst=mask)
-    if settings.mask_close_px > 1:
-        cv2.morphologyEx(mask, cv2.MORPH_CLOSE, disc(settings.mask_close_px), dst=mask)
+    side = closing_px(settings, frame_px)
+    if side > 1:
+        cv2.morphologyEx(mask, cv2.MORPH_CLOSE, disc(side), dst=mask)
 
 
 def clean_mask(mask: Mask, settings: ImagingSettings) -> Mask:
     """Open, close, drop small blobs, fill small holes: mask (h, w), 0 or 255, in place."""
-    open_and_close(mask, settings)
+    open_and_close(mask, settings, mask.size)
     drop_blobs(mask, settings.mask_blob_share * mask.size)
     fill_holes(mask, settings.mask_hole_share * mask.size)
     return mask

@@ -241,7 +241,8 @@ class Segmenter:
         whole = need.grown(border_reach(options.mask_trim_px), size_px)
         zone = whole.grown(slack, size_px)
         unknown = _open_sides(zone, size_px)
-        repair = repair_reach(options)
+        frame_px = size_px[0] * size_px[1]
+        repair = repair_reach(options, frame_px)
         patches = zone.grown(repair, size_px)
         window = patches.grown(_LOOK_PX + patch_reach(options, grey=self._grey), size_px)
         labels = self._labels(image, window)
@@ -254,10 +255,9 @@ class Segmenter:
         if asked:
             return None
         # Outside of `patches` the mask is wrong, but opening and closing reach no further.
-        open_and_close(mask, options)
+        open_and_close(mask, options, frame_px)
         inner = zone.within(window)
         wanted = whole.within(window)
-        frame_px = size_px[0] * size_px[1]
         least, largest = options.mask_blob_share * frame_px, options.mask_hole_share * frame_px
         if clear_small(mask, least, connectivity=8, zone=inner, need=wanted, unknown=unknown):
             return None

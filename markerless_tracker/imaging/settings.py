@@ -139,10 +139,14 @@ class ImagingSettings:
         3, "side of the opening that removes specks; 0 or 1 = none", least=0, most=101
     )
     mask_close_px: int = setting(
-        5, "side of the closing that mends cracks; 0 or 1 = none", least=0, most=101
+        5,
+        "side of the closing that mends cracks, in images of 640x480 or more; in smaller ones it "
+        "is as much smaller as they are; 0 or 1 = none",
+        least=0,
+        most=101,
     )
     mask_trim_px: int = setting(
-        2,
+        1,
         "layers of pixels that may be taken from the silhouette's border where the body, by the "
         "colours beside them, covers less than half of them; 0 = none",
         least=0,
