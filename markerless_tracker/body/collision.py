@@ -6,12 +6,14 @@ flat section of the torso is ignored, which refuses true poses with hanging arms
 second cone keeps its elliptic section, and both are shrunk by a margin.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from markerless_tracker.body.kinematics import node_transforms
+from markerless_tracker.body.kinematics import moving_nodes, node_transform, transforms
 from markerless_tracker.body.model import BodyModel, IntArray
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
@@ -80,20 +82,42 @@ class Feasibility:
         self.rule = rule
         self._spheres = fill_with_spheres(body)
         self._pairs = body.collisions if rule != "none" else np.empty((0, 2), dtype=np.int64)
-        self._nodes = np.empty((body.node_parent.size, 3, 4))
 
-    def __call__(self, poses: FloatArray) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+    def __call__(self, poses: FloatArray) -> NDArray[np.bool_]:
         """Mask (n,) of the poses (n, p) that keep the limits and do not inter-penetrate."""
-        body, spheres = self.body, self._spheres
-        out = np.empty(len(poses), dtype=np.bool_)
-        _feasible(
-            np.ascontiguousarray(poses, dtype=np.float64), self.limits,
-            body.node_parent, body.node_fixed, body.node_kind, body.node_sign, body.node_parameter,
-            body.cone_node, body.cone_fixed, body.cone_length, body.cone_shape,
-            self._pairs, spheres.first, spheres.centre, spheres.radius,
-            self.rule == "published", MARGIN_M, self._nodes, out,
-        )  # fmt: skip
-        return out
+        return self.around(np.arange(self.body.size), self.body.neutral)(poses)
+
+    def around(
+        self, active: IntArray, centre: FloatArray
+    ) -> Callable[[FloatArray], NDArray[np.bool_]]:
+        """The same test of points (n, d): values of some parameters, the others are at a centre.
+
+        What the active parameters (d,) do not move is tested once, at the centre (p,).
+        """
+        body, spheres, pairs = self.body, self._spheres, self._pairs
+        moves = moving_nodes(body, active)
+        either = moves[body.cone_node[pairs]].any(axis=1)
+        nodes = transforms(body, centre)
+        pose = np.array(centre, dtype=np.float64)
+
+        def test(
+            points: FloatArray, active: IntArray, moving: IntArray, pairs: IntArray
+        ) -> NDArray[np.bool_]:
+            out = np.empty(len(points), dtype=np.bool_)
+            _feasible(
+                np.ascontiguousarray(points, dtype=np.float64), active, pose, self.limits, moving,
+                body.node_parent, body.node_fixed, body.node_kind, body.node_sign,
+                body.node_parameter, body.cone_node, body.cone_fixed, body.cone_length,
+                body.cone_shape, pairs, spheres.first, spheres.centre, spheres.radius,
+                self.rule == "published", MARGIN_M, nodes, out,
+            )  # fmt: skip
+            return out
+
+        rest = np.setdiff1d(np.arange(body.size), active)
+        if not test(centre[None, rest], rest, np.empty(0, dtype=np.int64), pairs[~either])[0]:
+            return lambda points: np.zeros(len(points), dtype=np.bool_)
+        moving, touching = np.flatnonzero(moves), np.ascontiguousarray(pairs[either])
+        return lambda points: test(points, active, moving, touching)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
@@ -133,20 +157,22 @@ def _inside_cone(node, fixed, length, shape, point, grow):  # type: ignore[no-un
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
 def _feasible(  # type: ignore[no-untyped-def]
-    poses, limits, parent, fixed, kind, sign, parameter,
+    points, active, pose, limits, moving, parent, fixed, kind, sign, parameter,
     cone_node, cone_fixed, cone_length, cone_shape, pairs, first, centre, radius,
     published, margin, nodes, out,
 ):  # fmt: skip
     a = np.empty(3)
     b = np.empty(3)
-    for n in range(poses.shape[0]):
+    for n in range(points.shape[0]):
         good = True
-        for i in range(poses.shape[1]):
-            if not (limits[0, i] <= poses[n, i] <= limits[1, i]):
+        for i in range(active.size):
+            p = active[i]
+            pose[p] = points[n, i]
+            if not (limits[0, p] <= pose[p] <= limits[1, p]):
                 good = False
-                break
         if good and pairs.shape[0] > 0:
-            node_transforms(poses[n], parent, fixed, kind, sign, parameter, nodes)
+            for i in range(moving.size):
+                node_transform(moving[i], pose, parent, fixed, kind, sign, parameter, nodes)
             for k in range(pairs.shape[0]):
                 p, q = pairs[k, 0], pairs[k, 1]
                 for i in range(first[p], first[p + 1]):

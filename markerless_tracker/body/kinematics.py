@@ -2,29 +2,28 @@
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from markerless_tracker.body.model import BodyModel
+from markerless_tracker.body.model import BodyModel, IntArray
 from markerless_tracker.geometry import FloatArray
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def node_transforms(pose, parent, fixed, kind, sign, parameter, out):  # type: ignore[no-untyped-def]
-    """Fill out (m, 3, 4) with the world transforms of all nodes at a pose (p,)."""
-    for n in range(parent.size):
-        above = parent[n]
-        if above < 0:
-            for i in range(3):
-                for j in range(4):
-                    out[n, i, j] = fixed[n, i, j]
-        else:
-            for i in range(3):
-                a, b, c = out[above, i, 0], out[above, i, 1], out[above, i, 2]
-                for j in range(4):
-                    out[n, i, j] = a * fixed[n, 0, j] + b * fixed[n, 1, j] + c * fixed[n, 2, j]
-                out[n, i, 3] += out[above, i, 3]
-        move = kind[n]
-        if move < 0:
-            continue
+@njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
+def node_transform(n, pose, parent, fixed, kind, sign, parameter, out):  # type: ignore[no-untyped-def]
+    """Fill out[n] (3, 4) with the world transform of node n at a pose (p,), its parent's known."""
+    above = parent[n]
+    if above < 0:
+        for i in range(3):
+            for j in range(4):
+                out[n, i, j] = fixed[n, i, j]
+    else:
+        for i in range(3):
+            a, b, c = out[above, i, 0], out[above, i, 1], out[above, i, 2]
+            for j in range(4):
+                out[n, i, j] = a * fixed[n, 0, j] + b * fixed[n, 1, j] + c * fixed[n, 2, j]
+            out[n, i, 3] += out[above, i, 3]
+    move = kind[n]
+    if move >= 0:
         value = sign[n] * pose[parameter[n]]
         if move >= 3:
             for i in range(3):
@@ -36,6 +35,29 @@ def node_transforms(pose, parent, fixed, kind, sign, parameter, out):  # type: i
                 a, b = out[n, i, j], out[n, i, k]
                 out[n, i, j] = cos * a + sin * b
                 out[n, i, k] = cos * b - sin * a
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def node_transforms(pose, parent, fixed, kind, sign, parameter, out):  # type: ignore[no-untyped-def]
+    """Fill out (m, 3, 4) with the world transforms of all nodes at a pose (p,)."""
+    for n in range(parent.size):
+        node_transform(n, pose, parent, fixed, kind, sign, parameter, out)
+
+
+def moving_nodes(body: BodyModel, active: IntArray) -> NDArray[np.bool_]:
+    """Mask (m,) of the nodes whose transforms depend on any of the active parameters."""
+    moves = np.zeros(body.node_parent.size, dtype=np.bool_)
+    _find_moving(body.node_parent, body.node_parameter, np.asarray(active, dtype=np.int64), moves)
+    return moves
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def _find_moving(parent, parameter, active, moves):  # type: ignore[no-untyped-def]
+    for n in range(parent.size):
+        moves[n] = parent[n] >= 0 and moves[parent[n]]
+        for a in active:
+            if parameter[n] == a:
+                moves[n] = True
 
 
 def transforms(body: BodyModel, pose: FloatArray) -> FloatArray:

@@ -51,8 +51,16 @@ def pose_from_markers(
         neutral = _NEUTRAL_WEIGHT_M_PER_RAD * (pose - body.neutral)[angles]
         return np.concatenate([gap, neutral])
 
-    fit = least_squares(residuals, start, bounds=(low, high), x_scale="jac", max_nfev=400)
-    return np.clip(fit.x, bounds[0], bounds[1])
+    # From neutral a limb may get stuck at a limit; from the middle of its range it does not.
+    bent = start.copy()
+    ranged = np.isfinite(bounds).all(axis=0)
+    bent[ranged] = bounds[:, ranged].mean(axis=0)
+    fits = [
+        least_squares(residuals, begin, bounds=(low, high), x_scale="jac", max_nfev=400)
+        for begin in (start, bent)
+    ]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    return np.clip(best.x, bounds[0], bounds[1])
 
 
 def read_pose(path: Path, body: BodyModel) -> FloatArray:

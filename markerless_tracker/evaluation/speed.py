@@ -33,6 +33,9 @@ from markerless_tracker.tracking.stages import contour_stage, frame_stages
 THOUSAND = 1000
 _REFERENCE_POSES, _POSES = 16, 256
 _SHORT, _LONG = 2, 42
+_HARD = ("l_clavicle_x", "l_clavicle_y", "l_shoulder_x", "l_shoulder_y", "l_shoulder_z", "l_elbow")
+_ARM = {"limb": _HARD, "limb_soft": ("thorax_y", "thorax_z", *_HARD)}
+"""An arm alone, and with the torso's joint, as a hard and a soft partition vary it."""
 
 Report = Callable[[str, int, int], None]
 
@@ -58,7 +61,13 @@ def measure(
     threads = threads or usable_cores()
     tuned = TrackerConfig.from_mapping({"threads": threads})
     paper_body = TrackerConfig.from_mapping(
-        {"threads": threads, "body": "balan31", "refinement": "none", "fit_shape": False}
+        {
+            "threads": threads,
+            "body": "balan31",
+            "refinement": "none",
+            "fit_shape": False,
+            "edge_weight": 1.0,
+        }
     )
     backgrounds = {name: learn_background(images, tuned) for name, images in scene.empty.items()}
     observed = _observations(scene, tuned, backgrounds)
@@ -75,8 +84,10 @@ def measure(
         "frames": len(scene.frames),
         "image_size": list(scene.rig.cameras[0].size_px),
         "cameras": len(scene.rig),
-        "view_evaluation_us": {key: views[key] for key in ("full", "person31", "reference")},
+        "view_evaluation_us": views,
         "reference_ratio": views["reference"] / views["full"],
+        "limb_ratio": views["limb"] / views["full"],
+        "limb_soft_ratio": views["limb_soft"] / views["full"],
         "person31_ratio": views["person31"] / views["full"],
         "swarm_ms": {"sppso_1000": _spread(swarm)},
         "refine_ms": refine,
@@ -99,7 +110,7 @@ def scattered(body: BodyModel, pose: FloatArray, count: int) -> FloatArray:
 def _view_evaluations(
     scene: SpeedScene, observations: Mapping[str, Observation], repeats: int, progress: Report
 ) -> dict[str, float]:
-    """µs per pose and view on one thread, kinematics included."""
+    """µs per pose and view on one thread, kinematics, silhouettes and edges included."""
     timed: dict[str, tuple[Callable[[FloatArray], Any], FloatArray]] = {}
     views = len(scene.rig)
     for key, name in (("full", "balan31"), ("person31", "person31")):
@@ -107,17 +118,21 @@ def _view_evaluations(
         pose = scene.pose(body)
         config = TrackerConfig.from_mapping({"body": name, "refinement": "none"})
         fitness = _fitness(scene, body, config, threads=1)
+        seen = fitness.lay_out(observations)
+        poses = scattered(body, pose, _POSES)
         # The swarm's second stage: every parameter, every cone.
-        stage = frame_stages(body, config, pose, body.sigma)[-1]
-        timed[key] = (
-            fitness.prepare(fitness.lay_out(observations), stage),
-            scattered(body, pose, _POSES),
+        stage = replace(frame_stages(body, config, pose, body.sigma)[-1], edge_weight=1.0)
+        timed[key] = (fitness.prepare(seen, stage), poses)
+        if key != "full":
+            continue
+        reference = ReferenceFitness(
+            body, scene.rig.cameras, observations, pose, spacing_px=config.edge_spacing_px
         )
-        if key == "full":
-            reference = ReferenceFitness(
-                body, scene.rig.cameras, observations, pose, spacing_px=config.edge_spacing_px
-            )
-            timed["reference"] = (reference, scattered(body, pose, _REFERENCE_POSES))
+        timed["reference"] = (reference, scattered(body, pose, _REFERENCE_POSES))
+        for part, active in _ARM.items():
+            indices = np.sort([body.index(parameter) for parameter in active])
+            limb = fitness.prepare(seen, replace(stage, active=indices))
+            timed[part] = (limb, np.ascontiguousarray(poses[:, indices]))
     best = dict.fromkeys(timed, np.inf)
     for turn in range(repeats + 1):
         for key, (evaluate, poses) in timed.items():

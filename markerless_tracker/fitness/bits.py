@@ -6,8 +6,10 @@ Word w of row v of a frame lies at w * height + v: column after column of words.
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from markerless_tracker.fitness.compiled import inlined, kernel
 
 ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 
@@ -22,14 +24,14 @@ def popcount(typingctx: Any, word: Any) -> Any:
     return types.uint64(types.uint64), codegen
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
+@inlined
 def is_set(bits, height, u, v):  # type: ignore[no-untyped-def]
     """Whether the bit of column u in row v is set; both must lie inside the frame."""
     word = bits[np.uint64((u >> 6) * height + v)]
     return (word >> np.uint64(u & 63)) & np.uint64(1) != np.uint64(0)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def count_bits(rows):  # type: ignore[no-untyped-def]
     """Number of set bits of rows (h, w) of words."""
     total = np.uint64(0)

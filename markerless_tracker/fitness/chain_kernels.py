@@ -12,17 +12,21 @@ composite-rigid-body algorithm does for inertia: Featherstone, Rigid Body Dynami
 import numpy as np
 from numba import njit
 
+from markerless_tracker.fitness.compiled import kernel
+
 SUMS = 27
 """Per part: the upper triangle of the 6x6 sum of weighted outer products, then the 6 of W r."""
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def add_wrench(point, gradient, weight, value, sums, node, wrench):  # type: ignore[no-untyped-def]
-    """Add a residual's wrench to row `node` of sums (m, SUMS); wrench (6,) is working memory."""
-    x, y, z = point[0], point[1], point[2]
-    gx, gy, gz = gradient[0], gradient[1], gradient[2]
-    wrench[0], wrench[1], wrench[2] = gx, gy, gz
-    wrench[3], wrench[4], wrench[5] = y * gz - z * gy, z * gx - x * gz, x * gy - y * gx
+@kernel
+def add_wrench(x, y, z, gx, gy, gz, weight, value, sums, node):  # type: ignore[no-untyped-def]
+    """Add a residual's wrench to row `node` of sums (m, SUMS).
+
+    Args:
+        x, y, z: the point; gx, gy, gz: the residual's gradient with respect to it.
+        weight, value: the residual's.
+    """
+    wrench = (gx, gy, gz, y * gz - z * gy, z * gx - x * gz, x * gy - y * gx)
     k = 0
     for i in range(6):
         scaled = weight * wrench[i]

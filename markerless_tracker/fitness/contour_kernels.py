@@ -14,6 +14,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from markerless_tracker.fitness.chain_kernels import SUMS, add_wrench, sum_chain
+from markerless_tracker.fitness.compiled import kernel
 from markerless_tracker.fitness.kernels import cone_ends
 from markerless_tracker.fitness.outline import LANES
 from markerless_tracker.fitness.outline_samples import MAX_SAMPLES, sample_outline
@@ -21,6 +22,9 @@ from markerless_tracker.geometry import FloatArray
 
 BAND_PX = 8
 """Rows of a frame whose outline points are looked through together for the nearest."""
+
+_SMOOTH = (1.0, 4.0, 6.0, 4.0, 1.0)
+_RISE = (-1.0, -2.0, 0.0, 2.0, 1.0)
 
 
 class ContourViews(NamedTuple):
@@ -106,34 +110,51 @@ def make_contour_scratch(
     )
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _distance_at(contours, view, u, v, out):  # type: ignore[no-untyped-def]
-    """Bilinear signed distance, px, and its gradient into out (3,); False outside the window."""
-    left, top = contours.window[view, 0], contours.window[view, 1]
-    width, height = contours.window[view, 2], contours.window[view, 3]
+@kernel
+def steepest(distance, pixels, out):  # type: ignore[no-untyped-def]
+    """Fill out (n, 2): where distances (h, w) rise at pixels (n, 2), by Sobel's 5x5 px."""
+    height, width = distance.shape
+    for n in range(pixels.shape[0]):
+        along_u, along_v = 0.0, 0.0
+        for i in range(5):
+            v = min(max(pixels[n, 1] + i - 2, 0), height - 1)
+            for j in range(5):
+                u = min(max(pixels[n, 0] + j - 2, 0), width - 1)
+                along_u += _SMOOTH[i] * _RISE[j] * distance[v, u]
+                along_v += _RISE[i] * _SMOOTH[j] * distance[v, u]
+        out[n, 0], out[n, 1] = along_u, along_v
+
+
+@kernel
+def _distance_at(distance, start, left, top, width, height, u, v):  # type: ignore[no-untyped-def]
+    """Bilinear signed distance, px, and its gradient; whether the pixel is inside the window."""
     x, y = u - left, v - top
     if not (x >= 0.0 and y >= 0.0 and x < width - 1.0 and y < height - 1.0):
-        return False
+        return False, 0.0, 0.0, 0.0
     i, j = np.int64(x), np.int64(y)
     fx, fy = x - i, y - j
-    at = contours.distance_start[view] + j * width + i
-    d00, d10 = contours.distance[at], contours.distance[at + 1]
-    d01, d11 = contours.distance[at + width], contours.distance[at + width + 1]
-    out[0] = (d00 * (1 - fx) + d10 * fx) * (1 - fy) + (d01 * (1 - fx) + d11 * fx) * fy
-    out[1] = (d10 - d00) * (1 - fy) + (d11 - d01) * fy
-    out[2] = (d01 - d00) * (1 - fx) + (d11 - d10) * fx
-    return True
+    at = np.uint64(start + j * width + i)
+    below = at + np.uint64(width)
+    one = np.uint64(1)
+    d00, d10 = np.float64(distance[at]), np.float64(distance[at + one])
+    d01, d11 = np.float64(distance[below]), np.float64(distance[below + one])
+    value = (d00 * (1 - fx) + d10 * fx) * (1 - fy) + (d01 * (1 - fx) + d11 * fx) * fy
+    along_u = (d10 - d00) * (1 - fy) + (d11 - d01) * fy
+    along_v = (d01 - d00) * (1 - fx) + (d11 - d10) * fx
+    return True, value, along_u, along_v
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _world_gradient(views, view, point, du, dv, out):  # type: ignore[no-untyped-def]
-    """Gradient (3,) of du * u + dv * v with respect to a world point, through the lens."""
-    r, t = views.rotation[view], views.translation[view]
-    k, d = views.intrinsics[view], views.distortion[view]
-    x = r[0, 0] * point[0] + r[0, 1] * point[1] + r[0, 2] * point[2] + t[0]
-    y = r[1, 0] * point[0] + r[1, 1] * point[1] + r[1, 2] * point[2] + t[1]
-    z = r[2, 0] * point[0] + r[2, 1] * point[1] + r[2, 2] * point[2] + t[2]
-    a, b = x / z, y / z
+@kernel
+def _world_gradient(r, t, k, d, point, s, du, dv, out, n):  # type: ignore[no-untyped-def]
+    """Fill out[n] (3,) with the gradient of du * u + dv * v with respect to world point[s].
+
+    r, t, k, d: rotation, translation, intrinsics and lens of the view.
+    """
+    px, py, pz = point[s, 0], point[s, 1], point[s, 2]
+    x = r[0, 0] * px + r[0, 1] * py + r[0, 2] * pz + t[0]
+    y = r[1, 0] * px + r[1, 1] * py + r[1, 2] * pz + t[1]
+    z = 1.0 / (r[2, 0] * px + r[2, 1] * py + r[2, 2] * pz + t[2])
+    a, b = x * z, y * z
     r2 = a * a + b * b
     radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]))
     rate = 2.0 * (d[0] + r2 * (2.0 * d[1] + 3.0 * r2 * d[4]))
@@ -143,37 +164,38 @@ def _world_gradient(views, view, point, du, dv, out):  # type: ignore[no-untyped
     # d(u, v)/d(a, b), then d(a, b)/d(camera point), then to the world's axes.
     ga = du * (k[0] * aa + k[1] * ab) + dv * k[3] * ab
     gb = du * (k[0] * ab + k[1] * bb) + dv * k[3] * bb
-    gx, gy = ga / z, gb / z
-    gz = -(ga * a + gb * b) / z
+    gx, gy = ga * z, gb * z
+    gz = -(ga * a + gb * b) * z
     for i in range(3):
-        out[i] = gx * r[0, i] + gy * r[1, i] + gz * r[2, i]
+        out[n, i] = gx * r[0, i] + gy * r[1, i] + gz * r[2, i]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def sort_into_bands(view, height, samples, start, order):  # type: ignore[no-untyped-def]
-    """Sort one view's outline points into bands of BAND_PX rows; returns the number of bands.
+@kernel
+def sort_into_bands(count, height, pixel, start, order):  # type: ignore[no-untyped-def]
+    """Sort outline points, pixel (s, 2), into bands of BAND_PX rows; returns the number of bands.
 
     Band b holds the points order[start[b] : start[b + 1]].
     """
     bands = height // BAND_PX + 1
-    start[: bands + 1] = 0
-    for s in range(samples.count[view]):
-        start[int(samples.pixel[view, s, 1]) // BAND_PX + 1] += 1
+    for b in range(bands + 1):
+        start[b] = 0
+    for s in range(count):
+        start[int(pixel[s, 1]) // BAND_PX + 1] += 1
     for b in range(bands):
         start[b + 1] += start[b]
-    for s in range(samples.count[view] - 1, -1, -1):
-        b = int(samples.pixel[view, s, 1]) // BAND_PX + 1
+    for s in range(count - 1, -1, -1):
+        b = int(pixel[s, 1]) // BAND_PX + 1
         start[b] -= 1
         order[start[b]] = s
     # Each start has moved down to where its band begins, one place too far to the right.
     for b in range(bands):
         start[b] = start[b + 1]
-    start[bands] = samples.count[view]
+    start[bands] = count
     return bands
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _nearest(view, u, v, nu, nv, bands, samples, start, order):  # type: ignore[no-untyped-def]
+@kernel
+def _nearest(u, v, nu, nv, bands, pixel, normal, start, order):  # type: ignore[no-untyped-def]
     """The outline point nearest to a pixel among those that face as (nu, nv) does; -1: none."""
     best = np.inf
     nearest = -1
@@ -189,106 +211,109 @@ def _nearest(view, u, v, nu, nv, bands, samples, start, order):  # type: ignore[
             if band < 0 or band >= bands:
                 continue
             for i in range(start[band], start[band + 1]):
-                s = order[i]
-                du, dv = samples.pixel[view, s, 0] - u, samples.pixel[view, s, 1] - v
+                s = np.uint64(order[i])
+                du, dv = pixel[s, 0] - u, pixel[s, 1] - v
                 gap = du * du + dv * dv
-                if gap < best:
-                    facing = samples.normal[view, s, 0] * nu + samples.normal[view, s, 1] * nv
-                    if facing > 0.5:
-                        best = gap
-                        nearest = s
+                if gap < best and normal[s, 0] * nu + normal[s, 1] * nv > 0.5:
+                    best = gap
+                    nearest = order[i]
     return nearest
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def collect_residuals(view, views, contours, reach_m, samples, start, order, residuals):  # type: ignore[no-untyped-def]
     """Fill the residuals of one view, both ways.
 
     Robust weights are Tukey's, (1 - (r / reach)²)², and cost reach² / 6 (1 - (1 - (r / reach)²)³).
     """
-    k = views.intrinsics[view]
+    r, t = views.rotation[view], views.translation[view]
+    k, d = views.intrinsics[view], views.distortion[view]
+    pixel, normal, world = samples.pixel[view], samples.normal[view], samples.world[view]
+    depth, lengths, count = samples.depth[view], samples.length[view], samples.count[view]
+    values, weights = residuals.value[view], residuals.weight[view]
+    gradient, sample = residuals.gradient[view], residuals.sample[view]
+    distance, distance_start = contours.distance, contours.distance_start[view]
+    left, top = contours.window[view, 0], contours.window[view, 1]
+    width, height = contours.window[view, 2], contours.window[view, 3]
     n = 0
     cost = 0.0
-    found = np.empty(3)
     limit = reach_m * reach_m / 6.0
-    for s in range(samples.count[view]):
-        metres = samples.depth[view, s] / k[0]
-        u, v = samples.pixel[view, s, 0], samples.pixel[view, s, 1]
-        length = samples.length[view, s]
+    focal = 1.0 / k[0]
+    for s in range(count):
+        metres = depth[s] * focal
+        length = lengths[s]
         cost += length * limit
-        if not _distance_at(contours, view, u, v, found):
+        inside, value, along_u, along_v = _distance_at(
+            distance, distance_start, left, top, width, height, pixel[s, 0], pixel[s, 1]
+        )
+        value *= metres
+        if not inside or abs(value) >= reach_m:
             continue
-        value = found[0] * metres
-        steep = np.sqrt(found[1] * found[1] + found[2] * found[2])
-        if abs(value) >= reach_m or steep < 0.3:
-            continue
-        facing = found[1] * samples.normal[view, s, 0] + found[2] * samples.normal[view, s, 1]
-        if facing < 0.5 * steep:
+        steep = np.sqrt(along_u * along_u + along_v * along_v)
+        facing = along_u * normal[s, 0] + along_v * normal[s, 1]
+        if steep < 0.3 or facing < 0.5 * steep:
             continue
         share = 1.0 - (value / reach_m) ** 2
         cost -= length * limit * share**3
-        residuals.value[view, n] = value
-        residuals.weight[view, n] = length * share * share
-        residuals.sample[view, n] = s
-        _world_gradient(
-            views, view, samples.world[view, s], metres * found[1], metres * found[2],
-            residuals.gradient[view, n],
-        )  # fmt: skip
+        values[n] = value
+        weights[n] = length * share * share
+        sample[n] = s
+        _world_gradient(r, t, k, d, world, s, metres * along_u, metres * along_v, gradient, n)
         n += 1
-    bands = sort_into_bands(view, views.size[view, 1], samples, start, order)
+    bands = sort_into_bands(count, views.size[view, 1], pixel, start, order)
+    points, normals, spacing = contours.points, contours.normals, contours.spacing
     for m in range(contours.point_start[view], contours.point_start[view + 1]):
-        u, v = contours.points[m, 0], contours.points[m, 1]
-        nu, nv = contours.normals[m, 0], contours.normals[m, 1]
-        nearest = _nearest(view, u, v, nu, nv, bands, samples, start, order)
+        u, v = points[m, 0], points[m, 1]
+        nu, nv = normals[m, 0], normals[m, 1]
+        nearest = _nearest(u, v, nu, nv, bands, pixel, normal, start, order)
         metres = 0.0
         if nearest >= 0:
-            metres = samples.depth[view, nearest] / k[0]
-        elif samples.count[view] > 0:
-            metres = samples.depth[view, 0] / k[0]
-        length = contours.spacing[m] * metres
+            metres = depth[nearest] * focal
+        elif count > 0:
+            metres = depth[0] * focal
+        length = spacing[m] * metres
         cost += length * limit
         if nearest < 0:
             continue
-        du = samples.pixel[view, nearest, 0] - u
-        dv = samples.pixel[view, nearest, 1] - v
-        gap = du * du + dv * dv
-        if np.sqrt(gap) * metres >= reach_m:
+        du, dv = pixel[nearest, 0] - u, pixel[nearest, 1] - v
+        gap = (du * du + dv * dv) * metres * metres
+        if gap >= reach_m * reach_m:
             continue
-        value = (du * nu + dv * nv) * metres
-        share = 1.0 - gap * metres * metres / (reach_m * reach_m)
+        share = 1.0 - gap / (reach_m * reach_m)
         cost -= length * limit * share**3
-        residuals.value[view, n] = value
-        residuals.weight[view, n] = length * share * share
-        residuals.sample[view, n] = nearest
-        _world_gradient(
-            views, view, samples.world[view, nearest], metres * nu, metres * nv,
-            residuals.gradient[view, n],
-        )  # fmt: skip
+        values[n] = (du * nu + dv * nv) * metres
+        weights[n] = length * share * share
+        sample[n] = nearest
+        _world_gradient(r, t, k, d, world, nearest, metres * nu, metres * nv, gradient, n)
         n += 1
     residuals.count[view] = n
     residuals.cost[view] = cost
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _accumulate(view, body, samples, residuals, sums):  # type: ignore[no-untyped-def]
+@kernel
+def _accumulate(view, cone_node, samples, residuals, sums):  # type: ignore[no-untyped-def]
     """Sum one view's residuals per node of the body, into sums (m, SUMS)."""
-    sums[:] = 0.0
-    wrench = np.empty(6)
+    for m in range(sums.shape[0]):
+        for k in range(SUMS):
+            sums[m, k] = 0.0
+    world, cone = samples.world[view], samples.cone[view]
+    gradient, sample = residuals.gradient[view], residuals.sample[view]
+    weight, value = residuals.weight[view], residuals.value[view]
     for n in range(residuals.count[view]):
-        s = residuals.sample[view, n]
+        s = sample[n]
         add_wrench(
-            samples.world[view, s], residuals.gradient[view, n], residuals.weight[view, n],
-            residuals.value[view, n], sums, body.cone_node[samples.cone[view, s]], wrench,
+            world[s, 0], world[s, 1], world[s, 2], gradient[n, 0], gradient[n, 1], gradient[n, 2],
+            weight[n], value[n], sums, cone_node[cone[s]],
         )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def _one_view(  # type: ignore[no-untyped-def]
     view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch, outlines
 ):
-    root = scratch.world[: 2 * LANES + 1 : LANES]
+    world = scratch.world
     r, t = views.rotation[view], views.translation[view]
-    depth = r[2, 0] * root[0] + r[2, 1] * root[1] + r[2, 2] * root[2] + t[2]
+    depth = r[2, 0] * world[0] + r[2, 1] * world[LANES] + r[2, 2] * world[2 * LANES] + t[2]
     spacing_px = max(1.0, spacing_m * views.intrinsics[view, 0] / max(depth, 0.5))
     sample_outline(
         view, views, body.cone_node.size, spacing_px, step_px, scratch, outlines, samples
@@ -296,7 +321,7 @@ def _one_view(  # type: ignore[no-untyped-def]
     collect_residuals(
         view, views, contours, reach_m, samples, scratch.start[view], scratch.order[view], residuals
     )
-    _accumulate(view, body, samples, residuals, scratch.sums[view])
+    _accumulate(view, body.cone_node, samples, residuals, scratch.sums[view])
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]

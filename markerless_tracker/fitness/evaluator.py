@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel
@@ -13,14 +12,17 @@ from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.fitness import kernels
 from markerless_tracker.fitness.arrays import Views, body_arrays, lay_out_views
+from markerless_tracker.fitness.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule
 from markerless_tracker.fitness.outline import make_outlines
+from markerless_tracker.fitness.still import Drawing, divide
+from markerless_tracker.fitness.terms import CostRule, view_terms
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, Stage
 
-EDGE_RULES = {"sides": kernels.SIDES, "visible": kernels.VISIBLE, "outline": kernels.OUTLINE}
+EDGE_RULES = {"sides": SIDES, "visible": VISIBLE, "outline": OUTLINE}
 EDGE_TERMS = ("ssd", "mean")
-_CONE_S = 0.35e-6
+_CONE_S = 0.4e-6
 """About how long one cone in one view takes one thread."""
 
 
@@ -72,14 +74,15 @@ class Fitness:
         self.body = body
         self.cameras = tuple(cameras)
         self.threads = usable_threads(threads)
-        self._body = body_arrays(body)
-        self._rule = kernels.EdgeRule(
+        self._arrays = body_arrays(body)
+        self._rule = EdgeRule(
             EDGE_RULES[edge_rule], float(edge_spacing_px), float(edge_step_px), edge_term == "ssd"
         )
         height = max(camera.size_px[1] for camera in cameras)
         self._outlines = make_outlines(self.threads, height)
         self._scratch = kernels.make_scratch(
             self.threads,
+            body.size,
             body.node_parent.size,
             len(body.cone_names),
             height,
@@ -101,46 +104,74 @@ class Fitness:
         silhouette_cones: NDArray[np.bool_],
         edge_cones: NDArray[np.bool_],
     ) -> FloatArray:
-        """Counts (n, v, 4) of poses (n, p): see the columns of `kernels`."""
-        counts = np.empty((len(poses), len(views.names), 4))
-        sampled = self.body.cone_edges & edge_cones[:, None]
-        args = (
-            poses, self._body, views.arrays, silhouette_cones, sampled,
-            self._rule, self._scratch, self._outlines, counts,
+        """Counts (n, v, 4) of poses (n, p): see the columns of `terms`."""
+        everything = np.arange(self.body.size)
+        cost = CostRule(1.0, 1.0, self._rule.squared, False)
+        drawing = divide(
+            self.body, self._arrays, views.arrays, everything, self.body.neutral, silhouette_cones,
+            edge_cones, self._rule, cost, self._scratch, self._outlines,
         )  # fmt: skip
-        work_s = len(poses) * len(views.names) * len(self.body.cone_names) * _CONE_S
-        if not worth_waking(work_s, self.threads):
-            kernels.count_serial(*args)
-        else:
-            with ONE_CALLER:
-                numba.set_num_threads(self.threads)
-                kernels.count_parallel(*args)
-        return counts
+        bars = np.full(len(poses), np.inf)
+        return self._run(views, drawing, poses, everything, self.body.neutral, bars, cost)[0]
 
     def terms(self, views: Views, pose: FloatArray) -> dict[str, ViewTerms]:
         """f_s, f_e and overlap of one pose (p,), by the names of the cameras that see."""
         every = np.ones(len(self.body.cone_names), dtype=np.bool_)
-        counts = self.count(views, np.ascontiguousarray(pose[None]), every, every)
-        parts = np.empty((len(views.names), 3))
-        _view_terms(counts[0], views.arrays.observed, self._rule.squared, parts)
+        counts = self.count(views, np.ascontiguousarray(pose[None]), every, every)[0]
+        observed = views.arrays.observed
         return {
-            name: ViewTerms(*map(float, row)) for name, row in zip(views.names, parts, strict=True)
+            name: ViewTerms(*map(float, view_terms(row, seen, self._rule.squared)))
+            for name, row, seen in zip(views.names, counts, observed, strict=True)
         }
+
+    def _run(
+        self,
+        views: Views,
+        drawing: Drawing,
+        points: FloatArray,
+        active: NDArray[np.int64],
+        centre: FloatArray,
+        bars: FloatArray,
+        cost: CostRule,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Counts (n, v, 4) and costs (n,) of points (n, d)."""
+        counts = np.empty((len(points), len(views.names), 4))
+        costs = np.empty(len(points))
+        args = (
+            points, active, centre, bars, drawing.body, views.arrays, drawing.silhouette_cones,
+            drawing.edge_cones, self._rule, cost, drawing.still, self._scratch, self._outlines,
+            counts, costs,
+        )  # fmt: skip
+        work_s = len(points) * len(views.names) * drawing.silhouette_cones.size * _CONE_S
+        if not worth_waking(work_s, self.threads):
+            kernels.evaluate_serial(*args)
+        else:
+            with ONE_CALLER:
+                numba.set_num_threads(self.threads)
+                kernels.evaluate_parallel(*args)
+        return counts, costs
 
 
 class Evaluator:
     """Costs of one stage: weights' sum - f, hence 2 - f with both weights one.
 
     Called with points (n, d) of the stage's active parameters, returns costs (n,); NaN for points
-    that are not finite.
+    that are not finite. What the stage does not move is drawn when the evaluator is made.
     """
 
     def __init__(self, fitness: Fitness, views: Views, stage: Stage) -> None:
         self._fitness = fitness
         self._views = views
         self._stage = stage
-        # A term without weight is not looked at.
-        self._edge_cones = stage.edge_cones & (stage.edge_weight != 0.0)
+        self._cost = CostRule(
+            float(stage.silhouette_weight), float(stage.edge_weight), fitness._rule.squared, False
+        )
+        self._drawing = divide(
+            fitness.body, fitness._arrays, views.arrays, stage.active, stage.centre,
+            # A term without weight is not looked at.
+            stage.silhouette_cones, stage.edge_cones & (stage.edge_weight != 0.0),
+            fitness._rule, self._cost, fitness._scratch, fitness._outlines,
+        )  # fmt: skip
 
     def poses(self, points: FloatArray) -> FloatArray:
         """Full poses (n, p) of points (n, d): the other parameters stay at the stage's centre."""
@@ -148,55 +179,17 @@ class Evaluator:
         poses[:, self._stage.active] = points
         return poses
 
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """Costs (n,) of points (n, d)."""
-        stage, fitness = self._stage, self._fitness
-        counts = fitness.count(
-            self._views, self.poses(points), stage.silhouette_cones, self._edge_cones
-        )
-        costs = np.empty(len(points))
-        _costs(
-            counts, self._views.arrays.observed, fitness._rule.squared,
-            stage.silhouette_weight, stage.edge_weight, costs,
-        )  # fmt: skip
-        return costs
+    def __call__(self, points: FloatArray, bars: FloatArray | None = None) -> FloatArray:
+        """Costs (n,) of points (n, d).
 
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _view_terms(counts, observed, squared, parts):  # type: ignore[no-untyped-def]
-    """Fill parts (v, 3) with f_s, f_e and the overlap of one pose from its counts (v, 4).
-
-    f_s = ½ Y/(B+Y) + ½ Y/(R+Y) with Y in both, B projected only, R observed only. A view where the
-    body is neither projected nor observed is fully explained; where it is only one of the two, not
-    at all. Without edge samples f_e = 0.
-    """
-    for v in range(counts.shape[0]):
-        both, projected = counts[v, kernels.OVERLAP], counts[v, kernels.PROJECTED]
-        seen = np.float64(observed[v])
-        if projected == 0.0 and seen == 0.0:
-            parts[v, 0] = 1.0
-            parts[v, 2] = 1.0
-        elif projected == 0.0 or seen == 0.0:
-            parts[v, 0] = 0.0
-            parts[v, 2] = 0.0
-        else:
-            parts[v, 0] = 0.5 * both / projected + 0.5 * both / seen
-            parts[v, 2] = both / (projected + seen - both)
-        samples = counts[v, kernels.EDGE_COUNT]
-        mean = counts[v, kernels.EDGE_SUM] / samples if samples > 0.0 else (1.0 if squared else 0.0)
-        parts[v, 1] = 1.0 - mean if squared else mean
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _costs(counts, observed, squared, silhouette_weight, edge_weight, costs):  # type: ignore[no-untyped-def]
-    """Fill costs (n,) from counts (n, v, 4): the terms are averaged over the views."""
-    parts = np.empty((counts.shape[1], 3))
-    for n in range(counts.shape[0]):
-        if not np.isfinite(counts[n, 0, 0]):
-            costs[n] = np.nan
-            continue
-        _view_terms(counts[n], observed, squared, parts)
-        f = 0.0
-        for v in range(counts.shape[1]):
-            f += silhouette_weight * parts[v, 0] + edge_weight * parts[v, 1]
-        costs[n] = silhouette_weight + edge_weight - f / counts.shape[1]
+        Args:
+            points: the points.
+            bars: (n,) costs below which they matter: a point that does not get there may cost
+                anything from its bar to what it costs in full.
+        """
+        stage = self._stage
+        bars = np.full(len(points), np.inf) if bars is None else bars
+        return self._fitness._run(
+            self._views, self._drawing, np.ascontiguousarray(points), stage.active, stage.centre,
+            bars, self._cost,
+        )[1]  # fmt: skip

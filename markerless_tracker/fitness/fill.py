@@ -5,13 +5,13 @@ with vector instructions. Rows are unsigned: an index that may be negative would
 """
 
 import numpy as np
-from numba import njit
 
 from markerless_tracker.fitness.bits import ALL, popcount
+from markerless_tracker.fitness.compiled import kernel
 from markerless_tracker.fitness.outline import LANES
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def fill_outline(c, count, out, width, height, bits, used):  # type: ignore[no-untyped-def]
     """Set the pixels whose centres lie inside a convex polygon.
 
@@ -64,14 +64,14 @@ def fill_outline(c, count, out, width, height, bits, used):  # type: ignore[no-u
         used[w, 1] = max(used[w, 1], bottom - 1)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def clear_used(words, height, used):  # type: ignore[no-untyped-def]
     """No row holds bits."""
     for w in range(words):
         used[w, 0], used[w, 1] = height, -1
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def wipe(words, height, bits, used):  # type: ignore[no-untyped-def]
     """Clear what `used` says was set."""
     for w in range(words):
@@ -79,7 +79,7 @@ def wipe(words, height, bits, used):  # type: ignore[no-untyped-def]
             bits[w * height + v] = np.uint64(0)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def count_and_wipe(words, height, bits, mask, start, used):  # type: ignore[no-untyped-def]
     """Set bits that the mask, flat from `start` on, holds too, and all set bits; clears them."""
     overlap = np.uint64(0)
@@ -88,6 +88,21 @@ def count_and_wipe(words, height, bits, mask, start, used):  # type: ignore[no-u
         base, there = np.uint64(w * height), np.uint64(start + w * height)
         for v in range(np.uint64(used[w, 0]), np.uint64(used[w, 1] + 1)):
             word = bits[base + v]
+            overlap += popcount(word & mask[there + v])
+            projected += popcount(word)
+            bits[base + v] = np.uint64(0)
+    return overlap, projected
+
+
+@kernel
+def count_beside_and_wipe(words, height, bits, mask, still, start, used):  # type: ignore[no-untyped-def]
+    """As `count_and_wipe`, of the set bits that are not among those of `still`, flat likewise."""
+    overlap = np.uint64(0)
+    projected = np.uint64(0)
+    for w in range(words):
+        base, there = np.uint64(w * height), np.uint64(start + w * height)
+        for v in range(np.uint64(used[w, 0]), np.uint64(used[w, 1] + 1)):
+            word = bits[base + v] & ~still[there + v]
             overlap += popcount(word & mask[there + v])
             projected += popcount(word)
             bits[base + v] = np.uint64(0)

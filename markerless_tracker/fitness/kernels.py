@@ -1,9 +1,9 @@
-"""The compiled loops of the fitness: poses in, overlap counts and edge sums out.
+"""The compiled loops of the fitness: poses in, counts and costs out.
 
-One particle is one piece of work: kinematics once, then every view. Cones are filled as spans of
-bits into a frame-sized buffer of the working thread, which is counted against the observed
-silhouette and wiped on the way out, so nothing is allocated per particle. A result depends on its
-particle alone, hence not on the number of threads.
+One particle is one piece of work: kinematics once, then view by view until the particle is known to
+lose. Cones are filled as spans of bits into a frame-sized buffer of the working thread, which is
+counted against the observed silhouette and wiped on the way out, so nothing is allocated per
+particle. A result depends on its particle alone, hence not on the number of threads.
 """
 
 from typing import NamedTuple
@@ -12,38 +12,27 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from markerless_tracker.body.kinematics import node_transforms
-from markerless_tracker.fitness.bits import is_set
-from markerless_tracker.fitness.fill import clear_used, count_and_wipe, fill_outline
-from markerless_tracker.fitness.outline import (
-    ARC_POINTS,
-    HIDDEN,
-    LANES,
-    TAPERED,
-    find_outlines,
-    outlines_of,
+from markerless_tracker.body.kinematics import node_transform
+from markerless_tracker.fitness.compiled import kernel
+from markerless_tracker.fitness.edge_samples import OUTLINE, VISIBLE, recount_still, sample_cone
+from markerless_tracker.fitness.fill import (
+    clear_used,
+    count_and_wipe,
+    count_beside_and_wipe,
+    fill_outline,
 )
+from markerless_tracker.fitness.outline import HIDDEN, LANES, find_outlines, outlines_of
+from markerless_tracker.fitness.terms import EDGE_COUNT, EDGE_SUM, OVERLAP, PROJECTED, view_cost
 from markerless_tracker.geometry import FloatArray
 
-OVERLAP, PROJECTED, EDGE_SUM, EDGE_COUNT = 0, 1, 2, 3
-"""Columns of the counts: Y, Y + B, sum of (1 - M)² or of M over the edge samples, their number."""
-
-SIDES, VISIBLE, OUTLINE = 0, 1, 2
-"""Which model edges are sampled: all sides; those no nearer cone hides; the body's outline only."""
-
-
-class EdgeRule(NamedTuple):
-    """How edges are sampled: rule, spacing and outward step in px, whether costs are squared."""
-
-    rule: int
-    spacing_px: float
-    step_px: float
-    squared: bool
+_ROUNDING = 1e-9
+"""More than sums of a few costs may be off by."""
 
 
 class Scratch(NamedTuple):
-    """Working memory of t threads, for m nodes, c cones and frames of h rows of w words."""
+    """Working memory of t threads, for p parameters, m nodes, c cones and h rows of w words."""
 
+    pose: FloatArray  # (t, p)
     bits: NDArray[np.uint64]  # (t, w * h), all zero between calls
     used: NDArray[np.int64]  # (t, w, 2)
     nodes: FloatArray  # (t, m, 3, 4)
@@ -51,9 +40,12 @@ class Scratch(NamedTuple):
     order: NDArray[np.int64]  # (t, c)
 
 
-def make_scratch(threads: int, nodes: int, cones: int, height: int, words: int) -> Scratch:
+def make_scratch(
+    threads: int, parameters: int, nodes: int, cones: int, height: int, words: int
+) -> Scratch:
     """Allocate working memory for a number of threads."""
     return Scratch(
+        np.empty((threads, parameters)),
         np.zeros((threads, words * height), dtype=np.uint64),
         np.empty((threads, words, 2), dtype=np.int64),
         np.empty((threads, nodes, 3, 4)),
@@ -62,10 +54,43 @@ def make_scratch(threads: int, nodes: int, cones: int, height: int, words: int) 
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+class Still(NamedTuple):
+    """What all poses of a search share, drawn once: the parts that do not move.
+
+    Attributes:
+        moving: nodes that are worked out for every pose, parents first.
+        nodes: (m, 3, 4) transforms of all nodes at the search's centre.
+        bits: the still parts' silhouette, as `ViewArrays.mask`; empty if everything moves.
+        counts: (v, 4) the still parts' own, without edge samples that something may hide.
+        sample_start: (v + 1,) view i's edge samples that something may hide begin at
+            sample_start[i].
+        sample_at: (s,) word * 64 + bit that hides each; sample_cost: (s,) what it adds.
+        least: (v + 1,) what the views from i on cost together at least.
+    """
+
+    moving: NDArray[np.int64]
+    nodes: FloatArray
+    bits: NDArray[np.uint64]
+    counts: FloatArray
+    sample_start: NDArray[np.int64]
+    sample_at: NDArray[np.int64]
+    sample_cost: NDArray[np.int64]
+    least: FloatArray
+
+
+@kernel
 def cone_ends(pose, body, nodes, world):  # type: ignore[no-untyped-def]
     """Fill world (18 rows): per cone and end its centre and its two radius vectors, m."""
-    node_transforms(pose, body.parent, body.fixed, body.kind, body.sign, body.parameter, nodes)
+    for n in range(body.parent.size):
+        node_transform(
+            n, pose, body.parent, body.fixed, body.kind, body.sign, body.parameter, nodes
+        )
+    place_cones(body, nodes, world)
+
+
+@kernel
+def place_cones(body, nodes, world):  # type: ignore[no-untyped-def]
+    """As `cone_ends`, the nodes' transforms (m, 3, 4) known."""
     for c in range(body.cone_node.size):
         node = body.cone_node[c]
         for i in range(3):
@@ -84,67 +109,7 @@ def cone_ends(pose, body, nodes, world):  # type: ignore[no-untyped-def]
                 world[at + 6 * LANES] = y * ry
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
-def sample_side(  # type: ignore[no-untyped-def]
-    pu, pv, qu, qv, outward, bits, edges, width, height, rule, counts
-):
-    """Add the edge map along the segment (pu, pv) to (qu, qv) to counts.
-
-    Args:
-        outward: +1 or -1, the side of the segment that faces away from its cone.
-        bits: what hides a sample: nearer cones (VISIBLE) or the whole body (OUTLINE).
-        edges: (height * width,) uint8 edge map.
-        counts: (4,) EDGE_SUM and EDGE_COUNT are added to.
-    """
-    du, dv = qu - pu, qv - pv
-    length = np.sqrt(du * du + dv * dv)
-    if not (length > 0.0 and length < 1e6):
-        return
-    samples = np.int64(max(4.0, length / rule.spacing_px))
-    step = outward * rule.step_px / length
-    for i in range(samples):
-        t = (i + 0.5) / samples
-        u = pu + t * du
-        v = pv + t * dv
-        if not (u >= -0.5 and v >= -0.5 and u < width - 0.5 and v < height - 0.5):
-            continue
-        column, row = np.int64(u + 0.5), np.int64(v + 0.5)
-        if rule.rule == VISIBLE:
-            if is_set(bits, height, column, row):
-                continue
-        elif rule.rule == OUTLINE:
-            out_u = np.int64(np.floor(u - step * dv + 0.5))
-            out_v = np.int64(np.floor(v + step * du + 0.5))
-            if 0 <= out_u < width and 0 <= out_v < height and is_set(bits, height, out_u, out_v):
-                continue
-        strength = edges[row * width + column] * (1.0 / 255.0)
-        if rule.squared:
-            counts[EDGE_SUM] += (1.0 - strength) * (1.0 - strength)
-        else:
-            counts[EDGE_SUM] += strength
-        counts[EDGE_COUNT] += 1.0
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def _sample_cone(  # type: ignore[no-untyped-def]
-    c, count, wanted, out, bits, edges, width, height, rule, counts
-):
-    """Sample the sides of one cone, and its far end's edge, where wanted (c, 2)."""
-    if out.form[c] != TAPERED:
-        return
-    u, v = out.u, out.v
-    far, near, last = c, (ARC_POINTS - 1) * LANES + c, (count // 2) * LANES + c
-    end = last + (ARC_POINTS - 1) * LANES
-    if wanted[c, 0]:
-        sample_side(u[end], v[end], u[far], v[far], 1.0, bits, edges, width, height, rule, counts)
-        sample_side(
-            u[last], v[last], u[near], v[near], -1.0, bits, edges, width, height, rule, counts
-        )
-    if wanted[c, 1]:
-        sample_side(u[far], v[far], u[near], v[near], 1.0, bits, edges, width, height, rule, counts)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def _nearest_first(cones, ends, order):  # type: ignore[no-untyped-def]
     """Sort cones by their middles' depth: what is filled so far hides what comes."""
     for i in range(1, cones):
@@ -157,29 +122,29 @@ def _nearest_first(cones, ends, order):  # type: ignore[no-untyped-def]
         order[j + 1] = c
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def compare_view(  # type: ignore[no-untyped-def]
-    body_cones, edge_cones, views, view, rule, world, out, bits, used, order, counts
+    body_cones, edge_cones, views, view, rule, still, world, out, bits, used, order, counts
 ):
-    """Compare cones whose ends lie at world (18 rows) with what one camera sees.
+    """Draw the moving cones into one view and count.
 
     Args:
         body_cones: (c,) cones that make the silhouette.
         edge_cones: (c, 2) whether the sides, and the far edge, of a cone are sampled.
         out, bits, used, order: working memory of one thread.
-        counts: (v, 4), row `view` is filled: OVERLAP, PROJECTED, EDGE_SUM, EDGE_COUNT.
+        counts: (4,), filled.
     """
     cones = body_cones.size
     width, height, words = views.size[view, 0], views.size[view, 1], views.words[view]
-    for i in range(4):
-        counts[view, i] = 0.0
+    start, edge_start = views.mask_start[view], views.edge_start[view]
+    beside = still.bits.size > 0
     count = find_outlines(cones, views, view, world, out)
     clear_used(words, height, used)
     for c in range(cones):
         order[c] = c
     if rule.rule == VISIBLE:
         _nearest_first(cones, out.ends, order)
-    sampled = False
+    edge_sum, edge_count, sampled = 0, 0, False
     for i in range(cones):
         c = order[i]
         if out.form[c] == HIDDEN:
@@ -187,70 +152,118 @@ def compare_view(  # type: ignore[no-untyped-def]
         if edge_cones[c, 0] or edge_cones[c, 1]:
             sampled = True
             if rule.rule != OUTLINE:
-                edges = views.edges[views.edge_start[view] :]
-                _sample_cone(
-                    c, count, edge_cones, out, bits, edges, width, height, rule, counts[view]
-                )
+                more, number, _ = sample_cone(
+                    c, count, edge_cones, out, bits, still.bits, start, views.edges, edge_start,
+                    width, height, rule, None, 0,
+                )  # fmt: skip
+                edge_sum, edge_count = edge_sum + more, edge_count + number
         if body_cones[c]:
             fill_outline(c, count, out, width, height, bits, used)
     if sampled and rule.rule == OUTLINE:
-        edges = views.edges[views.edge_start[view] :]
         for c in range(cones):
             if out.form[c] != HIDDEN and (edge_cones[c, 0] or edge_cones[c, 1]):
-                _sample_cone(
-                    c, count, edge_cones, out, bits, edges, width, height, rule, counts[view]
-                )
-    overlap, projected = count_and_wipe(
-        words, height, bits, views.mask, views.mask_start[view], used
+                more, number, _ = sample_cone(
+                    c, count, edge_cones, out, bits, still.bits, start, views.edges, edge_start,
+                    width, height, rule, None, 0,
+                )  # fmt: skip
+                edge_sum, edge_count = edge_sum + more, edge_count + number
+    if not beside:
+        overlap, projected = count_and_wipe(words, height, bits, views.mask, start, used)
+        counts[OVERLAP], counts[PROJECTED] = overlap, projected
+        counts[EDGE_SUM], counts[EDGE_COUNT] = edge_sum, edge_count
+        return
+    more, number = recount_still(view, still, bits)
+    overlap, projected = count_beside_and_wipe(
+        words, height, bits, views.mask, still.bits, start, used
     )
-    counts[view, OVERLAP] = overlap
-    counts[view, PROJECTED] = projected
+    counts[OVERLAP] = still.counts[view, OVERLAP] + overlap
+    counts[PROJECTED] = still.counts[view, PROJECTED] + projected
+    counts[EDGE_SUM] = still.counts[view, EDGE_SUM] + edge_sum + more
+    counts[EDGE_COUNT] = still.counts[view, EDGE_COUNT] + edge_count + number
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def _work(  # type: ignore[no-untyped-def]
-    poses, body, views, body_cones, edge_cones, rule, scratch, outlines, counts, thread, threads
-):
-    """Evaluate every `threads`-th pose, from pose `thread` on."""
+    points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still, scratch,
+    outlines, counts, costs, thread, threads,
+):  # fmt: skip
+    """Evaluate every `threads`-th point, from point `thread` on."""
     out = outlines_of(outlines, thread)
+    pose = scratch.pose[thread]
     bits, used, order = scratch.bits[thread], scratch.used[thread], scratch.order[thread]
     nodes, world = scratch.nodes[thread], scratch.world[thread]
-    for n in range(thread, poses.shape[0], threads):
+    seen = views.size.shape[0]
+    for i in range(centre.size):
+        pose[i] = centre[i]
+    for m in range(nodes.shape[0]):
+        for i in range(3):
+            for j in range(4):
+                nodes[m, i, j] = still.nodes[m, i, j]
+    for n in range(thread, points.shape[0], threads):
         finite = True
-        for i in range(poses.shape[1]):
-            finite = finite and np.isfinite(poses[n, i])
+        for i in range(active.size):
+            finite = finite and np.isfinite(points[n, i])
+            pose[active[i]] = points[n, i]
         if not finite:
-            counts[n, :, :] = np.nan
+            for view in range(seen):
+                for i in range(4):
+                    counts[n, view, i] = np.nan
+            costs[n] = np.nan
             continue
-        cone_ends(poses[n], body, nodes, world)
-        for view in range(views.size.shape[0]):
-            compare_view(
-                body_cones, edge_cones, views, view, rule, world, out, bits, used, order,
-                counts[n],
+        for i in range(still.moving.size):
+            node_transform(
+                still.moving[i], pose, body.parent, body.fixed, body.kind, body.sign,
+                body.parameter, nodes,
             )  # fmt: skip
+        place_cones(body, nodes, world)
+        total = 0.0
+        for view in range(seen):
+            low = (total + still.least[view]) / seen - _ROUNDING
+            if low >= bars[n]:
+                break
+            compare_view(
+                body_cones, edge_cones, views, view, rule, still, world, out, bits, used, order,
+                counts[n, view],
+            )  # fmt: skip
+            total += view_cost(counts[n, view], views.observed[view], cost)
+            low = total / seen
+        costs[n] = low
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
-def count_serial(poses, body, views, body_cones, edge_cones, rule, scratch, outlines, counts):  # type: ignore[no-untyped-def]
-    """Fill counts (n, v, 4) for poses (n, p) on the calling thread; NaN for non-finite poses."""
-    _work(poses, body, views, body_cones, edge_cones, rule, scratch, outlines, counts, 0, 1)
+@kernel
+def evaluate_serial(  # type: ignore[no-untyped-def]
+    points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still, scratch,
+    outlines, counts, costs,
+):  # fmt: skip
+    """Fill costs (n,) of points (n, d) and counts (n, v, 4) on the calling thread.
+
+    Args:
+        points: values of the active parameters.
+        active: (d,) their indices; the others are at centre (p,).
+        bars: (n,) costs that matter only if they are lower: an evaluation that cannot get below
+            its bar may end early, its cost is then a lower bound that is not below the bar, and
+            counts of the views it has not come to are not filled.
+        body: the moving cones, and all nodes.
+        body_cones, edge_cones: see `compare_view`.
+        rule, cost: see `EdgeRule` and `CostRule`.
+
+    NaN for points that are not finite.
+    """
+    _work(
+        points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still,
+        scratch, outlines, counts, costs, 0, 1,
+    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, parallel=True)  # type: ignore[misc]
-def count_parallel(poses, body, views, body_cones, edge_cones, rule, scratch, outlines, counts):  # type: ignore[no-untyped-def]
-    """As `count_serial`, on as many threads as the scratch memory is for."""
+def evaluate_parallel(  # type: ignore[no-untyped-def]
+    points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still, scratch,
+    outlines, counts, costs,
+):  # fmt: skip
+    """As `evaluate_serial`, on as many threads as the scratch memory is for."""
     threads = scratch.bits.shape[0]
     for thread in prange(threads):
         _work(
-            poses,
-            body,
-            views,
-            body_cones,
-            edge_cones,
-            rule,
-            scratch,
-            outlines,
-            counts,
-            thread,
-            threads,
-        )
+            points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still,
+            scratch, outlines, counts, costs, thread, threads,
+        )  # fmt: skip

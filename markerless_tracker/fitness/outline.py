@@ -9,9 +9,9 @@ cones is one that the compiler turns into vector instructions.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from markerless_tracker.fitness.compiled import inlined, kernel
 from markerless_tracker.geometry import FloatArray
 
 LANES = 64
@@ -29,6 +29,14 @@ HIDDEN, TAPERED, ONLY_END = 0, 1, 2
 _VECTOR = 8
 """Loops run over a multiple of this many lanes, so that none is left over."""
 _TINY = 1e-300
+# cos and sin around a full turn, for polygons without and with points inside the sides.
+_TURNS = tuple(
+    np.array([np.cos(angle), np.sin(angle)])
+    for angle in (
+        2.0 * np.pi * np.arange(2 * ARC_POINTS) / (2 * ARC_POINTS),
+        2.0 * np.pi * np.arange(MAX_POINTS) / MAX_POINTS,
+    )
+)
 # 2 cos(h / 3) as a line in cos h, exact for arcs of no turn and of half a turn.
 _THIRD_0, _THIRD_1 = np.sqrt(3.0), 2.0 - np.sqrt(3.0)
 
@@ -83,7 +91,7 @@ def make_outlines(threads: int, height: int) -> Outlines:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@inlined
 def outlines_of(all_threads, i):  # type: ignore[no-untyped-def]
     """Thread i's part of `make_outlines`."""
     a = all_threads
@@ -93,7 +101,7 @@ def outlines_of(all_threads, i):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def lens(a, b, distortion):  # type: ignore[no-untyped-def]
     """Where a lens (5,) k1 k2 p1 p2 k3 moves a point of the plane at focal length 1."""
     k1, k2, k3 = distortion[0], distortion[1], distortion[4]
@@ -107,7 +115,7 @@ def lens(a, b, distortion):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@kernel
 def distorts(distortion):  # type: ignore[no-untyped-def]
     """Whether any coefficient (5,) of a lens is not zero."""
     for i in range(5):
@@ -116,7 +124,7 @@ def distorts(distortion):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def to_camera(cones, world, rotation, translation, ends):  # type: ignore[no-untyped-def]
     """Cone ends (18 rows) of the world in a camera's frame."""
     n = (cones + _VECTOR - 1) // _VECTOR * _VECTOR
@@ -137,7 +145,7 @@ def to_camera(cones, world, rotation, translation, ends):  # type: ignore[no-unt
                 t = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def find_forms(cones, ends, flat, form):  # type: ignore[no-untyped-def]
     """Fill flat and form from ends."""
     n = (cones + _VECTOR - 1) // _VECTOR * _VECTOR
@@ -170,7 +178,7 @@ def find_forms(cones, ends, flat, form):  # type: ignore[no-untyped-def]
         form[c] = only if near > NEAR_M else HIDDEN
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def find_tangents(cones, flat, form, arcs):  # type: ignore[no-untyped-def]
     """Fill arcs: where the common tangents touch the ends.
 
@@ -209,7 +217,7 @@ def find_tangents(cones, flat, form, arcs):  # type: ignore[no-untyped-def]
             arcs[at + 2 * LANES], arcs[at + 3 * LANES] = 1.0, 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def arc_sweep(e, c, flat, form, arcs):  # type: ignore[no-untyped-def]
     """The angle (rad) that end e's arc of cone c sweeps, by the way that leads over the outside."""
     if form[c] == ONLY_END + e:
@@ -223,13 +231,13 @@ def arc_sweep(e, c, flat, form, arcs):  # type: ignore[no-untyped-def]
     return sweep + 2.0 * np.pi if sweep < 0.0 else sweep
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
+@inlined
 def clockwise(at, flat):  # type: ignore[no-untyped-def]
     """Whether arcs of the end whose rows of flat begin at `at` run towards smaller angles."""
     return flat[at + 2 * LANES] * flat[at + 5 * LANES] > flat[at + 3 * LANES] * flat[at + 4 * LANES]
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
+@inlined
 def _place(cos, sin, at, to, ends, u, v):  # type: ignore[no-untyped-def]
     """Image at focal length 1 of the point at an angle of an end, into u and v at `to`."""
     inverse = 1.0 / (ends[at + 2 * LANES] + cos * ends[at + 5 * LANES] + sin * ends[at + 8 * LANES])
@@ -237,7 +245,7 @@ def _place(cos, sin, at, to, ends, u, v):  # type: ignore[no-untyped-def]
     v[to] = (ends[at + LANES] + cos * ends[at + 4 * LANES] + sin * ends[at + 7 * LANES]) * inverse
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def _arc(cones, e, row, ends, flat, arcs, u, v):  # type: ignore[no-untyped-def]
     """Place the points of end e's arc, from a row on.
 
@@ -276,7 +284,7 @@ def _arc(cones, e, row, ends, flat, arcs, u, v):  # type: ignore[no-untyped-def]
         _place(cb, sb, at + c, to + 6 * LANES + c, ends, u, v)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def _side(cones, e, row, ends, arcs, u, v):  # type: ignore[no-untyped-def]
     """Place the inner points of the side that leaves end e, from a row on.
 
@@ -296,13 +304,13 @@ def _side(cones, e, row, ends, arcs, u, v):  # type: ignore[no-untyped-def]
             v[(row + i) * LANES + c] = (w0 * v[begin] + w1 * v[end]) * inverse
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[misc]
+@inlined
 def _depth(e, c, cos, sin, ends):  # type: ignore[no-untyped-def]
     at = 9 * e * LANES + c
     return ends[at + 2 * LANES] + cos * ends[at + 5 * LANES] + sin * ends[at + 8 * LANES]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def _to_pixels(cones, count, k, distortion, distorted, u, v):  # type: ignore[no-untyped-def]
     """Turn points at focal length 1 into pixels."""
     n = (cones + _VECTOR - 1) // _VECTOR * _VECTOR
@@ -319,7 +327,7 @@ def _to_pixels(cones, count, k, distortion, distorted, u, v):  # type: ignore[no
             v[i * LANES + c] = fy * b + cy
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def scan_edges(cones, count, height, u, v, first, slope, box):  # type: ignore[no-untyped-def]
     """Fill first, slope and box from polygons of `count` points in a frame of `height` rows."""
     n = (cones + _VECTOR - 1) // _VECTOR * _VECTOR
@@ -327,22 +335,27 @@ def scan_edges(cones, count, height, u, v, first, slope, box):  # type: ignore[n
     for c in range(n):
         box[c], box[LANES + c] = np.inf, -np.inf
         box[2 * LANES + c], box[3 * LANES + c] = np.inf, -np.inf
+    # Several short loops: the compiler gives up on one that touches many arrays, since any two of
+    # them might overlap.
     for i in range(count):
-        before = (i - 1 if i > 0 else count - 1) * LANES
+        at, before = i * LANES, (i - 1 if i > 0 else count - 1) * LANES
         for c in range(n):
-            x, y = u[i * LANES + c], v[i * LANES + c]
-            slope[i * LANES + c] = (x - u[before + c]) / (y - v[before + c])
+            slope[at + c] = (u[at + c] - u[before + c]) / (v[at + c] - v[before + c])
+        for c in range(n):
+            y = v[at + c]
             # Comparisons with NaN are false: it comes out as the frame's border.
             row = np.ceil(y) if y > 0.0 else 0.0
             row = row if row < limit else limit
-            first[i * LANES + c] = np.int32(row)
-            box[c] = x if x < box[c] else box[c]
-            box[LANES + c] = x if x > box[LANES + c] else box[LANES + c]
+            first[at + c] = np.int32(row)
             box[2 * LANES + c] = row if row < box[2 * LANES + c] else box[2 * LANES + c]
             box[3 * LANES + c] = row if row > box[3 * LANES + c] else box[3 * LANES + c]
+        for c in range(n):
+            x = u[at + c]
+            box[c] = x if x < box[c] else box[c]
+            box[LANES + c] = x if x > box[LANES + c] else box[LANES + c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc]
+@kernel
 def find_outlines(cones, views, view, world, out):  # type: ignore[no-untyped-def]
     """Fill `out`, one thread's `Outlines`, for cones whose ends lie at world (18 rows).
 
@@ -364,10 +377,10 @@ def find_outlines(cones, views, view, world, out):  # type: ignore[no-untyped-de
         _side(cones, 0, near + ARC_POINTS, out.ends, out.arcs, out.u, out.v)
     for c in range(cones):
         if out.form[c] >= ONLY_END:
+            turn = _TURNS[1] if distorted else _TURNS[0]
+            at = 9 * (out.form[c] - ONLY_END) * LANES + c
             for i in range(count):
-                angle = 2.0 * np.pi * i / count
-                at = 9 * (out.form[c] - ONLY_END) * LANES + c
-                _place(np.cos(angle), np.sin(angle), at, i * LANES + c, out.ends, out.u, out.v)
+                _place(turn[0, i], turn[1, i], at, i * LANES + c, out.ends, out.u, out.v)
     _to_pixels(cones, count, views.intrinsics[view], distortion, distorted, out.u, out.v)
     scan_edges(cones, count, views.size[view, 1], out.u, out.v, out.first, out.slope, out.box)
     return count

@@ -10,8 +10,8 @@ from markerless_tracker.errors import SearchError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim.problem import Problem
 
-Evaluate = Callable[[FloatArray], FloatArray]
-"""Costs (n,) of a batch of points (n, d)."""
+Evaluate = Callable[..., FloatArray]
+"""Costs (n,) of a batch of points (n, d); may take bars (n,), see `Optimizer.run`."""
 
 
 class Optimizer(ABC):
@@ -79,10 +79,26 @@ class Optimizer(ABC):
             self.best_x = points[best].copy()
         self._tell(points, costs)
 
-    def run(self, evaluate: Evaluate) -> FloatArray:
-        """Spend the budget; returns the best point (d,)."""
+    @property
+    def bars(self) -> FloatArray | None:
+        """Costs (n,) below which the costs of the points asked for matter; None: all matter.
+
+        A particle swarm only learns from a particle that beats its own best.
+        """
+        return None
+
+    def run(self, evaluate: Evaluate, *, early: bool = False) -> FloatArray:
+        """Spend the budget; returns the best point (d,).
+
+        Args:
+            evaluate: costs of points.
+            early: it takes bars as well, and may return, for a point that cannot get below its
+                bar, any cost from the bar to the point's own. The run comes out the same.
+        """
         while not self.finished:
-            self.tell(evaluate(self.ask()))
+            points = self.ask()
+            bars = self.bars if early else None
+            self.tell(evaluate(points) if bars is None else evaluate(points, bars))
         return self.best_x
 
     @abstractmethod

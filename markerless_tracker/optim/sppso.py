@@ -8,6 +8,7 @@ partition itself, two such stages with their parameters and spreads, is made in 
 import math
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from markerless_tracker.errors import SearchError
@@ -59,9 +60,20 @@ def constricted_step(
     Returns:
         The new positions and velocities, (n, d) each.
     """
-    moved = constriction(c) * (v + c * r1 * (best - x) + c * r2 * (leader - x))
-    np.clip(moved, -v_max, v_max, out=moved)
-    return x + moved, moved
+    return _constricted_step(x, v, best, leader, r1, r2, c, constriction(c), v_max)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def _constricted_step(x, v, best, leader, r1, r2, c, chi, v_max):  # type: ignore[no-untyped-def]
+    moved, there = np.empty(x.shape), np.empty(x.shape)
+    for n in range(x.shape[0]):
+        for i in range(x.shape[1]):
+            own, all_ = best[n, i] - x[n, i], leader[i] - x[n, i]
+            speed = chi * (v[n, i] + c * r1[n, i] * own + c * r2[n, i] * all_)
+            speed = min(max(speed, -v_max[i]), v_max[i])
+            moved[n, i] = speed
+            there[n, i] = x[n, i] + speed
+    return there, moved
 
 
 class Sppso(Optimizer):
@@ -94,36 +106,46 @@ class Sppso(Optimizer):
         self._iteration = 1
         self._next = 0
 
-    def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:
-        rows = np.arange(self._next, self._next + self._batch)
-        if self._iteration == 1:
-            return self._x[rows].copy(), np.zeros(rows.size, dtype=np.bool_)
-        return self._move(rows)
+    @property
+    def bars(self) -> FloatArray:
+        """Each particle's own best cost; one that broke a constraint cannot win at all."""
+        bars = self._best_costs[self._rows].copy()
+        bars[self._barred] = -np.inf
+        return bars
 
-    def _move(self, rows: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.bool_]]:
+    @property
+    def _rows(self) -> slice:
+        return slice(self._next, self._next + self._batch)
+
+    def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:
+        if self._iteration == 1:
+            return self._x[self._rows].copy(), np.zeros(self._batch, dtype=np.bool_)
+        return self._move(self._rows)
+
+    def _move(self, rows: slice) -> tuple[FloatArray, NDArray[np.bool_]]:
         problem = self.problem
         c = acceleration(self._iteration, problem.iterations)
         x, v, best = self._x[rows], self._v[rows], self._best[rows]
-        new_x, new_v = x.copy(), v.copy()
-        todo = np.arange(rows.size)
-        for _ in range(ATTEMPTS):
+        r1, r2 = problem.rng.random((2, *x.shape))
+        new_x, new_v = constricted_step(x, v, best, self.best_x, r1, r2, c, self._v_max)
+        barred = ~problem.feasible(new_x)
+        for _ in range(ATTEMPTS - 1):
+            todo = np.flatnonzero(barred)
+            if todo.size == 0:
+                break
             r1, r2 = problem.rng.random((2, todo.size, problem.centre.size))
             new_x[todo], new_v[todo] = constricted_step(
                 x[todo], v[todo], best[todo], self.best_x, r1, r2, c, self._v_max
             )
-            todo = todo[~problem.feasible(new_x[todo])]
-            if todo.size == 0:
-                break
+            barred[todo] = ~problem.feasible(new_x[todo])
         self._x[rows], self._v[rows] = new_x, new_v
-        barred = np.zeros(rows.size, dtype=np.bool_)
-        barred[todo] = True
-        return new_x.copy(), barred
+        return new_x, barred
 
     def _tell(self, points: FloatArray, costs: FloatArray) -> None:
-        rows = np.arange(self._next, self._next + len(points))
+        rows = self._rows
         better = costs < self._best_costs[rows]
-        self._best[rows[better]] = points[better]
-        self._best_costs[rows[better]] = costs[better]
+        self._best[rows][better] = points[better]
+        self._best_costs[rows][better] = costs[better]
         self._next += len(points)
         if self._next == self.problem.particles:
             self._next = 0

@@ -145,11 +145,11 @@ class FrameSearch:
             sigma=stage.sigma[stage.active],
             particles=stage.particles,
             iterations=stage.iterations,
-            feasible=lambda points: searcher.feasible(evaluator.poses(points)),
+            feasible=searcher.feasible.around(stage.active, stage.centre),
             rng=keyed_generator(searcher.config.seed, self._stamp_ns, stage.name),
         )
         optimizer = Sppso(problem, update=searcher.config.update)
-        best = optimizer.run(evaluator)
+        best = optimizer.run(evaluator, early=True)
         self.evaluations += optimizer.evaluations
         return np.asarray(evaluator.poses(best[None])[0])
 

@@ -189,3 +189,20 @@ def test_no_poses() -> None:
 def test_unknown_rule() -> None:
     with pytest.raises(ConfigError, match="collision is 'soft', expected one of elliptic, pub"):
         Feasibility(BODY, BODY.limits, "soft")
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from(sorted(BODY.subspaces)),
+    st.sampled_from(["elliptic", "published", "none"]),
+)
+def test_points_around_a_centre_are_tested_as_whole_poses_are(seed, part, rule) -> None:
+    rng = np.random.default_rng(seed)
+    centre = BODY.neutral + rng.choice([0.0, 0.3]) * rng.standard_normal(BODY.size)
+    active = BODY.subspaces[part]
+    feasible = Feasibility(BODY, BODY.limits, rule)
+    points = centre[active] + 0.5 * rng.standard_normal((20, active.size))
+    poses = np.tile(centre, (20, 1))
+    poses[:, active] = points
+    np.testing.assert_array_equal(feasible.around(active, centre)(points), feasible(poses))

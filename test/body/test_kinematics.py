@@ -1,6 +1,7 @@
 """Forward kinematics against the formulas written out, and against a slow twin on any tree."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,7 +15,7 @@ from markerless_tracker.body import (
     root_transform,
     transforms,
 )
-from markerless_tracker.body.kinematics import node_transforms
+from markerless_tracker.body.kinematics import moving_nodes, node_transforms
 
 _LENGTHS = {
     "torso": 0.579, "head": 0.268, "l_clavicle": 0.241, "r_clavicle": 0.177,
@@ -208,3 +209,17 @@ def test_description_and_body_agree_on_names() -> None:
     description = load_description("balan31")
     assert tuple(description.parameters) == BODY.parameter_names
     assert BODY.joint_names == BODY.parameter_names[6:]
+
+
+@pytest.mark.parametrize("part", ["root", "l_arm", "torso_head"])
+def test_moving_nodes_are_those_whose_transforms_change(part) -> None:
+    body = load_body("balan31")
+    active = body.subspaces[part]
+    pose = body.neutral + 0.1
+    moved = pose.copy()
+    moved[active] += 0.3
+    changes = np.abs(transforms(body, moved) - transforms(body, pose)).max(axis=(1, 2)) > 1e-9
+    # A joint at a node turns what hangs on it; the mask may not miss any.
+    assert (moving_nodes(body, active) | ~changes).all()
+    assert moving_nodes(body, active).sum() < len(changes) or part == "root"
+    assert not moving_nodes(body, np.empty(0, dtype=int)).any()

@@ -92,8 +92,11 @@ def test_the_table_of_speed(capsys) -> None:
 
     spread = {"median": 1.25, "p95": 2.5}
     figures = {
-        "view_evaluation_us": {"full": 6.6, "person31": 9.9, "reference": 198.0},
-        "reference_ratio": 30.0, "person31_ratio": 1.5, "swarm_ms": {"sppso_1000": spread},
+        "view_evaluation_us": {
+            "full": 6.6, "limb": 2.2, "limb_soft": 4.4, "person31": 9.9, "reference": 198.0,
+        },
+        "reference_ratio": 30.0, "person31_ratio": 1.5, "limb_ratio": 0.33,
+        "limb_soft_ratio": 0.66, "swarm_ms": {"sppso_1000": spread},
         "refine_ms": 0.345, "refine_setup_ms": 4.0, "thousand_evaluations_ms": spread,
         "frame_ms": dict.fromkeys(("background", "edges", "fitness", "total"), spread),
         "fit_vs_1000_evaluations": 0.5,

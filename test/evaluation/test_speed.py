@@ -78,7 +78,8 @@ def test_every_figure_is_there(scene) -> None:
     figures = measure(
         scene, threads=2, repeats=1, progress=lambda part, done, total: reports.append(part)
     )
-    assert set(figures["view_evaluation_us"]) == {"full", "person31", "reference"}
+    parts = {"full", "limb", "limb_soft", "person31", "reference"}
+    assert set(figures["view_evaluation_us"]) == parts
     assert set(figures["swarm_ms"]) == {"sppso_1000"}
     assert set(figures["frame_ms"]) == {"background", "edges", "imaging", "fitness", "total"}
     for spread in (*figures["swarm_ms"].values(), *figures["frame_ms"].values()):
@@ -88,6 +89,8 @@ def test_every_figure_is_there(scene) -> None:
     assert {"cpu", "cores"} <= set(figures["machine"]) and "numpy" in figures["versions"]
     view = figures["view_evaluation_us"]
     assert figures["reference_ratio"] == view["reference"] / view["full"]
+    assert figures["limb_ratio"] == view["limb"] / view["full"]
+    assert figures["limb_soft_ratio"] == view["limb_soft"] / view["full"]
     timed = ("view_evaluation_us", "swarm_ms", "frame_ms", "thousand_evaluations_ms")
     assert all(np.isfinite(numbers({key: figures[key] for key in timed})))
     assert figures["fit_vs_1000_evaluations"] > 0.0 and np.isfinite(figures["refine_ms"])

@@ -1,7 +1,7 @@
 """Bits against NumPy's booleans."""
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
@@ -19,11 +19,13 @@ def _is_set(bits, height, u, v):
     return is_set(bits, height, u, v)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**64 - 1))
 def test_popcount_counts_the_ones_of_a_word(word):
     assert _popcount(np.uint64(word)) == word.bit_count()
 
 
+@settings(deadline=None)
 @given(st.integers(1, 5), st.integers(1, 200), st.integers(0, 2**32 - 1))
 def test_bits_read_and_counted_are_those_packed(height, width, seed):
     mask = np.random.default_rng(seed).random((height, width)) < 0.5

@@ -16,16 +16,10 @@ from hypothesis import strategies as st
 from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.fitness import EDGE_RULES, Fitness
+from markerless_tracker.fitness.edge_samples import EdgeRule, sample_side
 from markerless_tracker.fitness.fill import clear_used, fill_outline
-from markerless_tracker.fitness.kernels import (
-    EDGE_COUNT,
-    EDGE_SUM,
-    OVERLAP,
-    PROJECTED,
-    EdgeRule,
-    sample_side,
-)
 from markerless_tracker.fitness.outline import LANES, make_outlines, outlines_of, scan_edges
+from markerless_tracker.fitness.terms import EDGE_COUNT, EDGE_SUM, EDGE_TOP, OVERLAP, PROJECTED
 from markerless_tracker.records import Observation, unpack_mask
 from markerless_tracker.synthesis import look_at
 
@@ -138,7 +132,8 @@ def test_edge_sums(
             assert abs(row[EDGE_COUNT] - slow.count) <= 2 + 0.05 * slow.count
             if slow.count >= 20:
                 mean = (slow.squared if squared else slow.total) / slow.count
-                assert row[EDGE_SUM] / row[EDGE_COUNT] == pytest.approx(mean, abs=0.01)
+                top = EDGE_TOP ** (2 if squared else 1)
+                assert row[EDGE_SUM] / row[EDGE_COUNT] / top == pytest.approx(mean, abs=0.01)
 
 
 def test_the_rules_sample_ever_fewer_edges(make_pose, make_observation, body, rig):
@@ -279,12 +274,12 @@ def test_polygons_that_are_none_stay_inside_the_frame(points):
 def sample(p, q, edges, rule: str, *, bits=None, outward=1.0, spacing=5.0, squared=False):
     height, width = edges.shape
     rows = np.zeros((height, (width + 63) // 64), dtype=np.uint64) if bits is None else bits
-    counts = np.zeros(4)
-    sample_side(
-        float(p[0]), float(p[1]), float(q[0]), float(q[1]), outward, rows.T.ravel(), edges.ravel(),
-        width, height, EdgeRule(EDGE_RULES[rule], spacing, 2.0, squared), counts,
+    total, number, _ = sample_side(
+        float(p[0]), float(p[1]), float(q[0]), float(q[1]), outward, rows.T.ravel(),
+        np.empty(0, dtype=np.uint64), 0, edges.ravel(), 0, width, height,
+        EdgeRule(EDGE_RULES[rule], spacing, 2.0, squared), None, 0,
     )  # fmt: skip
-    return counts[EDGE_COUNT], counts[EDGE_SUM]
+    return number, total / EDGE_TOP ** (2 if squared else 1)
 
 
 def test_samples_of_one_side_by_hand():

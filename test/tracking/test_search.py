@@ -83,8 +83,8 @@ def found(monkeypatch) -> list[tuple[str, FloatArray]]:
         results.append((CONTOUR, plain_refine(*args, **kwargs)))
         return results[-1][1]
 
-    def run(self, evaluate):
-        best = plain_run(self, evaluate)
+    def run(self, evaluate, **kwargs):
+        best = plain_run(self, evaluate, **kwargs)
         results.append(("sppso", evaluate.poses(best[None])[0]))
         return best
 

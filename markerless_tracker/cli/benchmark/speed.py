@@ -85,11 +85,17 @@ def speed_table(figures: Mapping[str, Any]) -> Table:
     for label, key in (
         ("view-evaluation, balan31, one thread", "full"),
         ("view-evaluation, person31, one thread", "person31"),
+        ("view-evaluation, arm alone, one thread", "limb"),
+        ("view-evaluation, arm and torso's joint, one thread", "limb_soft"),
         ("view-evaluation, reference (NumPy, OpenCV)", "reference"),
     ):
         table.add_row(label, "µs", f"{view[key]:.1f}", "")
     table.add_row("reference / balan31", "ratio", f"{figures['reference_ratio']:.1f}", "")
     table.add_row("person31 / balan31", "ratio", f"{figures['person31_ratio']:.2f}", "")
+    table.add_row("arm alone / balan31", "ratio", f"{figures['limb_ratio']:.2f}", "")
+    table.add_row(
+        "arm and torso's joint / balan31", "ratio", f"{figures['limb_soft_ratio']:.2f}", ""
+    )
     frame = figures["frame_ms"]
     for label, spread in (
         ("fitness and swarm, balan31, 1000 evaluations", figures["swarm_ms"]["sppso_1000"]),
