@@ -15,7 +15,7 @@ from markerless_tracker.body import MARKER_NAMES, Subject, write_pose, write_sub
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.datasets.writer import new_recording
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.synthesis import MILD_LENS, MOTIONS, SyntheticScene
+from markerless_tracker.synthesis import LIGHTS, MILD_LENS, MOTIONS, SyntheticScene
 
 HELP = (
     "Write a made-up person (shaded cones in a textured room) as a recording folder: calibration, "
@@ -56,6 +56,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--shadow", type=float, default=0.35,
         help="part of the light that the shadow on the floor takes away (default 0.35)",
     )  # fmt: skip
+    parser.add_argument(
+        "--light", choices=tuple(LIGHTS), default="steady",
+        help="drift: 20 %% brighter and darker in 10 s; step: 30 %% brighter from 1 s on",
+    )  # fmt: skip
+    parser.add_argument("--grey", action="store_true", help="grey cameras")
+    parser.add_argument(
+        "--dull", action="store_true", help="grey clothes within 10 %% of the room's brightness"
+    )
     parser.add_argument("--undistorted", action="store_true", help="lenses without distortion")
     parser.add_argument(
         "--lossless", action="store_true", help="videos that keep every grey level (large)"
@@ -76,6 +84,9 @@ def run(args: argparse.Namespace) -> int:
         seed=args.seed,
         noise=args.noise,
         shadow=args.shadow,
+        light=args.light,
+        grey=args.grey,
+        dull=args.dull,
         distortion=(0.0,) * 5 if args.undistorted else MILD_LENS,
     )
     with Progress(console=Console(file=sys.stderr)) as bar:

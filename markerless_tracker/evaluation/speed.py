@@ -103,7 +103,8 @@ def measure(
         "refine_ms": refine,
         "refine_setup_ms": contours,
         "frame_ms": {
-            key: _spread(frames[key]) for key in ("background", "edges", "fitness", "total")
+            key: _spread(frames[key])
+            for key in ("background", "edges", "imaging", "fitness", "total")
         },
         "thousand_evaluations_ms": _spread(thousand),
         "fit_vs_1000_evaluations": float(fit.min() / thousand.min()),
@@ -219,13 +220,15 @@ def _frames(
 ) -> dict[str, FloatArray]:
     """ms per frame (n - 1,) of each part; the first frame, which fits the shape, is left out.
 
-    background: labels, shadows, repair; edges: the edge maps; fitness: from evidence to pose;
-    total: images to pose; thousand: as many evaluations of the same body on the same threads.
+    background: labels, shadows, repair; edges: the edge maps; imaging: both and their packing, as
+    the tracker has it done; all three around the body of the frame before, as while tracking.
+    fitness: from evidence to pose; total: images to pose; thousand: as many evaluations of the same
+    body on the same threads.
     """
     whole = _tracker(scene, config, backgrounds)
     fit = _tracker(scene, config, {})
     segmenters = {n: Segmenter(n, backgrounds[n], config) for n in backgrounds}
-    names = ("background", "edges", "fitness", "total", "thousand")
+    names = ("background", "edges", "imaging", "fitness", "total", "thousand")
     best = {name: np.full(len(observed), np.inf) for name in names}
     with ThreadPoolExecutor(max_workers=min(config.threads, len(segmenters))) as pool:
         whole.warm_up()
@@ -237,15 +240,26 @@ def _frames(
                 images, stamp_ns = frame.images, frame.stamp_ns
                 masks: dict[str, Any] = {}
 
-                def label(name: str, images: Any = images, masks: Any = masks) -> None:
-                    masks[name] = segmenters[name].mask(images[name])
+                regions = whole.regions(stamp_ns)
 
-                def edges(name: str, images: Any = images, masks: Any = masks) -> None:
-                    edge_map(images[name], masks[name], config)
+                def label(
+                    name: str, images: Any = images, masks: Any = masks, regions: Any = regions
+                ) -> None:
+                    masks[name] = segmenters[name].mask(images[name], regions[name])
+
+                def edges(
+                    name: str, images: Any = images, masks: Any = masks, regions: Any = regions
+                ) -> None:
+                    part = regions[name].slices if regions[name] else np.s_[:, :]
+                    edge_map(images[name][part], masks[name], config)
+
+                def observe(name: str, images: Any = images, regions: Any = regions) -> None:
+                    segmenters[name].observe(images[name], 0, regions[name])
 
                 taken = {
                     "background": _seconds(lambda f=label: list(pool.map(f, segmenters))),  # type: ignore[misc]
                     "edges": _seconds(lambda f=edges: list(pool.map(f, segmenters))),  # type: ignore[misc]
+                    "imaging": _seconds(lambda f=observe: list(pool.map(f, segmenters))),  # type: ignore[misc]
                     "fitness": _seconds(lambda v=observed[i], s=stamp_ns: fit.step(v, s)),  # type: ignore[misc]
                     "total": _seconds(lambda v=images, s=stamp_ns: whole.step(v, s)),  # type: ignore[misc]
                 }

@@ -1,9 +1,11 @@
 """From camera images to evidence: background, shadows, silhouette, edges."""
 
-from markerless_tracker.imaging.background import BackgroundModel, learn_background
+from markerless_tracker.imaging.background import BackgroundModel, Mode, learn_background
 from markerless_tracker.imaging.images import Image, check_image, scale_image
+from markerless_tracker.imaging.model_file import read_background_model, write_background_model
 from markerless_tracker.imaging.plate import Plate, background_plate
 from markerless_tracker.imaging.recording import learn_from_recording
+from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmenter import Segmenter
 from markerless_tracker.imaging.settings import ImagingSettings
 
@@ -11,11 +13,15 @@ __all__ = [
     "BackgroundModel",
     "Image",
     "ImagingSettings",
+    "Mode",
     "Plate",
+    "Region",
     "Segmenter",
     "background_plate",
     "check_image",
     "learn_background",
     "learn_from_recording",
+    "read_background_model",
     "scale_image",
+    "write_background_model",
 ]

@@ -1,11 +1,17 @@
 """The edge map: where the silhouette's neighbourhood changes brightness, in [0, 1]."""
 
 import cv2
+import numba
 import numpy as np
 
 from markerless_tracker.imaging.images import Image, grey_of
 from markerless_tracker.imaging.morphology import Mask
 from markerless_tracker.imaging.settings import ImagingSettings
+
+
+def edge_reach(settings: ImagingSettings) -> int:
+    """How far from a pixel its edge strength looks at the mask and the image, px."""
+    return settings.edge_margin_px + settings.edge_blur_px // 2 + 1
 
 
 def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
@@ -46,16 +52,51 @@ def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
 
 def _gradient_strength(grey: Image, settings: ImagingSettings) -> Image:
     """Sobel gradient of a grey image (h, w), thresholded as `edge_form` says, 0..255."""
-    border = cv2.BORDER_REPLICATE
-    across = cv2.Sobel(grey, cv2.CV_32F, 1, 0, borderType=border)
-    down = cv2.Sobel(grey, cv2.CV_32F, 0, 1, borderType=border)
-    # Squares and their sum are whole numbers below 2^24, hence exact. cv2.magnitude is not: its
-    # last bit depends on where the arrays lie in memory, and results would differ between runs.
-    size = np.sqrt(across * across + down * down)
+    strength = np.empty_like(grey)
     threshold = 8.0 * settings.edge_gradient
     if settings.edge_form == "published":
-        return (size >= threshold).astype(np.uint8) * np.uint8(255)
-    gain = 255.0 / (1.5 * threshold)
-    # Saturates at 255; what lies below half the threshold is cut off by the subtraction.
-    strength = np.maximum(size - np.float32(0.5 * threshold), 0.0)
-    return np.asarray(cv2.convertScaleAbs(strength, alpha=gain), dtype=np.uint8)
+        # From just below the threshold so steep that there is nothing between 0 and 255.
+        low = np.float32(threshold * (1.0 - 1e-6))
+        gradient_strength(grey, low, np.float32(np.inf), strength)
+    else:
+        gain = np.float32(255.0 / (1.5 * threshold))
+        gradient_strength(grey, np.float32(0.5 * threshold), gain, strength)
+    return strength
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _weighted(above, here, below, smooth, slope):  # type: ignore[no-untyped-def]
+    """Three rows (w,) into smooth, slope (w + 2,), the last values repeated at both ends."""
+    n = here.size
+    for j in range(n):
+        smooth[1 + j] = np.int32(above[j]) + 2 * np.int32(here[j]) + np.int32(below[j])
+    for j in range(n):
+        slope[1 + j] = np.int32(below[j]) - np.int32(above[j])
+    smooth[0] = smooth[1]
+    smooth[n + 1] = smooth[n]
+    slope[0] = slope[1]
+    slope[n + 1] = slope[n]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _steep(smooth, slope, low, gain, out):  # type: ignore[no-untyped-def]
+    full = np.float32(255.0)
+    for j in range(out.size):
+        across = smooth[j + 2] - smooth[j]
+        down = slope[j] + 2 * slope[j + 1] + slope[j + 2]
+        # Whole numbers below 2^24 are exact in float32: the same on any machine.
+        size = np.sqrt(np.float32(across * across + down * down))
+        value = (size - low) * gain
+        value = value if size > low else np.float32(0.0)
+        out[j] = np.uint8(np.int32(min(value, full) + np.float32(0.5)))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def gradient_strength(grey, low, gain, strength):  # type: ignore[no-untyped-def]
+    """Fill strength (h, w) uint8 with (Sobel gradient - low) gain of grey (h, w) uint8, to 255."""
+    rows, columns = grey.shape
+    smooth = np.empty(columns + 2, dtype=np.int32)
+    slope = np.empty(columns + 2, dtype=np.int32)
+    for i in range(rows):
+        _weighted(grey[max(i - 1, 0)], grey[i], grey[min(i + 1, rows - 1)], smooth, slope)
+        _steep(smooth, slope, low, gain, strength[i])

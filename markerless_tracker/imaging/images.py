@@ -42,9 +42,11 @@ def check_image(image: Any, what: str, *, size_px: tuple[int, int] | None = None
 
 
 def grey_of(image: Image) -> Image:
-    """The image as grey (h, w); three equal channels keep their value."""
+    """The image (h, w) or (h, w, c) as grey (h, w); three equal channels keep their value."""
     if image.ndim == 2:
         return image
+    if image.shape[2] == 1:
+        return image[:, :, 0]
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 

@@ -51,47 +51,130 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
     return min(turn, np.float32(360.0) - turn) <= rule[3]
 
 
+# Loops over one row with few arrays each: what the compiler turns into vector instructions.
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def label_colour(image, mean, scale, rule, labels):  # type: ignore[no-untyped-def]
-    """Label every pixel of a colour image: 0 background, 127 shadow, 255 foreground.
+def _split_row(pixel, blue, green, red):  # type: ignore[no-untyped-def]
+    for j in range(blue.size):
+        blue[j] = pixel[3 * j]
+    for j in range(blue.size):
+        green[j] = pixel[3 * j + 1]
+    for j in range(blue.size):
+        red[j] = pixel[3 * j + 2]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _add_square(value, mean, scale, gain, distance):  # type: ignore[no-untyped-def]
+    white = np.float32(255.0)
+    for j in range(distance.size):
+        x = (np.float32(value[j]) - min(gain * mean[j], white)) * scale[j]
+        distance[j] += x * x
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _beyond(distance, row, marks):  # type: ignore[no-untyped-def]
+    for j in range(distance.size):
+        marks[j] = np.uint8(255) if distance[j] > np.float32(1.0) else np.uint8(0)
+    for j in range(distance.size):
+        row[j] = marks[j]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def label_colour(image, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
+    """Label a part of a colour image: 0 background, 127 shadow, 255 foreground.
 
     Args:
-        image: (h, w, 3) uint8, BGR.
-        mean: (h, w, 3) float32, grey levels.
-        scale: (h, w, 3) float32, 1 / (sigma * sqrt(limit)): the foreground test is |.|^2 > 1.
+        image: (a, b, 3) uint8, BGR: the part alone.
+        mean: (k, 3, h, w) float32, grey levels, of the k Gaussians of each pixel.
+        scale: (k, 3, h, w) float32, 1 / (sigma * sqrt(limit)): the foreground test is |.|^2 > 1.
+        gain: (3,) float32, brightness of the image relative to the background's.
         rule: of `shadow.shadow_rule`.
-        labels: (h, w) uint8, written.
+        left, top: where the part begins in the image.
+        labels: (a, b) uint8, written.
     """
     one = np.float32(1.0)
-    height, width = labels.shape
-    for v in range(height):
-        for u in range(width):
-            b = np.float32(image[v, u, 0])
-            g = np.float32(image[v, u, 1])
-            r = np.float32(image[v, u, 2])
-            x = (b - mean[v, u, 0]) * scale[v, u, 0]
-            y = (g - mean[v, u, 1]) * scale[v, u, 1]
-            z = (r - mean[v, u, 2]) * scale[v, u, 2]
-            label = 0
-            if x * x + y * y + z * z > one:
+    white = np.float32(255.0)
+    modes = mean.shape[0]
+    rows, columns = labels.shape
+    gain_b, gain_g, gain_r = gain[0], gain[1], gain[2]
+    distance = np.empty(columns, dtype=np.float32)
+    # Eight pixels are passed over at a time where all are background.
+    marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
+    words = marks.view(np.uint64)
+    split = np.empty((3, columns), dtype=np.uint8)
+    for i in range(rows):
+        v = top + i
+        # Whole rows first, without a branch: most pixels are background of the first Gaussian.
+        _split_row(image[i].ravel(), split[0], split[1], split[2])
+        distance[:] = 0.0
+        for c in range(3):
+            base = mean[0, c, v, left : left + columns]
+            narrow = scale[0, c, v, left : left + columns]
+            _add_square(split[c], base, narrow, gain[c], distance)
+        row = labels[i]
+        _beyond(distance, row, marks)
+        for word in range(words.size):
+            if words[word] == 0:
+                continue
+            for j in range(8 * word, min(8 * word + 8, columns)):
+                if marks[j] == 0:
+                    continue
+                b = np.float32(split[0, j])
+                g = np.float32(split[1, j])
+                r = np.float32(split[2, j])
                 label = 255
-                if is_shadow(b, g, r, mean[v, u, 0], mean[v, u, 1], mean[v, u, 2], rule):
-                    label = 127
-            labels[v, u] = label
+                for k in range(modes):
+                    mean_b = min(gain_b * mean[k, 0, v, left + j], white)
+                    mean_g = min(gain_g * mean[k, 1, v, left + j], white)
+                    mean_r = min(gain_r * mean[k, 2, v, left + j], white)
+                    x = (b - mean_b) * scale[k, 0, v, left + j]
+                    y = (g - mean_g) * scale[k, 1, v, left + j]
+                    z = (r - mean_r) * scale[k, 2, v, left + j]
+                    if k > 0 and x * x + y * y + z * z <= one:
+                        label = 0
+                        break
+                    if label == 255 and is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):
+                        label = 127
+                row[j] = label
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def label_grey(image, mean, scale, rule, labels):  # type: ignore[no-untyped-def]
-    """As `label_colour`, everything (h, w); the ratio of brightness alone tells a shadow."""
+def label_grey(image, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
+    """As `label_colour` with one channel: image (a, b), mean and scale (k, 1, h, w), gain (1,).
+
+    The ratio of brightness alone tells a shadow.
+    """
     one = np.float32(1.0)
-    height, width = labels.shape
-    for v in range(height):
-        for u in range(width):
-            value = np.float32(image[v, u])
-            x = (value - mean[v, u]) * scale[v, u]
-            label = 0
-            if x * x > one:
+    white = np.float32(255.0)
+    modes = mean.shape[0]
+    rows, columns = labels.shape
+    gain_v = gain[0]
+    distance = np.empty(columns, dtype=np.float32)
+    # Eight pixels are passed over at a time where all are background.
+    marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
+    words = marks.view(np.uint64)
+    for i in range(rows):
+        v = top + i
+        pixel = image[i]
+        base = mean[0, 0, v, left : left + columns]
+        narrow = scale[0, 0, v, left : left + columns]
+        distance[:] = 0.0
+        _add_square(pixel, base, narrow, gain_v, distance)
+        row = labels[i]
+        _beyond(distance, row, marks)
+        for word in range(words.size):
+            if words[word] == 0:
+                continue
+            for j in range(8 * word, min(8 * word + 8, columns)):
+                if marks[j] == 0:
+                    continue
+                value = np.float32(pixel[j])
                 label = 255
-                if rule[0] * mean[v, u] <= value and value <= rule[1] * mean[v, u]:
-                    label = 127
-            labels[v, u] = label
+                for k in range(modes):
+                    expected = min(gain_v * mean[k, 0, v, left + j], white)
+                    x = (value - expected) * scale[k, 0, v, left + j]
+                    if k > 0 and x * x <= one:
+                        label = 0
+                        break
+                    if rule[0] * expected <= value and value <= rule[1] * expected:
+                        label = 127
+                row[j] = label

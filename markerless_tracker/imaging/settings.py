@@ -24,6 +24,19 @@ class ImagingSettings:
         least=-6.0,
         most=200.0,
     )
+    background_risks: str = setting(
+        "same",
+        "same: background_risk for every camera; humaneva: that dataset's own for cameras 1 to 4 "
+        "(80, 60, 30, 80), by the number at the end of the name",
+        choices=("same", "humaneva"),
+    )
+    background_modes: int = setting(
+        1,
+        "Gaussians per pixel of a background learned from several images: 1 = mean and variance, "
+        "more = a mixture, for scenes that show things by turns",
+        least=1,
+        most=8,
+    )
     background_sigma_min: float = setting(
         2.0, "smallest noise believed of a background pixel, grey levels", least=0.1, most=50.0
     )
@@ -32,6 +45,27 @@ class ImagingSettings:
         "noise assumed where the background is a single still, grey levels",
         least=0.1,
         most=50.0,
+    )
+    denoise_sigma: float = setting(
+        5.0,
+        "images of cameras whose background is noisier than this, grey levels, are smoothed first",
+        least=0.0,
+        most=1000.0,
+    )
+    exposure_compensation: bool = setting(
+        True,
+        "find in every image how much brighter it is than the background (exposure steps, "
+        "flicker), by channel, and compare with the background as bright",
+    )
+    background_follow_s: float = setting(
+        0.0,
+        "time constant with which the background follows slow changes of light away from the "
+        "silhouette; 0 = never: evidence then depends on each image alone",
+        least=0.0,
+        most=1e6,
+    )
+    background_follow_margin_px: int = setting(
+        12, "distance from the silhouette that does not follow", least=0, most=500
     )
     shadow_removal: bool = setting(True, "take pixels that look like a shadow for background")
     shadow_value_min: float = setting(
@@ -83,11 +117,40 @@ class ImagingSettings:
         least=0.0,
         most=1.0,
     )
+    texture_radius_px: int = setting(
+        3,
+        "radius of the windows in which the background's pattern is looked for: what shows it in "
+        "any light is shadow, what hides it is none; 0 = do not look",
+        least=0,
+        most=6,
+    )
+    texture_light_min: float = setting(
+        0.15,
+        "darkest shadow that its pattern can give away, as a ratio of its brightness to the "
+        "background's",
+        least=0.0,
+        most=1.0,
+    )
+    texture_reveal: bool = setting(
+        True,
+        "grey cameras: what is as bright as the background but hides its pattern is foreground",
+    )
     mask_open_px: int = setting(
         3, "side of the opening that removes specks; 0 or 1 = none", least=0, most=101
     )
     mask_close_px: int = setting(
-        5, "side of the closing that mends cracks; 0 or 1 = none", least=0, most=101
+        5,
+        "side of the closing that mends cracks, in images of 640x480 or more; in smaller ones it "
+        "is as much smaller as they are; 0 or 1 = none",
+        least=0,
+        most=101,
+    )
+    mask_trim_px: int = setting(
+        1,
+        "layers of pixels that may be taken from the silhouette's border where the body, by the "
+        "colours beside them, covers less than half of them; 0 = none",
+        least=0,
+        most=20,
     )
     mask_hole_share: float = setting(
         2e-4, "holes up to this share of the image are filled", least=0.0, most=1.0

@@ -2,9 +2,10 @@
 
 from markerless_tracker.synthesis.motion import MOTIONS, Motion
 from markerless_tracker.synthesis.rig import MILD_LENS, look_at, ring_rig
-from markerless_tracker.synthesis.scene import SyntheticScene
+from markerless_tracker.synthesis.scene import LIGHTS, SyntheticScene
 
 __all__ = [
+    "LIGHTS",
     "MILD_LENS",
     "MOTIONS",
     "Motion",

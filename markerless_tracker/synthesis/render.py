@@ -18,6 +18,7 @@ LIGHT = np.array([0.35, -0.25, 0.90]) / np.linalg.norm([0.35, -0.25, 0.90])
 """Direction towards the lamp, world frame."""
 AMBIENT = 0.60
 _SKIN, _SHIRT, _TROUSERS = (130.0, 160.0, 235.0), (45.0, 50.0, 200.0), (165.0, 70.0, 30.0)
+_LUMA = (0.114, 0.587, 0.299)
 _CLOTHES = {
     "head": _SKIN, "neck": _SKIN, "forearm": _SKIN, "hand": _SKIN, "upper_arm": _SHIRT,
     "torso": _SHIRT, "chest": _SHIRT, "pelvis": _TROUSERS, "thigh": _TROUSERS,
@@ -33,11 +34,13 @@ class Look:
         noise: standard deviation of the sensor's noise, in grey levels.
         shadow: part of the light that the shadow on the floor takes away, 0 for none.
         samples: samples per pixel in each direction; odd: even ones bias masks outwards.
+        grey: whether the camera sees brightness only.
     """
 
     noise: float = 3.0
     shadow: float = 0.35
     samples: int = 3
+    grey: bool = False
 
 
 class Renderer:
@@ -69,10 +72,13 @@ class Renderer:
         self.look = look or Look()
         self.mesh = mesh or body_mesh(body)
 
-    def render(self, pose: FloatArray, rng: np.random.Generator) -> tuple[Image, Mask]:
-        """The picture (h, w, 3) BGR at a pose (p,), and the mask (h, w) of the body.
+    def render(
+        self, pose: FloatArray, rng: np.random.Generator, *, light: float = 1.0
+    ) -> tuple[Image, Mask]:
+        """The picture (h, w, 3) BGR or (h, w) grey at a pose (p,), and the mask (h, w) of the body.
 
-        A pixel belongs to the mask if the body covers at least half of it.
+        All brightness is multiplied by `light`, as a change of exposure does. A pixel belongs to
+        the mask if the body covers at least half of it.
         """
         vertices, normals = self.mesh.posed(self.body, pose)
         shade = AMBIENT + (1.0 - AMBIENT) * np.maximum(normals @ LIGHT, 0.0)
@@ -92,10 +98,12 @@ class Renderer:
             self.background, nearness, labels, shades, self.palette, cast,
             self.look.shadow, samples, image, covered,
         )  # fmt: skip
+        if light != 1.0:
+            image *= np.float32(light)
         return self._noisy(image, rng), covered >= 0.5
 
     def empty(self, rng: np.random.Generator) -> Image:
-        """A picture (h, w, 3) BGR of the empty room."""
+        """A picture (h, w, 3) BGR or (h, w) grey of the empty room."""
         return self._noisy(self.background.copy(), rng)
 
     def _draw(
@@ -112,6 +120,8 @@ class Renderer:
         return nearness, labels, shades
 
     def _noisy(self, image: NDArray[np.float32], rng: np.random.Generator) -> Image:
+        if self.look.grey:
+            image = np.asarray(image @ np.array(_LUMA, dtype=np.float32))
         if self.look.noise > 0.0:
             image += np.float32(self.look.noise) * rng.standard_normal(
                 image.shape, dtype=np.float32
@@ -128,3 +138,16 @@ def clothes(body: BodyModel, rng: np.random.Generator) -> FloatArray:
         side = 1.12 if name.startswith("l_") else 0.92 if name.startswith("r_") else 1.0
         palette[i] = np.clip(colour * side + rng.uniform(-12.0, 12.0, 3), 0.0, 255.0)
     return palette
+
+
+def dull_clothes(body: BodyModel, rng: np.random.Generator, brightness: float) -> FloatArray:
+    """Grey colours (c, 3) BGR of a body's cones whose lit surface is as bright as its background.
+
+    Args:
+        body: the body.
+        rng: source of each cone's own shade, within 10 % of the background's.
+        brightness: of the background, grey levels.
+    """
+    mean_shade = AMBIENT + 0.5 * (1.0 - AMBIENT)
+    shades = brightness * rng.uniform(0.9, 1.1, (len(body.cone_names), 1)) / mean_shade
+    return np.repeat(np.clip(shades, 0.0, 255.0), 3, axis=1)

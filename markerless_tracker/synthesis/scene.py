@@ -4,7 +4,7 @@ Images and truth come from the very model that a tracker fits: errors measured o
 the parts fit together, and say nothing about accuracy on people.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,9 +14,16 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.synthesis.mesh import body_mesh
 from markerless_tracker.synthesis.motion import Motion
-from markerless_tracker.synthesis.render import Image, Look, Mask, Renderer, clothes
+from markerless_tracker.synthesis.render import Image, Look, Mask, Renderer, clothes, dull_clothes
 from markerless_tracker.synthesis.rig import MILD_LENS, ring_rig
 from markerless_tracker.synthesis.room import room_picture
+
+LIGHTS: Mapping[str, Callable[[float], float]] = {
+    "steady": lambda time_s: 1.0,
+    "drift": lambda time_s: 1.0 + 0.2 * float(np.sin(0.2 * np.pi * time_s)),
+    "step": lambda time_s: 1.0 if time_s < 1.0 else 1.3,
+}
+"""Brightness of everything by time in s."""
 
 _ROOM_M = 7.0
 # Keeps the noise of empty frames apart from that of frames with the person.
@@ -38,6 +45,10 @@ class SyntheticScene:
         shadow: part of the light that the person's shadow on the floor takes away.
         samples: samples per pixel in each direction.
         distortion: lens k1 k2 p1 p2 (k3), zeros for none.
+        light: steady; drift: brightness swings by 20 % in 10 s; step: 30 % more from 1 s on.
+            Pictures of the empty room are taken in steady light.
+        grey: grey cameras: images are (h, w).
+        dull: clothes as bright as the background, within 10 %, and without colour.
 
     Raises:
         ConfigError: an argument is impossible; the message names it.
@@ -58,6 +69,9 @@ class SyntheticScene:
         shadow: float = 0.35,
         samples: int = 3,
         distortion: Sequence[float] = MILD_LENS,
+        light: str = "steady",
+        grey: bool = False,
+        dull: bool = False,
     ) -> None:
         _check("cameras", cameras, 1, 99)
         _check("image width", size_px[0], 16, 8192)
@@ -71,21 +85,25 @@ class SyntheticScene:
             raise ConfigError(
                 f"distortion has {len(distortion)} coefficients, expected finite k1 k2 p1 p2 (k3)"
             )
+        if light not in LIGHTS:
+            raise ConfigError(f"light is {light!r}, expected one of {', '.join(LIGHTS)}")
+        self._light = LIGHTS[light]
         self.body = body if isinstance(body, BodyModel) else load_body(body, stature_m)
         self.rig: CameraRig = ring_rig(cameras, size_px, distortion=tuple(distortion))
         self.fps = float(fps)
         self.seed = seed
         self.motion = Motion(self.body, motion, seed)
-        look, mesh = Look(noise=noise, shadow=shadow, samples=samples), body_mesh(self.body)
-        palette = clothes(self.body, np.random.default_rng([seed, 0]))
+        look = Look(noise=noise, shadow=shadow, samples=samples, grey=grey)
+        mesh, rng = body_mesh(self.body), np.random.default_rng([seed, 0])
+        rooms = {camera.name: room_picture(camera, _ROOM_M, seed) for camera in self.rig}
+        if dull:
+            brightness = float(np.mean([picture.mean() for picture in rooms.values()]))
+            palette = dull_clothes(self.body, rng, brightness)
+        else:
+            palette = clothes(self.body, rng)
         self._renderers = {
             camera.name: Renderer(
-                self.body,
-                camera,
-                room_picture(camera, _ROOM_M, seed),
-                palette,
-                look=look,
-                mesh=mesh,
+                self.body, camera, rooms[camera.name], palette, look=look, mesh=mesh
             )
             for camera in self.rig
         }
@@ -103,12 +121,14 @@ class SyntheticScene:
         return markers(self.body, self.pose(index))
 
     def frame(self, index: int) -> tuple[dict[str, Image], dict[str, Mask], FloatArray]:
-        """Images (h, w, 3) BGR and exact masks (h, w) by camera, and the true pose (p,)."""
+        """Images (h, w, 3) or (h, w) and exact masks (h, w) by camera, and the true pose (p,)."""
         pose = self.pose(index)
         images, masks = {}, {}
         for number, (name, renderer) in enumerate(self._renderers.items()):
             rng = np.random.default_rng([self.seed, _PERSON, number, index])
-            images[name], masks[name] = renderer.render(pose, rng)
+            images[name], masks[name] = renderer.render(
+                pose, rng, light=self._light(index / self.fps)
+            )
         return images, masks, pose
 
     def backgrounds(self, count: int) -> dict[str, list[Image]]:

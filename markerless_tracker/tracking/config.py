@@ -240,6 +240,20 @@ class TrackerConfig(ImagingSettings):
     edge_step_px: float = setting(
         2.0, "outline: how far outside a sample must be free of the body", least=0.5, most=50.0
     )
+    full_frame_every: int = setting(
+        30,
+        "while the person is tracked, images are looked at around the predicted body only, and "
+        "each camera's whole image every so many frames (it does not change the pose); 1 = always",
+        least=1,
+        most=100000,
+    )
+    region_margin_m: float = setting(
+        0.15,
+        "how far around the predicted body images are looked at, at the body; more where frames "
+        "are further apart",
+        least=0.0,
+        most=100.0,
+    )
     component_margin_px: int = setting(
         0,
         "silhouette components that come no nearer to the predicted body than this are left out",

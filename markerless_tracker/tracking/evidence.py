@@ -7,10 +7,11 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import ImageError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import BackgroundModel, Image, Segmenter
+from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
+from markerless_tracker.imaging.edges import edge_reach
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.selection import explained_part
+from markerless_tracker.tracking.selection import body_region, explained_in_region, explained_part
 
 
 class EvidenceMaker:
@@ -35,6 +36,9 @@ class EvidenceMaker:
     ) -> None:
         self._rig = rig
         self._margin_px = config.component_margin_px
+        self._clear_px = edge_reach(config) + config.component_margin_px
+        self._every = config.full_frame_every
+        self._turn = 0
         self._pool = pool
         self.segmenters: dict[str, Segmenter] = {}
         for camera in rig:
@@ -49,10 +53,20 @@ class EvidenceMaker:
                 )
             self.segmenters[camera.name] = Segmenter(camera.name, background, config)
 
-    def observe(
-        self, views: Mapping[str, Image | Observation], stamp_ns: int
-    ) -> dict[str, Observation]:
-        """Observations of the views; ready-made ones pass.
+    def gather(
+        self,
+        views: Mapping[str, Image | Observation],
+        stamp_ns: int,
+        body: BodyModel,
+        predicted: FloatArray,
+        *,
+        margin_m: float | None,
+    ) -> tuple[dict[str, Observation], tuple[str, ...]]:
+        """Observations of the views, and what should be known about them, one line each.
+
+        Of the silhouettes only the components stay that a predicted pose (p,) explains. With a
+        margin around the body at that pose, images are looked at there alone, except where that
+        would change what stays, and each camera's whole frame every `full_frame_every` calls.
 
         Raises:
             ImageError, CalibrationError: no view, an unknown camera, an image without a background
@@ -62,32 +76,50 @@ class EvidenceMaker:
             raise ImageError(f"no view came, expected some of {', '.join(self._rig.names)}")
         for name in views:
             self._rig[name]
+        self._turn += 1
 
-        def evidence(item: tuple[str, Image | Observation]) -> Observation:
+        regions = self.regions(body, predicted, margin_m)
+
+        def evidence(item: tuple[str, Image | Observation]) -> tuple[Observation, int]:
             name, view = item
-            if isinstance(view, Observation):
-                return view
-            if name not in self.segmenters:
-                raise ImageError(
-                    f"{name}: an image came, but no background to tell the person from"
-                )
-            return self.segmenters[name].observe(view, stamp_ns)
+            camera = self._rig[name]
+            if not isinstance(view, Observation):
+                if name not in self.segmenters:
+                    raise ImageError(
+                        f"{name}: an image came, but no background to tell the person from"
+                    )
+                segmenter = self.segmenters[name]
+                region = regions[name]
+                if region is not None and not self._whole_frame_is_due(name):
+                    seen = segmenter.observe(view, stamp_ns, region)
+                    found = explained_in_region(
+                        seen, camera, body, predicted, self._margin_px, self._clear_px
+                    )
+                    if found is not None:
+                        return found
+                view = segmenter.observe(view, stamp_ns)
+            return explained_part(view, camera, body, predicted, self._margin_px)
 
-        return dict(zip(views, self._pool.map(evidence, views.items()), strict=True))
-
-    def select(
-        self, observed: Mapping[str, Observation], body: BodyModel, predicted: FloatArray
-    ) -> tuple[dict[str, Observation], tuple[str, ...]]:
-        """Keep the components that a predicted pose (p,) explains; say what was left out."""
-
-        def part(item: tuple[str, Observation]) -> tuple[Observation, int]:
-            name, observation = item
-            return explained_part(observation, self._rig[name], body, predicted, self._margin_px)
-
-        parts = dict(zip(observed, self._pool.map(part, observed.items()), strict=True))
+        parts = dict(zip(views, self._pool.map(evidence, views.items()), strict=True))
         warnings = tuple(
             f"{name}: {left_out} px of silhouette away from the body left out"
             for name, (_, left_out) in parts.items()
             if left_out
         )
         return {name: kept for name, (kept, _) in parts.items()}, warnings
+
+    def regions(
+        self, body: BodyModel, predicted: FloatArray, margin_m: float | None
+    ) -> dict[str, Region | None]:
+        """Where each camera looks at a body at a pose (p,), and a margin around it; None = all."""
+        if margin_m is None:
+            return dict.fromkeys(self._rig.names)
+        return {
+            camera.name: body_region(camera, body, predicted, margin_m, self._clear_px)
+            for camera in self._rig
+        }
+
+    def _whole_frame_is_due(self, name: str) -> bool:
+        """Cameras take turns, so that no frame costs much more than others."""
+        shift = self._rig.names.index(name) * self._every // len(self._rig)
+        return (self._turn + shift) % self._every == 0

@@ -11,7 +11,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import BackgroundModel, Image
+from markerless_tracker.imaging import BackgroundModel, Image, Region
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
@@ -23,6 +23,8 @@ from markerless_tracker.tracking.stages import frame_stages
 
 TRAINING_RATE_HZ = 60.0
 """The published spreads are changes between frames at this rate."""
+LIMB_SPEED_M_S = 3.0
+"""How fast a hand or foot may move against its prediction; it is looked for that far away."""
 
 
 class Tracker:
@@ -116,12 +118,21 @@ class Tracker:
                 channels = segmenter.background.channels
                 shape = (height, width) if channels == 1 else (height, width, channels)
                 segmenter.observe(np.zeros(shape, dtype=np.uint8), 0)
+                segmenter.reset()
             nothing[height // 4 : height // 2, width // 4 : width // 2] = 1
             blank[camera.name] = Observation.from_mask(camera.name, 0, nothing, nothing)
         # The most work and the least: whether threads are woken depends on it.
         for views in (blank, dict(list(blank.items())[:1])):
             self.step(views, 0)
             self.reset()
+
+    def regions(self, stamp_ns: int) -> dict[str, Region | None]:
+        """Where in each camera's image `step` would look at a time; None for all of it.
+
+        Each camera's turn to be looked at whole comes besides (`full_frame_every`).
+        """
+        margin_m = self._region_margin(stamp_ns)
+        return self._evidence.regions(self.body, self._predict(stamp_ns), margin_m)
 
     def step(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> TrackResult:
         """Find the pose that explains the views of one time.
@@ -136,8 +147,9 @@ class Tracker:
                 fit its calibration or background; names the camera.
         """
         predicted = self._predict(stamp_ns)
-        observed = self._evidence.observe(views, stamp_ns)
-        observations, warnings = self._evidence.select(observed, self.body, predicted)
+        observations, warnings = self._evidence.gather(
+            views, stamp_ns, self.body, predicted, margin_m=self._region_margin(stamp_ns)
+        )
         if not self._shape_fitted:
             self._shape_fitted = True
             predicted = self._take_shape(observations, stamp_ns)
@@ -201,6 +213,17 @@ class Tracker:
         )
         moved = self._pose + self.config.prediction * elapsed_ns * self._velocity_per_ns
         return np.asarray(np.clip(moved, *self._searcher.limits))
+
+    def _region_margin(self, stamp_ns: int) -> float | None:
+        """How far around the predicted body to look, m; None for the whole images."""
+        if (
+            self.state is not TrackState.TRACKING
+            or self._stamp_ns is None
+            or stamp_ns <= self._stamp_ns
+        ):
+            return None
+        elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
+        return self.config.region_margin_m + LIMB_SPEED_M_S * elapsed_s
 
     def _rate_factor(self, stamp_ns: int) -> float:
         """How much wider than at the training rate to search, by the time since the last step."""

@@ -171,7 +171,9 @@ def test_the_table_of_speed(capsys) -> None:
         "limb_soft_ratio": 0.66, "swarm_ms": {"sppso_1000": spread},
         "swarm_ratio": {"hmcpso_3600": 3.21},
         "refine_ms": 0.345, "refine_setup_ms": 4.0, "thousand_evaluations_ms": spread,
-        "frame_ms": dict.fromkeys(("background", "edges", "fitness", "total"), spread),
+        "frame_ms": dict.fromkeys(
+            ("background", "edges", "imaging", "fitness", "total"), spread
+        ),
         "fit_vs_1000_evaluations": 0.5,
     }  # fmt: skip
     Console(width=100).print(speed_table(figures))
@@ -211,3 +213,14 @@ def test_what_cannot_be_done_says_so_in_one_line(words, said, status, capsys) ->
     assert code == status and not captured.out
     last = captured.err.strip().splitlines()[-1]
     assert said in last and "Traceback" not in captured.err
+
+
+def test_silhouettes_of_a_recording(walk, tmp_path: Path, capsys) -> None:
+    words = ["silhouettes", walk, "--pictures", str(tmp_path), "--json"]
+    assert main(["benchmark", *words]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["exact"] and figures["frames"] == [0]
+    assert figures["iou_mean"] > 0.8 and set(figures["opencv"]) == {"mog2", "knn"}
+    assert len(list(tmp_path.glob("walk-cam*-000000.png"))) == 3
+    assert main(["benchmark", "silhouettes", walk, walk]) == 0
+    assert capsys.readouterr().out.count("OpenCV MOG2") == 2

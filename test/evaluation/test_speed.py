@@ -82,7 +82,7 @@ def test_every_figure_is_there(scene) -> None:
     assert set(figures["view_evaluation_us"]) == parts
     assert list(figures["swarm_ms"]) == ["sppso_1000", "hmcpso_3600", "hmcpso_3600_hard"]
     assert all(ratio > 0.0 for ratio in figures["swarm_ratio"].values())
-    assert set(figures["frame_ms"]) == {"background", "edges", "fitness", "total"}
+    assert set(figures["frame_ms"]) == {"background", "edges", "imaging", "fitness", "total"}
     for spread in (*figures["swarm_ms"].values(), *figures["frame_ms"].values()):
         assert spread["p95"] >= spread["median"] > 0.0
     assert figures["image_size"] == list(SIZE_PX)

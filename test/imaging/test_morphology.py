@@ -4,6 +4,7 @@ import numpy as np
 from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.imaging.morphology import (
     clean_mask,
+    closing_px,
     drop_blobs,
     fill_holes,
     foreground_mask,
@@ -38,6 +39,15 @@ def test_a_gap_open_to_the_outside_is_no_hole() -> None:
     mask[50, 60:64] = 0
     fill_holes(mask, 10)
     assert (mask[50, 60:64] == 0).all()
+
+
+def test_small_images_are_closed_less() -> None:
+    options = ImagingSettings(mask_close_px=5)
+    sides = [
+        closing_px(options, w * h) for w, h in ((1920, 1080), (640, 480), (320, 240), (64, 48))
+    ]
+    assert sides == [5, 5, 3, 1]
+    assert closing_px(ImagingSettings(mask_close_px=0), 640 * 480) == 1
 
 
 def test_blobs_are_dropped_by_area() -> None:

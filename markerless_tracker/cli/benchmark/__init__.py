@@ -2,15 +2,15 @@
 
 import argparse
 
-from markerless_tracker.cli.benchmark import speed, tables
+from markerless_tracker.cli.benchmark import silhouettes, speed, tables
 
 HELP = (
-    "Measure accuracy (tables) or speed (speed). Recordings for tables have a ground_truth.trc: "
-    "its first row is the start and gives the lengths, its rows are the truth."
+    "Measure accuracy (tables), speed (speed) or silhouettes (silhouettes). Recordings for tables "
+    "have a ground_truth.trc: its first row is the start and gives the lengths, its rows the truth."
 )
 EXAMPLE = "markerless_tracker benchmark tables RECORDING --fps 60,20 --seeds 6 -o out/tables"
 
-_KINDS = {"tables": tables, "speed": speed}
+_KINDS = {"tables": tables, "speed": speed, "silhouettes": silhouettes}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

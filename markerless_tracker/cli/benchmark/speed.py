@@ -101,6 +101,7 @@ def speed_table(figures: Mapping[str, Any]) -> Table:
         *((f"swarm alone, balan31: {name}", ms) for name, ms in figures["swarm_ms"].items()),
         ("frame: background", frame["background"]),
         ("frame: edges", frame["edges"]),
+        ("frame: images to evidence", frame["imaging"]),
         ("frame: evidence to pose, tuned", frame["fitness"]),
         ("frame: images to pose, tuned", frame["total"]),
         ("1000 evaluations of the tuned body", figures["thousand_evaluations_ms"]),

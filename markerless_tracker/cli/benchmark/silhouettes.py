@@ -1,0 +1,116 @@
+"""`benchmark silhouettes`: masks against exact ones, beside OpenCV's subtractors."""
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from markerless_tracker.cli.benchmark.arguments import count, progress_bars
+from markerless_tracker.cli.track import read_config
+from markerless_tracker.imaging import Image
+
+
+def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
+    """Declare the arguments."""
+    parser = kinds.add_parser(
+        "silhouettes",
+        help="masks against exact ones, beside OpenCV's MOG2 and KNN",
+        description=(
+            "Silhouettes against a recording's masks/ or, without any, against the body posed at "
+            "its ground_truth.trc; beside OpenCV's MOG2 and KNN on the same frames, with the same "
+            "repairs, one thread each."
+        ),
+        epilog="example: markerless_tracker benchmark silhouettes RECORDING --pictures out/masks",
+    )
+    parser.add_argument(
+        "sources", nargs="*", type=Path, metavar="SOURCE",
+        help="recording; default: a made-up walk, 4 x 656x490",
+    )  # fmt: skip
+    parser.add_argument(
+        "--frames", type=count, metavar="N",
+        help="at most N frames, evenly spread (all with exact masks; 10 with markers)",
+    )  # fmt: skip
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
+    parser.add_argument(
+        "--scale", type=float, default=1.0, metavar="S", help="factor for the images"
+    )
+    parser.add_argument(
+        "--pictures", type=Path, metavar="DIR",
+        help="write RECORDING-CAMERA-FRAME.png: too much red, missing blue, the rest green",
+    )  # fmt: skip
+    parser.add_argument(
+        "--json", action="store_true", help="print JSON (a list for several recordings)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print; returns the exit status."""
+    # Takes a moment to import; `--help` does without.
+    from markerless_tracker.datasets import write_image
+    from markerless_tracker.evaluation.silhouette_scene import made_up_scene, recorded_scene
+    from markerless_tracker.evaluation.silhouettes import measure
+
+    config = read_config(args.config, {})
+    results = []
+    with progress_bars() as bars:
+        for source in args.sources or (None,):
+            task = bars.add_task("made up" if source is None else source.name, total=None)
+            if source is None:
+                scene = made_up_scene(**({} if args.frames is None else {"frames": args.frames}))
+            else:
+                scene = recorded_scene(source, scale=args.scale, frames=args.frames)
+
+            def picture(camera: str, frame: int, image: Image, name: str = scene.name) -> None:
+                name = name.replace(" ", "_")
+                write_image(args.pictures / f"{name}-{camera}-{frame:06d}.png", image)
+
+            def progress(done: int, total: int, task: Any = task) -> None:
+                bars.update(task, completed=done, total=total)
+
+            results.append(
+                measure(
+                    scene, config, progress=progress, picture=picture if args.pictures else None
+                )
+            )
+    if args.json:
+        json.dump(results[0] if len(results) == 1 else results, sys.stdout, indent=2)
+        sys.stdout.write("\n")
+        return 0
+    console = Console(width=None if sys.stdout.isatty() else 100)
+    for figures in results:
+        console.print(silhouette_table(figures))
+    return 0
+
+
+def silhouette_table(figures: Mapping[str, Any]) -> Table:
+    """The figures of `evaluation.silhouettes.measure` for people."""
+    width, height = figures["image_size"]
+    frames = len(figures["frames"])
+    title = f"{figures['recording']}, {width}x{height} px, {frames} frames"
+    if figures["exact"]:
+        columns = {"iou": "IoU", "precision": "precision", "recall": "recall"}
+        columns["shadow_leak"] = "shadow leak"
+        mean = "iou_mean"
+    else:
+        title += f"; against the body {figures['body']['name']} at the reference"
+        columns = {"overlap": "overlap", "overlap_selected": "overlap, its components"}
+        mean = "overlap_mean"
+    table = Table(title=title)
+    table.add_column("")
+    for heading in (*columns.values(), "ms"):
+        table.add_column(heading, justify="right")
+    for name, row in figures["cameras"].items():
+        cells = (f"{row[key]:.3f}" for key in columns)
+        table.add_row(name, *cells, f"{row['ms']:.1f}")
+    blank = [""] * (len(columns) - 1)
+    table.add_section()
+    table.add_row("mean", f"{figures[mean]:.3f}", *blank, f"{figures['ms']:.1f}")
+    for key, label in (("mog2", "OpenCV MOG2"), ("knn", "OpenCV KNN")):
+        row = figures["opencv"][key]
+        table.add_row(label, f"{row[mean]:.3f}", *blank, f"{row['ms']:.1f}")
+    return table

@@ -1,0 +1,215 @@
+"""Connected patches of a mask too small to count, where more of the mask may lie outside.
+
+Patches are found from the runs of each row, which a silhouette has few of.
+"""
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.imaging.region import Region
+
+LEFT, TOP, RIGHT, BOTTOM = 1, 2, 4, 8
+"""Sides of a rectangle, to be combined."""
+EVERY = LEFT | TOP | RIGHT | BOTTOM
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _root(parent, i):  # type: ignore[no-untyped-def]
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _count_runs(mask, part, target):  # type: ignore[no-untyped-def]
+    """Runs of ``target`` in a part (left, top, right, bottom) of a mask."""
+    count = 0
+    for v in range(part[1], part[3]):
+        row = mask[v, part[0] : part[2]]
+        before = row[: row.size - 1]
+        after = row[1:]
+        count += row[0] == target
+        for u in range(after.size):
+            count += (after[u] == target) & (before[u] != target)
+    return count
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _same_until(values, words, u, value):  # type: ignore[no-untyped-def]
+    """First place from u on whose value differs; eight at a time, ``value`` is 0 or 255."""
+    n = values.size
+    whole = np.uint64(0) if value == 0 else np.uint64(0xFFFFFFFFFFFFFFFF)
+    while u < n:
+        if u & 7 == 0 and words[u >> 3] == whole:
+            u += 8
+            continue
+        if values[u] != value:
+            return u
+        u += 1
+    return n
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def flip_small(mask, part, need, target, least, reach, spared, unknown):  # type: ignore[no-untyped-def]
+    """Turn patches of ``target`` with fewer than ``least`` pixels into 255 - target, in place.
+
+    Args:
+        mask: (h, w) uint8, 0 or 255.
+        part: (left, top, right, bottom) that is looked at.
+        need: the same, where the result is needed.
+        target: 0 or 255.
+        least: pixels.
+        reach: 0: patches are 4-connected, 1: 8-connected.
+        spared: sides of the part; patches that touch them stay.
+        unknown: sides of the part beyond which patches may go on.
+
+    Returns:
+        Whether a patch in ``need`` may be larger than what is seen of it, so that its size is not
+        known; it is left as it is.
+    """
+    count = _count_runs(mask, part, target)
+    begin = np.empty(count, dtype=np.int32)
+    end = np.empty(count, dtype=np.int32)
+    parent = np.empty(count, dtype=np.int32)
+    rows = part[3] - part[1]
+    first = np.empty(rows + 1, dtype=np.int32)
+    n = 0
+    columns = part[2] - part[0]
+    # Filled up with what is not looked for: a run never ends in the filling.
+    values = np.full((columns + 7) // 8 * 8, 255 - target, dtype=np.uint8)
+    words = values.view(np.uint64)
+    for i in range(rows):
+        first[i] = n
+        values[:columns] = mask[part[1] + i, part[0] : part[2]]
+        u = _same_until(values, words, 0, 255 - target)
+        while u < columns:
+            begin[n] = part[0] + u
+            u = _same_until(values, words, u, target)
+            end[n] = part[0] + min(u, columns)
+            parent[n] = n
+            n += 1
+            u = _same_until(values, words, u, 255 - target)
+        if i == 0:
+            continue
+        a = first[i - 1]
+        b = first[i]
+        while a < first[i] and b < n:
+            if begin[a] < end[b] + reach and begin[b] < end[a] + reach:
+                x = _root(parent, a)
+                y = _root(parent, b)
+                parent[max(x, y)] = min(x, y)
+            if end[a] < end[b]:
+                a += 1
+            else:
+                b += 1
+    first[rows] = n
+    area = np.zeros(count, dtype=np.int64)
+    sides = np.zeros(count, dtype=np.uint8)
+    needed = np.zeros(count, dtype=np.bool_)
+    for i in range(rows):
+        v = part[1] + i
+        side = 0
+        if i == 0:
+            side |= TOP
+        if i == rows - 1:
+            side |= BOTTOM
+        inside = need[1] <= v and v < need[3]
+        for r in range(first[i], first[i + 1]):
+            root = _root(parent, r)
+            area[root] += end[r] - begin[r]
+            sides[root] |= side
+            if begin[r] == part[0]:
+                sides[root] |= LEFT
+            if end[r] == part[2]:
+                sides[root] |= RIGHT
+            if inside and begin[r] < need[2] and end[r] > need[0]:
+                needed[root] = True
+    open_question = False
+    other = np.uint8(255 - target)
+    for i in range(rows):
+        for r in range(first[i], first[i + 1]):
+            root = _root(parent, r)
+            if area[root] >= least or sides[root] & spared:
+                continue
+            if sides[root] & unknown:
+                open_question = open_question or needed[root]
+                continue
+            for u in range(begin[r], end[r]):
+                mask[part[1] + i, u] = other
+    return open_question
+
+
+def clear_small(
+    mask: NDArray[np.uint8],
+    least_px: float,
+    *,
+    connectivity: int,
+    zone: Region | None = None,
+    need: Region | None = None,
+    unknown: int = 0,
+) -> bool:
+    """Clear patches of fewer than ``least_px`` pixels, in place.
+
+    Args:
+        mask: (h, w) uint8, 0 or 255, C-contiguous.
+        least_px: size from which on a patch stays.
+        connectivity: 4 or 8.
+        zone: part of the mask that is looked at; all of it if None.
+        need: where the result is needed; all of the zone if None.
+        unknown: sides of the zone beyond which patches may go on.
+
+    Returns:
+        Whether a needed patch's size is not known (it is left).
+    """
+    zone = zone or Region(0, 0, mask.shape[1], mask.shape[0])
+    part = occupied(mask, zone)
+    if part.width <= 0:
+        return False
+    return bool(
+        flip_small(
+            mask, part, need or zone, np.uint8(255), float(least_px), int(connectivity == 8), 0,
+            unknown & _shared_sides(zone, part),
+        )
+    )  # fmt: skip
+
+
+def fill_small(
+    mask: NDArray[np.uint8],
+    largest_px: float,
+    *,
+    zone: Region | None = None,
+    need: Region | None = None,
+    unknown: int = 0,
+) -> bool:
+    """Set 4-connected gaps of fewer than ``largest_px`` pixels, in place; see `clear_small`.
+
+    A gap that reaches the border of the mask's bounding box is no hole.
+    """
+    zone = zone or Region(0, 0, mask.shape[1], mask.shape[0])
+    part = occupied(mask, zone)
+    if part.width <= 0:
+        return False
+    unknown &= _shared_sides(zone, part)
+    return bool(
+        flip_small(
+            mask, part, need or zone, np.uint8(0), float(largest_px), 0, EVERY & ~unknown, unknown
+        )
+    )
+
+
+def occupied(mask: NDArray[np.uint8], zone: Region) -> Region:
+    """Bounding box of what is set in a zone of the mask; without columns if nothing is."""
+    left, top, width, height = cv2.boundingRect(mask[zone.slices])
+    return Region(left, top, left + width, top + height).moved(zone.left, zone.top)
+
+
+def _shared_sides(zone: Region, part: Region) -> int:
+    return (
+        LEFT * (part.left == zone.left)
+        | TOP * (part.top == zone.top)
+        | RIGHT * (part.right == zone.right)
+        | BOTTOM * (part.bottom == zone.bottom)
+    )

@@ -1,0 +1,99 @@
+"""Where the silhouette ends: pixels that the body covers by less than half are not the body's.
+
+The foreground test asks whether a pixel is anything but background, so that it also takes the
+pixels at the border that the body only touches, and the silhouette is half a pixel too wide. What
+such a pixel shows is a mixture, I = a F + (1 - a) B, of the background B there and the body F
+beside it; a is the part that is covered.
+"""
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.imaging.images import Image
+from markerless_tracker.imaging.region import Region
+
+# Radius of the window in which the body beside a pixel is looked up, px.
+_NEAR_PX = 3
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, gone):  # type: ignore[no-untyped-def]
+    """Mark pixels of the mask's border that are covered by less than half.
+
+    Args:
+        image: (a, b, c) uint8, a part of an image.
+        mean: (c, h, w) float32, the background; gain (c,) brightness relative to it.
+        left, top: where the part begins in the image.
+        mask: (a, b) uint8, 0 or 255.
+        inner, deep: (a, b) the mask without its border, and without two layers more.
+        least: squared difference of body and background, grey levels, below which nothing is told.
+        gone: (a, b) uint8, 255 where the mask should end; written.
+    """
+    rows, columns = mask.shape
+    channels = image.shape[2]
+    body = np.empty(channels, dtype=np.float32)
+    for i in range(rows):
+        for j in range(columns):
+            gone[i, j] = 0
+            if mask[i, j] == 0 or inner[i, j] != 0:
+                continue
+            count = 0
+            for source in (deep, inner):
+                body[:] = 0.0
+                for y in range(max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)):
+                    for x in range(max(j - _NEAR_PX, 0), min(j + _NEAR_PX + 1, columns)):
+                        if source[y, x] != 0:
+                            count += 1
+                            for c in range(channels):
+                                body[c] += np.float32(image[y, x, c])
+                if count > 0:
+                    break
+            if count == 0:
+                continue
+            along = np.float32(0.0)
+            length = np.float32(0.0)
+            for c in range(channels):
+                base = min(gain[c] * mean[c, top + i, left + j], np.float32(255.0))
+                way = body[c] / np.float32(count) - base
+                along += (np.float32(image[i, j, c]) - base) * way
+                length += way * way
+            if length >= least and along < np.float32(0.5) * length:
+                gone[i, j] = 255
+
+
+def border_reach(layers: int) -> int:
+    """How far from a pixel `trim_border` looks, px."""
+    return layers * (_NEAR_PX + 2)
+
+
+def trim_border(
+    image: Image,
+    mean: NDArray[np.float32],
+    gain: NDArray[np.float32],
+    mask: NDArray[np.uint8],
+    part: Region,
+    *,
+    layers: int,
+    least: float,
+) -> None:
+    """Take pixels covered by less than half from the border of a mask, in place.
+
+    Args:
+        image: (a, b, c) uint8, a part of an image.
+        mean: (c, h, w) grey levels, the background of the whole image.
+        gain: (c,) brightness of the image relative to the background's.
+        mask: (a, b) uint8, 0 or 255, of the part.
+        part: its place in the image.
+        layers: pixels that may go, one after the other.
+        least: difference of body and background, grey levels, below which nothing is told.
+    """
+    gone = np.empty_like(mask)
+    for _ in range(layers):
+        inner = cv2.erode(mask, np.ones((3, 3), dtype=np.uint8))
+        deep = cv2.erode(inner, np.ones((3, 3), dtype=np.uint8))
+        mark_half_covered(
+            image, mean, gain, part.left, part.top, mask, inner, deep, np.float32(least**2), gone
+        )
+        cv2.subtract(mask, gone, dst=mask)

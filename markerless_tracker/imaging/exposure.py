@@ -1,0 +1,118 @@
+"""How much brighter an image is than the background it is compared with, by channel.
+
+Exposure control, flicker and clouds multiply a whole image. The factor is the value that the ratios
+of pixels to their background crowd around: a person or a shadow gives other ratios, but none that
+so many pixels share. It is found anew in every image and remembers nothing.
+"""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.imaging.images import Image
+
+# Pixels looked at; a grid over the image.
+_SAMPLES = 6_000
+# Ratios are counted in bins of their logarithm, from 1/4 to 4.
+_REACH = math.log(4.0)
+_BINS = 1024
+# Width of the crowd in bins: about +-5 %.
+_CROWD = 37
+# Darker pixels are noise, brighter ones may be clipped.
+_DARK, _BRIGHT = 20.0, 250.0
+# A crowd with less than this share of the samples, or with fewer samples, says nothing.
+_LEAST_SHARE = 0.2
+_LEAST_SAMPLES = 200
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def crowded_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-untyped-def]
+    """Fill gain (c,) from the pixels where (n, 2) = (v, u) of an image (h, w, c).
+
+    base_logs: (n, c) log of the background there, NaN where it says nothing; value_logs: (256,) log
+    of each grey level, NaN where it says nothing.
+    """
+    per_log = _BINS / (2.0 * _REACH)
+    counts = np.empty(_BINS, dtype=np.int64)
+    sums = np.empty(_BINS, dtype=np.float64)
+    for c in range(gain.size):
+        counts[:] = 0
+        sums[:] = 0.0
+        total = 0
+        for i in range(where.shape[0]):
+            ratio = value_logs[image[where[i, 0], where[i, 1], c]] - base_logs[i, c]
+            if abs(ratio) < _REACH:  # not for NaN either
+                place = min(int((ratio + _REACH) * per_log), _BINS - 1)
+                counts[place] += 1
+                sums[place] += ratio
+                total += 1
+        gain[c] = 1.0
+        inside = 0
+        for place in range(_CROWD):
+            inside += counts[place]
+        most = inside
+        first = 0
+        equals = 1
+        for place in range(1, _BINS - _CROWD + 1):
+            inside += counts[place + _CROWD - 1] - counts[place - 1]
+            if inside > most:
+                most = inside
+                first = place
+                equals = 1
+            elif inside == most:
+                equals += 1
+        if most < max(_LEAST_SAMPLES, _LEAST_SHARE * total):
+            continue
+        # Of equal crowds the middle one: a flat top has no bias then.
+        inside = most
+        place = first
+        seen = 1
+        while seen <= equals // 2:
+            inside += counts[place + _CROWD] - counts[place]
+            place += 1
+            if inside == most:
+                seen += 1
+        middle = 0.0
+        for k in range(place, place + _CROWD):
+            middle += sums[k]
+        gain[c] = math.exp(middle / most)
+
+
+class ExposureMeter:
+    """Compares images with one background.
+
+    Args:
+        mean: (h, w, c) float32, the background.
+    """
+
+    def __init__(self, mean: NDArray[np.float32]) -> None:
+        height, width, channels = mean.shape
+        step = max(1, math.isqrt(height * width // _SAMPLES))
+        v, u = np.mgrid[step // 2 : height : step, step // 2 : width : step]
+        self._where = np.column_stack([v.ravel(), u.ravel()])
+        self._base_logs = _logs(mean[v.ravel(), u.ravel()].astype(np.float64))
+        self._value_logs = _logs(np.arange(256.0))
+        self._channels = channels
+
+    def gain(self, image: Image) -> NDArray[np.float32]:
+        """(c,) float32: brightness of an image (h, w, c) uint8; 1 where it cannot tell."""
+        gain = np.empty(self._channels, dtype=np.float32)
+        crowded_ratio(image, self._where, self._base_logs, self._value_logs, gain)
+        return gain
+
+
+def _logs(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    usable = (values >= _DARK) & (values <= _BRIGHT)
+    return np.where(usable, np.log(np.where(usable, values, 1.0)), np.nan)
+
+
+def exposure_gain(image: Image, mean: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Brightness of the image relative to the background's, (c,) float32; 1 where it cannot tell.
+
+    Args:
+        image: (h, w, c) uint8.
+        mean: (h, w, c) float32, the background.
+    """
+    return ExposureMeter(mean).gain(image)

@@ -1,0 +1,103 @@
+"""Several Gaussians per pixel: what an empty scene shows by turns (screens, leaves, flicker)."""
+
+from collections.abc import Iterable, Iterator
+from itertools import chain
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.imaging.images import Image
+
+FloatImage = NDArray[np.float32]
+
+# Values within this many deviations of the sensor's noise, and at least so many grey levels, are
+# of one mode.
+_REACH_SIGMAS = 4.0
+_REACH_LEAST = 12.0
+# A mode that fewer of the frames show is none: something passed.
+_LEAST_SHARE = 0.05
+_LEAST_FRAMES = 2
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def add_frame(image, reach, count, mean, moment):  # type: ignore[no-untyped-def]
+    """Give every pixel (h, w, c) to the nearest of its modes within ``reach`` in each channel.
+
+    One that fits none begins a new mode, in a free place or that of a mode seen only once.
+    count (k, h, w), mean and moment (k, h, w, c) float32 are updated: Welford's sums.
+    """
+    modes, height, width, channels = mean.shape
+    for v in range(height):
+        for u in range(width):
+            best = -1
+            nearest = reach
+            for k in range(modes):
+                if count[k, v, u] == 0.0:
+                    continue
+                furthest = np.float32(0.0)
+                for c in range(channels):
+                    furthest = max(furthest, abs(np.float32(image[v, u, c]) - mean[k, v, u, c]))
+                if furthest <= nearest:
+                    nearest = furthest
+                    best = k
+            if best < 0:
+                rarest = 0
+                for k in range(1, modes):
+                    if count[k, v, u] < count[rarest, v, u]:
+                        rarest = k
+                if count[rarest, v, u] > 1.0:
+                    continue
+                best = rarest
+                count[best, v, u] = 0.0
+                for c in range(channels):
+                    mean[best, v, u, c] = 0.0
+                    moment[best, v, u, c] = 0.0
+            count[best, v, u] += np.float32(1.0)
+            for c in range(channels):
+                value = np.float32(image[v, u, c])
+                change = value - mean[best, v, u, c]
+                mean[best, v, u, c] += change / count[best, v, u]
+                moment[best, v, u, c] += change * (value - mean[best, v, u, c])
+
+
+def learn_modes(
+    frames: Iterable[Image], modes: int
+) -> tuple[int, FloatImage, FloatImage, FloatImage]:
+    """Cluster each pixel's values over the frames, one pass, memory for ``modes`` models.
+
+    Args:
+        frames: (h, w, c) uint8, all of one shape, at least one.
+        modes: most modes per pixel.
+
+    Returns:
+        Number of frames; counts (k, h, w), means (k, h, w, c) and summed squared deviations
+        (k, h, w, c), the most frequent mode first; modes that hardly any frame shows are 0.
+    """
+    first, second, rest = _two_and_rest(frames)
+    reach = _REACH_LEAST
+    if second is not None:
+        change = np.abs(second.astype(np.int16) - first.astype(np.int16))
+        reach = max(reach, _REACH_SIGMAS * 1.4826 / np.sqrt(2.0) * float(np.median(change)))
+    count = np.zeros((modes, *first.shape[:2]), dtype=np.float32)
+    mean = np.zeros((modes, *first.shape), dtype=np.float32)
+    moment = np.zeros_like(mean)
+    total = 0
+    for frame in rest:
+        add_frame(frame, np.float32(reach), count, mean, moment)
+        total += 1
+    least = max(float(_LEAST_FRAMES), _LEAST_SHARE * total)
+    order = np.argsort(-count, axis=0, kind="stable")
+    count = np.take_along_axis(count, order, axis=0)
+    mean = np.take_along_axis(mean, order[..., None], axis=0)
+    moment = np.take_along_axis(moment, order[..., None], axis=0)
+    count[1:][count[1:] < least] = 0.0
+    return total, count, mean, moment
+
+
+def _two_and_rest(frames: Iterable[Image]) -> tuple[Image, Image | None, Iterator[Image]]:
+    iterator = iter(frames)
+    first = next(iterator)
+    second = next(iterator, None)
+    seen = [first] if second is None else [first, second]
+    return first, second, chain(seen, iterator)

@@ -1,0 +1,321 @@
+"""What a patch's texture tells about it: a shadow keeps the floor's pattern, a body hides it.
+
+Brightness alone cannot tell a hard shadow from dark trousers, nor grey clothes from a grey wall as
+bright as they are. In a small window, image I and background B are compared by
+e^2 = var(I - p B) with p = mean(I) / mean(B): that of the sensor's noise where the window shows
+the background in any light, and larger by p^2 var(B) where something covers it. A window says
+something only where p^2 var(B), the pattern, stands out from the noise.
+"""
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.imaging.images import Image
+from markerless_tracker.imaging.region import Region
+
+# The pattern's variance, in those of the noise, from which on a window can show that the pattern is
+# there, and from which on that it is hidden.
+SURE, TOLD = 6.0, 6.0
+# What is left of the pattern's variance after it is taken away: less is the same, more is other.
+SAME, OTHER = 0.15, 0.85
+# Windows without a pattern: this plus their light.
+UNKNOWN = 100.0
+# Change of light from one pixel to the next that may be the same shadow, and how far windows
+# without a pattern take it over along a row and then along a column, px.
+STEP = 0.006
+SPREAD_PX = 24
+# Largest radius of a window.
+MOST_RADIUS = 6
+# Deviations of the noise within which a pixel agrees with a window's light.
+_AGREE = 3.5
+
+
+# Loops over one row with few arrays each: what the compiler turns into vector instructions.
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _slide(total, came, gone):  # type: ignore[no-untyped-def]
+    for j in range(came.size):
+        total[j] += came[j] - gone[j]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _slide_product(total, came_x, came_y, gone_x, gone_y):  # type: ignore[no-untyped-def]
+    for j in range(came_x.size):
+        total[j] += came_x[j] * came_y[j] - gone_x[j] * gone_y[j]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _sum_across(part, side, total):  # type: ignore[no-untyped-def]
+    """total[j] = part[j] + ... + part[j + side - 1], side odd."""
+    n = total.size
+    if side == 7:
+        for j in range(n):
+            left = part[j] + part[j + 1] + part[j + 2]
+            total[j] = left + part[j + 3] + part[j + 4] + part[j + 5] + part[j + 6]
+        return
+    for j in range(n):
+        total[j] = part[j]
+    for shift in range(1, side, 2):
+        one = part[shift : shift + n]
+        other = part[shift + 1 : shift + 1 + n]
+        for j in range(n):
+            total[j] += one[j] + other[j]
+
+
+# Division as in NumPy: a test for zero would be a branch in the loop.
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[no-untyped-def]
+    for j in range(out.size):
+        n = down * across[j]
+        share = np.float32(1.0) / np.float32(n)
+        # n times sums of squares fits 31 bits up to a radius of `MOST_RADIUS`.
+        var_a = np.float32(n * aa[j] - a[j] * a[j]) * share * share
+        cov = np.float32(n * ab[j] - a[j] * b[j]) * share * share
+        var_b = np.float32(n * bb[j] - b[j] * b[j]) * share * share
+        p = np.float32(a[j]) / max(np.float32(b[j]), np.float32(1e-6))
+        pattern = p * p * var_b
+        rest = var_a - np.float32(2.0) * p * cov + pattern - noise
+        found = np.float32(UNKNOWN) + p if rest < noise else np.float32(0.0)
+        hidden = (pattern >= np.float32(TOLD) * noise) & (rest > np.float32(OTHER) * pattern)
+        found = np.float32(-1.0) if hidden else found
+        shown = (pattern >= np.float32(SURE) * noise) & (rest < np.float32(SAME) * pattern)
+        found = p if shown else found
+        out[j] = found if (a[j] > 0) & (b[j] > 0) else np.float32(0.0)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _whole_levels(image, mean, gain, a, b):  # type: ignore[no-untyped-def]
+    for j in range(a.size):
+        a[j] = np.int32(image[j])
+    for j in range(b.size):
+        b[j] = np.int32(mean[j] * gain + np.float32(0.5))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def window_light(image, mean, gain, noise, radius, left, top, light):  # type: ignore[no-untyped-def]
+    """Light of the windows on a part of an image: p > 0 where they show the background in light p.
+
+    image (a, b) uint8, the part alone; mean (h, w) float32, the part begins at (left, top) of it;
+    gain, noise (variance) of the image; light (a, b) float32: p; -1 where something else covers the
+    background; UNKNOWN + p where there is no pattern; 0 where the window says nothing. Windows end
+    at the part's border.
+    """
+    rows, columns = light.shape
+    side = 2 * radius + 1
+    # Column sums of whole numbers, the same whatever the order, with room for windows at the sides.
+    sums = np.zeros((5, columns + 2 * radius), dtype=np.int32)
+    window = np.empty((5, columns), dtype=np.int32)
+    # The rows of the window, in turns; rows beyond the part are 0.
+    grey = np.zeros((side + 1, columns), dtype=np.int32)
+    base = np.zeros((side + 1, columns), dtype=np.int32)
+    across = np.empty(columns, dtype=np.int32)
+    for j in range(columns):
+        across[j] = min(j + radius, columns - 1) - max(j - radius, 0) + 1
+    for v in range(rows + radius):
+        # The row that leaves the window lies just after the one that comes.
+        came = v % (side + 1)
+        gone = (v + 1) % (side + 1)
+        a, b = grey[came], base[came]
+        old_a, old_b = grey[gone], base[gone]
+        if v < rows:
+            _whole_levels(image[v], mean[top + v, left : left + columns], gain, a, b)
+        else:
+            a[:] = 0
+            b[:] = 0
+        _slide(sums[0, radius : radius + columns], a, old_a)
+        _slide(sums[1, radius : radius + columns], b, old_b)
+        _slide_product(sums[2, radius : radius + columns], a, a, old_a, old_a)
+        _slide_product(sums[3, radius : radius + columns], a, b, old_a, old_b)
+        _slide_product(sums[4, radius : radius + columns], b, b, old_b, old_b)
+        i = v - radius
+        if i < 0:
+            continue
+        for k in range(5):
+            _sum_across(sums[k], side, window[k])
+        down = np.int32(min(i + radius, rows - 1) - max(i - radius, 0) + 1)
+        _light_of_sums(
+            window[0], window[1], window[2], window[3], window[4], across, down, noise, light[i]
+        )
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _spread_run(row, start, stop, step, out):  # type: ignore[no-untyped-def]
+    """Along a row of light from a window on, windows without a pattern take over its light."""
+    near = row[start]
+    j = start + step
+    taken = 0
+    while j != stop and taken < SPREAD_PX:
+        own = row[j] - np.float32(UNKNOWN)
+        if abs(own - near) > np.float32(STEP):
+            return
+        out[j] = own
+        near = own
+        taken += 1
+        j += step
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def spread_light(light, spread):  # type: ignore[no-untyped-def]
+    """Let plain windows take part in the light next to them if theirs is the same.
+
+    First along rows, then along columns, `SPREAD_PX` each: whatever part of an image is looked at,
+    what lies further away has no influence. light (a, b) is changed; spread (a, b) is written.
+    """
+    rows, columns = light.shape
+    spread[:] = light
+    for i in range(rows):
+        row = light[i]
+        j = 0
+        while j < columns:
+            if row[j] < np.float32(UNKNOWN):
+                j += 1
+                continue
+            begin = j
+            while j < columns and row[j] >= np.float32(UNKNOWN):
+                j += 1
+            if begin > 0 and row[begin - 1] > np.float32(0.0):
+                _spread_run(row, begin - 1, j, 1, spread[i])
+            if j < columns and row[j] > np.float32(0.0):
+                _spread_run(row, j, begin - 1, -1, spread[i])
+    light[:] = spread
+    nears = np.zeros(columns, dtype=np.float32)
+    steps_of = np.zeros(columns, dtype=np.int32)
+    for turn in range(2):
+        nears[:] = 0.0
+        for k in range(rows):
+            i = k if turn == 0 else rows - 1 - k
+            _spread_row(light[i], nears, steps_of, spread[i])
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
+    """One row of light takes over what comes from the row before; as `_spread_run`, branchless."""
+    for j in range(row.size):
+        p = row[j]
+        own = p - np.float32(UNKNOWN)
+        plain = p >= np.float32(UNKNOWN)
+        same = abs(own - near[j]) <= np.float32(STEP)
+        taken = plain & same & (near[j] > np.float32(0.0)) & (steps[j] < np.int32(SPREAD_PX))
+        out[j] = own if taken else out[j]
+        passed_on = own if taken else np.float32(0.0)
+        near[j] = passed_on if plain else max(p, np.float32(0.0))
+        steps[j] = steps[j] + np.int32(1) if taken else np.int32(0)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def lit(light, least, most, valid):  # type: ignore[no-untyped-def]
+    """Drop light that is not between least and most; valid (a, b) uint8 is 1 where any is left."""
+    for i in range(light.shape[0]):
+        row = light[i]
+        out = valid[i]
+        for j in range(row.size):
+            p = row[j]
+            good = (p >= least) & (p <= most)
+            out[j] = good
+            row[j] = p if good else min(p, np.float32(0.0))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def apply_light(  # type: ignore[no-untyped-def]
+    image, mean, gain, agree, radius, protect, reveal, left, top, light, near_valid, part, corner,
+    looked_at, labels,
+):  # fmt: skip
+    """Correct labels by the light of the windows around each pixel, in place.
+
+    A pixel that agrees with the light of any valid window that holds it is background, or shadow
+    if it was not background before. Else, if its own window is covered, with ``protect`` shadow
+    becomes foreground, and with ``reveal`` background too.
+
+    Args:
+        image, mean, gain, left, top, light: as in `window_light`; light is 0 where not valid,
+            below 0 where covered.
+        agree: grey levels within which a pixel agrees.
+        near_valid: (a, b), not 0 where a window within the radius is valid.
+        part: (left, top, right, bottom) of the light's array to correct.
+        corner: column and row of the labels' array where that array begins.
+        looked_at: (c, d) labels that are not background are corrected only where this is not 0.
+        labels: (c, d).
+    """
+    rows, columns = light.shape
+    for i in range(part[1], part[3]):
+        for j in range(part[0], part[2]):
+            y = corner[1] + i
+            x = corner[0] + j
+            label = labels[y, x]
+            if label == 0:
+                if not reveal or light[i, j] >= 0.0:
+                    continue
+            elif looked_at[y, x] == 0 or (label == 127 and not protect):
+                continue
+            explained = False
+            if near_valid[i, j] != 0:
+                value = np.float32(image[i, j])
+                base = mean[top + i, left + j] * gain
+                for di in range(max(i - radius, 0), min(i + radius + 1, rows)):
+                    for dj in range(max(j - radius, 0), min(j + radius + 1, columns)):
+                        p = light[di, dj]
+                        if p > 0.0 and abs(value - p * base) <= agree:
+                            explained = True
+                            break
+                    if explained:
+                        break
+            if explained:
+                if label != 0:
+                    labels[y, x] = 127
+            elif light[i, j] < 0.0 and protect:
+                labels[y, x] = 255
+
+
+def texture_reach(radius: int) -> int:
+    """How far from a pixel its correction looks, px."""
+    return SPREAD_PX + 2 * radius
+
+
+def correct_labels(
+    grey: Image,
+    mean: NDArray[np.float32],
+    gain: float,
+    sigma: float,
+    labels: NDArray[np.uint8],
+    window: Region,
+    part: Region,
+    seen: Region,
+    *,
+    looked_at: NDArray[np.uint8],
+    radius: int,
+    light: tuple[float, float],
+    protect: bool,
+    reveal: bool,
+) -> None:
+    """Correct labels of `kernels` by texture, in place.
+
+    Args:
+        grey: what is seen of the image, (c, d) uint8.
+        mean: (h, w) grey background of the whole image.
+        gain: brightness of the image relative to the background's.
+        sigma: the sensor's noise, grey levels.
+        labels: (a, b) of a window: 0 background, 127 shadow, 255 foreground.
+        window: the window's place in the image.
+        part: what is corrected, inside the window.
+        seen: place of ``grey``: the part and `texture_reach` around it, as far as the image goes.
+        looked_at: (a, b), 0 where shadow and foreground are left as they are.
+        radius: of the windows, px.
+        light: least and largest light of a shadow.
+        protect: whether shadow may become foreground.
+        reveal: whether background may become foreground.
+    """
+    found = np.empty((2, *grey.shape), dtype=np.float32)
+    one = np.float32(gain)
+    noise = np.float32(sigma**2)
+    window_light(grey, mean, one, noise, radius, seen.left, seen.top, found[0])
+    spread_light(found[0], found[1])
+    valid = np.empty(grey.shape, dtype=np.uint8)
+    lit(found[1], np.float32(light[0]), np.float32(light[1]), valid)
+    square = np.ones((2 * radius + 1, 2 * radius + 1), dtype=np.uint8)
+    near_valid = np.asarray(cv2.dilate(valid, square), dtype=np.uint8)
+    corner = (seen.left - window.left, seen.top - window.top)
+    apply_light(
+        grey, mean, one, np.float32(_AGREE * sigma), radius, protect, reveal, seen.left, seen.top,
+        found[1], near_valid, part.within(seen), corner, looked_at, labels,
+    )  # fmt: skip

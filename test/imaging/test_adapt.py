@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+
+from markerless_tracker.imaging import ImagingSettings, Segmenter, learn_background
+
+FOLLOW = ImagingSettings(background_follow_s=2.0, exposure_compensation=False, texture_radius_px=0)
+STILL = ImagingSettings(exposure_compensation=False, texture_radius_px=0)
+
+
+def shot(lamp: float, person: bool, seed: int, channels: int) -> np.ndarray:
+    """A wall whose left half gets brighter by ``lamp`` grey levels, maybe with a person."""
+    image = np.random.default_rng(seed).normal(110.0, 2.0, (60, 80, channels))
+    image[:, :40] += lamp
+    if person:
+        image[15:45, 50:65] = 20.0
+    image = np.clip(np.rint(image), 0, 255).astype(np.uint8)
+    return image if channels == 3 else image[:, :, 0]
+
+
+def run(settings: ImagingSettings, channels: int, seconds: float = 12.0) -> list[np.ndarray]:
+    empty = [shot(0.0, False, i, channels) for i in range(10)]
+    segmenter = Segmenter("cam01", learn_background(empty), settings)
+    masks = []
+    for i in range(int(seconds * 10)):
+        image = shot(0.2 * i, True, 100 + i, channels)
+        masks.append(segmenter.observe(image, i * 100_000_000).mask)
+    return masks
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_slow_light_is_followed_and_a_still_person_stays(channels: int) -> None:
+    last = run(FOLLOW, channels)[-1]
+    assert not last[:, :38].any()
+    assert last[17:43, 52:63].all()
+    assert run(STILL, channels)[-1][:, 5:35].mean() > 0.9
+
+
+def test_the_same_images_give_the_same_masks_again_after_a_reset() -> None:
+    empty = [shot(0.0, False, i, 3) for i in range(10)]
+    images = [shot(0.2 * i, True, 100 + i, 3) for i in range(60)]
+    segmenter = Segmenter("cam01", learn_background(empty), FOLLOW)
+
+    def masks() -> list[bytes]:
+        stamps = range(0, 6_000_000_000, 100_000_000)
+        pairs = zip(images, stamps, strict=True)
+        return [segmenter.observe(image, at).mask.tobytes() for image, at in pairs]
+
+    first = masks()
+    segmenter.reset()
+    assert masks() == first
+
+
+def test_nothing_is_learned_across_a_gap_or_backwards() -> None:
+    empty = [shot(0.0, False, i, 3) for i in range(10)]
+    segmenter = Segmenter("cam01", learn_background(empty), FOLLOW)
+    before = segmenter._mean.copy()
+    for stamp_ns in (0, 5_000_000_000, 3_000_000_000, 3_000_000_000):
+        segmenter.observe(shot(5.0, False, 3, 3), stamp_ns)
+    assert (segmenter._mean == before).all()
+    for i in range(4):
+        segmenter.observe(shot(5.0, False, 3, 3), 3_100_000_000 + i)
+    assert (segmenter._mean != before).any()

@@ -1,0 +1,145 @@
+"""Looking only around the predicted body gives what the whole images give."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from markerless_tracker.body import load_body
+from markerless_tracker.drawing import silhouette
+from markerless_tracker.imaging import Region
+from markerless_tracker.records import Observation, TrackState
+from markerless_tracker.synthesis import ring_rig
+from markerless_tracker.tracking.selection import (
+    body_region,
+    explained_in_region,
+    explained_part,
+)
+
+
+def with_things(frames, scene):
+    """The frames with a patch beside the person, touching the edge of any region, and a far one."""
+    changed = []
+    for frame in frames:
+        images = {}
+        for name, image in frame.images.items():
+            left, top, width, height = cv2.boundingRect(frame.masks[name].astype(np.uint8))
+            image = image.copy()
+            beside = left + width + 4
+            image[top + 5 : top + 12, beside : beside + 60] = (20, 200, 240)
+            image[-12:, :12] = 0
+            images[name] = image
+        changed.append(replace(frame, images=images))
+    return changed
+
+
+@pytest.mark.parametrize("things", [False, True], ids=["alone", "among things"])
+def test_the_pose_is_that_of_whole_images(
+    make_tracker, frames, scene, swarm_settings, things
+) -> None:
+    frames = with_things(frames, scene) if things else frames
+    small = dict(evaluations=200, edge_weight=0.0)
+    whole = make_tracker(swarm_settings, full_frame_every=1, **small)
+    part = make_tracker(swarm_settings, full_frame_every=4, **small)
+    sizes = []
+    for frame in frames:
+        a, b = (tracker.step(frame.images, frame.stamp_ns) for tracker in (whole, part))
+        assert a.state is b.state is TrackState.TRACKING
+        assert a.pose.tobytes() == b.pose.tobytes()
+        for name, seen in b.observations.items():
+            u, v = seen.offset_px
+            cut = np.s_[v : v + seen.height, u : u + seen.width]
+            np.testing.assert_array_equal(seen.mask, a.observations[name].mask[cut])
+            assert a.observations[name].mask.sum() == seen.mask.sum()
+        sizes.append([seen.edges.size for seen in b.observations.values()])
+    full = 256 * 192
+    # The first frame looks everywhere, later ones but for the cameras whose turn it is do not.
+    assert sizes[0] == [full] * 4
+    assert all(sum(size == full for size in row) in (1, 2) for row in sizes[1:]) or things
+    assert any(size < full // 2 for row in sizes[1:] for size in row)
+
+
+@pytest.fixture(scope="module")
+def body():
+    return load_body("balan31", 1.75)
+
+
+@pytest.fixture(scope="module")
+def camera():
+    return ring_rig(1, (240, 180)).cameras[0]
+
+
+@pytest.fixture
+def pose(body):
+    standing = body.neutral.copy()
+    standing[body.index("pelvis_tz")] = 0.95
+    return standing
+
+
+def seen_in(mask, region: Region) -> Observation:
+    part = np.ascontiguousarray(mask[region.slices])
+    return Observation.from_mask(
+        "cam01",
+        5,
+        part,
+        np.zeros(part.shape, np.uint8),
+        size_px=(240, 180),
+        offset_px=(region.left, region.top),
+    )
+
+
+def test_the_region_holds_the_body_and_its_margin(camera, body, pose):
+    mask = np.asarray(silhouette(body, pose, camera)).astype(np.uint8)
+    box = cv2.boundingRect(mask)
+    bare = body_region(camera, body, pose, 0.0, 0)
+    wide = body_region(camera, body, pose, 0.2, 0)
+    assert bare.left <= box[0] and bare.right >= box[0] + box[2]
+    assert bare.top <= box[1] and bare.bottom >= box[1] + box[3]
+    depth_m = np.linalg.norm(camera.T_cam_world[:3, 3])
+    margin = 0.2 * camera.matrix[0, 0] / depth_m
+    assert bare.left - wide.left == pytest.approx(margin, rel=0.3)
+    assert body_region(camera, body, pose, 0.0, 30).left <= bare.left - 29
+    assert body_region(camera, body, pose, 1e6, 0) == Region(0, 0, 240, 180)
+
+
+@pytest.mark.parametrize("away_m", [50.0, -50.0, 1e9])
+def test_a_body_out_of_sight_has_no_region(camera, body, pose, away_m):
+    for axis in ("pelvis_tx", "pelvis_ty"):
+        moved = pose.copy()
+        moved[body.index(axis)] = away_m
+        region = body_region(camera, body, moved, 0.1, 0)
+        assert region is None or region.width * region.height < 240 * 180 / 4
+
+
+def test_what_is_kept_in_a_region_is_what_is_kept_of_the_frame(camera, body, pose):
+    mask = np.asarray(silhouette(body, pose, camera)).astype(bool)
+    left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
+    region = Region(left, top, left + width, top + height).grown(20, (240, 180))
+    mask[region.top + 30 : region.top + 36, region.left : region.left + 5] = True
+    mask[2:6, 2:6] = True
+    whole = explained_part(seen_in(mask, Region(0, 0, 240, 180)), camera, body, pose, 0)[0]
+    found = explained_in_region(seen_in(mask, region), camera, body, pose, 0, 3)
+    assert found is not None and found[1] == 30
+    np.testing.assert_array_equal(found[0].mask, whole.mask[region.slices])
+
+
+def test_a_body_cut_by_the_region_asks_for_the_frame(camera, body, pose):
+    mask = np.asarray(silhouette(body, pose, camera)).astype(bool)
+    left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
+    box = Region(left, top, left + width, top + height)
+    assert explained_in_region(seen_in(mask, box), camera, body, pose, 0, 3) is None
+    near = box.grown(2, (240, 180))
+    assert explained_in_region(seen_in(mask, near), camera, body, pose, 0, 3) is None
+    assert explained_in_region(seen_in(mask, near), camera, body, pose, 0, 2) is not None
+    # Cut by the frame itself: there is nothing more to see.
+    whole = Region(0, 0, 240, 180)
+    assert explained_in_region(seen_in(mask, whole), camera, body, pose, 0, 500) is not None
+
+
+def test_a_region_without_the_body_asks_for_the_frame(camera, body, pose):
+    region = Region(0, 0, 240, 180)
+    nothing = np.zeros((180, 240), dtype=bool)
+    assert explained_in_region(seen_in(nothing, region), camera, body, pose, 0, 3) is None
+    nothing[2:8, 2:8] = True
+    assert explained_in_region(seen_in(nothing, region), camera, body, pose, 0, 3) is None
