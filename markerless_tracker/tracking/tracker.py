@@ -1,7 +1,7 @@
 """The one door: `Tracker.step` turns the views of one time into a pose."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -19,13 +19,14 @@ from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first
 from markerless_tracker.tracking.loss import next_state
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.stages import frame_stages
+from markerless_tracker.tracking.start.starter import Starter
 
 TRAINING_RATE_HZ = 60.0
 """The published spreads are changes between frames at this rate."""
 
 
 class Tracker:
-    """Tracks one person, frame by frame, from a start pose.
+    """Tracks one person, frame by frame, from a start pose or from where it finds somebody.
 
     Knows no clock, no ROS and no files: results depend on the arguments alone, and the same ones
     give the same bytes with any number of threads. Calls must come from one thread at a time.
@@ -34,13 +35,15 @@ class Tracker:
         rig: the cameras; views are named after them.
         body: the body with the person's sizes.
         config: every setting.
-        start_pose: (p,) pose near which the first frame's search begins.
+        start_pose: (p,) pose near which the first frame's search begins; None = look for
+            somebody, which takes some frames.
         backgrounds: the empty scene per camera; cameras without one take ready-made observations
             only.
         shape_known: whether the body's sections are this person's; if not, and `fit_shape` is set,
             they are fitted to the first frame's silhouettes with the start pose held.
         start_markers: the markers that gave the start pose; noisy ones are settled on the first
             frame's silhouettes before the shape is fitted.
+        sized: makes the body of a stature (m), if the person's is unknown and looked for.
 
     Raises:
         BodyModelError: the start pose has another size, is not finite or breaks a joint limit.
@@ -54,16 +57,18 @@ class Tracker:
         body: BodyModel,
         config: TrackerConfig,
         *,
-        start_pose: FloatArray,
+        start_pose: FloatArray | None = None,
         backgrounds: Mapping[str, BackgroundModel] | None = None,
         shape_known: bool = False,
         start_markers: StartMarkers | None = None,
+        sized: Callable[[float], BodyModel] | None = None,
     ) -> None:
         self.rig = rig
         self.config = config
         self.state = TrackState.SEARCHING
         self._generic = body
-        self._start = np.array(start_pose, dtype=np.float64)
+        given = start_pose is not None
+        self._start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
         if self._start.shape != (body.size,) or not np.isfinite(self._start).all():
             raise BodyModelError(
                 f"start pose has shape {self._start.shape}, body {body.name} expects "
@@ -79,9 +84,15 @@ class Tracker:
         self._shape_fitted = not self._fit_shape
         self._start_markers = start_markers
         self._searcher = self._searcher_for(body)
+        self._starter = Starter(
+            rig, body, self._searcher_for, self._evidence.select,
+            sized=sized, fit_shape=self._fit_shape,
+        )  # fmt: skip
+        self._seeks = not given
+        self._seeking = self._seeks
         low, high = self._searcher.limits
         for name, value, a, b in zip(body.parameter_names, self._start, low, high, strict=True):
-            if not a <= value <= b:
+            if given and not a <= value <= b:
                 raise BodyModelError(
                     f"start pose: {name} is {value:.4g}, its limits are {a:.4g} to {b:.4g}"
                 )
@@ -94,11 +105,13 @@ class Tracker:
         return self._searcher.body
 
     def reset(self) -> None:
-        """Forget the track: the next step searches around the start pose again."""
+        """Forget the track: the next step searches around the start pose, or for somebody."""
         self._pose = self._start
         self._velocity_per_ns = np.zeros(self._generic.size)
         self._stamp_ns = None
         self.state = TrackState.SEARCHING
+        self._starter.reset()
+        self._seeking = self._seeks
         if self._fit_shape:
             self._shape_fitted = False
             self._searcher = self._searcher_for(self._generic)
@@ -118,6 +131,7 @@ class Tracker:
             blank[camera.name] = Observation.from_mask(camera.name, 0, nothing, nothing)
         # The most work and the least: whether threads are woken depends on it.
         for views in (blank, dict(list(blank.items())[:1])):
+            self._seeking = False
             self.step(views, 0)
             self.reset()
 
@@ -133,8 +147,10 @@ class Tracker:
             ImageError, CalibrationError: no view, one of an unknown camera, or one that does not
                 fit its calibration or background; names the camera.
         """
-        predicted = self._predict(stamp_ns)
         observed = self._evidence.observe(views, stamp_ns)
+        if self._seeking:
+            return self._seek(observed, stamp_ns)
+        predicted = self._predict(stamp_ns)
         observations, warnings = self._evidence.select(observed, self.body, predicted)
         if not self._shape_fitted:
             self._shape_fitted = True
@@ -143,6 +159,23 @@ class Tracker:
         sigma = self.body.sigma * self._rate_factor(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
         return self._conclude(search, stamp_ns, observations, warnings)
+
+    def _seek(self, observed: Mapping[str, Observation], stamp_ns: int) -> TrackResult:
+        """Look for somebody; no pose if nobody is there."""
+        found = self._starter.step(observed, stamp_ns)
+        if found is None:
+            self.state = TrackState.SEARCHING
+            return TrackResult(
+                stamp_ns=stamp_ns, state=self.state, pose=None, markers_m=None,
+                fitness=float("nan"), agreement={}, evaluations=0, observations=observed,
+            )  # fmt: skip
+        self._searcher = found.searcher
+        search = self._searcher.frame(found.observations, stamp_ns, found.pose)
+        if found.settled:
+            self._seeking, self._shape_fitted = False, True
+            self._starter.reset()
+            search.run(frame_stages(self.body, self.config, found.pose, self.body.sigma))
+        return self._conclude(search, stamp_ns, found.observations, found.notes)
 
     def _take_shape(self, observations: Mapping[str, Observation], stamp_ns: int) -> FloatArray:
         """Fit the body's sections to the first frame; returns the start pose (p,) to go on from."""
