@@ -16,7 +16,7 @@ _SIDES = ("Hip", "Shoulder")
 
 
 def posture(body: BodyModel, angles_rad: Mapping[str, float]) -> FloatArray:
-    """The neutral pose (p,) with anatomical angles added; joints that the body lacks are ignored."""
+    """The neutral pose (p,) with anatomical angles added; joints the body lacks are ignored."""
     pose = body.neutral.copy()
     for name, angle in angles_rad.items():
         if name in body.parameter_names:

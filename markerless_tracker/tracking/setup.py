@@ -29,7 +29,6 @@ from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.first_frame import StartMarkers, start_noise_m
 from markerless_tracker.tracking.tracker import Tracker
 
-
 _USUAL_STATURE_M = 1.72
 """What an unknown person is taken for until somebody is found."""
 

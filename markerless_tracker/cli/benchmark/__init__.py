@@ -2,15 +2,16 @@
 
 import argparse
 
-from markerless_tracker.cli.benchmark import speed, tables
+from markerless_tracker.cli.benchmark import speed, start, tables
 
 HELP = (
-    "Measure accuracy (tables) or speed (speed). Recordings for tables have a ground_truth.trc: "
-    "its first row is the start and gives the lengths, its rows are the truth."
+    "Measure accuracy (tables), automatic starts (start) or speed (speed). Recordings have a "
+    "ground_truth.trc: in tables its first row is the start and gives the lengths; its rows are "
+    "the truth."
 )
 EXAMPLE = "markerless_tracker benchmark tables RECORDING --fps 60,20 --seeds 6 -o out/tables"
 
-_KINDS = {"tables": tables, "speed": speed}
+_KINDS = {"tables": tables, "speed": speed, "start": start}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

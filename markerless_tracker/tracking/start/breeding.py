@@ -45,9 +45,7 @@ class Breeder:
         self._turn = body.index("pelvis_rz")
         self._tilt = [body.index("pelvis_rx"), body.index("pelvis_ry")]
 
-    def children(
-        self, parents: FloatArray, count: int, rng: np.random.Generator
-    ) -> FloatArray:
+    def children(self, parents: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
         """Children (count, p) of poses (n, p), the best parent first."""
         out = np.empty((count, self._body.size))
         for child in out:

@@ -5,8 +5,9 @@ looks there sees silhouette (Laurentini 1994, on a grid of points). People are w
 of a person's size, seen by two cameras at least.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,7 +18,7 @@ from markerless_tracker.camera import CameraModel, project_camera
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
-COARSE_M = 0.15
+COARSE_M = 0.20
 """Spacing of the room's grid."""
 FINE_M = 0.03
 """Spacing of the grid around a person."""
@@ -28,6 +29,7 @@ LEAST_HEIGHT_M = 0.45
 LEAST_VOLUME_M3 = 0.015
 MOST_VOLUME_M3 = 1.5
 """A person of two metres with the slack of two views; more is a room, not a person."""
+MOST_COARSE_M3 = 6.0
 _REACH_M = 5.0
 _UP_M = 2.5
 _FAR_M = 4.0
@@ -61,41 +63,38 @@ class Hull:
     @property
     def trunk_m(self) -> FloatArray:
         """(m, 3) the thick part: points that lie at least half as deep as the deepest."""
-        return self.points_m[self.depth_m >= _TRUNK_SHARE * self.depth_m.max()]
+        return np.asarray(self.points_m[self.depth_m >= _TRUNK_SHARE * self.depth_m.max()])
 
 
 def find_hulls(
     cameras: Mapping[str, CameraModel], observations: Mapping[str, Observation]
-) -> tuple[Hull, ...]:
-    """The lumps of the visual hull that may be a person, the largest first; () for nobody.
+) -> Iterator[Hull]:
+    """The lumps of the visual hull that may be a person, the largest first; none for nobody.
 
     Args:
         cameras: cameras by name.
         observations: silhouettes of some of them.
     """
+    # A view without any silhouette says nothing about who is there: perhaps it is broken.
     seen = [
         (cameras[name], observation)
         for name, observation in observations.items()
         if observation.mask_words.any()
     ]
-    # A view without any silhouette says nothing about who is there: perhaps it is broken.
     if len(seen) < LEAST_VIEWS:
-        return ()
+        return
     middle = _middle([cameras[name] for name in observations])
     views = [_View.of(camera, observation, middle) for camera, observation in seen]
     low = middle - (_REACH_M, _REACH_M, _UP_M)
     size = np.ceil(2.0 * np.array([_REACH_M, _REACH_M, _UP_M]) / COARSE_M).astype(np.int64)
-    inside, _ = _occupied(low, size, COARSE_M, views)
+    inside, looking = _occupied(low, size, COARSE_M, views)
     labels, count = ndimage.label(inside, structure=np.ones((3, 3, 3)))
-    if count == 0:
-        return ()
-    found = []
-    for number, box in enumerate(ndimage.find_objects(labels), start=1):
-        if int((labels[box] == number).sum()) < 3:
-            continue
-        found.append(_fine(labels, number, box, low, views))
-    lumps = [hull for hull in found if hull is not None]
-    return tuple(sorted(lumps, key=lambda hull: -len(hull.points_m) * hull.views))
+    support = np.bincount(labels[inside], weights=looking[inside], minlength=count + 1)
+    boxes = ndimage.find_objects(labels)
+    for number in np.argsort(-support[1:], kind="stable") + 1:
+        hull = _fine(labels, int(number), boxes[number - 1], low, views)
+        if hull is not None:
+            yield hull
 
 
 def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
@@ -124,17 +123,18 @@ def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Obs
 
 
 def _fine(
-    labels: NDArray[np.int32],
+    labels: NDArray[np.signedinteger[Any]],
     number: int,
     box: tuple[slice, ...],
     low: FloatArray,
     views: "Sequence[_View]",
 ) -> Hull | None:
     """A coarse lump looked at closely; None if it is nobody."""
+    cells = int((labels[box] == number).sum())
+    if cells < 2 or COARSE_M**3 * cells > MOST_COARSE_M3:
+        return None
     first = low + COARSE_M * (np.array([part.start for part in box]) - 1.0)
     extent = COARSE_M * (np.array([part.stop - part.start for part in box]) + 2.0)
-    if COARSE_M**3 * float((labels[box] == number).sum()) > MOST_VOLUME_M3:
-        return None
     size = np.ceil(extent / FINE_M).astype(np.int64)
     inside, looking = _occupied(first, size, FINE_M, views)
     parts, count = ndimage.label(inside)
@@ -177,7 +177,7 @@ class _View:
         for spacing in (COARSE_M, FINE_M):
             grown = 2 * round(0.5 * spacing * scale) + 1
             kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (grown, grown))
-            masks[spacing] = cv2.dilate(mask, kernel)
+            masks[spacing] = cv2.dilate(mask, kernel).astype(np.uint8, copy=False)
         return cls(camera, masks)
 
 

@@ -121,9 +121,7 @@ class FramePopulation:
         costs = self._costs(poses)
         return np.where(np.isfinite(costs), costs, np.inf)
 
-    def refined(
-        self, poses: FloatArray, iterations: int, reach: tuple[float, float]
-    ) -> FloatArray:
+    def refined(self, poses: FloatArray, iterations: int, reach: tuple[float, float]) -> FloatArray:
         """Poses (n, p), each refined on the contours."""
         searcher = self._searcher
         scale = 1.0 / (CORRELATION_M * searcher.config.refine_sigma_m**2)

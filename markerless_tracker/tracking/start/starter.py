@@ -32,7 +32,8 @@ _WALKED_M, _WALK_M_S, _WALK_BONUS = 0.05, 0.25, 0.01
 _GENERATION_SHARE = 0.5
 _SHAPE_FRAMES = 5
 _SHAPE_SLACK = 0.01
-_LAST = (6, (0.10, 0.035))
+_RESIZED_AFTER = 3
+_RESIZE = (4, (0.12, 0.05))
 _TRUNK_MARKERS = [0, 1]
 
 Select = Callable[
@@ -170,7 +171,7 @@ class Starter:
         population = frame.sown(hull)
         for generation in range(GENERATIONS):
             population = frame.bred(population, generation)
-            if self._sized is not None and generation in (2, GENERATIONS - 2):
+            if self._sized is not None and generation == _RESIZED_AFTER:
                 frame, population = self._resize(
                     frame, population, height_m, observations, stamp_ns
                 )
@@ -187,13 +188,12 @@ class Starter:
         """Try other statures; the one whose best pose explains the views best is kept."""
         assert self._sized is not None and self._searcher is not None
         best = (float(population.costs[0]), frame, population, self._searcher)
-        tried = population.poses[:2]
         for share in STATURES:
             stature_m = float(np.clip(share * height_m, *_STATURE_RANGE_M))
             searcher = self._searcher_for(self._sized(stature_m))
             moved = scaled_to(self._searcher.body, searcher.body, population.poses)
             other = FramePopulation(searcher, observations, stamp_ns, moved[0])
-            cost = float(other.costs(other.refined(moved[: len(tried)], *_LAST)).min())
+            cost = float(other.costs(other.refined(moved[:1], *_RESIZE))[0])
             if cost < best[0]:
                 best = (cost, other, Population(moved, population.costs, population.headings),
                         searcher)  # fmt: skip
@@ -252,4 +252,3 @@ class Starter:
     def _trunk(self, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None
         return np.asarray(markers(self._searcher.body, pose)[_TRUNK_MARKERS].mean(axis=0))
-
