@@ -23,7 +23,7 @@ HELP = (
     "Track the person in a recording folder, a Pose2Sim project or a bag, as fast as it goes, and "
     "write NAME.trc (15 markers, metres) and NAME.json (settings, state, fitness, parameters)."
 )
-EXAMPLE = "markerless_tracker track RECORDING -o out/walk --start RECORDING/ground_truth.trc"
+EXAMPLE = "markerless_tracker track RECORDING -o out/walk --stature 1.75"
 
 _KEYS = ("optimizer", "body", "evaluations", "seed", "threads")
 
@@ -34,7 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", dest="name", type=Path, required=True, metavar="NAME", help="result without suffix"
     )
-    parser.add_argument("--start", type=Path, metavar="TRC|YAML", help="start pose")
+    parser.add_argument(
+        "--start", type=Path, metavar="TRC|YAML", help="start pose; default: found by itself"
+    )
     parser.add_argument("--subject", type=Path, metavar="FILE", help="subject file")
     parser.add_argument(
         "--subject-from", type=Path, metavar="TRC", help="measure the subject on its first row"

@@ -197,7 +197,6 @@ def test_a_subject_serves_every_shipped_body() -> None:
     assert from_small == pytest.approx(person.lengths_m)
 
 
-
 def test_a_missing_length_comes_from_the_stature_of_the_others() -> None:
     lengths = dict(subject_from_stature(DESCRIPTION, 1.5).lengths_m)
     del lengths["l_thigh"]

@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         json.dump(table, sys.stdout, indent=2, allow_nan=False)
         sys.stdout.write("\n")
         return 0
-    console = Console(width=None if sys.stdout.isatty() else 120)
+    console = Console(width=None if sys.stdout.isatty() else 160)
     console.print(_rendered(rows, args.frames))
     console.print(
         f"Error, heading: in frame {args.frames} of each start; reached: mean error of at most "

@@ -29,7 +29,7 @@ def cameras(scene):
 
 
 def test_the_hull_holds_the_person_and_little_else(person) -> None:
-    scene, masks, pose = person
+    scene, masks, _ = person
     hull, *others = find_hulls(cameras(scene), observed(masks))
     assert not others
     points = scene.markers(0)
