@@ -73,7 +73,7 @@ def measure_starts(
             Path(folder),
             progress=lambda n: report(f"evidence of {recording.name}", n, recording.frame_count),
         )
-        truth = _truth(evidence, reference)
+        truth = true_markers(evidence, reference)
         firsts = [
             k
             for k in range(0, len(truth) - plan.frames + 1, plan.every)
@@ -129,7 +129,7 @@ def one_start(
         seconds = time.perf_counter() - began
         if result.pose is not None and first_pose_s is None:
             first_pose_s = seconds
-        errors.append(_error_mm(result, true))
+        errors.append(error_mm(result, true))
         turned |= any("turned round" in warning for warning in result.warnings)
         off = None
         if result.markers_m is not None:
@@ -172,7 +172,7 @@ def summarise(starts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _truth(evidence: Evidence, reference: MarkerTrack) -> NDArray[np.float64]:
+def true_markers(evidence: Evidence, reference: MarkerTrack) -> NDArray[np.float64]:
     """True markers (n, 15, 3) of the evidence's frames, NaN where there are none."""
     stamps = np.array(evidence.stamps_ns, dtype=np.int64)
     out = np.full((len(stamps), len(MARKER_NAMES), 3), np.nan)
@@ -185,7 +185,7 @@ def _truth(evidence: Evidence, reference: MarkerTrack) -> NDArray[np.float64]:
     return out
 
 
-def _error_mm(result: TrackResult, true: NDArray[np.float64]) -> float | None:
+def error_mm(result: TrackResult, true: NDArray[np.float64]) -> float | None:
     if result.markers_m is None:
         return None
     gaps = np.linalg.norm(result.markers_m - true, axis=1)

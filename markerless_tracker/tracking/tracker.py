@@ -16,10 +16,11 @@ from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
 from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first_frame
-from markerless_tracker.tracking.loss import next_state
+from markerless_tracker.tracking.loss import Track
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.stages import frame_stages
 from markerless_tracker.tracking.start.starter import Starter
+from markerless_tracker.tracking.views import ViewWatch, anybody
 
 TRAINING_RATE_HZ = 60.0
 """The published spreads are changes between frames at this rate."""
@@ -65,7 +66,8 @@ class Tracker:
     ) -> None:
         self.rig = rig
         self.config = config
-        self.state = TrackState.SEARCHING
+        self._track = Track()
+        self._views = ViewWatch(rig)
         self._generic = body
         given = start_pose is not None
         self._start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
@@ -84,12 +86,11 @@ class Tracker:
         self._shape_fitted = not self._fit_shape
         self._start_markers = start_markers
         self._searcher = self._searcher_for(body)
-        self._starter = Starter(
+        self._first_starter = None if given else Starter(
             rig, body, self._searcher_for, self._evidence.select,
             sized=sized, fit_shape=self._fit_shape,
         )  # fmt: skip
-        self._seeks = not given
-        self._seeking = self._seeks
+        self._starter = self._first_starter
         low, high = self._searcher.limits
         for name, value, a, b in zip(body.parameter_names, self._start, low, high, strict=True):
             if given and not a <= value <= b:
@@ -98,6 +99,11 @@ class Tracker:
                 )
         # Refuses a budget that cannot be spent before the first frame comes.
         frame_stages(body, config, self._pose, body.sigma)
+
+    @property
+    def state(self) -> TrackState:
+        """State after the last step."""
+        return self._track.state
 
     @property
     def body(self) -> BodyModel:
@@ -109,9 +115,11 @@ class Tracker:
         self._pose = self._start
         self._velocity_per_ns = np.zeros(self._generic.size)
         self._stamp_ns = None
-        self.state = TrackState.SEARCHING
-        self._starter.reset()
-        self._seeking = self._seeks
+        self._track = Track()
+        self._views.reset()
+        self._starter = self._first_starter
+        if self._starter is not None:
+            self._starter.reset()
         if self._fit_shape:
             self._shape_fitted = False
             self._searcher = self._searcher_for(self._generic)
@@ -131,7 +139,7 @@ class Tracker:
             blank[camera.name] = Observation.from_mask(camera.name, 0, nothing, nothing)
         # The most work and the least: whether threads are woken depends on it.
         for views in (blank, dict(list(blank.items())[:1])):
-            self._seeking = False
+            self._starter = None
             self.step(views, 0)
             self.reset()
 
@@ -148,34 +156,81 @@ class Tracker:
                 fit its calibration or background; names the camera.
         """
         observed = self._evidence.observe(views, stamp_ns)
-        if self._seeking:
-            return self._seek(observed, stamp_ns)
         predicted = self._predict(stamp_ns)
-        observations, warnings = self._evidence.select(observed, self.body, predicted)
+        expected = predicted if self.state is TrackState.TRACKING else None
+        believed, notes = self._views.sort(observed, self.body, expected)
+        if not anybody(believed):
+            return self._unseen(observed, stamp_ns, notes)
+        if self._starter is not None:
+            return self._seek(self._starter, believed, stamp_ns, notes)
+        observations, warnings = self._evidence.select(believed, self.body, predicted)
         if not self._shape_fitted:
             self._shape_fitted = True
             predicted = self._take_shape(observations, stamp_ns)
         search = self._searcher.frame(observations, stamp_ns, predicted)
         sigma = self.body.sigma * self._rate_factor(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
-        return self._conclude(search, stamp_ns, observations, warnings)
+        result = self._conclude(search, stamp_ns, observations, notes + warnings)
+        if self.config.search_again and self._track.given_up(stamp_ns):
+            self._look_again()
+        return result
 
-    def _seek(self, observed: Mapping[str, Observation], stamp_ns: int) -> TrackResult:
+    def _unseen(
+        self, observed: Mapping[str, Observation], stamp_ns: int, notes: tuple[str, ...]
+    ) -> TrackResult:
+        """Nobody, in any view that can be believed."""
+        if self._starter is not None:
+            self._starter.reset()
+        if self._starter is not None or self.state is TrackState.SEARCHING:
+            return self._nobody(observed, stamp_ns, notes)
+        self._track.note(0.0, stamp_ns)
+        self._velocity_per_ns = np.zeros(self.body.size)
+        if self.config.search_again and self._track.given_up(stamp_ns):
+            self._look_again()
+        return self._without_pose(observed, stamp_ns, notes)
+
+    def _look_again(self) -> None:
+        """From the next step on look for the body that was lost."""
+        self._starter = Starter(
+            self.rig, self.body, self._searcher_for, self._evidence.select,
+            fit_shape=False, last_pose=self._pose,
+        )  # fmt: skip
+
+    def _nobody(
+        self, observed: Mapping[str, Observation], stamp_ns: int, notes: tuple[str, ...]
+    ) -> TrackResult:
+        self._track = Track()
+        return self._without_pose(observed, stamp_ns, notes)
+
+    def _without_pose(
+        self, observed: Mapping[str, Observation], stamp_ns: int, notes: tuple[str, ...]
+    ) -> TrackResult:
+        return TrackResult(
+            stamp_ns=stamp_ns, state=self.state, pose=None, markers_m=None,
+            fitness=float("nan"), agreement={}, evaluations=0, observations=observed,
+            warnings=notes,
+        )  # fmt: skip
+
+    def _seek(
+        self,
+        starter: Starter,
+        observed: Mapping[str, Observation],
+        stamp_ns: int,
+        notes: tuple[str, ...],
+    ) -> TrackResult:
         """Look for somebody; no pose if nobody is there."""
-        found = self._starter.step(observed, stamp_ns)
+        found = starter.step(observed, stamp_ns)
         if found is None:
-            self.state = TrackState.SEARCHING
-            return TrackResult(
-                stamp_ns=stamp_ns, state=self.state, pose=None, markers_m=None,
-                fitness=float("nan"), agreement={}, evaluations=0, observations=observed,
-            )  # fmt: skip
+            return self._nobody(observed, stamp_ns, notes)
         self._searcher = found.searcher
         search = self._searcher.frame(found.observations, stamp_ns, found.pose)
         if found.settled:
-            self._seeking, self._shape_fitted = False, True
-            self._starter.reset()
+            self._starter, self._shape_fitted = None, True
             search.run(frame_stages(self.body, self.config, found.pose, self.body.sigma))
-        return self._conclude(search, stamp_ns, found.observations, found.notes)
+        result = self._conclude(search, stamp_ns, found.observations, notes + found.notes)
+        # Poses of a search jump, that is no motion.
+        self._velocity_per_ns = np.zeros(self.body.size)
+        return result
 
     def _take_shape(self, observations: Mapping[str, Observation], stamp_ns: int) -> FloatArray:
         """Fit the body's sections to the first frame; returns the start pose (p,) to go on from."""
@@ -203,7 +258,7 @@ class Tracker:
     ) -> TrackResult:
         terms = search.terms()
         overlap = float(np.mean([t.overlap for t in terms.values()]))
-        self.state = next_state(self.state, overlap)
+        self._track.note(overlap, stamp_ns)
         elapsed_ns = stamp_ns - self._stamp_ns if self._stamp_ns is not None else 0
         moving = elapsed_ns > 0 and self.state is TrackState.TRACKING
         change = search.pose - self._pose

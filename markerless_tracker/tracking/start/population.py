@@ -85,15 +85,16 @@ class FramePopulation:
         self._costs = searcher.fitness.prepare(self.contours.views, stage)
         self._breeder = Breeder(searcher.body, searcher.limits)
 
-    def sown(self, hull: Hull) -> Population:
-        """The best first guesses of every heading, refined."""
+    def sown(self, hull: Hull, hints: FloatArray | None = None) -> Population:
+        """The best first guesses of every heading, and hints (n, p), refined."""
         rng = keyed_generator(self._searcher.config.seed, self._stamp_ns, "sow")
         guesses = first_guesses(self._searcher.body, self._searcher.limits, hull, rng)
         costs = self.costs(guesses.reshape(-1, guesses.shape[2])).reshape(guesses.shape[:2])
         best = np.argsort(costs, axis=1, kind="stable")[:, :_PER_HEADING]
         order = np.argsort(np.take_along_axis(costs, best, axis=1).ravel(), kind="stable")[:_SOWN]
         chosen = np.take_along_axis(guesses, best[:, :, None], axis=1).reshape(-1, guesses.shape[2])
-        return self.selected(self.refined(chosen[order], *_SOW))
+        sown = chosen[order] if hints is None else np.concatenate([hints, chosen[order]])
+        return self.selected(self.refined(sown, *_SOW))
 
     def bred(self, population: Population, generation: int, *, share: float = 1.0) -> Population:
         """One more generation.

@@ -90,6 +90,14 @@ def first_guesses(
     return out
 
 
+def put_at(body: BodyModel, hull: Hull, pose: FloatArray) -> FloatArray:
+    """A pose (p,) with its trunk moved to where the hull's is."""
+    moved = pose.copy()
+    at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
+    moved[at] += hull.trunk_m.mean(axis=0) - _trunk_middle(body, pose)
+    return moved
+
+
 def _trunk_middle(body: BodyModel, pose: FloatArray) -> FloatArray:
     cones = [i for i, name in enumerate(body.cone_names) if name in _LIKE_TRUNK]
     placed = cone_transforms(body, pose)[cones or slice(None)]

@@ -15,6 +15,7 @@ from markerless_tracker.records import Observation
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull, find_hulls, hulls_part
 from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
+from markerless_tracker.tracking.start.postures import put_at
 
 SETTLING_FRAMES = 8
 """Frames from the first pose to the one from which on it is tracked like any other."""
@@ -86,6 +87,7 @@ class Starter:
         select: keeps the parts of silhouettes that a pose explains.
         sized: makes the body of a stature, if that is unknown.
         fit_shape: whether to fit the sections in the end.
+        last_pose: (p,) where the body was when it was lost.
     """
 
     def __init__(
@@ -97,6 +99,7 @@ class Starter:
         *,
         sized: Callable[[float], BodyModel] | None = None,
         fit_shape: bool = True,
+        last_pose: FloatArray | None = None,
     ) -> None:
         self._cameras = {camera.name: camera for camera in rig}
         self._body = body
@@ -104,6 +107,7 @@ class Starter:
         self._select = select
         self._sized = sized
         self._fit_shape = fit_shape
+        self._last_pose = last_pose
         self.reset()
 
     def reset(self) -> None:
@@ -168,7 +172,10 @@ class Starter:
         near = body.neutral.copy()
         near[[body.index(f"pelvis_t{axis}") for axis in "xyz"]] = hull.trunk_m.mean(axis=0)
         frame = FramePopulation(self._searcher, observations, stamp_ns, near)
-        population = frame.sown(hull)
+        hints = None
+        if self._last_pose is not None:
+            hints = np.array([self._last_pose, put_at(body, hull, self._last_pose)])
+        population = frame.sown(hull, hints)
         for generation in range(GENERATIONS):
             population = frame.bred(population, generation)
             if self._sized is not None and generation == _RESIZED_AFTER:
