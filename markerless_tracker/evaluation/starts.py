@@ -186,6 +186,7 @@ def true_markers(evidence: Evidence, reference: MarkerTrack) -> NDArray[np.float
 
 
 def error_mm(result: TrackResult, true: NDArray[np.float64]) -> float | None:
+    """Mean distance (mm) of a result's markers from true ones (15, 3), over those there are."""
     if result.markers_m is None:
         return None
     gaps = np.linalg.norm(result.markers_m - true, axis=1)

@@ -123,6 +123,7 @@ def build_tracker(
             None if named or start is None else _start_markers(description, subject, start)
         ),
         sized=sized,
+        lengths_measured=stature is None and sized is None,
     )
     return TrackerSetup(tracker, None if start is None else start.stamp_ns)
 

@@ -12,7 +12,8 @@ from markerless_tracker.errors import BodyModelError
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image
-from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.records import Confidence, Observation, TrackResult, TrackState
+from markerless_tracker.tracking.confidence import confidence_of
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
 from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first_frame
@@ -45,6 +46,7 @@ class Tracker:
         start_markers: the markers that gave the start pose; noisy ones are settled on the first
             frame's silhouettes before the shape is fitted.
         sized: makes the body of a stature (m), if the person's is unknown and looked for.
+        lengths_measured: whether the body's lengths are the person's, not those of a stature.
 
     Raises:
         BodyModelError: the start pose has another size, is not finite or breaks a joint limit.
@@ -63,9 +65,11 @@ class Tracker:
         shape_known: bool = False,
         start_markers: StartMarkers | None = None,
         sized: Callable[[float], BodyModel] | None = None,
+        lengths_measured: bool = True,
     ) -> None:
         self.rig = rig
         self.config = config
+        self._measured = lengths_measured
         self._track = Track()
         self._views = ViewWatch(rig)
         self._generic = body
@@ -207,8 +211,8 @@ class Tracker:
     ) -> TrackResult:
         return TrackResult(
             stamp_ns=stamp_ns, state=self.state, pose=None, markers_m=None,
-            fitness=float("nan"), agreement={}, evaluations=0, observations=observed,
-            warnings=notes,
+            fitness=float("nan"), evaluations=0, observations=observed, warnings=notes,
+            agreement=dict.fromkeys(observed, 0.0) if self.state is TrackState.LOST else {},
         )  # fmt: skip
 
     def _seek(
@@ -276,7 +280,13 @@ class Tracker:
             refinements=search.refinements,
             observations=observations,
             warnings=warnings,
+            confidence=self._confidence(search),
         )
+
+    def _confidence(self, search: FrameSearch) -> Confidence | None:
+        if self.config.refinement == "none":
+            return None
+        return confidence_of(self.body, search.pose, search.contours, measured=self._measured)
 
     def _predict(self, stamp_ns: int) -> FloatArray:
         """The pose (p,) expected at a time: the last one moved on, with damped velocity."""

@@ -5,9 +5,9 @@ import argparse
 from markerless_tracker.cli.benchmark import recovery, speed, start, tables
 
 HELP = (
-    "Measure accuracy (tables), automatic starts (start), recovery or speed (speed). Recordings have a "
-    "ground_truth.trc: in tables its first row is the start and gives the lengths; its rows are "
-    "the truth."
+    "Measure accuracy (tables), automatic starts (start), recovery or speed (speed). Recordings "
+    "have a ground_truth.trc: in tables its first row is the start and gives the lengths; its rows "
+    "are the truth."
 )
 EXAMPLE = "markerless_tracker benchmark tables RECORDING --fps 60,20 --seeds 6 -o out/tables"
 
