@@ -105,6 +105,11 @@ class TrackerConfig(ImagingSettings):
         least=0.0,
         most=1.0,
     )
+    smoothing: str = setting(
+        "none",
+        "one_euro: results pass a causal filter that calms what stands; none",
+        choices=("none", "one_euro"),
+    )
     search_again: bool = setting(
         True, "look for a body anew that has been lost for a tenth of a second"
     )

@@ -19,6 +19,7 @@ from markerless_tracker.tracking.evidence import EvidenceMaker
 from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first_frame
 from markerless_tracker.tracking.loss import Track
 from markerless_tracker.tracking.search import FrameSearch, Searcher
+from markerless_tracker.tracking.smoothing import OneEuro
 from markerless_tracker.tracking.stages import frame_stages
 from markerless_tracker.tracking.start.starter import Starter
 from markerless_tracker.tracking.views import ViewWatch, anybody
@@ -70,6 +71,7 @@ class Tracker:
         self.rig = rig
         self.config = config
         self._measured = lengths_measured
+        self._smooth = OneEuro(body) if config.smoothing == "one_euro" else None
         self._track = Track()
         self._views = ViewWatch(rig)
         self._generic = body
@@ -121,6 +123,8 @@ class Tracker:
         self._stamp_ns = None
         self._track = Track()
         self._views.reset()
+        if self._smooth is not None:
+            self._smooth.reset()
         self._starter = self._first_starter
         if self._starter is not None:
             self._starter.reset()
@@ -195,6 +199,8 @@ class Tracker:
 
     def _look_again(self) -> None:
         """From the next step on look for the body that was lost."""
+        if self._smooth is not None:
+            self._smooth.reset()
         self._starter = Starter(
             self.rig, self.body, self._searcher_for, self._evidence.select,
             fit_shape=False, last_pose=self._pose,
@@ -226,6 +232,9 @@ class Tracker:
         found = starter.step(observed, stamp_ns)
         if found is None:
             return self._nobody(observed, stamp_ns, notes)
+        if self._smooth is not None:
+            # A person turned round, or found elsewhere, has not moved there.
+            self._smooth.reset()
         self._searcher = found.searcher
         search = self._searcher.frame(found.observations, stamp_ns, found.pose)
         if found.settled:
@@ -269,11 +278,14 @@ class Tracker:
         self._velocity_per_ns = change / elapsed_ns if moving else np.zeros(change.size)
         self._pose = search.pose
         self._stamp_ns = stamp_ns
+        shown = search.pose
+        if self._smooth is not None:
+            shown = np.clip(self._smooth(shown, stamp_ns), *self._searcher.limits)
         return TrackResult(
             stamp_ns=stamp_ns,
             state=self.state,
-            pose=search.pose,
-            markers_m=markers(self.body, search.pose),
+            pose=shown,
+            markers_m=markers(self.body, shown),
             fitness=float(np.mean([t.silhouette + t.edges for t in terms.values()])),
             agreement={name: t.overlap for name, t in terms.items()},
             evaluations=search.evaluations,

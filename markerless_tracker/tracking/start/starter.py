@@ -20,6 +20,7 @@ from markerless_tracker.tracking.start.postures import put_at
 SETTLING_FRAMES = 8
 """Frames from the first pose to the one from which on it is tracked like any other."""
 GENERATIONS = 7
+SECOND_GENERATIONS = 5
 STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
 """Statures that are tried for somebody unknown, in heights of the hull; raised arms make it
 higher than the person."""
@@ -131,6 +132,8 @@ class Starter:
         )
         frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
         population = frame.followed(population)
+        if len(self._seen[0]) == 1:
+            population = self._second_look(frame, population, observations)
         population = frame.bred(population, 0, share=_GENERATION_SHARE)
         if 1.0 - population.costs[0] < LEAST_FIT:
             self.reset()
@@ -162,6 +165,21 @@ class Starter:
             assert self._searcher is not None
             return Found(self._searcher, population.poses[0], observations, False)
         return None
+
+    def _second_look(
+        self,
+        frame: FramePopulation,
+        population: Population,
+        observations: Mapping[str, Observation],
+    ) -> Population:
+        """Search the second frame from nothing, too: what one search missed, another finds."""
+        hull = next(find_hulls(self._cameras, observations), None)
+        if hull is None:
+            return population
+        fresh = frame.sown(hull)
+        for generation in range(1, 1 + SECOND_GENERATIONS):
+            fresh = frame.bred(fresh, generation)
+        return frame.selected(np.concatenate([population.poses, fresh.poses]))
 
     def _search(
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
