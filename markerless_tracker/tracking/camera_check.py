@@ -29,6 +29,7 @@ _LEAST_CHECKS = 3
 _ITERATIONS = 4
 _REACH_M = (0.10, 0.035)
 _WIDE_M = 0.10
+_SHIFTS = 3
 
 
 @dataclass(frozen=True)
@@ -175,19 +176,35 @@ def _shift(
     pose: FloatArray,
     stamp_ns: int,
 ) -> tuple[float, float, float] | None:
-    """Shift (u, v) px of one view by weighted least squares on its residuals, and px per metre."""
-    contours = searcher.frame({camera.name: observation}, stamp_ns, pose).contours
-    contours.collect(pose, _WIDE_M)
-    rows = slice(int(contours.residuals.count[0]))
-    value, weight = contours.residuals.value[0, rows], contours.residuals.weight[0, rows]
-    gradient = contours.residuals.gradient[0, rows]
+    """Shift (u, v) px of one view that lays the body over it, and px per metre.
+
+    Weighted least squares on the contours' residuals, repeated with the camera moved by the shift
+    so far, since residuals count the less the larger they are.
+    """
     to_camera = camera.T_cam_world
     at = pose[[searcher.body.index(f"pelvis_t{axis}") for axis in "xyz"]]
     depth = float(to_camera[2, :3] @ at + to_camera[2, 3])
-    focal = np.array([camera.matrix[0, 0], camera.matrix[1, 1]])
-    slopes = gradient @ to_camera[:2, :3].T * (depth / focal)
-    normal = slopes.T @ (weight[:, None] * slopes)
-    if depth <= 0.0 or np.linalg.matrix_rank(normal) < 2:
+    if depth <= 0.0:
         return None
-    u, v = -np.linalg.solve(normal, slopes.T @ (weight * value))
-    return float(u), float(v), float(focal.mean()) / depth
+    focal = np.array([camera.matrix[0, 0], camera.matrix[1, 1]])
+    shift = np.zeros(2)
+    for _ in range(_SHIFTS):
+        matrix = camera.matrix.copy()
+        matrix[:2, 2] += shift
+        alone = Searcher(
+            CameraRig((replace(camera, matrix=matrix),)),
+            searcher.body,
+            searcher.config,
+            limits=searcher.limits,
+            threads=1,
+        )
+        contours = alone.frame({camera.name: observation}, stamp_ns, pose).contours
+        contours.collect(pose, _WIDE_M)
+        rows = slice(int(contours.residuals.count[0]))
+        value, weight = contours.residuals.value[0, rows], contours.residuals.weight[0, rows]
+        slopes = contours.residuals.gradient[0, rows] @ to_camera[:2, :3].T * (depth / focal)
+        normal = slopes.T @ (weight[:, None] * slopes)
+        if np.linalg.matrix_rank(normal) < 2:
+            return None
+        shift = shift - np.linalg.solve(normal, slopes.T @ (weight * value))
+    return float(shift[0]), float(shift[1]), float(focal.mean()) / depth
