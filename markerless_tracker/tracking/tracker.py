@@ -17,6 +17,7 @@ from markerless_tracker.tracking.confidence import confidence_of
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
 from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first_frame
+from markerless_tracker.tracking.limbs import LimbWatch
 from markerless_tracker.tracking.loss import Track
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.smoothing import OneEuro
@@ -74,6 +75,8 @@ class Tracker:
         self._smooth = OneEuro(body) if config.smoothing == "one_euro" else None
         self._track = Track()
         self._views = ViewWatch(rig)
+        self._limbs = LimbWatch(rig)
+        self._mends = config.search_again and config.refinement != "none"
         self._generic = body
         given = start_pose is not None
         self._start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
@@ -123,6 +126,7 @@ class Tracker:
         self._stamp_ns = None
         self._track = Track()
         self._views.reset()
+        self._limbs.reset()
         if self._smooth is not None:
             self._smooth.reset()
         self._starter = self._first_starter
@@ -178,6 +182,11 @@ class Tracker:
         search = self._searcher.frame(observations, stamp_ns, predicted)
         sigma = self.body.sigma * self._rate_factor(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
+        if self._mends:
+            search.pose, found = self._limbs.mend(
+                self._searcher, observations, stamp_ns, search.pose
+            )
+            notes += found
         result = self._conclude(search, stamp_ns, observations, notes + warnings)
         if self.config.search_again and self._track.given_up(stamp_ns):
             self._look_again()

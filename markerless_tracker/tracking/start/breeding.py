@@ -56,6 +56,19 @@ class Breeder:
                 self._mix(child, parents, rng)
         return np.clip(out, self._limits[0], self._limits[1], out=out)
 
+    def with_limb(
+        self,
+        pose: FloatArray,
+        limb: np.ndarray[tuple[int], np.dtype[np.int64]],
+        count: int,
+        rng: np.random.Generator,
+    ) -> FloatArray:
+        """Poses (count, p): one with a limb's parameters drawn anew."""
+        out = np.tile(pose, (count, 1))
+        for child in out:
+            self._draw(child, limb, rng)
+        return out
+
     def _draw(
         self, child: FloatArray, limb: np.ndarray[tuple[int], np.dtype[np.int64]],
         rng: np.random.Generator,
