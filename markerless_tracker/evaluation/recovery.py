@@ -100,7 +100,10 @@ def measure_recovery(
             tracker.warm_up()
             begins = round((_FIRST_S + _LATER_S * seed) * recording.fps)
             calm = _errors(tracker, frames, truth)
-            usual.append(float(np.nanmean(calm[round(SETTLED_S * recording.fps) :])))
+            settled = min(round(SETTLED_S * recording.fps), len(calm) // 2)
+            if not np.isfinite(calm[settled:]).any():
+                raise DatasetError(f"{source}: nobody was tracked, seed {seed}: nothing to disturb")
+            usual.append(float(np.nanmean(calm[settled:])))
             report(f"runs on {recording.name}", seed * (1 + len(DISTURBANCES)) + 1, total)
             for number, disturbance in enumerate(DISTURBANCES):
                 ends = begins + round(disturbance.seconds * recording.fps)

@@ -100,3 +100,71 @@ def test_a_given_shape_is_not_fitted_again(walk, tmp_path) -> None:
     results = [tracker.step(seen, stamp) for stamp, seen, _ in taken]
     np.testing.assert_array_equal(tracker.body.cone_shape, scene.body.cone_shape)
     assert error_mm(results[-1], taken[-1][2]) < 25.0
+
+
+def blind(seen):
+    """The views of cameras that the light dazzles."""
+    return {
+        name: Observation.from_mask(
+            name, 0, np.ones((view.height, view.width), np.uint8), view.edges
+        )
+        for name, view in seen.items()
+    }
+
+
+def test_a_person_lost_sight_of_is_found_again_elsewhere(walk) -> None:
+    """Blind for a quarter of a second, then the person stands half a metre further on."""
+    scene, taken = walk
+    tracker = tracker_of(scene, stature=1.72)
+    for stamp, seen, _ in taken:
+        tracker.step(seen, stamp)
+    body, stamp = tracker.body, taken[-1][0]
+    states = []
+    for _ in range(15):
+        stamp += 16_666_667
+        result = tracker.step(blind(taken[-1][1]), stamp)
+        assert result.pose is None
+        states.append(result.state)
+    assert states[0] is TrackState.LOST and states[-1] is TrackState.SEARCHING
+    _, masks, _ = scene.frame(60)
+    seen = {
+        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+    }
+    points = scene.markers(60)
+    assert np.linalg.norm(points[0] - taken[-1][2][0]) > 0.5
+    result = tracker.step(seen, stamp + 16_666_667)
+    assert result.state is TrackState.TRACKING
+    assert error_mm(result, points) < 80.0
+    assert tracker.body is body
+
+
+def test_some_blind_cameras_are_left_out_and_said(walk) -> None:
+    scene, taken = walk
+    tracker = tracker_of(scene, stature=1.72)
+    for stamp, seen, _ in taken[:-1]:
+        tracker.step(seen, stamp)
+    stamp, seen, points = taken[-1]
+    result = tracker.step({**seen, "cam01": blind(seen)["cam01"]}, stamp)
+    assert "cam01" not in result.agreement and error_mm(result, points) < 60.0
+    assert any(w.startswith("cam01: left out") for w in result.warnings)
+
+
+def test_who_is_turned_round_is_said_once() -> None:
+    """What explains the frames better wins; the first thought may be wrong once."""
+    from markerless_tracker.tracking.start.starter import Starter, _Seen
+
+    scene = SyntheticScene(body="person31", motion="stand", size_px=(64, 48), seed=2)
+    tracker = tracker_of(scene, stature=1.72)
+    starter = Starter(scene.rig, scene.body, tracker._searcher_for, tracker._evidence.select)
+    starter._searcher = tracker._searcher_for(scene.body)
+    pose = scene.pose(0)
+    starter._from_m = starter._trunk(pose)
+    for cost, other in ((0.10, 0.09), (0.10, 0.08)):
+        starter._seen[0].append(_Seen(None, pose, cost))
+        starter._seen[1].append(_Seen(None, pose, other))
+    (note,) = starter._turn(33_000_000)
+    assert "turned round" in note
+    for seen, cost in zip(starter._seen, (0.01, 0.2), strict=True):
+        seen.append(_Seen(None, pose, cost))
+    assert starter._turn(50_000_000) == ()
