@@ -181,6 +181,26 @@ class TrackState(Enum):
 
 
 @dataclass(frozen=True, eq=False)
+class Confidence:
+    """How sure a pose of p parameters is: standard deviations, in m and rad.
+
+    Attributes:
+        pose_sd: (p,) of each parameter.
+        markers_sd_m: (15, 3) of each marker, along the world's axes.
+        root_covariance: (6, 6) of the root frame: x, y, z, and small turns about the world's x, y
+            and z axis.
+    """
+
+    pose_sd: NDArray[np.float64]
+    markers_sd_m: NDArray[np.float64]
+    root_covariance: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        for name in ("pose_sd", "markers_sd_m", "root_covariance"):
+            object.__setattr__(self, name, locked(getattr(self, name), np.float64))
+
+
+@dataclass(frozen=True, eq=False)
 class TrackResult:
     """What `Tracker.step` found in one set of images.
 
@@ -195,6 +215,7 @@ class TrackResult:
         refinements: iterations of contour refinement spent on this frame.
         observations: the evidence each camera gave.
         warnings: what the user should know about this frame, one line each.
+        confidence: how sure the pose is, None without contour refinement.
     """
 
     stamp_ns: int
@@ -207,6 +228,7 @@ class TrackResult:
     refinements: int = 0
     observations: Mapping[str, Observation] = field(default_factory=dict, repr=False)
     warnings: tuple[str, ...] = ()
+    confidence: Confidence | None = None
 
     def __post_init__(self) -> None:
         for name in ("pose", "markers_m"):

@@ -49,7 +49,7 @@ class Subject:
 
 
 def subject_from_stature(description: BodyDescription, stature_m: float) -> Subject:
-    """A generic person of that height (fractions of stature after Drillis and Contini).
+    """A generic person of that height, by the description's fractions of stature.
 
     Raises:
         BodyModelError: the stature is not between 0.5 and 2.6 m.

@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +12,21 @@ import yaml
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from markerless_tracker.camera.calibration import write_calibration
 from markerless_tracker.datasets import Recording, open_recording
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.evaluation.result import ResultWriter
 from markerless_tracker.evaluation.run import recording_backgrounds, track_recording
 from markerless_tracker.records import TrackState
 from markerless_tracker.tracking import OPTIMIZERS, PRESETS, TrackerConfig, build_tracker
+from markerless_tracker.tracking.camera_check import CameraCheck, Shift, corrected, describe
 from markerless_tracker.viewing.debug_images import DebugImages
 
 HELP = (
     "Track the person in a recording folder, a Pose2Sim project or a bag, as fast as it goes, and "
     "write NAME.trc (15 markers, metres) and NAME.json (settings, state, fitness, parameters)."
 )
-EXAMPLE = "markerless_tracker track RECORDING -o out/walk --start RECORDING/ground_truth.trc"
+EXAMPLE = "markerless_tracker track RECORDING -o out/walk --stature 1.75"
 
 _KEYS = ("optimizer", "body", "evaluations", "seed", "threads")
 
@@ -34,7 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", dest="name", type=Path, required=True, metavar="NAME", help="result without suffix"
     )
-    parser.add_argument("--start", type=Path, metavar="TRC|YAML", help="start pose")
+    parser.add_argument(
+        "--start", type=Path, metavar="TRC|YAML", help="start pose; default: found by itself"
+    )
     parser.add_argument("--subject", type=Path, metavar="FILE", help="subject file")
     parser.add_argument(
         "--subject-from", type=Path, metavar="TRC", help="measure the subject on its first row"
@@ -73,6 +78,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="per frame and camera: input, evidence, body",
     )
+    parser.add_argument(
+        "--refine-calibration",
+        type=Path,
+        metavar="OUT.toml",
+        help="write the calibration with cameras that disagree with the others corrected",
+    )
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
 
 
@@ -106,10 +117,12 @@ def run(args: argparse.Namespace) -> int:
         )
         started = time.perf_counter()
         frames = 0
+        check = CameraCheck(setup.tracker.rig, config)
         with writer:
             for tracked in track_recording(recording, setup, fps=args.fps):
                 writer.add(tracked.result)
                 writer.body = setup.tracker.body
+                check.add(tracked.result, setup.tracker.body)
                 state = tracked.result.state.value
                 states[state] = states.get(state, 0) + 1
                 if debug:
@@ -120,8 +133,14 @@ def run(args: argparse.Namespace) -> int:
                 bars.update(
                     task, completed=frames, total=_total(recording, setup.start_stamp_ns, rate)
                 )
+            shifts = check.shifts()
+            cameras = _cameras(shifts)
+            writer.note({"cameras": cameras})
         seconds = time.perf_counter() - started
-    for warning in recording.warnings:
+    if args.refine_calibration is not None:
+        full = open_recording(args.source).rig
+        write_calibration(args.refine_calibration, corrected(full, shifts, args.scale))
+    for warning in (*recording.warnings, *describe(shifts)):
         console.print(f"warning: {warning}", markup=False, highlight=False, soft_wrap=True)
     summary: dict[str, Any] = {
         "source": str(args.source),
@@ -130,7 +149,8 @@ def run(args: argparse.Namespace) -> int:
         "states": states,
         "seconds": round(seconds, 3),
         "frames_per_s": round(frames / seconds, 2) if seconds > 0 else None,
-        "warnings": list(recording.warnings),
+        "warnings": [*recording.warnings, *describe(shifts)],
+        "cameras": cameras,
     }
     if args.json:
         json.dump(summary, sys.stdout, indent=2)
@@ -163,6 +183,19 @@ def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
             )
         values = {str(key): value for key, value in (loaded or {}).items()}
     return TrackerConfig.from_mapping({**values, **flags})
+
+
+def _cameras(shifts: Mapping[str, Shift]) -> dict[str, Any]:
+    """How far each camera's silhouettes lie from the body, for JSON."""
+    return {
+        name: {
+            "shift_px": [round(value, 2) for value in shift.px],
+            "shift_mm": round(1000.0 * shift.length_m, 1),
+            "checks": shift.checks,
+            "disagrees": shift.disagrees,
+        }
+        for name, shift in shifts.items()
+    }
 
 
 def _flags(args: argparse.Namespace) -> dict[str, Any]:

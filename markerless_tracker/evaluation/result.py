@@ -130,10 +130,23 @@ class ResultWriter:
                     "refinements": r.refinements,
                     "agreement": dict(r.agreement),
                     "parameters": None if r.pose is None else r.pose.tolist(),
+                    **_confidence(r),
                 }
                 for r in self._results
             ],
         }
+
+
+def _confidence(result: TrackResult) -> dict[str, Any]:
+    """Standard deviations: of the parameters (m, rad), and per marker along x, y, z (mm)."""
+    sure = result.confidence
+    if sure is None:
+        return {}
+    in_mm = np.round(sure.markers_sd_m * 1000.0, 2).tolist()
+    return {
+        "parameters_sd": np.round(sure.pose_sd, 5).tolist(),
+        "markers_sd_mm": dict(zip(MARKER_NAMES, in_mm, strict=True)),
+    }
 
 
 def versions() -> dict[str, str]:

@@ -13,7 +13,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from markerless_tracker.body import BodyModel, cone_transforms, root_transform
 from markerless_tracker.geometry import quaternion_from_rotation
 from markerless_tracker.node.stamps import time_message
-from markerless_tracker.records import TrackState
+from markerless_tracker.records import Confidence, TrackState
 
 WORLD_FRAME = "map"
 """Frame of everything in world coordinates (REP-105)."""
@@ -44,11 +44,24 @@ def joint_state(body: BodyModel, pose: FloatArray, stamp_ns: int) -> JointState:
     )
 
 
-def root_pose(body: BodyModel, pose: FloatArray, stamp_ns: int) -> PoseWithCovarianceStamped:
-    """Pose of the body's root frame in the world; the covariance stays zero (unknown)."""
+def root_pose(
+    body: BodyModel, pose: FloatArray, stamp_ns: int, confidence: Confidence | None = None
+) -> PoseWithCovarianceStamped:
+    """Pose of the body's root frame in the world; the covariance is zero if it is unknown."""
     message = PoseWithCovarianceStamped(header=header(stamp_ns))
     message.pose.pose = _pose(root_transform(body, pose))
+    if confidence is not None:
+        message.pose.covariance = confidence.root_covariance.ravel().tolist()
     return message
+
+
+def joint_deviations(body: BodyModel, confidence: Confidence, stamp_ns: int) -> JointState:
+    """Standard deviation of every joint, rad, where a joint state has the position."""
+    return JointState(
+        header=header(stamp_ns, ""),
+        name=list(body.joint_names),
+        position=confidence.pose_sd[body.joints].tolist(),
+    )
 
 
 def marker_poses(markers_m: FloatArray, stamp_ns: int) -> PoseArray:

@@ -19,7 +19,7 @@ class NodeSettings:
         background_dir: folder of empty-scene images, one image, clip or folder per camera.
         subject_file: sizes of the person.
         stature: the person's stature in m, for those who have no subject file.
-        start_file: TRC or pose YAML to begin with.
+        start_file: TRC or pose YAML to begin with; without one, somebody is looked for.
         scale: factor by which images are made smaller on arrival.
         result_file: NAME of NAME.trc and NAME.json; none are written if None.
         sync_tolerance: s by which the stamps of one set may differ; 0 means equal stamps.

@@ -1,6 +1,6 @@
 """Matching the cameras' images by their stamps; the newest complete set wins."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from threading import Condition
@@ -11,6 +11,11 @@ from markerless_tracker.errors import ConfigError
 View = TypeVar("View")
 
 
+STOPPED_VIEWS = 12
+STOPPED_S = 0.5
+LEAST_CAMERAS = 2
+
+
 class _Entry(NamedTuple, Generic[View]):
     stamp_ns: int
     view: View
@@ -18,7 +23,7 @@ class _Entry(NamedTuple, Generic[View]):
 
 @dataclass(frozen=True)
 class MatchedSet(Generic[View]):
-    """One view of every camera.
+    """One view of every camera that sends.
 
     Attributes:
         stamp_ns: the earliest of their stamps.
@@ -59,6 +64,10 @@ class Synchronizer(Generic[View]):
     anew, or one stamp far in the future, therefore cannot block it. Nothing queues up behind a
     slow consumer: at most one complete set waits, and at most `depth` views per camera.
 
+    A camera that stops after it was heard is waited for no longer once another has sent
+    `STOPPED_VIEWS` views since, over `STOPPED_S` at least: sets are then complete without it, as
+    long as `LEAST_CAMERAS` are left. Its next view takes it back.
+
     Safe to use from several threads; no callback is ever called.
 
     Args:
@@ -84,6 +93,7 @@ class Synchronizer(Generic[View]):
         self._depth = depth
         self._pending: dict[str, deque[_Entry[View]]] = {name: deque() for name in cameras}
         self._heard_s: dict[str, float] = {}
+        self._since: dict[str, Counter[str]] = {name: Counter() for name in cameras}
         self._waiting: MatchedSet[View] | None = None
         self._last_ns: int | None = None
         self._counts = {"complete": 0, "skipped": 0, "incomplete": 0, "restarts": 0}
@@ -116,8 +126,12 @@ class Synchronizer(Generic[View]):
         """
         with self._changed:
             self._heard_s[camera] = now_s
+            self._since[camera].clear()
+            for name in self.cameras:
+                if name != camera:
+                    self._since[name][camera] += 1
             self._pending[camera].append(_Entry(stamp_ns, view))
-            positions = self._match(camera, stamp_ns)
+            positions = self._match(camera, stamp_ns, self._stopped(now_s))
             if positions is None:
                 if len(self._pending[camera]) > self._depth:
                     self._give_up(camera)
@@ -161,10 +175,23 @@ class Synchronizer(Generic[View]):
             self._waiting = None
             return counts
 
-    def _match(self, camera: str, stamp_ns: int) -> dict[str, int] | None:
+    def _stopped(self, now_s: float) -> frozenset[str]:
+        """Cameras that are waited for no longer."""
+        stopped = frozenset(
+            name
+            for name, since in self._since.items()
+            if name in self._heard_s
+            and now_s - self._heard_s[name] >= STOPPED_S
+            and max(since.values(), default=0) >= STOPPED_VIEWS
+        )
+        return stopped if len(self.cameras) - len(stopped) >= LEAST_CAMERAS else frozenset()
+
+    def _match(self, camera: str, stamp_ns: int, stopped: frozenset[str]) -> dict[str, int] | None:
         """Positions of a set's members in the cameras' queues, if that view completes one."""
         positions: dict[str, int] = {}
         for name, queue in self._pending.items():
+            if name in stopped:
+                continue
             if name == camera:
                 positions[name] = len(queue) - 1
                 continue
@@ -178,6 +205,8 @@ class Synchronizer(Generic[View]):
     def _complete(self, positions: Mapping[str, int], now_s: float) -> None:
         members: dict[str, _Entry[View]] = {}
         for name in self.cameras:
+            if name not in positions:
+                continue
             for _ in range(positions[name]):
                 self._give_up(name)
             members[name] = self._pending[name].popleft()

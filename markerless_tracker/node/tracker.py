@@ -187,6 +187,7 @@ class TrackerNode(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._descriptions = self.create_publisher(String, "robot_description", latched)
         self._joint_states = self.create_publisher(JointState, "joint_states", output_qos())
+        self._deviations = self.create_publisher(JointState, "joint_deviations", output_qos())
         self._root_poses = self.create_publisher(
             PoseWithCovarianceStamped, "root_pose", output_qos()
         )
@@ -204,7 +205,10 @@ class TrackerNode(Node):
         if result.pose is not None and result.markers_m is not None:
             pose, points = result.pose, result.markers_m
             self._joint_states.publish(messages.joint_state(body, pose, stamp_ns))
-            self._root_poses.publish(messages.root_pose(body, pose, stamp_ns))
+            sure = result.confidence
+            self._root_poses.publish(messages.root_pose(body, pose, stamp_ns, sure))
+            if sure is not None:
+                self._deviations.publish(messages.joint_deviations(body, sure, stamp_ns))
             self._marker_poses.publish(messages.marker_poses(points, stamp_ns))
             if self._markers.get_subscription_count():
                 self._markers.publish(messages.body_markers(body, pose, points, stamp_ns))

@@ -11,7 +11,7 @@ from markerless_tracker.node.ros import StopSignals, init_context, print_help, r
 _SUMMARY = "Tracks a person in the images of several calibrated cameras."
 _EXAMPLE = (
     "tracker --ros-args -p calibration_file:=bag/calibration.toml "
-    "-p background_dir:=bag/background -p stature:=1.75 -p start_file:=start.yaml"
+    "-p background_dir:=bag/background -p stature:=1.75"
 )
 _CLOSE_S = 5.0
 # A signal is noticed at the latest after this.

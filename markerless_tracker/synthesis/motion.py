@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from markerless_tracker.body import MARKER_NAMES, BodyModel, markers
+from markerless_tracker.body.anatomy import posture
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.synthesis.mesh import body_mesh
@@ -87,9 +88,6 @@ _MOTIONS: Mapping[str, tuple[Callable[[float], Angles], float, float, float, tup
 MOTIONS = tuple(_MOTIONS)
 """Names of the motions."""
 
-# Anatomical directions to the signs of the parameters, for those that differ.
-_NEGATIVE = ("r_hip_x", "l_knee", "r_knee", "l_shoulder_y", "l_elbow", "r_elbow")
-
 
 class Motion:
     """A motion of one body: a smooth function of time, deterministic by its seed.
@@ -142,12 +140,8 @@ class Motion:
 
     def _posture(self, phase: float) -> FloatArray:
         """The pose at the origin with heading 0 and height 0."""
-        pose = self.body.neutral.copy()
-        for name, angle in self._angles(phase).items():
-            if name in self.body.parameter_names:
-                sign = -1.0 if name in _NEGATIVE else 1.0
-                pose[self.body.index(name)] += sign * self._amplitude * angle
-        return pose
+        angles = self._angles(phase)
+        return posture(self.body, {n: self._amplitude * angle for n, angle in angles.items()})
 
     def _solve_height(self) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
         """Fourier coefficients of the pelvis' height that keeps the feet on the floor."""

@@ -21,6 +21,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         "fit_shape": False,
         "prediction": 0.0,
         "refinement": "none",
+        "search_again": False,
         "sigma_scale": 1.0,
     },
 }
@@ -127,6 +128,14 @@ class TrackerConfig(ImagingSettings):
         "share of the last change of pose that is expected again; 0 = zero motion",
         least=0.0,
         most=1.0,
+    )
+    smoothing: str = setting(
+        "none",
+        "one_euro: results pass a causal filter that calms what stands; none",
+        choices=("none", "one_euro"),
+    )
+    search_again: bool = setting(
+        True, "look for a body anew that has been lost for a tenth of a second"
     )
     fit_shape: bool = setting(
         True,

@@ -53,6 +53,36 @@ class EvidenceMaker:
                 )
             self.segmenters[camera.name] = Segmenter(camera.name, background, config)
 
+    def observe(
+        self, views: Mapping[str, Image | Observation], stamp_ns: int
+    ) -> dict[str, Observation]:
+        """Observations of the whole views, as they are; ready-made ones pass.
+
+        Raises:
+            ImageError, CalibrationError: no view, an unknown camera, an image without a background
+                or one that does not fit; names the camera.
+        """
+        self._check(views)
+
+        def evidence(item: tuple[str, Image | Observation]) -> Observation:
+            name, view = item
+            if isinstance(view, Observation):
+                return view
+            return self._segmenter(name).observe(view, stamp_ns)
+
+        return dict(zip(views, self._pool.map(evidence, views.items()), strict=True))
+
+    def select(
+        self, observed: Mapping[str, Observation], body: BodyModel, predicted: FloatArray
+    ) -> tuple[dict[str, Observation], tuple[str, ...]]:
+        """Keep the components that a predicted pose (p,) explains; say what was left out."""
+
+        def part(item: tuple[str, Observation]) -> tuple[Observation, int]:
+            name, observation = item
+            return explained_part(observation, self._rig[name], body, predicted, self._margin_px)
+
+        return _kept(dict(zip(observed, self._pool.map(part, observed.items()), strict=True)))
+
     def gather(
         self,
         views: Mapping[str, Image | Observation],
@@ -62,34 +92,24 @@ class EvidenceMaker:
         *,
         margin_m: float | None,
     ) -> tuple[dict[str, Observation], tuple[str, ...]]:
-        """Observations of the views, and what should be known about them, one line each.
+        """As `observe` and then `select`, in less time while the body is tracked.
 
-        Of the silhouettes only the components stay that a predicted pose (p,) explains. With a
-        margin around the body at that pose, images are looked at there alone, except where that
-        would change what stays, and each camera's whole frame every `full_frame_every` calls.
+        With a margin around the body at the predicted pose, images are looked at there alone,
+        except where that would change what stays, and each camera's whole frame every
+        `full_frame_every` calls.
 
         Raises:
-            ImageError, CalibrationError: no view, an unknown camera, an image without a background
-                or one that does not fit; names the camera.
+            ImageError, CalibrationError: as `observe`.
         """
-        if not views:
-            raise ImageError(f"no view came, expected some of {', '.join(self._rig.names)}")
-        for name in views:
-            self._rig[name]
+        self._check(views)
         self._turn += 1
-
         regions = self.regions(body, predicted, margin_m)
 
         def evidence(item: tuple[str, Image | Observation]) -> tuple[Observation, int]:
             name, view = item
-            camera = self._rig[name]
+            camera, region = self._rig[name], regions[name]
             if not isinstance(view, Observation):
-                if name not in self.segmenters:
-                    raise ImageError(
-                        f"{name}: an image came, but no background to tell the person from"
-                    )
-                segmenter = self.segmenters[name]
-                region = regions[name]
+                segmenter = self._segmenter(name)
                 if region is not None and not self._whole_frame_is_due(name):
                     seen = segmenter.observe(view, stamp_ns, region)
                     found = explained_in_region(
@@ -100,13 +120,7 @@ class EvidenceMaker:
                 view = segmenter.observe(view, stamp_ns)
             return explained_part(view, camera, body, predicted, self._margin_px)
 
-        parts = dict(zip(views, self._pool.map(evidence, views.items()), strict=True))
-        warnings = tuple(
-            f"{name}: {left_out} px of silhouette away from the body left out"
-            for name, (_, left_out) in parts.items()
-            if left_out
-        )
-        return {name: kept for name, (kept, _) in parts.items()}, warnings
+        return _kept(dict(zip(views, self._pool.map(evidence, views.items()), strict=True)))
 
     def regions(
         self, body: BodyModel, predicted: FloatArray, margin_m: float | None
@@ -123,3 +137,26 @@ class EvidenceMaker:
         """Cameras take turns, so that no frame costs much more than others."""
         shift = self._rig.names.index(name) * self._every // len(self._rig)
         return (self._turn + shift) % self._every == 0
+
+    def _check(self, views: Mapping[str, Image | Observation]) -> None:
+        if not views:
+            raise ImageError(f"no view came, expected some of {', '.join(self._rig.names)}")
+        for name in views:
+            self._rig[name]
+
+    def _segmenter(self, name: str) -> Segmenter:
+        if name not in self.segmenters:
+            raise ImageError(f"{name}: an image came, but no background to tell the person from")
+        return self.segmenters[name]
+
+
+def _kept(
+    parts: Mapping[str, tuple[Observation, int]],
+) -> tuple[dict[str, Observation], tuple[str, ...]]:
+    """What is kept of each view, and a line for each of which something was left out."""
+    warnings = tuple(
+        f"{name}: {left_out} px of silhouette away from the body left out"
+        for name, (_, left_out) in parts.items()
+        if left_out
+    )
+    return {name: kept for name, (kept, _) in parts.items()}, warnings

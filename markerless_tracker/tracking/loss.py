@@ -1,16 +1,60 @@
 """Whether the body is still tracked: a pure test on how well the silhouettes agree."""
 
+from dataclasses import dataclass
+
 from markerless_tracker.records import TrackState
 
 LOST_BELOW = 0.40
 REGAINED_ABOVE = 0.55
+LOST_SHARE, REGAINED_SHARE = 0.75, 0.85
+"""The same as shares of the overlap that this track usually has."""
+PATIENCE_NS = 100_000_000
+"""How long a body may be lost before it is looked for anew."""
+_MEMORY = 0.05
 
 
-def next_state(state: TrackState, overlap: float) -> TrackState:
+def next_state(state: TrackState, overlap: float, usual: float = 0.0) -> TrackState:
     """State after a frame whose mean overlap (IoU of body and silhouettes) is given.
 
     One threshold to lose the track and a higher one to regain it, so that it does not flicker.
+
+    Args:
+        state: before the frame.
+        overlap: of the frame; 0 if no view could be used.
+        usual: the overlap that this track usually has, 0 if unknown.
     """
-    if overlap >= REGAINED_ABOVE or (overlap >= LOST_BELOW and state is not TrackState.LOST):
+    regained = max(REGAINED_ABOVE, REGAINED_SHARE * usual)
+    lost = max(LOST_BELOW, LOST_SHARE * usual)
+    if overlap >= regained or (overlap >= lost and state is not TrackState.LOST):
         return TrackState.TRACKING
     return TrackState.LOST
+
+
+@dataclass
+class Track:
+    """What a track's frames were like: for `next_state`, and for how long it has been lost.
+
+    Attributes:
+        state: after the last frame.
+        usual: mean overlap of the tracked frames, recent ones counting more; 0 before the first.
+        lost_since_ns: stamp of the first frame in a row that was lost, None while tracked.
+    """
+
+    state: TrackState = TrackState.SEARCHING
+    usual: float = 0.0
+    lost_since_ns: int | None = None
+
+    def note(self, overlap: float, stamp_ns: int) -> TrackState:
+        """Take a frame's overlap; returns the state after it."""
+        self.state = next_state(self.state, overlap, self.usual)
+        if self.state is TrackState.TRACKING:
+            self.lost_since_ns = None
+            rate = _MEMORY if self.usual else 1.0
+            self.usual += rate * (overlap - self.usual)
+        elif self.lost_since_ns is None:
+            self.lost_since_ns = stamp_ns
+        return self.state
+
+    def given_up(self, stamp_ns: int) -> bool:
+        """Whether it has been lost for too long to be found near where it was."""
+        return self.lost_since_ns is not None and stamp_ns - self.lost_since_ns >= PATIENCE_NS

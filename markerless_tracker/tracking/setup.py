@@ -1,6 +1,6 @@
 """From files and settings to a tracker: what the node and the offline verbs share."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,6 +30,9 @@ from markerless_tracker.tracking.first_frame import StartMarkers, start_noise_m
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.tracker import Tracker
 
+_USUAL_STATURE_M = 1.72
+"""What an unknown person is taken for until somebody is found."""
+
 
 @dataclass(frozen=True)
 class TrackerSetup:
@@ -57,18 +60,17 @@ def build_tracker(
     subject_from: Path | None = None,
     stature: float | None = None,
 ) -> TrackerSetup:
-    """Build a tracker from a start (TRC or YAML) and a subject.
+    """Build a tracker from a start (TRC or YAML) and a subject, from either or from neither.
 
     The subject is the file's, or measured on the first row of a TRC (`subject_from`), or a generic
     person of a stature, or, when none is named, measured on the start's first row; if that row's
-    markers are noisy, the first frame settles the lengths measured on it.
+    markers are noisy, the first frame settles the lengths measured on it. Without a start the
+    tracker finds somebody by itself, without a subject the stature, too.
 
     Raises:
-        ConfigError: no start, more than one subject, or none and the start is no TRC.
+        ConfigError: more than one subject, or none and the start is no TRC.
         TrackerError: a file cannot be read or does not fit.
     """
-    if start_file is None:
-        raise ConfigError("no start pose: name a TRC or a pose YAML (--start, start_file)")
     named = [
         name
         for name, value in (
@@ -81,7 +83,12 @@ def build_tracker(
     if len(named) > 1:
         raise ConfigError(f"{' and '.join(named)} both name a subject, expected one")
     description = load_description(config.body)
-    start = first_row(start_file) if start_file.suffix.lower() == ".trc" else None
+    start = (
+        first_row(start_file)
+        if start_file is not None and start_file.suffix.lower() == ".trc"
+        else None
+    )
+    sized: Callable[[float], BodyModel] | None = None
     if subject_file is not None:
         subject = read_subject(subject_file)
     elif stature is not None:
@@ -90,15 +97,21 @@ def build_tracker(
         subject = subject_from_markers(description, first_row(subject_from).markers_m)
     elif start is not None:
         subject = subject_from_markers(description, start.markers_m)
+    elif start_file is None:
+        subject = subject_from_stature(description, _USUAL_STATURE_M)
+
+        def sized(stature_m: float) -> BodyModel:
+            return build_body(description, subject_from_stature(description, stature_m))
     else:
         raise ConfigError(
             f"{start_file} gives a pose but no subject: name one "
             "(--subject, --subject-from or --stature)"
         )
     body = build_body(description, subject)
+    pose: FloatArray | None = None
     if start is not None:
         pose = pose_from_markers(body, start.markers_m, limits=joint_limits(body, config))
-    else:
+    elif start_file is not None:
         pose = read_pose(start_file, body)
     tracker = Tracker(
         rig,
@@ -110,6 +123,8 @@ def build_tracker(
         start_markers=(
             None if named or start is None else _start_markers(description, subject, start)
         ),
+        sized=sized,
+        lengths_measured=stature is None and sized is None,
     )
     return TrackerSetup(tracker, None if start is None else start.stamp_ns)
 

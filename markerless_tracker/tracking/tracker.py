@@ -1,7 +1,7 @@
 """The one door: `Tracker.step` turns the views of one time into a pose."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -12,14 +12,19 @@ from markerless_tracker.errors import BodyModelError
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image, Region
-from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.records import Confidence, Observation, TrackResult, TrackState
+from markerless_tracker.tracking.confidence import confidence_of
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
 from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first_frame
+from markerless_tracker.tracking.limbs import LimbWatch
 from markerless_tracker.tracking.limits import joint_limits
-from markerless_tracker.tracking.loss import next_state
+from markerless_tracker.tracking.loss import Track
 from markerless_tracker.tracking.search import FrameSearch, Searcher
+from markerless_tracker.tracking.smoothing import OneEuro
 from markerless_tracker.tracking.stages import frame_stages
+from markerless_tracker.tracking.start.starter import Starter
+from markerless_tracker.tracking.views import ViewWatch, anybody
 
 TRAINING_RATE_HZ = 60.0
 """The published spreads are changes between frames at this rate."""
@@ -28,7 +33,7 @@ LIMB_SPEED_M_S = 3.0
 
 
 class Tracker:
-    """Tracks one person, frame by frame, from a start pose.
+    """Tracks one person, frame by frame, from a start pose or from where it finds somebody.
 
     Knows no clock, no ROS and no files: results depend on the arguments alone, and the same ones
     give the same bytes with any number of threads. Calls must come from one thread at a time.
@@ -37,13 +42,16 @@ class Tracker:
         rig: the cameras; views are named after them.
         body: the body with the person's sizes.
         config: every setting.
-        start_pose: (p,) pose near which the first frame's search begins.
+        start_pose: (p,) pose near which the first frame's search begins; None = look for
+            somebody, which takes some frames.
         backgrounds: the empty scene per camera; cameras without one take ready-made observations
             only.
         shape_known: whether the body's sections are this person's; if not, and `fit_shape` is set,
             they are fitted to the first frame's silhouettes with the start pose held.
         start_markers: the markers that gave the start pose; noisy ones are settled on the first
             frame's silhouettes before the shape is fitted.
+        sized: makes the body of a stature (m), if the person's is unknown and looked for.
+        lengths_measured: whether the body's lengths are the person's, not those of a stature.
 
     Raises:
         BodyModelError: the start pose has another size, is not finite or breaks a joint limit.
@@ -57,16 +65,24 @@ class Tracker:
         body: BodyModel,
         config: TrackerConfig,
         *,
-        start_pose: FloatArray,
+        start_pose: FloatArray | None = None,
         backgrounds: Mapping[str, BackgroundModel] | None = None,
         shape_known: bool = False,
         start_markers: StartMarkers | None = None,
+        sized: Callable[[float], BodyModel] | None = None,
+        lengths_measured: bool = True,
     ) -> None:
         self.rig = rig
         self.config = config
-        self.state = TrackState.SEARCHING
+        self._measured = lengths_measured
+        self._smooth = OneEuro(body) if config.smoothing == "one_euro" else None
+        self._track = Track()
+        self._views = ViewWatch(rig)
+        self._limbs = LimbWatch(rig)
+        self._mends = config.search_again and config.refinement != "none"
         self._generic = body
-        self._start = np.array(start_pose, dtype=np.float64)
+        given = start_pose is not None
+        self._start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
         if self._start.shape != (body.size,) or not np.isfinite(self._start).all():
             raise BodyModelError(
                 f"start pose has shape {self._start.shape}, body {body.name} expects "
@@ -82,9 +98,14 @@ class Tracker:
         self._shape_fitted = not self._fit_shape
         self._start_markers = start_markers
         self._searcher = self._searcher_for(body)
+        self._first_starter = None if given else Starter(
+            rig, body, self._searcher_for, self._evidence.select,
+            sized=sized, fit_shape=self._fit_shape,
+        )  # fmt: skip
+        self._starter = self._first_starter
         low, high = self._searcher.limits
         for name, value, a, b in zip(body.parameter_names, self._start, low, high, strict=True):
-            if not a <= value <= b:
+            if given and not a <= value <= b:
                 raise BodyModelError(
                     f"start pose: {name} is {value:.4g}, its limits are {a:.4g} to {b:.4g}"
                 )
@@ -92,17 +113,29 @@ class Tracker:
         frame_stages(body, config, self._pose, body.sigma)
 
     @property
+    def state(self) -> TrackState:
+        """State after the last step."""
+        return self._track.state
+
+    @property
     def body(self) -> BodyModel:
         """The tracked body; from the first frame on with the fitted sections."""
         return self._searcher.body
 
     def reset(self) -> None:
-        """Forget the track: the next step searches around the start pose again."""
+        """Forget the track: the next step searches around the start pose, or for somebody."""
         self._pose = self._start
         self._velocity_per_ns = np.zeros(self._generic.size)
         self._stamp_ns = None
-        self.state = TrackState.SEARCHING
         self._searcher.forget()
+        self._track = Track()
+        self._views.reset()
+        self._limbs.reset()
+        if self._smooth is not None:
+            self._smooth.reset()
+        self._starter = self._first_starter
+        if self._starter is not None:
+            self._starter.reset()
         if self._fit_shape:
             self._shape_fitted = False
             self._searcher = self._searcher_for(self._generic)
@@ -123,6 +156,7 @@ class Tracker:
             blank[camera.name] = Observation.from_mask(camera.name, 0, nothing, nothing)
         # The most work and the least: whether threads are woken depends on it.
         for views in (blank, dict(list(blank.items())[:1])):
+            self._starter = None
             self.step(views, 0)
             self.reset()
 
@@ -147,16 +181,96 @@ class Tracker:
                 fit its calibration or background; names the camera.
         """
         predicted = self._predict(stamp_ns)
-        observations, warnings = self._evidence.gather(
+        if self._starter is not None:
+            observed = self._evidence.observe(views, stamp_ns)
+            believed, notes = self._views.sort(observed, self.body, None)
+            if not anybody(believed):
+                return self._unseen(observed, stamp_ns, notes)
+            return self._seek(self._starter, believed, stamp_ns, notes)
+        observed, warnings = self._evidence.gather(
             views, stamp_ns, self.body, predicted, margin_m=self._region_margin(stamp_ns)
         )
+        expected = predicted if self.state is TrackState.TRACKING else None
+        observations, notes = self._views.sort(observed, self.body, expected)
+        if not anybody(observations):
+            return self._unseen(observed, stamp_ns, notes)
         if not self._shape_fitted:
             self._shape_fitted = True
             predicted = self._take_shape(observations, stamp_ns)
         search = self._searcher.frame(observations, stamp_ns, predicted)
         sigma = self.body.sigma * self._rate_factor(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
-        return self._conclude(search, stamp_ns, observations, warnings)
+        if self._mends:
+            search.pose, found = self._limbs.mend(
+                self._searcher, observations, stamp_ns, search.pose
+            )
+            notes += found
+        result = self._conclude(search, stamp_ns, observations, notes + warnings)
+        if self.config.search_again and self._track.given_up(stamp_ns):
+            self._look_again()
+        return result
+
+    def _unseen(
+        self, observed: Mapping[str, Observation], stamp_ns: int, notes: tuple[str, ...]
+    ) -> TrackResult:
+        """Nobody, in any view that can be believed."""
+        if self._starter is not None:
+            self._starter.reset()
+        if self._starter is not None or self.state is TrackState.SEARCHING:
+            return self._nobody(observed, stamp_ns, notes)
+        self._track.note(0.0, stamp_ns)
+        self._velocity_per_ns = np.zeros(self.body.size)
+        if self.config.search_again and self._track.given_up(stamp_ns):
+            self._look_again()
+        return self._without_pose(observed, stamp_ns, notes)
+
+    def _look_again(self) -> None:
+        """From the next step on look for the body that was lost."""
+        if self._smooth is not None:
+            self._smooth.reset()
+        self._starter = Starter(
+            self.rig, self.body, self._searcher_for, self._evidence.select,
+            fit_shape=False, last_pose=self._pose,
+        )  # fmt: skip
+
+    def _nobody(
+        self, observed: Mapping[str, Observation], stamp_ns: int, notes: tuple[str, ...]
+    ) -> TrackResult:
+        self._track = Track()
+        return self._without_pose(observed, stamp_ns, notes)
+
+    def _without_pose(
+        self, observed: Mapping[str, Observation], stamp_ns: int, notes: tuple[str, ...]
+    ) -> TrackResult:
+        return TrackResult(
+            stamp_ns=stamp_ns, state=self.state, pose=None, markers_m=None,
+            fitness=float("nan"), evaluations=0, observations=observed, warnings=notes,
+            agreement=dict.fromkeys(observed, 0.0) if self.state is TrackState.LOST else {},
+        )  # fmt: skip
+
+    def _seek(
+        self,
+        starter: Starter,
+        observed: Mapping[str, Observation],
+        stamp_ns: int,
+        notes: tuple[str, ...],
+    ) -> TrackResult:
+        """Look for somebody; no pose if nobody is there."""
+        found = starter.step(observed, stamp_ns)
+        if found is None:
+            return self._nobody(observed, stamp_ns, notes)
+        if self._smooth is not None:
+            # A person turned round, or found elsewhere, has not moved there.
+            self._smooth.reset()
+        self._searcher = found.searcher
+        search = self._searcher.frame(found.observations, stamp_ns, found.pose)
+        if found.settled:
+            self._starter, self._shape_fitted = None, True
+            search.run(frame_stages(self.body, self.config, found.pose, self.body.sigma))
+        result = self._conclude(search, stamp_ns, found.observations, notes + found.notes)
+        # Poses of a search jump, that is no motion.
+        self._velocity_per_ns = np.zeros(self.body.size)
+        return result
 
     def _take_shape(self, observations: Mapping[str, Observation], stamp_ns: int) -> FloatArray:
         """Fit the body's sections to the first frame; returns the start pose (p,) to go on from."""
@@ -184,25 +298,34 @@ class Tracker:
     ) -> TrackResult:
         terms = search.terms()
         overlap = float(np.mean([t.overlap for t in terms.values()]))
-        self.state = next_state(self.state, overlap)
+        self._track.note(overlap, stamp_ns)
         elapsed_ns = stamp_ns - self._stamp_ns if self._stamp_ns is not None else 0
         moving = elapsed_ns > 0 and self.state is TrackState.TRACKING
         change = search.pose - self._pose
         self._velocity_per_ns = change / elapsed_ns if moving else np.zeros(change.size)
         self._pose = search.pose
         self._stamp_ns = stamp_ns
+        shown = search.pose
+        if self._smooth is not None:
+            shown = np.clip(self._smooth(shown, stamp_ns), *self._searcher.limits)
         return TrackResult(
             stamp_ns=stamp_ns,
             state=self.state,
-            pose=search.pose,
-            markers_m=markers(self.body, search.pose),
+            pose=shown,
+            markers_m=markers(self.body, shown),
             fitness=float(np.mean([t.silhouette + t.edges for t in terms.values()])),
             agreement={name: t.overlap for name, t in terms.items()},
             evaluations=search.evaluations,
             refinements=search.refinements,
             observations=observations,
             warnings=warnings,
+            confidence=self._confidence(search),
         )
+
+    def _confidence(self, search: FrameSearch) -> Confidence | None:
+        if self.config.refinement == "none":
+            return None
+        return confidence_of(self.body, search.pose, search.contours, measured=self._measured)
 
     def _predict(self, stamp_ns: int) -> FloatArray:
         """The pose (p,) expected at a time: the last one moved on, with damped velocity."""

@@ -250,5 +250,5 @@ def test_hands_and_feet_follow_the_stature_that_markers_suggest() -> None:
     tall = load_body("person31", 1.9)
     points = dict(zip(MARKER_NAMES, markers(tall, tall.neutral), strict=True))
     lengths = subject_from_markers(DESCRIPTION, points).lengths_m
-    assert lengths["hand"] == pytest.approx(0.108 * 1.9)
-    assert lengths["foot"] == pytest.approx(0.152 * 1.9)
+    assert lengths["hand"] == pytest.approx(0.104 * 1.9)
+    assert lengths["foot"] == pytest.approx(0.142 * 1.9)

@@ -189,9 +189,12 @@ def test_missing_and_binary_subject_files(tmp_path) -> None:
 def test_a_subject_serves_every_shipped_body() -> None:
     """Hands and feet that a smaller body lacks come from the stature, and may be to spare."""
     small, large = (load_description(name) for name in ("balan31", "person31"))
-    for made_for, used_by in ((small, "person31"), (large, "balan31")):
-        body = load_body(used_by, subject_from_stature(made_for, 1.9))
-        assert body.lengths_m == pytest.approx(load_body(used_by, 1.9).lengths_m)
+    person = subject_from_stature(large, 1.9)
+    assert load_body("person31", person).lengths_m == person.lengths_m
+    known = {name: person.lengths_m[name] for name in small.lengths}
+    assert load_body("balan31", person).lengths_m == known
+    from_small = load_body("person31", Subject("short of hands", known)).lengths_m
+    assert from_small == pytest.approx(person.lengths_m)
 
 
 def test_a_missing_length_comes_from_the_stature_of_the_others() -> None:

@@ -224,3 +224,24 @@ def test_silhouettes_of_a_recording(walk, tmp_path: Path, capsys) -> None:
     assert len(list(tmp_path.glob("walk-cam*-000000.png"))) == 3
     assert main(["benchmark", "silhouettes", walk, walk]) == 0
     assert capsys.readouterr().out.count("OpenCV MOG2") == 2
+
+
+def test_starts_without_a_start(walk, capsys) -> None:
+    words = ["start", walk, "--stature", "1.72", "--every", "2", "--frames", "2", "--threads", "1"]
+    assert main(["benchmark", *words, "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert row["count"] == len(row["starts"]) == 2 and row["found"] == 1.0
+    assert [start["frame"] for start in row["starts"]] == [0, 2]
+    assert row["reached"] == 1.0 and row["wrong_heading"] == 0.0
+
+
+def test_values_for_each_recording(walk, capsys) -> None:
+    assert main(["benchmark", "start", walk, "--stature", "1.72,1.8"]) == 1
+    assert "--stature: 2 values for 1 recordings" in capsys.readouterr().err
+
+
+def test_what_a_recording_is_too_short_for_is_left_out(walk, capsys) -> None:
+    words = ["recovery", walk, "--stature", "1.72", "--seeds", "1", "--threads", "1", "--json"]
+    assert main(["benchmark", *words]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert row["runs"] == [] and len(row["usual_mm"]) == 1

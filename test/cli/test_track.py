@@ -147,10 +147,6 @@ def test_the_same_result_without_debug_images(track, walk, tmp_path):
 
 
 class TestRefusals:
-    def test_no_start(self, track, tmp_path):
-        assert refusal(track()).startswith("no start pose: name a TRC or a pose YAML (--start")
-        assert not (tmp_path / "out.trc").exists()
-
     def test_no_subject(self, track, walk):
         assert "start.yaml gives a pose but no subject" in refusal(
             track("--start", walk / "start.yaml")
@@ -187,7 +183,7 @@ class TestRefusals:
     def test_an_empty_settings_file_sets_nothing(self, track, tmp_path):
         path = tmp_path / "empty.yaml"
         path.write_text("", encoding="utf-8")
-        assert refusal(track(config=path)).startswith("no start pose")
+        assert "nowhere.trc" in refusal(track("--start", tmp_path / "nowhere.trc", config=path))
 
     def test_a_budget_that_cannot_be_spent(self, track, walk):
         line = refusal(track("--start", walk / "ground_truth.trc", "--evaluations", 1050))

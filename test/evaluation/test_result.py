@@ -11,7 +11,7 @@ from markerless_tracker.body import MARKER_NAMES, load_body, read_subject
 from markerless_tracker.datasets import read_trc
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.evaluation.result import ResultWriter, versions
-from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.records import Confidence, Observation, TrackResult, TrackState
 from markerless_tracker.tracking import TrackerConfig
 
 
@@ -173,3 +173,14 @@ def test_the_subject_it_writes_gives_the_same_body_again(tmp_path) -> None:
     again = load_body("person31", read_subject(tmp_path / "walk.subject.yaml"))
     np.testing.assert_array_equal(again.cone_shape, fitted.cone_shape)
     assert again.lengths_m == fitted.lengths_m
+
+
+def test_standard_deviations_stand_beside_the_pose(tmp_path, body, config):
+    sure = Confidence(np.full(body.size, 0.1), np.full((15, 3), 0.0123), np.eye(6))
+    with ResultWriter(tmp_path / "out", body, config, fps=60.0) as writer:
+        writer.add(result(0, confidence=sure))
+        writer.add(result(1))
+    with_them, without = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["frames"]
+    assert with_them["parameters_sd"] == [0.1] * body.size
+    assert with_them["markers_sd_mm"]["LKnee"] == [12.3, 12.3, 12.3]
+    assert "markers_sd_mm" not in without

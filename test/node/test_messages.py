@@ -10,7 +10,7 @@ from markerless_tracker.body.urdf import urdf
 from markerless_tracker.geometry import apply, inverse, rotation_from_quaternion
 from markerless_tracker.node import messages
 from markerless_tracker.node.stamps import stamp_of, time_message
-from markerless_tracker.records import TrackState
+from markerless_tracker.records import Confidence, TrackState
 
 STAMP_NS = 12_345_678_901
 
@@ -115,3 +115,14 @@ def test_state_levels(state: TrackState, ready: bool, level: bytes) -> None:
     assert status.level == level and state.value in status.message
     assert {pair.key: pair.value for pair in status.values} == values
     assert stamp_of(message) == STAMP_NS
+
+
+def test_deviations_and_covariance(body: BodyModel, pose: np.ndarray) -> None:
+    covariance = np.arange(36.0).reshape(6, 6)
+    sure = Confidence(np.arange(float(body.size)), np.ones((15, 3)), covariance)
+    message = messages.joint_deviations(body, sure, STAMP_NS)
+    assert message.name == messages.joint_state(body, pose, 0).name
+    assert stamp_of(message) == STAMP_NS
+    assert list(message.position) == [float(index) for index in body.joints]
+    root = messages.root_pose(body, pose, STAMP_NS, sure)
+    np.testing.assert_array_equal(np.reshape(root.pose.covariance, (6, 6)), covariance)

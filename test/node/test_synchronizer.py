@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.node.synchronizer import Synchronizer
+from markerless_tracker.node.synchronizer import STOPPED_VIEWS, Synchronizer
 
 CAMERAS = ("a", "b", "c", "d")
 FRAME_NS = 16_666_667
@@ -75,6 +75,34 @@ def test_memory_is_bounded_while_a_camera_is_silent_and_it_is_named() -> None:
     # It recovers with the first frame that all have.
     feed(sets, *every_camera(1000))
     assert sets.take() is not None
+
+
+def test_a_camera_that_stops_is_left_out_and_taken_back() -> None:
+    sets: Synchronizer[str] = Synchronizer(("a", "b", "c"))
+    taken = []
+    for number in range(60):
+        stopped = 10 <= number < 40
+        for name in ("a", "b") if stopped else ("a", "b", "c"):
+            sets.add(name, number, name, now_s=number / 20.0)
+        found = sets.take()
+        taken.append(None if found is None else "".join(found.views))
+    first = taken.index("ab")
+    assert taken[:10] == ["abc"] * 10 and 10 + STOPPED_VIEWS - 2 <= first <= 10 + STOPPED_VIEWS
+    assert taken[10:first] == [None] * (first - 10)
+    assert taken[first:40] == ["ab"] * (40 - first)
+    # The set that its return belongs to was complete without it.
+    assert taken[40:] == ["ab"] + ["abc"] * 19
+
+
+def test_a_camera_never_heard_and_the_last_but_one_are_waited_for() -> None:
+    sets: Synchronizer[str] = Synchronizer(("a", "b", "c"))
+    two: Synchronizer[str] = Synchronizer(("a", "b"))
+    two.add("b", -1, "b", now_s=0.0)
+    for number in range(60):
+        for name in ("a", "b"):
+            sets.add(name, number, name, now_s=number / 20.0)
+        two.add("a", number, "a", now_s=number / 20.0)
+        assert sets.take() is None and two.take() is None
 
 
 def test_all_cameras_are_silent_before_and_long_after_their_images() -> None:

@@ -388,7 +388,6 @@ def test_a_signal_completes_the_result(
         ({"cameras": ["cam01", "cam09"]}, "cam09"),
         ({"background_dir": ""}, "background_dir: not given"),
         ({"background_dir": "{empty}"}, "background_dir: .*nothing for cam01, cam02"),
-        ({"start_file": ""}, "start"),
         ({"start_file": "nowhere.yaml"}, "nowhere.yaml"),
         ({"result_file": "/proc/nowhere/name"}, "/proc/nowhere"),
     ],

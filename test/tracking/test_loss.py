@@ -3,7 +3,13 @@
 import pytest
 
 from markerless_tracker.records import TrackState
-from markerless_tracker.tracking.loss import LOST_BELOW, REGAINED_ABOVE, next_state
+from markerless_tracker.tracking.loss import (
+    LOST_BELOW,
+    PATIENCE_NS,
+    REGAINED_ABOVE,
+    Track,
+    next_state,
+)
 
 SEARCHING, TRACKING, LOST = TrackState.SEARCHING, TrackState.TRACKING, TrackState.LOST
 MIDDLE = 0.5 * (LOST_BELOW + REGAINED_ABOVE)
@@ -39,3 +45,22 @@ def test_an_overlap_that_hovers_between_the_thresholds_does_not_flicker():
         for step in range(20):
             seen = next_state(seen, MIDDLE + (0.05 if step % 2 else -0.05))
             assert seen is state
+
+
+def test_a_track_that_fits_well_is_lost_sooner():
+    assert next_state(TRACKING, 0.6, 0.9) is LOST
+    assert next_state(TRACKING, 0.6, 0.7) is TRACKING
+    assert next_state(LOST, 0.7, 0.9) is LOST
+    assert next_state(LOST, 0.8, 0.9) is TRACKING
+
+
+def test_patience_begins_with_the_first_lost_frame_in_a_row():
+    track = Track()
+    for stamp_ns in range(3):
+        assert track.note(0.8, stamp_ns) is TRACKING
+    assert track.usual == pytest.approx(0.8)
+    assert track.note(0.0, 10) is LOST and not track.given_up(10 + PATIENCE_NS - 1)
+    assert track.given_up(10 + PATIENCE_NS)
+    track.note(0.8, 20)
+    track.note(0.0, 30)
+    assert not track.given_up(10 + PATIENCE_NS) and track.given_up(30 + PATIENCE_NS)

@@ -15,6 +15,7 @@ from markerless_tracker.body import (
 )
 from markerless_tracker.datasets import MarkerTrack, write_trc
 from markerless_tracker.errors import BodyModelError, ConfigError, DatasetError
+from markerless_tracker.records import TrackState
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 
 
@@ -72,9 +73,11 @@ def test_a_pose_file_starts_with_the_first_frame_that_comes(scene, config, files
         assert gap_mm(scene, setup.tracker) < 1.0
 
 
-def test_no_start(scene, config):
-    with pytest.raises(ConfigError, match="no start pose: name a TRC or a pose YAML"):
-        build_tracker(scene.rig, config, stature=1.8)
+def test_without_a_start_it_looks_for_somebody(scene, config, files):
+    setup = build_tracker(scene.rig, config, subject_file=files / "subject.yaml")
+    assert setup.start_stamp_ns is None
+    assert setup.tracker.body.lengths_m == scene.body.lengths_m
+    assert setup.tracker.state is TrackState.SEARCHING
 
 
 def test_two_subjects(scene, config, files):

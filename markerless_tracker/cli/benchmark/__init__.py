@@ -2,15 +2,22 @@
 
 import argparse
 
-from markerless_tracker.cli.benchmark import silhouettes, speed, tables
+from markerless_tracker.cli.benchmark import recovery, silhouettes, speed, start, tables
 
 HELP = (
-    "Measure accuracy (tables), speed (speed) or silhouettes (silhouettes). Recordings for tables "
-    "have a ground_truth.trc: its first row is the start and gives the lengths, its rows the truth."
+    "Measure accuracy (tables), automatic starts (start), recovery, silhouettes or speed (speed). "
+    "Recordings have a ground_truth.trc: in tables its first row is the start and gives the "
+    "lengths; its rows are the truth."
 )
 EXAMPLE = "markerless_tracker benchmark tables RECORDING --fps 60,20 --seeds 6 -o out/tables"
 
-_KINDS = {"tables": tables, "speed": speed, "silhouettes": silhouettes}
+_KINDS = {
+    "tables": tables,
+    "speed": speed,
+    "silhouettes": silhouettes,
+    "start": start,
+    "recovery": recovery,
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 from markerless_tracker.cli.demo.fetch import fetch_recording
 from markerless_tracker.cli.main import main as command
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.resources import config_file
 
 SCALE = 0.5
 """Full-size sets are 25 MB; no middleware carries sixty of those a second."""
@@ -17,14 +16,12 @@ MADE_UP_BODY = "balan31"
 
 @dataclass(frozen=True)
 class Scene:
-    """A recording with what a tracker has to know beforehand.
+    """A recording and how to track it: nobody says where the person is, or how tall.
 
     Attributes:
         title: what is seen, for the reader.
         recording: folder to convert.
         scale: factor for its images.
-        subject: sizes of the person (YAML).
-        start: pose in the first frame (YAML).
         body: body to track with, the tracker's own choice if empty.
         note: why it is not the real recording; empty if it is.
     """
@@ -32,8 +29,6 @@ class Scene:
     title: str
     recording: Path
     scale: float
-    subject: Path
-    start: Path
     body: str = ""
     note: str = ""
 
@@ -43,14 +38,11 @@ def real_scene(folder: Path) -> Scene:
 
     Raises:
         DatasetError: it cannot be had.
-        ConfigError: the start pose or the subject are not installed.
     """
     return Scene(
         "a real person, four cameras, 60 fps",
         fetch_recording(folder),
         SCALE,
-        config_file("demo/subject.yaml"),
-        config_file("demo/start.yaml"),
     )
 
 
@@ -72,8 +64,6 @@ def made_up_scene(folder: Path, note: str) -> Scene:
         "a made-up person, four cameras, 60 fps",
         recording,
         1.0,
-        recording / "subject.yaml",
-        recording / "start.yaml",
         body=MADE_UP_BODY,
         note=note,
     )

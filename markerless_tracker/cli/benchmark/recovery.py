@@ -1,0 +1,102 @@
+"""`benchmark recovery`: how soon the tracker is back after it saw nothing."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from markerless_tracker.cli.benchmark.arguments import count, positive, progress_bars
+from markerless_tracker.cli.benchmark.start import each, list_of_each
+from markerless_tracker.cli.track import read_config
+from markerless_tracker.evaluation import recovery
+from markerless_tracker.evaluation.machine import machine
+from markerless_tracker.evaluation.result import versions
+
+
+def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
+    """Declare the arguments."""
+    parser = kinds.add_parser(
+        "recovery",
+        help="how soon the person is tracked again after black views or missing frames",
+        description="Black views and missing frames, and how soon the person is tracked again.",
+        epilog="example: markerless_tracker benchmark recovery WALK --stature 1.72",
+    )
+    parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
+    parser.add_argument(
+        "--stature", type=list_of_each(positive), default=(), metavar="LIST",
+        help="of the persons, m: one for all recordings or one each; default: unknown",
+    )  # fmt: skip
+    parser.add_argument(
+        "--scale", type=list_of_each(positive), default=(1.0,), metavar="LIST",
+        help="factor for the images, one for all recordings or one each",
+    )  # fmt: skip
+    parser.add_argument("--seeds", type=count, default=5, metavar="N", help="seeds 0..N-1 (5)")
+    parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print; returns the exit status."""
+    flags = {} if args.threads is None else {"threads": args.threads}
+    config = read_config(args.config, flags)
+    statures = each(args.stature or (None,), args.sources, "--stature")
+    scales = each(args.scale, args.sources, "--scale")
+    rows = []
+    with progress_bars() as bars:
+        task = bars.add_task("reading", total=None)
+        for source, stature_m, scale in zip(args.sources, statures, scales, strict=True):
+            rows.append(
+                recovery.measure_recovery(
+                    source,
+                    config,
+                    stature_m=stature_m,
+                    scale=scale,
+                    seeds=args.seeds,
+                    progress=lambda part, done, total: bars.update(
+                        task, description=part, completed=done, total=total
+                    ),
+                )
+            )
+    if args.json:
+        table = {"machine": machine(), "versions": versions(), "rows": rows}
+        json.dump(table, sys.stdout, indent=2, allow_nan=False)
+        sys.stdout.write("\n")
+        return 0
+    console = Console(width=None if sys.stdout.isatty() else 120)
+    console.print(_rendered(rows))
+    console.print(
+        f"Back: the error is at most the undisturbed run's mean + {recovery.OVER_USUAL_MM:g} mm, "
+        f"within {recovery.WITHIN_FRAMES} frames.",
+        highlight=False,
+    )
+    return 0
+
+
+def _rendered(rows: list[dict[str, Any]]) -> Table:
+    table = Table(title="Recovery")
+    for title in ("recording", "disturbance"):
+        table.add_column(title)
+    for title in ("usual mm", "runs", "back", "frames until back", "worst mm after"):
+        table.add_column(title, justify="right")
+    for row in rows:
+        usual = sum(row["usual_mm"]) / len(row["usual_mm"])
+        for disturbance in recovery.DISTURBANCES:
+            runs = [run for run in row["runs"] if run["disturbance"] == disturbance.name]
+            if not runs:
+                continue
+            until = [run["frames_until_back"] for run in runs]
+            table.add_row(
+                row["recording"],
+                disturbance.name,
+                f"{usual:.1f}",
+                str(len(runs)),
+                str(sum(run["back"] for run in runs)),
+                ", ".join("never" if n is None else str(n) for n in until),
+                f"{max(run['worst_mm'] for run in runs):.0f}",
+            )
+    return table

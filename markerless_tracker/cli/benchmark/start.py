@@ -1,0 +1,143 @@
+"""`benchmark start`: how well the tracker starts by itself."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from markerless_tracker.cli.benchmark.arguments import count, list_of, positive, progress_bars
+from markerless_tracker.cli.track import read_config
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.evaluation import starts
+from markerless_tracker.evaluation.machine import machine
+from markerless_tracker.evaluation.result import versions
+
+
+def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
+    """Declare the arguments."""
+    parser = kinds.add_parser(
+        "start",
+        help="starts without any start pose, from many frames of recordings",
+        description="Starts without a start pose, judged by the truth after some frames.",
+        epilog="example: markerless_tracker benchmark start WALK BALANCE --stature 1.72,1.70",
+    )
+    parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
+    parser.add_argument(
+        "--stature", type=list_of_each(positive), default=(), metavar="LIST",
+        help="of the persons, m: one for all recordings or one each; default: unknown",
+    )  # fmt: skip
+    parser.add_argument(
+        "--scale", type=list_of_each(positive), default=(1.0,), metavar="LIST",
+        help="factor for the images, one for all recordings or one each",
+    )  # fmt: skip
+    parser.add_argument(
+        "--every", type=count, default=10, metavar="N", help="a start from each N-th frame (10)"
+    )
+    parser.add_argument(
+        "--frames", type=count, default=10, metavar="N", help="judged in the N-th frame (10)"
+    )
+    parser.add_argument("--seeds", type=count, default=1, metavar="N", help="seeds 0..N-1 (1)")
+    parser.add_argument("--preset", metavar="NAME", help="tuned (default) or paper")
+    parser.add_argument("--body", metavar="NAME", help="default: the preset's")
+    parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print; returns the exit status."""
+    flags = {key: getattr(args, key) for key in ("preset", "body", "threads")}
+    config = read_config(args.config, {k: v for k, v in flags.items() if v is not None})
+    plan = starts.StartPlan(config, every=args.every, frames=args.frames, seeds=args.seeds)
+    statures = each(args.stature or (None,), args.sources, "--stature")
+    scales = each(args.scale, args.sources, "--scale")
+    rows = []
+    with progress_bars() as bars:
+        task = bars.add_task("reading", total=None)
+        for source, stature_m, scale in zip(args.sources, statures, scales, strict=True):
+            rows.append(
+                starts.measure_starts(
+                    source,
+                    plan,
+                    stature_m=stature_m,
+                    scale=scale,
+                    progress=lambda part, done, total: bars.update(
+                        task, description=part, completed=done, total=total
+                    ),
+                )
+            )
+    table = {"machine": machine(), "versions": versions(), "rows": rows}
+    if args.json:
+        json.dump(table, sys.stdout, indent=2, allow_nan=False)
+        sys.stdout.write("\n")
+        return 0
+    console = Console(width=None if sys.stdout.isatty() else 160)
+    console.print(_rendered(rows, args.frames))
+    console.print(
+        f"Error, heading: in frame {args.frames} of each start; reached: mean error of at most "
+        f"{starts.REACHED_MM:g} mm; wrong heading: more than {starts.WRONG_HEADING_DEG:g}° off; "
+        "turned: changed to the opposite heading on the way.",
+        highlight=False,
+    )
+    return 0
+
+
+def list_of_each(kind: Any) -> Any:
+    """Parser of a list with commas that keeps values standing twice."""
+
+    def parse(text: str) -> tuple[Any, ...]:
+        return tuple(list_of(kind)(word)[0] for word in text.split(","))
+
+    return parse
+
+
+def each(values: tuple[Any, ...], sources: list[Path], option: str) -> tuple[Any, ...]:
+    """A value per source, from one for all or one each.
+
+    Raises:
+        ConfigError: neither.
+    """
+    if len(values) == 1:
+        return values * len(sources)
+    if len(values) != len(sources):
+        raise ConfigError(
+            f"{option}: {len(values)} values for {len(sources)} recordings, expected one or "
+            f"{len(sources)}"
+        )
+    return values
+
+
+def _rendered(rows: list[dict[str, Any]], frames: int) -> Table:
+    table = Table(title=f"Starts without a start pose, judged in frame {frames}")
+    table.add_column("recording")
+    for title in (
+        "stature", "starts", "found", "reached", "mean mm", "median", "worst", "first frame",
+        "wrong heading", "turned", "first pose s", "max",
+    ):  # fmt: skip
+        table.add_column(title, justify="right")
+    for row in rows:
+        table.add_row(
+            row["recording"],
+            "unknown" if row["stature_m"] is None else f"{row['stature_m']:g} m",
+            str(row["count"]),
+            f"{row['found']:.1%}",
+            f"{row['reached']:.1%}",
+            *(_mm(row[key]) for key in ("mean_mm", "median_mm", "worst_mm", "first_mm")),
+            f"{row['wrong_heading']:.1%}",
+            f"{row['turned']:.1%}",
+            _seconds(row["first_pose_s"]),
+            _seconds(row["first_pose_max_s"]),
+        )
+    return table
+
+
+def _mm(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
+
+
+def _seconds(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"

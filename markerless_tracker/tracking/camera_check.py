@@ -1,0 +1,210 @@
+"""Whether a camera disagrees with the others: its silhouettes sit beside the tracked body.
+
+Now and then the pose is refined without one camera, and the shift of that camera's image is
+estimated that lays the body's outline over its silhouette. What stays over a whole run is no
+motion and no mask: the camera stands or looks elsewhere than its calibration says.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.fitness.shape import CORRELATION_M
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import Prior, refine
+from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.search import Searcher
+
+DISAGREES_M = 0.020
+"""A systematic shift of this much, at the body, is the calibration's."""
+EVERY_NS = 160_000_000
+LEAST_VIEWS = 3
+"""Of two cameras that disagree nobody knows which is wrong."""
+_FIRST_NS = 300_000_000
+_LEAST_CHECKS = 3
+_ITERATIONS = 4
+_REACH_M = (0.10, 0.035)
+_WIDE_M = 0.10
+_SHIFTS = 3
+
+
+@dataclass(frozen=True)
+class Shift:
+    """How far one camera's silhouettes lie from the body as the others see it.
+
+    Attributes:
+        px: (u, v), medians over the checks; at the scale of the images tracked.
+        length_m: its length at the body.
+        checks: frames it was estimated in.
+    """
+
+    px: tuple[float, float]
+    length_m: float
+    checks: int
+
+    @property
+    def disagrees(self) -> bool:
+        """Whether it is too large to be chance."""
+        return self.checks >= _LEAST_CHECKS and self.length_m >= DISAGREES_M
+
+
+class CameraCheck:
+    """Compares each camera with the others over a run.
+
+    Args:
+        rig: the cameras, as the tracker has them.
+        config: its settings.
+    """
+
+    def __init__(self, rig: CameraRig, config: TrackerConfig) -> None:
+        self._rig = rig
+        self._config = config
+        self._first_ns: int | None = None
+        self._last_ns: int | None = None
+        self._suspects: frozenset[str] = frozenset()
+        self._found: dict[str, list[tuple[float, float, float]]] = {n: [] for n in rig.names}
+
+    def add(self, result: TrackResult, body: BodyModel) -> None:
+        """Take a frame; most are passed over."""
+        if result.state is not TrackState.TRACKING or result.pose is None:
+            return
+        if self._first_ns is None:
+            self._first_ns = result.stamp_ns
+        if result.stamp_ns - self._first_ns < _FIRST_NS or (
+            self._last_ns is not None and result.stamp_ns - self._last_ns < EVERY_NS
+        ):
+            return
+        seen = {n: o for n, o in result.observations.items() if o.mask_words.any()}
+        if len(seen) < LEAST_VIEWS:
+            return
+        self._last_ns = result.stamp_ns
+        searcher = Searcher(self._rig, body, self._config, limits=body.limits, threads=1)
+        for name in seen:
+            others = {n: o for n, o in seen.items() if n != name and n not in self._suspects}
+            if len(others) < LEAST_VIEWS - 1:
+                continue
+            pose = _refined(searcher, others, result)
+            shift = _shift(searcher, seen[name], self._rig[name], pose, result.stamp_ns)
+            if shift is not None:
+                self._found[name].append(shift)
+        self._suspect()
+
+    def shifts(self) -> dict[str, Shift]:
+        """The shift of every camera that could be compared, by name."""
+        out = {}
+        for name, found in self._found.items():
+            if found:
+                u, v, scale = np.median(np.array(found), axis=0)
+                length = float(np.hypot(u, v)) / float(scale)
+                out[name] = Shift((float(u), float(v)), length, len(found))
+        return out
+
+    def _suspect(self) -> None:
+        """Trust the camera that disagrees most no longer when others are judged."""
+        worst = max(self.shifts().items(), key=lambda item: item[1].length_m, default=None)
+        if worst is None or worst[0] in self._suspects or not worst[1].disagrees:
+            return
+        if len(self._rig) - len(self._suspects) - 1 < LEAST_VIEWS:
+            return
+        self._suspects |= {worst[0]}
+        for name in self._found:
+            if name not in self._suspects:
+                self._found[name] = []
+
+
+def corrected(rig: CameraRig, shifts: Mapping[str, Shift], scale: float) -> CameraRig:
+    """The rig with the principal points of the cameras that disagree moved by their shifts.
+
+    Args:
+        rig: the cameras of the full-size images.
+        shifts: at the scale of the images tracked.
+        scale: factor from the full size to those.
+    """
+    cameras = []
+    for camera in rig:
+        shift = shifts.get(camera.name)
+        if shift is not None and shift.disagrees:
+            matrix = camera.matrix.copy()
+            matrix[0, 2] += shift.px[0] / scale
+            matrix[1, 2] += shift.px[1] / scale
+            camera = replace(camera, matrix=matrix)
+        cameras.append(camera)
+    return CameraRig(tuple(cameras))
+
+
+def describe(shifts: Mapping[str, Shift]) -> list[str]:
+    """A line for each camera that disagrees with the others."""
+    return [
+        f"{name}: silhouettes ({shift.px[0]:+.1f}, {shift.px[1]:+.1f}) px, "
+        f"{1000.0 * shift.length_m:.0f} mm, beside the body as the other cameras see it; "
+        "check its calibration"
+        for name, shift in shifts.items()
+        if shift.disagrees
+    ]
+
+
+def _refined(
+    searcher: Searcher, observations: Mapping[str, Observation], result: TrackResult
+) -> FloatArray:
+    """The result's pose (p,) as these views alone would have it."""
+    assert result.pose is not None
+    contours = searcher.frame(observations, result.stamp_ns, result.pose).contours
+    scale = 1.0 / (CORRELATION_M * searcher.config.refine_sigma_m**2)
+
+    def equations(pose: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
+        sums = contours.equations(pose, reach_m)
+        return sums.hessian * scale, sums.slope * scale
+
+    return refine(
+        equations,
+        result.pose,
+        priors=(Prior(searcher.body.neutral, 1.0 / searcher.body.spread**2),),
+        bounds=searcher.limits,
+        iterations=_ITERATIONS,
+        reach=_REACH_M,
+    )
+
+
+def _shift(
+    searcher: Searcher,
+    observation: Observation,
+    camera: CameraModel,
+    pose: FloatArray,
+    stamp_ns: int,
+) -> tuple[float, float, float] | None:
+    """Shift (u, v) px of one view that lays the body over it, and px per metre.
+
+    Weighted least squares on the contours' residuals, repeated with the camera moved by the shift
+    so far, since residuals count the less the larger they are.
+    """
+    to_camera = camera.T_cam_world
+    at = pose[[searcher.body.index(f"pelvis_t{axis}") for axis in "xyz"]]
+    depth = float(to_camera[2, :3] @ at + to_camera[2, 3])
+    if depth <= 0.0:
+        return None
+    focal = np.array([camera.matrix[0, 0], camera.matrix[1, 1]])
+    shift = np.zeros(2)
+    for _ in range(_SHIFTS):
+        matrix = camera.matrix.copy()
+        matrix[:2, 2] += shift
+        alone = Searcher(
+            CameraRig((replace(camera, matrix=matrix),)),
+            searcher.body,
+            searcher.config,
+            limits=searcher.limits,
+            threads=1,
+        )
+        contours = alone.frame({camera.name: observation}, stamp_ns, pose).contours
+        contours.collect(pose, _WIDE_M)
+        rows = slice(int(contours.residuals.count[0]))
+        value, weight = contours.residuals.value[0, rows], contours.residuals.weight[0, rows]
+        slopes = contours.residuals.gradient[0, rows] @ to_camera[:2, :3].T * (depth / focal)
+        normal = slopes.T @ (weight[:, None] * slopes)
+        if np.linalg.matrix_rank(normal) < 2:
+            return None
+        shift = shift - np.linalg.solve(normal, slopes.T @ (weight * value))
+    return float(shift[0]), float(shift[1]), float(focal.mean()) / depth

@@ -1,0 +1,122 @@
+"""A limb that is lost while the rest is tracked: it lies outside the silhouettes."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel, cone_transforms
+from markerless_tracker.camera import CameraRig, project_camera
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import keyed_generator
+from markerless_tracker.records import Observation
+from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.start.breeding import Breeder
+from markerless_tracker.tracking.start.population import FramePopulation
+
+LOST_BELOW = 0.55
+FOUND_ABOVE = 0.75
+"""Shares of a limb's axis inside the silhouettes, mean over the views."""
+GAIN = 0.002
+"""How much of f_s a limb found elsewhere must bring."""
+_DRAWS = 400
+_REFINED = 8
+_REFINE = (4, (0.12, 0.035))
+_ALONG = np.linspace(0.1, 0.9, 5)
+
+
+class LimbWatch:
+    """Tells which limbs lie outside the silhouettes, and looks for those alone.
+
+    Args:
+        rig: the cameras.
+    """
+
+    def __init__(self, rig: CameraRig) -> None:
+        self._rig = rig
+        self._lost: frozenset[str] = frozenset()
+
+    def reset(self) -> None:
+        """Forget which limbs are lost."""
+        self._lost = frozenset()
+
+    def mend(
+        self,
+        searcher: Searcher,
+        observations: Mapping[str, Observation],
+        stamp_ns: int,
+        pose: FloatArray,
+    ) -> tuple[FloatArray, tuple[str, ...]]:
+        """The pose (p,) with lost limbs found again, and a line for each limb that gets lost."""
+        body = searcher.body
+        shares = limb_shares(body, pose, observations, self._rig)
+        lost = {
+            name
+            for name, share in shares.items()
+            if share < (FOUND_ABOVE if name in self._lost else LOST_BELOW)
+        }
+        notes = tuple(f"{name}: lost, looked for alone" for name in sorted(lost - self._lost))
+        self._lost = frozenset(lost)
+        if not lost:
+            return pose, ()
+        frame = FramePopulation(searcher, observations, stamp_ns, pose)
+        breeder = Breeder(body, searcher.limits)
+        cost = float(frame.costs(pose[None])[0])
+        for name in sorted(lost):
+            rng = keyed_generator(searcher.config.seed, stamp_ns, f"lost {name}")
+            drawn = breeder.with_limb(pose, body.subspaces[name], _DRAWS, rng)
+            best = np.argsort(frame.costs(drawn), kind="stable")[:_REFINED]
+            tried = frame.refined(drawn[best], *_REFINE)
+            costs = frame.costs(tried)
+            if costs.min() < cost - GAIN:
+                pose, cost = tried[int(costs.argmin())], float(costs.min())
+        return pose, notes
+
+
+def limb_shares(
+    body: BodyModel,
+    pose: FloatArray,
+    observations: Mapping[str, Observation],
+    rig: CameraRig,
+) -> dict[str, float]:
+    """By limb, how much of its cones' axes lies inside the silhouettes, mean over the views.
+
+    Points outside a view's region count as outside, those outside its frame not at all.
+    """
+    placed = cone_transforms(body, pose)
+    shares = {}
+    for name in body.limbs:
+        nodes = np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name]))
+        below = _below(body, nodes)
+        cones = [c for c, node in enumerate(body.cone_node) if int(node) in below]
+        points = np.concatenate(
+            [placed[c, :, 3] + _ALONG[:, None] * body.cone_length[c] * placed[c, :, 2]
+             for c in cones] or [np.empty((0, 3))]
+        )  # fmt: skip
+        seen = [_inside(points, observations[n], rig) for n in observations]
+        values = [value for value in seen if np.isfinite(value)]
+        if values:
+            shares[name] = float(np.mean(values))
+    return shares
+
+
+def _below(body: BodyModel, nodes: np.ndarray[tuple[int], np.dtype[np.int64]]) -> set[int]:
+    below = {int(node) for node in nodes}
+    for node, above in enumerate(body.node_parent):
+        if int(above) in below:
+            below.add(node)
+    return below
+
+
+def _inside(points: FloatArray, observation: Observation, rig: CameraRig) -> float:
+    """Share of points (n, 3) inside a silhouette, of those in the frame; NaN for none."""
+    pixels = project_camera(points, rig[observation.camera])
+    with np.errstate(invalid="ignore"):
+        framed = (pixels >= 0.0).all(axis=1) & (pixels <= np.array(observation.size_px) - 1).all(
+            axis=1
+        )
+    if not framed.any():
+        return float("nan")
+    mask = observation.mask
+    u, v = (np.round(pixels[framed]) - observation.offset_px).astype(np.int64).T
+    there = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
+    return float(mask[v[there], u[there]].sum()) / float(framed.sum())

@@ -1,0 +1,1 @@
+"""Starting by itself: where somebody stands, which way, and in which pose."""

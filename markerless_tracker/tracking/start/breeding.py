@@ -1,0 +1,92 @@
+"""New poses from good ones: whole limbs exchanged, taken from a posture, or drawn anew.
+
+A refinement homes in on the nearest optimum, and a limb's optimum is far from where another limb
+is drawn on the same silhouette: so limbs change as wholes, and the good ones are refined.
+"""
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.start.postures import joint_spread, postures
+
+_ONE_LIMB = 0.5
+"""Share of children with one limb drawn anew; the others mix limbs."""
+_MIXED = 0.35
+"""Share of the limbs that a mixed child changes."""
+_TURNED = 0.4
+"""Share of the mixed children that are also turned and tilted."""
+_TURN_RAD, _TILT_RAD = 0.5, 0.15
+_FREE_RAD = 2.8
+_FEW = 0.3
+"""A narrower belief than this (rad) marks a joint that hardly moves: clavicles, thorax."""
+_RANK = 0.15
+"""Parents are drawn by rank; each is this much likelier to be taken than passed over."""
+
+
+class Breeder:
+    """Makes children of poses of one body.
+
+    Args:
+        body: the body.
+        limits: (2, p), kept.
+    """
+
+    def __init__(self, body: BodyModel, limits: FloatArray) -> None:
+        self._body = body
+        self._limits = limits
+        self._spread = joint_spread(body)
+        self._known = postures(body)
+        self._limbs = [body.subspaces[step[0]] for step in body.steps("six")[1:]]
+        reach = np.where(self._spread < _FEW, _FEW, _FREE_RAD)
+        self._low = np.maximum(limits[0], body.neutral - reach)
+        self._high = np.minimum(limits[1], body.neutral + reach)
+        self._turn = body.index("pelvis_rz")
+        self._tilt = [body.index("pelvis_rx"), body.index("pelvis_ry")]
+
+    def children(self, parents: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
+        """Children (count, p) of poses (n, p), the best parent first."""
+        out = np.empty((count, self._body.size))
+        for child in out:
+            child[:] = parents[min(int(rng.geometric(_RANK)) - 1, len(parents) - 1)]
+            if rng.random() < _ONE_LIMB:
+                self._draw(child, self._limbs[rng.integers(len(self._limbs))], rng)
+            else:
+                self._mix(child, parents, rng)
+        return np.clip(out, self._limits[0], self._limits[1], out=out)
+
+    def with_limb(
+        self,
+        pose: FloatArray,
+        limb: np.ndarray[tuple[int], np.dtype[np.int64]],
+        count: int,
+        rng: np.random.Generator,
+    ) -> FloatArray:
+        """Poses (count, p): one with a limb's parameters drawn anew."""
+        out = np.tile(pose, (count, 1))
+        for child in out:
+            self._draw(child, limb, rng)
+        return out
+
+    def _draw(
+        self, child: FloatArray, limb: np.ndarray[tuple[int], np.dtype[np.int64]],
+        rng: np.random.Generator,
+    ) -> None:  # fmt: skip
+        low, high = self._low[limb], self._high[limb]
+        child[limb] = low + (high - low) * rng.random(len(limb))
+
+    def _mix(self, child: FloatArray, parents: FloatArray, rng: np.random.Generator) -> None:
+        for limb in self._limbs:
+            if rng.random() > _MIXED:
+                continue
+            how = rng.integers(3)
+            if how == 0:
+                child[limb] = parents[rng.integers(len(parents))][limb]
+            elif how == 1:
+                child[limb] = self._known[rng.integers(len(self._known))][limb]
+            else:
+                scale = (0.5, 1.0)[rng.integers(2)]
+                child[limb] += scale * self._spread[limb] * rng.standard_normal(len(limb))
+        if rng.random() < _TURNED:
+            child[self._turn] += _TURN_RAD * rng.standard_normal()
+            child[self._tilt] += _TILT_RAD * rng.standard_normal(2)

@@ -1,0 +1,224 @@
+"""Where somebody is: a coarse visual hull of the silhouettes, and the trunk in it.
+
+The hull is what all silhouettes agree on: a point of the room belongs to it if every camera that
+looks there sees silhouette (Laurentini 1994, on a grid of points). People are where it has a lump
+of a person's size, seen by two cameras at least.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from markerless_tracker.camera import CameraModel, project_camera
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation
+
+COARSE_M = 0.20
+"""Spacing of the room's grid."""
+FINE_M = 0.03
+"""Spacing of the grid around a person."""
+LEAST_VIEWS = 2
+"""Cameras that must look at a point for it to count."""
+LEAST_HEIGHT_M = 0.45
+"""A lump that reaches less far, in any direction, is nobody."""
+LEAST_VOLUME_M3 = 0.015
+MOST_VOLUME_M3 = 1.5
+"""A person of two metres with the slack of two views; more is a room, not a person."""
+MOST_COARSE_M3 = 6.0
+_REACH_M = 5.0
+_UP_M = 2.5
+_FAR_M = 4.0
+_TRUNK_SHARE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """One lump of the visual hull.
+
+    Attributes:
+        points_m: (n, 3) points of a grid with spacing `FINE_M` that lie in it, world frame.
+        depth_m: (n,) how deep each lies in the lump.
+        views: how many cameras see it.
+    """
+
+    points_m: FloatArray
+    depth_m: FloatArray
+    views: int
+
+    @property
+    def low_m(self) -> float:
+        """Height of its lowest point: the floor, for somebody who stands."""
+        return float(self.points_m[:, 2].min()) - 0.5 * FINE_M
+
+    @property
+    def high_m(self) -> float:
+        """Height of its highest point."""
+        return float(self.points_m[:, 2].max()) + 0.5 * FINE_M
+
+    @property
+    def trunk_m(self) -> FloatArray:
+        """(m, 3) the thick part: points that lie at least half as deep as the deepest."""
+        return np.asarray(self.points_m[self.depth_m >= _TRUNK_SHARE * self.depth_m.max()])
+
+
+def find_hulls(
+    cameras: Mapping[str, CameraModel], observations: Mapping[str, Observation]
+) -> Iterator[Hull]:
+    """The lumps of the visual hull that may be a person, the largest first; none for nobody.
+
+    Args:
+        cameras: cameras by name.
+        observations: silhouettes of some of them.
+    """
+    # A view without any silhouette says nothing about who is there: perhaps it is broken.
+    seen = [
+        (cameras[name], observation)
+        for name, observation in observations.items()
+        if observation.mask_words.any()
+    ]
+    if len(seen) < LEAST_VIEWS:
+        return
+    middle = _middle([cameras[name] for name in observations])
+    views = [_View.of(camera, observation, middle) for camera, observation in seen]
+    low = middle - (_REACH_M, _REACH_M, _UP_M)
+    size = np.ceil(2.0 * np.array([_REACH_M, _REACH_M, _UP_M]) / COARSE_M).astype(np.int64)
+    inside, looking = _occupied(low, size, COARSE_M, views)
+    labels, count = ndimage.label(inside, structure=np.ones((3, 3, 3)))
+    support = np.bincount(labels[inside], weights=looking[inside], minlength=count + 1)
+    boxes = ndimage.find_objects(labels)
+    for number in np.argsort(-support[1:], kind="stable") + 1:
+        hull = _fine(labels, int(number), boxes[number - 1], low, views)
+        if hull is not None:
+            yield hull
+
+
+def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
+    """The silhouette's components that a hull's points fall on, the very same if that is all."""
+    mask = observation.mask.view(np.uint8)
+    count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
+    if count <= 2:
+        return observation
+    pixels = project_camera(hull.points_m, camera) - observation.offset_px
+    with np.errstate(invalid="ignore"):
+        u, v = np.round(pixels).T
+        framed = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
+    kept = np.zeros(count, dtype=np.bool_)
+    kept[np.unique(labels[v[framed].astype(np.int64), u[framed].astype(np.int64)])] = True
+    kept[0] = False
+    if not kept.any() or kept[1:].all():
+        return observation
+    return Observation.from_mask(
+        observation.camera,
+        observation.stamp_ns,
+        kept[labels],
+        observation.edges,
+        size_px=observation.size_px,
+        offset_px=observation.offset_px,
+    )
+
+
+def _fine(
+    labels: NDArray[np.signedinteger[Any]],
+    number: int,
+    box: tuple[slice, ...],
+    low: FloatArray,
+    views: "Sequence[_View]",
+) -> Hull | None:
+    """A coarse lump looked at closely; None if it is nobody."""
+    cells = int((labels[box] == number).sum())
+    if cells < 2 or COARSE_M**3 * cells > MOST_COARSE_M3:
+        return None
+    first = low + COARSE_M * (np.array([part.start for part in box]) - 1.0)
+    extent = COARSE_M * (np.array([part.stop - part.start for part in box]) + 2.0)
+    size = np.ceil(extent / FINE_M).astype(np.int64)
+    inside, looking = _occupied(first, size, FINE_M, views)
+    parts, count = ndimage.label(inside)
+    if count == 0:
+        return None
+    sizes = np.bincount(parts.ravel())[1:]
+    largest = parts == 1 + int(sizes.argmax())
+    volume = FINE_M**3 * float(sizes.max())
+    if not LEAST_VOLUME_M3 <= volume <= MOST_VOLUME_M3:
+        return None
+    depth = ndimage.distance_transform_edt(np.pad(largest, 1))[1:-1, 1:-1, 1:-1]
+    points = first + FINE_M * (np.argwhere(largest) + 0.5)
+    if float(np.ptp(points, axis=0).max()) < LEAST_HEIGHT_M:
+        return None
+    return Hull(points, FINE_M * depth[largest], int(np.median(looking[largest])))
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A camera and its silhouette, grown to bridge a grid's spacing.
+
+    Attributes:
+        camera: the camera.
+        masks: by spacing of the grid, (h, w) of the full frame.
+    """
+
+    camera: CameraModel
+    masks: Mapping[float, NDArray[np.uint8]]
+
+    @classmethod
+    def of(cls, camera: CameraModel, observation: Observation, middle: FloatArray) -> "_View":
+        """The view, its silhouette grown by half a grid spacing at the room's middle."""
+        width, height = observation.size_px
+        u, v = observation.offset_px
+        mask = np.zeros((height, width), dtype=np.uint8)
+        mask[v : v + observation.height, u : u + observation.width] = observation.mask
+        depth = float(camera.T_cam_world[2, :3] @ middle + camera.T_cam_world[2, 3])
+        scale = float(camera.matrix[0, 0]) / max(depth, 1.0)
+        masks = {}
+        for spacing in (COARSE_M, FINE_M):
+            grown = 2 * round(0.5 * spacing * scale) + 1
+            kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (grown, grown))
+            masks[spacing] = cv2.dilate(mask, kernel).astype(np.uint8, copy=False)
+        return cls(camera, masks)
+
+
+def _occupied(
+    low: FloatArray,
+    size: NDArray[np.int64],
+    spacing: float,
+    views: Sequence[_View],
+) -> tuple[NDArray[np.bool_], NDArray[np.int8]]:
+    """Which points of a grid lie in all silhouettes that could show them, and how many look."""
+    axes = [low[i] + spacing * (np.arange(size[i]) + 0.5) for i in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    index = np.arange(len(points))
+    looking = np.zeros(len(points), dtype=np.int8)
+    for view in views:
+        camera = view.camera
+        pixels = project_camera(points[index], camera)
+        mask = view.masks[spacing]
+        with np.errstate(invalid="ignore"):
+            u, v = np.round(pixels[:, 0]), np.round(pixels[:, 1])
+            framed = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
+        keep = ~framed
+        keep[framed] = mask[v[framed].astype(np.int64), u[framed].astype(np.int64)] > 0
+        looking[index] += framed
+        index = index[keep]
+    inside = np.zeros(len(points), dtype=np.bool_)
+    inside[index] = looking[index] >= LEAST_VIEWS
+    shape = tuple(int(n) for n in size)
+    return inside.reshape(shape), looking.reshape(shape)
+
+
+def _middle(cameras: Sequence[CameraModel]) -> FloatArray:
+    """The point (3,) nearest to all optical axes, m: the middle of what is looked at.
+
+    A weak pull to a place some metres ahead of the cameras decides where the axes are parallel.
+    """
+    total, right = np.zeros((3, 3)), np.zeros(3)
+    for camera in cameras:
+        to_world = camera.T_world_cam
+        axis, centre = to_world[:3, 2], to_world[:3, 3]
+        across = np.eye(3) - np.outer(axis, axis)
+        total += across + 0.02 * np.eye(3)
+        right += across @ centre + 0.02 * (centre + _FAR_M * axis)
+    return np.asarray(np.linalg.solve(total, right))

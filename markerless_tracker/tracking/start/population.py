@@ -1,0 +1,172 @@
+"""Several poses that explain one frame, better and better: bred, refined, selected."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body.anatomy import heading, turned_by
+from markerless_tracker.fitness.shape import CORRELATION_M
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import Prior, keyed_generator, refine
+from markerless_tracker.records import CONTOUR, Observation, Stage
+from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.start.breeding import Breeder
+from markerless_tracker.tracking.start.hull import Hull
+from markerless_tracker.tracking.start.postures import first_guesses
+
+PER_QUARTER = 4
+"""Poses that are kept of each quarter of the headings, seen from the best."""
+_SOWN = 24
+_PER_HEADING = 2
+_CHILDREN = 480
+_REFINED = 10
+_ALIKE_M = 0.07
+"""Poses whose markers lie nearer to each other than this, on average, are the same."""
+_PRIOR = 4.0
+"""Weight of the belief in usual poses: a generic body's outline fits by some centimetres only."""
+_SOW = (6, (0.25, 0.08))
+_BREED = (5, (0.15, 0.05))
+_FOLLOW = (3, (0.12, 0.05))
+"""Iterations of refinement, and reach (m) of the first and last: from nothing, in a search, from
+the frame before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Population:
+    """Poses of one frame, the best first.
+
+    Attributes:
+        poses: (n, p).
+        costs: (n,) 1 - f_s, ascending.
+        headings: (n,) rad.
+    """
+
+    poses: FloatArray
+    costs: FloatArray
+    headings: FloatArray
+
+    def facing(self, heading_rad: float) -> "Population":
+        """Those that face within a right angle of a heading; may be empty."""
+        near = np.array([turned_by(h, heading_rad) < 0.5 * np.pi for h in self.headings], bool)
+        return Population(self.poses[near], self.costs[near], self.headings[near])
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+
+class FramePopulation:
+    """Makes populations of one frame.
+
+    Args:
+        searcher: the body, the cameras and the settings.
+        observations: the evidence.
+        stamp_ns: keys the draws, together with the seed.
+        near: (p,) a pose whose root is about where the body is.
+    """
+
+    def __init__(
+        self,
+        searcher: Searcher,
+        observations: Mapping[str, Observation],
+        stamp_ns: int,
+        near: FloatArray,
+    ) -> None:
+        self._searcher = searcher
+        self._stamp_ns = stamp_ns
+        self.contours = searcher.frame(observations, stamp_ns, near).contours
+        every = np.ones(len(searcher.body.cone_names), dtype=np.bool_)
+        stage = Stage(
+            name="start", algorithm=CONTOUR, active=np.arange(near.size), centre=near,
+            sigma=searcher.body.sigma, particles=0, iterations=1, silhouette_weight=1.0,
+            edge_weight=0.0, silhouette_cones=every, edge_cones=every,
+        )  # fmt: skip
+        self._costs = searcher.fitness.prepare(self.contours.views, stage)
+        self._breeder = Breeder(searcher.body, searcher.limits)
+
+    def sown(self, hull: Hull, hints: FloatArray | None = None) -> Population:
+        """The best first guesses of every heading, and hints (n, p), refined."""
+        rng = keyed_generator(self._searcher.config.seed, self._stamp_ns, "sow")
+        guesses = first_guesses(self._searcher.body, self._searcher.limits, hull, rng)
+        costs = self.costs(guesses.reshape(-1, guesses.shape[2])).reshape(guesses.shape[:2])
+        best = np.argsort(costs, axis=1, kind="stable")[:, :_PER_HEADING]
+        order = np.argsort(np.take_along_axis(costs, best, axis=1).ravel(), kind="stable")[:_SOWN]
+        chosen = np.take_along_axis(guesses, best[:, :, None], axis=1).reshape(-1, guesses.shape[2])
+        sown = chosen[order] if hints is None else np.concatenate([hints, chosen[order]])
+        return self.selected(self.refined(sown, *_SOW))
+
+    def bred(self, population: Population, generation: int, *, share: float = 1.0) -> Population:
+        """One more generation.
+
+        Args:
+            population: the parents, who stay if they are good enough.
+            generation: keys the draws.
+            share: of the usual number of children.
+        """
+        rng = keyed_generator(
+            self._searcher.config.seed, self._stamp_ns, f"generation {generation}"
+        )
+        children = self._breeder.children(population.poses, round(share * _CHILDREN), rng)
+        best = np.argsort(self.costs(children), kind="stable")[: max(1, round(share * _REFINED))]
+        return self.selected(
+            np.concatenate([population.poses, self.refined(children[best], *_BREED)])
+        )
+
+    def followed(self, population: Population) -> Population:
+        """The population of the frame before, refined in this one."""
+        return self.selected(self.refined(population.poses, *_FOLLOW))
+
+    def costs(self, poses: FloatArray) -> FloatArray:
+        """1 - f_s (n,) of poses (n, p); infinite where there is none."""
+        costs = self._costs(poses)
+        return np.where(np.isfinite(costs), costs, np.inf)
+
+    def refined(self, poses: FloatArray, iterations: int, reach: tuple[float, float]) -> FloatArray:
+        """Poses (n, p), each refined on the contours."""
+        searcher = self._searcher
+        scale = 1.0 / (CORRELATION_M * searcher.config.refine_sigma_m**2)
+        usual = Prior(searcher.body.neutral, _PRIOR / searcher.body.spread**2)
+
+        def equations(pose: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
+            sums = self.contours.equations(pose, reach_m)
+            return sums.hessian * scale, sums.slope * scale
+
+        return np.array(
+            [
+                refine(
+                    equations, pose, priors=(usual,), bounds=searcher.limits,
+                    iterations=iterations, reach=reach,
+                )
+                for pose in poses
+            ]
+        )  # fmt: skip
+
+    def selected(self, poses: FloatArray) -> Population:
+        """The best of poses (n, p) that differ; some facing the other way among them."""
+        costs = self.costs(poses)
+        order = [int(i) for i in np.argsort(costs, kind="stable") if np.isfinite(costs[i])]
+        points = {i: markers(self._searcher.body, poses[i]) for i in order}
+        ways = {i: heading(points[i]) for i in order}
+        kept: list[int] = []
+        quarters = [0, 0, 0, 0]
+        for i in order:
+            turn = ways[i] - ways[kept[0]] if kept else 0.0
+            quarter = round(turn / (0.5 * np.pi)) % 4
+            if quarters[quarter] == PER_QUARTER:
+                continue
+            gaps = (np.linalg.norm(points[i] - points[j], axis=1).mean() for j in kept)
+            if all(gap >= _ALIKE_M for gap in gaps):
+                kept.append(i)
+                quarters[quarter] += 1
+        rows = np.array(kept, dtype=np.int64)
+        return Population(poses[rows], costs[rows], np.array([ways[i] for i in kept]))
+
+
+def scaled_to(body: BodyModel, other: BodyModel, poses: FloatArray) -> FloatArray:
+    """Poses (n, p) of one body for another of the same kind: markers' middles stay in place."""
+    out = poses.copy()
+    at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
+    for pose in out:
+        pose[at] += markers(body, pose).mean(axis=0) - markers(other, pose).mean(axis=0)
+    return out

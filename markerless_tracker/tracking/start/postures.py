@@ -1,0 +1,105 @@
+"""Generic postures to begin with, put where a hull's trunk is, facing all ways."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel, cone_transforms
+from markerless_tracker.body.anatomy import posture
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.start.hull import Hull
+
+HEADINGS = 16
+VARIATIONS = 48
+"""Random variations of the postures, per heading."""
+VARIATION_SHARE = 0.6
+"""Their spread, as a share of how far people's joints scatter."""
+_TILT_RAD = (0.35, 0.40)
+_LIKE_TRUNK = ("pelvis", "belly", "chest", "torso")
+
+_LEFT_STEP = {
+    "l_hip_y": 0.45, "r_hip_y": -0.20, "l_knee": 0.15, "r_knee": 0.35,
+    "l_shoulder_y": -0.35, "r_shoulder_y": 0.35, "l_elbow": 0.40, "r_elbow": 0.40,
+}  # fmt: skip
+_LEFT_KNEE_UP = {"l_hip_y": 1.1, "l_knee": 0.9, "l_shoulder_x": 0.8, "r_shoulder_x": 0.8}
+_LEFT_SWING = {"r_hip_y": 0.1, "r_knee": 0.1, "l_hip_y": 0.35, "l_knee": 1.0, "l_elbow": 0.4}
+
+
+def _mirrored(angles: Mapping[str, float]) -> dict[str, float]:
+    other = {"l": "r", "r": "l"}
+    return {other[name[0]] + name[1:]: angle for name, angle in angles.items()}
+
+
+POSTURES: tuple[Mapping[str, float], ...] = (
+    {},
+    _LEFT_STEP,
+    _mirrored(_LEFT_STEP),
+    _LEFT_SWING,
+    _mirrored(_LEFT_SWING),
+    {"l_shoulder_x": 1.2, "r_shoulder_x": 1.2, "l_elbow": 0.2, "r_elbow": 0.2},
+    {"l_shoulder_y": 1.0, "r_shoulder_y": 1.0, "l_elbow": 0.6, "r_elbow": 0.6},
+    {"l_shoulder_x": 2.2, "r_shoulder_x": 2.2, "l_elbow": 0.6, "r_elbow": 0.6},
+    _LEFT_KNEE_UP,
+    _mirrored(_LEFT_KNEE_UP),
+    {
+        "pelvis_ry": 0.8, "l_hip_y": 0.8, "r_hip_y": 0.8, "l_knee": 0.2, "r_knee": 0.2,
+        "l_shoulder_y": 0.8, "r_shoulder_y": 0.8,
+    },
+    {"l_hip_y": 1.2, "r_hip_y": 1.2, "l_knee": 1.6, "r_knee": 1.6, "pelvis_ry": 0.3},
+)  # fmt: skip
+"""Anatomical angles (rad): standing, steps, swinging legs, raised arms, raised knees, a bow, a
+squat."""
+
+
+def postures(body: BodyModel) -> FloatArray:
+    """The postures (k, p) at the origin, facing along x."""
+    return np.array([posture(body, angles) for angles in POSTURES])
+
+
+def joint_spread(body: BodyModel) -> FloatArray:
+    """(p,) how far people's joints scatter about neutral, rad; 0 for the root."""
+    return np.where(np.isfinite(body.spread), body.spread, 0.0)
+
+
+def first_guesses(
+    body: BodyModel, limits: FloatArray, hull: Hull, rng: np.random.Generator
+) -> FloatArray:
+    """Poses (`HEADINGS`, n, p): postures and variations of them, in every heading.
+
+    Args:
+        body: the body.
+        limits: (2, p), kept.
+        hull: its trunk is where the body's trunk is put.
+        rng: draws the variations.
+    """
+    known = postures(body)
+    spread = VARIATION_SHARE * joint_spread(body)
+    spread[[body.index("pelvis_rx"), body.index("pelvis_ry")]] = _TILT_RAD
+    middle = hull.trunk_m.mean(axis=0)
+    out = np.empty((HEADINGS, len(known) + VARIATIONS, body.size))
+    for k in range(HEADINGS):
+        varied = known[rng.integers(len(known), size=VARIATIONS)]
+        out[k] = np.concatenate(
+            [known, varied + spread * rng.standard_normal((VARIATIONS, body.size))]
+        )
+        out[k, :, body.index("pelvis_rz")] += 2.0 * np.pi * k / HEADINGS
+    np.clip(out, limits[0], limits[1], out=out)
+    at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
+    for pose in out.reshape(-1, body.size):
+        pose[at] += middle - _trunk_middle(body, pose)
+    return out
+
+
+def put_at(body: BodyModel, hull: Hull, pose: FloatArray) -> FloatArray:
+    """A pose (p,) with its trunk moved to where the hull's is."""
+    moved = pose.copy()
+    at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
+    moved[at] += hull.trunk_m.mean(axis=0) - _trunk_middle(body, pose)
+    return moved
+
+
+def _trunk_middle(body: BodyModel, pose: FloatArray) -> FloatArray:
+    cones = [i for i, name in enumerate(body.cone_names) if name in _LIKE_TRUNK]
+    placed = cone_transforms(body, pose)[cones or slice(None)]
+    length = body.cone_length[cones or slice(None)]
+    return np.asarray((placed[:, :, 3] + 0.5 * length[:, None] * placed[:, :, 2]).mean(axis=0))

@@ -1,0 +1,279 @@
+"""Starting by itself, over some frames: found in the first, sure of the heading in the last."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body.anatomy import turned_by
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.fitness.contours import ContourFrame
+from markerless_tracker.fitness.shape import fit_shape
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation
+from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.start.hull import Hull, find_hulls, hulls_part
+from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
+from markerless_tracker.tracking.start.postures import put_at
+
+SETTLING_FRAMES = 8
+"""Frames from the first pose to the one from which on it is tracked like any other."""
+GENERATIONS = 7
+SECOND_GENERATIONS = 5
+STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
+"""Statures that are tried for somebody unknown, in heights of the hull; raised arms make it
+higher than the person."""
+_STATURE_RANGE_M = (1.2, 2.1)
+LEAST_FIT = 0.62
+"""f_s that a pose needs at least to be somebody's: other things than people reach less."""
+_FLIP_MARGIN = 0.005
+"""How much better, on average, the other way must explain the views before the settling ends."""
+_WALKED_M, _WALK_M_S, _WALK_BONUS = 0.05, 0.25, 0.01
+"""People walk forwards: worth this much of f, from that way and speed on."""
+_GENERATION_SHARE = 0.5
+_SHAPE_FRAMES = 5
+_SHAPE_SLACK = 0.01
+_RESIZED_AFTER = 3
+_RESIZE = (4, (0.12, 0.05))
+_TRUNK_MARKERS = [0, 1]
+
+Select = Callable[
+    [Mapping[str, Observation], BodyModel, FloatArray],
+    tuple[dict[str, Observation], tuple[str, ...]],
+]
+SearcherFor = Callable[[BodyModel], Searcher]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the starter found in one frame.
+
+    Attributes:
+        searcher: searches with the body found so far.
+        pose: (p,).
+        observations: the silhouettes' parts that are this person's.
+        settled: whether the start is over.
+        notes: what the user should know, one line each.
+    """
+
+    searcher: Searcher
+    pose: FloatArray
+    observations: Mapping[str, Observation]
+    settled: bool
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """One frame as one way of facing explains it."""
+
+    contours: ContourFrame
+    pose: FloatArray
+    cost: float
+
+
+class Starter:
+    """Finds somebody in the views, without any start pose.
+
+    From a body of the right stature (tried, if unknown) in many postures and headings the best are
+    refined, bred and refined again. Facing one way or the opposite looks alike: both are followed
+    for some frames, and what explains them better wins; who walks faces where he goes. Then the
+    body's sections are fitted with the poses held.
+
+    Args:
+        rig: the cameras.
+        body: the body; its lengths are the person's if `sized` is None.
+        searcher_for: makes a searcher of a body.
+        select: keeps the parts of silhouettes that a pose explains.
+        sized: makes the body of a stature, if that is unknown.
+        fit_shape: whether to fit the sections in the end.
+        last_pose: (p,) where the body was when it was lost.
+    """
+
+    def __init__(
+        self,
+        rig: CameraRig,
+        body: BodyModel,
+        searcher_for: SearcherFor,
+        select: Select,
+        *,
+        sized: Callable[[float], BodyModel] | None = None,
+        fit_shape: bool = True,
+        last_pose: FloatArray | None = None,
+    ) -> None:
+        self._cameras = {camera.name: camera for camera in rig}
+        self._body = body
+        self._searcher_for = searcher_for
+        self._select = select
+        self._sized = sized
+        self._fit_shape = fit_shape
+        self._last_pose = last_pose
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget whom it was about to find."""
+        self._population: Population | None = None
+        self._searcher: Searcher | None = None
+        self._way = 0.0
+        self._seen: tuple[list[_Seen | None], list[_Seen | None]] = ([], [])
+        self._leading = 0
+        self._flipped = False
+        self._begun_ns = 0
+        self._from_m = np.zeros(3)
+
+    def step(self, observed: Mapping[str, Observation], stamp_ns: int) -> Found | None:
+        """Look at one frame; None for nobody."""
+        if self._population is None or self._searcher is None:
+            return self._begin(observed, stamp_ns)
+        population = self._population
+        observations, notes = self._select(
+            observed, self._searcher.body, self._best(population).poses[0]
+        )
+        frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
+        population = frame.followed(population)
+        if len(self._seen[0]) == 1:
+            population = self._second_look(frame, population, observations)
+        population = frame.bred(population, 0, share=_GENERATION_SHARE)
+        if 1.0 - population.costs[0] < LEAST_FIT:
+            self.reset()
+            return None
+        self._population = population
+        self._note(frame, population)
+        notes += self._turn(stamp_ns)
+        settled = len(self._seen[0]) >= SETTLING_FRAMES
+        pose = self._best(population).poses[0]
+        if settled:
+            pose = self._settle(frame, pose)
+        return Found(self._searcher, pose, observations, settled, notes)
+
+    def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> Found | None:
+        for hull in find_hulls(self._cameras, observed):
+            observations = {
+                name: hulls_part(observation, self._cameras[name], hull)
+                for name, observation in observed.items()
+            }
+            found = self._search(hull, observations, stamp_ns)
+            if found is None:
+                continue
+            frame, population = found
+            self._population = population
+            self._way = float(population.headings[0])
+            self._begun_ns = stamp_ns
+            self._note(frame, population)
+            self._from_m = self._trunk(population.poses[0])
+            assert self._searcher is not None
+            return Found(self._searcher, population.poses[0], observations, False)
+        return None
+
+    def _second_look(
+        self,
+        frame: FramePopulation,
+        population: Population,
+        observations: Mapping[str, Observation],
+    ) -> Population:
+        """Search the second frame from nothing, too: what one search missed, another finds."""
+        hull = next(find_hulls(self._cameras, observations), None)
+        if hull is None:
+            return population
+        fresh = frame.sown(hull)
+        for generation in range(1, 1 + SECOND_GENERATIONS):
+            fresh = frame.bred(fresh, generation)
+        return frame.selected(np.concatenate([population.poses, fresh.poses]))
+
+    def _search(
+        self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
+    ) -> tuple[FramePopulation, Population] | None:
+        height_m = float(np.clip(hull.high_m - hull.low_m, *_STATURE_RANGE_M))
+        body = self._body if self._sized is None else self._sized(height_m)
+        self._searcher = self._searcher_for(body)
+        near = body.neutral.copy()
+        near[[body.index(f"pelvis_t{axis}") for axis in "xyz"]] = hull.trunk_m.mean(axis=0)
+        frame = FramePopulation(self._searcher, observations, stamp_ns, near)
+        hints = None
+        if self._last_pose is not None:
+            hints = np.array([self._last_pose, put_at(body, hull, self._last_pose)])
+        population = frame.sown(hull, hints)
+        for generation in range(GENERATIONS):
+            population = frame.bred(population, generation)
+            if self._sized is not None and generation == _RESIZED_AFTER:
+                frame, population = self._resize(
+                    frame, population, height_m, observations, stamp_ns
+                )
+        return (frame, population) if 1.0 - population.costs[0] >= LEAST_FIT else None
+
+    def _resize(
+        self,
+        frame: FramePopulation,
+        population: Population,
+        height_m: float,
+        observations: Mapping[str, Observation],
+        stamp_ns: int,
+    ) -> tuple[FramePopulation, Population]:
+        """Try other statures; the one whose best pose explains the views best is kept."""
+        assert self._sized is not None and self._searcher is not None
+        best = (float(population.costs[0]), frame, population, self._searcher)
+        for share in STATURES:
+            stature_m = float(np.clip(share * height_m, *_STATURE_RANGE_M))
+            searcher = self._searcher_for(self._sized(stature_m))
+            moved = scaled_to(self._searcher.body, searcher.body, population.poses)
+            other = FramePopulation(searcher, observations, stamp_ns, moved[0])
+            cost = float(other.costs(other.refined(moved[:1], *_RESIZE))[0])
+            if cost < best[0]:
+                best = (cost, other, Population(moved, population.costs, population.headings),
+                        searcher)  # fmt: skip
+        _, found, chosen, self._searcher = best
+        return found, chosen if found is frame else found.followed(chosen)
+
+    def _note(self, frame: FramePopulation, population: Population) -> None:
+        for side, seen in enumerate(self._seen):
+            facing = population.facing(self._way + side * np.pi)
+            seen.append(
+                _Seen(frame.contours, facing.poses[0], float(facing.costs[0]))
+                if len(facing)
+                else None
+            )
+
+    def _turn(self, stamp_ns: int) -> tuple[str, ...]:
+        """Change to the other way of facing, at most once, if it explains the frames better."""
+        other = 1 - self._leading
+        both = [
+            (a.cost, b.cost)
+            for a, b in zip(self._seen[self._leading], self._seen[other], strict=True)
+            if a is not None and b is not None
+        ]
+        lead, rival = self._seen[self._leading][-1], self._seen[other][-1]
+        if self._flipped or rival is None:
+            return ()
+        gain = float(np.mean([a - b for a, b in both])) if both and lead is not None else 1.0
+        moved = self._trunk(rival.pose) - self._from_m
+        seconds = (stamp_ns - self._begun_ns) * 1e-9
+        way = float(np.hypot(moved[0], moved[1]))
+        if way > _WALKED_M and seconds > 0.0 and way / seconds > _WALK_M_S:
+            off = turned_by(float(np.arctan2(moved[1], moved[0])), self._way + other * np.pi)
+            gain += 2.0 * _WALK_BONUS * float(np.cos(off))
+        over = len(self._seen[0]) >= SETTLING_FRAMES
+        if gain <= (0.0 if over else _FLIP_MARGIN):
+            return ()
+        self._leading, self._flipped = other, True
+        return ("start: the person faces the other way than first thought, turned round",)
+
+    def _best(self, population: Population) -> Population:
+        """The part of a population that faces the leading way, or all if none does."""
+        facing = population.facing(self._way + self._leading * np.pi)
+        return facing if len(facing) else population
+
+    def _settle(self, frame: FramePopulation, pose: FloatArray) -> FloatArray:
+        assert self._searcher is not None
+        if not self._fit_shape:
+            return pose
+        seen = [one for one in self._seen[self._leading] if one is not None]
+        good = min((one.cost for one in seen), default=0.0) + _SHAPE_SLACK
+        used = [(one.contours, one.pose) for one in seen if one.cost <= good][-_SHAPE_FRAMES:]
+        body = fit_shape(self._searcher.body, used or [(frame.contours, pose)])
+        self._searcher = self._searcher_for(body)
+        return pose
+
+    def _trunk(self, pose: FloatArray) -> FloatArray:
+        assert self._searcher is not None
+        return np.asarray(markers(self._searcher.body, pose)[_TRUNK_MARKERS].mean(axis=0))

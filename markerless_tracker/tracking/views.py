@@ -1,0 +1,86 @@
+"""Which views can be believed: a blinded camera shows silhouette everywhere, or nobody at all."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.camera import CameraRig, project_camera
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation
+
+MOST_COVER = 0.6
+"""Silhouettes that cover more of the frame are no person's: the light or the camera changed."""
+IN_FRAME = 0.7
+"""Share of the markers that must be in the frame for a view without silhouette to be wrong."""
+
+
+class ViewWatch:
+    """Sorts out views that cannot be right, and says when a camera is left out or taken back.
+
+    Args:
+        rig: the cameras.
+    """
+
+    def __init__(self, rig: CameraRig) -> None:
+        self._rig = rig
+        self._out: dict[str, str] = {}
+
+    def reset(self) -> None:
+        """Forget which cameras were left out."""
+        self._out = {}
+
+    def sort(
+        self,
+        observed: Mapping[str, Observation],
+        body: BodyModel,
+        expected: FloatArray | None,
+    ) -> tuple[dict[str, Observation], tuple[str, ...]]:
+        """The views to believe, and a line for each camera that goes or comes back.
+
+        Args:
+            observed: what the cameras saw.
+            body: the tracked body.
+            expected: (p,) where it should be, None if that is unknown.
+        """
+        reasons: dict[str, str] = {}
+        for camera in self._rig:
+            observation = observed.get(camera.name)
+            if observation is None:
+                reasons[camera.name] = "no image"
+                continue
+            width, height = observation.size_px
+            cover = float(observation.mask.sum()) / (width * height)
+            if cover > MOST_COVER:
+                reasons[camera.name] = f"silhouette over {cover:.0%} of the frame"
+        believed = {name: seen for name, seen in observed.items() if name not in reasons}
+        empty = [name for name, seen in believed.items() if not seen.mask_words.any()]
+        # If nobody is in any view, he left.
+        if expected is not None and len(empty) < len(believed):
+            points = markers(body, expected)
+            for name in empty:
+                if self._in_frame(points, name) >= IN_FRAME:
+                    reasons[name] = "nobody where the others see somebody"
+                    del believed[name]
+        return believed, self._changes(reasons)
+
+    def _in_frame(self, points: FloatArray, name: str) -> float:
+        camera = self._rig[name]
+        with np.errstate(invalid="ignore"):
+            pixels = project_camera(points, camera)
+            inside = (pixels >= 0.0).all(axis=1) & (pixels < camera.size_px).all(axis=1)
+        return float(inside.mean())
+
+    def _changes(self, reasons: Mapping[str, str]) -> tuple[str, ...]:
+        gone = [name for name in reasons if name not in self._out]
+        back = [name for name in self._out if name not in reasons]
+        self._out = dict(reasons)
+        return (
+            *(f"{name}: left out, {reasons[name]}" for name in gone),
+            *(f"{name}: taken back" for name in back),
+        )
+
+
+def anybody(believed: Mapping[str, Observation]) -> bool:
+    """Whether any view shows any silhouette."""
+    return any(observation.mask_words.any() for observation in believed.values())

@@ -1,0 +1,90 @@
+"""The visual hull: where somebody is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking.start.hull import find_hulls, hulls_part
+
+
+@pytest.fixture(scope="module")
+def person():
+    scene = SyntheticScene(body="person31", motion="walk", size_px=(256, 192), seed=4)
+    _, masks, pose = scene.frame(0)
+    return scene, masks, pose
+
+
+def observed(masks):
+    return {
+        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+    }
+
+
+def cameras(scene):
+    return {camera.name: camera for camera in scene.rig}
+
+
+def test_the_hull_holds_the_person_and_little_else(person) -> None:
+    scene, masks, _ = person
+    hull, *others = find_hulls(cameras(scene), observed(masks))
+    assert not others
+    points = scene.markers(0)
+    gaps = np.linalg.norm(hull.points_m[:, None] - points[None], axis=2).min(axis=0)
+    assert gaps.max() < 0.06
+    assert hull.views == 4
+    assert abs(hull.high_m - points[2, 2]) < 0.06
+    assert abs(hull.low_m) < 0.08
+    pelvis, neck = points[0], points[1]
+    assert np.linalg.norm(hull.trunk_m.mean(axis=0) - 0.5 * (pelvis + neck)) < 0.12
+
+
+def test_two_views_are_enough_and_one_is_not(person) -> None:
+    scene, masks, _ = person
+    seen = observed(masks)
+    two = dict(list(seen.items())[:2])
+    (hull,) = find_hulls(cameras(scene), two)
+    assert np.linalg.norm(hull.trunk_m.mean(axis=0)[:2] - scene.markers(0)[0, :2]) < 0.2
+    assert not list(find_hulls(cameras(scene), dict(list(seen.items())[:1])))
+
+
+def test_nobody(person) -> None:
+    scene, masks, _ = person
+    empty = {name: np.zeros_like(mask) for name, mask in masks.items()}
+    assert not list(find_hulls(cameras(scene), observed(empty)))
+
+
+def test_a_thing_of_a_hands_size_is_nobody(person) -> None:
+    scene, masks, _ = person
+    specks = {}
+    for camera in scene.rig:
+        mask = np.zeros_like(masks[camera.name])
+        u, v = np.array(mask.shape[::-1]) // 2
+        mask[v - 3 : v + 4, u - 3 : u + 4] = 1
+        specks[camera.name] = mask
+    assert not list(find_hulls(cameras(scene), observed(specks)))
+
+
+def test_a_view_that_shows_nothing_does_not_hide_the_person(person) -> None:
+    scene, masks, _ = person
+    seen = observed(masks)
+    name = next(iter(seen))
+    seen[name] = observed({name: np.zeros_like(masks[name])})[name]
+    assert len(list(find_hulls(cameras(scene), seen))) == 1
+
+
+def test_other_components_are_left_out(person) -> None:
+    scene, masks, _ = person
+    name = next(iter(masks))
+    hull = next(find_hulls(cameras(scene), observed(masks)))
+    mask = masks[name].copy()
+    mask[:8, :8] = 1
+    seen = observed({name: mask})[name]
+    kept = hulls_part(seen, scene.rig[name], hull)
+    assert not kept.mask[:8, :8].any()
+    assert kept.mask.sum() == (masks[name] > 0).sum()
+    alone = replace(seen, mask_words=kept.mask_words)
+    assert hulls_part(alone, scene.rig[name], hull) is alone

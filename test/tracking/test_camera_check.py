@@ -1,0 +1,82 @@
+"""A camera that disagrees with the others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import markers
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.camera_check import CameraCheck, Shift, corrected, describe
+
+CONFIG = TrackerConfig(threads=1)
+FRAME_NS = 200_000_000
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=3)
+
+
+def shifted(rig: CameraRig, name: str, du: float, dv: float) -> CameraRig:
+    """The rig with one camera's calibration off by that much."""
+    moved = {
+        camera.name: replace(camera, matrix=camera.matrix + [[0, 0, du], [0, 0, dv], [0, 0, 0]])
+        for camera in rig
+    }
+    return CameraRig(tuple(moved[c.name] if c.name == name else c for c in rig))
+
+
+def checked(scene, rig, frames: int = 8):
+    check = CameraCheck(rig, CONFIG)
+    for index in range(frames):
+        _, masks, pose = scene.frame(12 * index)
+        seen = {
+            name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+            for name, mask in masks.items()
+        }
+        check.add(
+            TrackResult(
+                index * FRAME_NS, TrackState.TRACKING, pose, markers(scene.body, pose), 1.8, {}, 0,
+                observations=seen,
+            ),
+            scene.body,
+        )  # fmt: skip
+    return check.shifts()
+
+
+def test_cameras_that_agree_are_not_named(scene) -> None:
+    shifts = checked(scene, scene.rig)
+    assert set(shifts) == set(scene.rig.names)
+    assert all(shift.length_m < 0.01 for shift in shifts.values())
+    assert describe(shifts) == []
+    assert corrected(scene.rig, shifts, 1.0) == CameraRig(scene.rig.cameras)
+
+
+def test_the_camera_that_is_off_is_named_and_corrected(scene) -> None:
+    wrong = shifted(scene.rig, "cam03", -5.0, 3.0)
+    shifts = checked(scene, wrong)
+    assert [name for name, shift in shifts.items() if shift.disagrees] == ["cam03"]
+    np.testing.assert_allclose(shifts["cam03"].px, (5.0, -3.0), atol=1.0)
+    (line,) = describe(shifts)
+    assert line.startswith("cam03: silhouettes (+")
+    better = corrected(wrong, shifts, 1.0)
+    np.testing.assert_allclose(better["cam03"].matrix, scene.rig["cam03"].matrix, atol=1.0)
+    assert better["cam01"] is wrong["cam01"]
+
+
+def test_a_correction_is_for_the_full_size(scene) -> None:
+    shift = Shift((4.0, -2.0), 0.05, 9)
+    better = corrected(scene.rig, {"cam02": shift}, 0.5)
+    change = better["cam02"].matrix - scene.rig["cam02"].matrix
+    np.testing.assert_allclose(change[:2, 2], (8.0, -4.0))
+
+
+def test_few_checks_and_lost_frames_say_nothing(scene) -> None:
+    assert not Shift((9.0, 9.0), 0.1, 2).disagrees
+    check = CameraCheck(scene.rig, CONFIG)
+    check.add(TrackResult(0, TrackState.LOST, None, None, float("nan"), {}, 0), scene.body)
+    assert check.shifts() == {}

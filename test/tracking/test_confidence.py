@@ -1,0 +1,89 @@
+"""How sure a pose is."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import MARKER_NAMES, markers, root_transform
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.confidence import GENERIC_M, MEASURED_M, _slopes, confidence_of
+from markerless_tracker.tracking.search import Searcher
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=3)
+
+
+def frame_of(scene, names):
+    _, masks, pose = scene.frame(0)
+    seen = {
+        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+        if name in names
+    }
+    body = scene.body
+    searcher = Searcher(scene.rig, body, TrackerConfig(threads=1), limits=body.limits, threads=1)
+    return pose, searcher.frame(seen, 0, pose).contours
+
+
+def test_fewer_views_are_less_sure(scene) -> None:
+    pose, four = frame_of(scene, scene.rig.names)
+    _, one = frame_of(scene, scene.rig.names[:1])
+    sure = confidence_of(scene.body, pose, four, measured=True)
+    unsure = confidence_of(scene.body, pose, one, measured=True)
+    assert sure is not None and unsure is not None
+    assert unsure.markers_sd_m.mean() > 1.5 * sure.markers_sd_m.mean()
+    # One camera does not see depth.
+    camera = scene.rig.cameras[0]
+    depth = np.abs(camera.T_cam_world[2, :3])
+    pelvis = MARKER_NAMES.index("Pelvis")
+    assert np.argmax(unsure.markers_sd_m[pelvis]) == np.argmax(depth)
+
+
+def test_lengths_of_a_stature_are_less_sure(scene) -> None:
+    pose, contours = frame_of(scene, scene.rig.names)
+    measured = confidence_of(scene.body, pose, contours, measured=True)
+    generic = confidence_of(scene.body, pose, contours, measured=False)
+    assert measured is not None and generic is not None
+    assert (measured.markers_sd_m >= MEASURED_M).all()
+    assert (generic.markers_sd_m >= GENERIC_M).all()
+    assert (generic.pose_sd > measured.pose_sd).all()
+
+
+def test_the_roots_covariance_is_one(scene) -> None:
+    pose, contours = frame_of(scene, scene.rig.names)
+    sure = confidence_of(scene.body, pose, contours, measured=True)
+    assert sure is not None
+    assert np.linalg.eigvalsh(sure.root_covariance).min() > 0.0
+    at = [scene.body.index(f"pelvis_t{axis}") for axis in "xyz"]
+    np.testing.assert_allclose(
+        np.sqrt(np.diag(sure.root_covariance)[:3]), sure.pose_sd[at], rtol=1e-6
+    )
+
+
+def test_no_silhouette_no_confidence(scene) -> None:
+    pose, _ = frame_of(scene, scene.rig.names)
+    body = scene.body
+    nothing = {
+        c.name: Observation.from_mask(
+            c.name, 0, np.zeros(c.size_px[::-1], np.uint8), np.zeros(c.size_px[::-1], np.uint8)
+        )
+        for c in scene.rig
+    }
+    searcher = Searcher(scene.rig, body, TrackerConfig(threads=1), limits=body.limits, threads=1)
+    contours = searcher.frame(nothing, 0, pose).contours
+    assert confidence_of(body, pose, contours, measured=True) is None
+
+
+def test_slopes_against_finite_differences(scene) -> None:
+    body, pose = scene.body, scene.pose(0)
+    by_marker, by_root = _slopes(body, pose)
+    rng = np.random.default_rng(0)
+    change = 1e-3 * rng.standard_normal(body.size)
+    after, before = markers(body, pose + change), markers(body, pose - change)
+    np.testing.assert_allclose(2.0 * by_marker @ change, (after - before).ravel(), atol=2e-5)
+    turn = root_transform(body, pose + change)[:3, :3] @ root_transform(body, pose)[:3, :3].T
+    small = np.array([turn[2, 1], turn[0, 2], turn[1, 0]])
+    np.testing.assert_allclose(by_root[3:] @ change, small, atol=2e-5)
