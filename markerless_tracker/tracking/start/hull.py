@@ -61,6 +61,11 @@ class Hull:
         return float(self.points_m[:, 2].max()) + 0.5 * FINE_M
 
     @property
+    def height_m(self) -> float:
+        """From its lowest to its highest point, without what the grid's spacing adds."""
+        return self.high_m - self.low_m - FINE_M
+
+    @property
     def trunk_m(self) -> FloatArray:
         """(m, 3) the thick part: points that lie at least half as deep as the deepest."""
         return np.asarray(self.points_m[self.depth_m >= _TRUNK_SHARE * self.depth_m.max()])

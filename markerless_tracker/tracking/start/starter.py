@@ -25,6 +25,9 @@ STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
 """Statures that are tried for somebody unknown, in heights of the hull; raised arms make it
 higher than the person."""
 _STATURE_RANGE_M = (1.2, 2.1)
+_USUAL_STATURE_M, _STATURE_SD_M = 1.70, 0.10
+_STATURE_BELIEF = 0.002
+"""A stature one standard deviation from the usual one must raise f_s by this much more."""
 LEAST_FIT = 0.62
 """f_s that a pose needs at least to be somebody's: other things than people reach less."""
 _FLIP_MARGIN = 0.005
@@ -184,7 +187,7 @@ class Starter:
     def _search(
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> tuple[FramePopulation, Population] | None:
-        height_m = float(np.clip(hull.high_m - hull.low_m, *_STATURE_RANGE_M))
+        height_m = float(np.clip(hull.height_m, *_STATURE_RANGE_M))
         body = self._body if self._sized is None else self._sized(height_m)
         self._searcher = self._searcher_for(body)
         near = body.neutral.copy()
@@ -212,13 +215,16 @@ class Starter:
     ) -> tuple[FramePopulation, Population]:
         """Try other statures; the one whose best pose explains the views best is kept."""
         assert self._sized is not None and self._searcher is not None
-        best = (float(population.costs[0]), frame, population, self._searcher)
+        best = (
+            float(population.costs[0]) + _unusual(height_m), frame, population, self._searcher
+        )  # fmt: skip
         for share in STATURES:
             stature_m = float(np.clip(share * height_m, *_STATURE_RANGE_M))
             searcher = self._searcher_for(self._sized(stature_m))
             moved = scaled_to(self._searcher.body, searcher.body, population.poses)
             other = FramePopulation(searcher, observations, stamp_ns, moved[0])
             cost = float(other.costs(other.refined(moved[:1], *_RESIZE))[0])
+            cost += _unusual(stature_m)
             if cost < best[0]:
                 best = (cost, other, Population(moved, population.costs, population.headings),
                         searcher)  # fmt: skip
@@ -277,3 +283,8 @@ class Starter:
     def _trunk(self, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None
         return np.asarray(markers(self._searcher.body, pose)[_TRUNK_MARKERS].mean(axis=0))
+
+
+def _unusual(stature_m: float) -> float:
+    """What a stature costs for being unusual, in units of f_s."""
+    return _STATURE_BELIEF * ((stature_m - _USUAL_STATURE_M) / _STATURE_SD_M) ** 2
