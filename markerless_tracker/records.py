@@ -193,6 +193,8 @@ class TrackResult:
         refinements: iterations of contour refinement spent on this frame.
         observations: the evidence each camera gave.
         warnings: what the user should know about this frame, one line each.
+        exposure: per camera whose image came, its brightness relative to its background's, by
+            channel.
     """
 
     stamp_ns: int
@@ -205,6 +207,7 @@ class TrackResult:
     refinements: int = 0
     observations: Mapping[str, Observation] = field(default_factory=dict, repr=False)
     warnings: tuple[str, ...] = ()
+    exposure: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("pose", "markers_m"):

@@ -195,7 +195,9 @@ class Segmenter:
         mask, zone = self._silhouette(image, region, edge_reach(self.settings))
         inside = region.within(zone).slices
         edges = edge_map(image[zone.slices], mask, self.settings)[inside]
-        if self._adaptation is not None and region == self._whole:
+        if self._adaptation is not None and region != self._whole:
+            self._adaptation.pass_over(stamp_ns)
+        elif self._adaptation is not None:
             values = (grey_of(image) if self._grey else image).reshape(*mask.shape, -1)
             self._adaptation.follow(
                 values, mask, stamp_ns, self._gain, self._means_by_channel, self._scales_by_channel

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
@@ -154,7 +155,8 @@ class Tracker:
         search = self._searcher.frame(observations, stamp_ns, predicted)
         sigma = self.body.sigma * self._rate_factor(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
-        return self._conclude(search, stamp_ns, observations, warnings)
+        result = self._conclude(search, stamp_ns, observations, warnings)
+        return replace(result, exposure=self._evidence.exposure(views))
 
     def _take_shape(self, observations: Mapping[str, Observation], stamp_ns: int) -> FloatArray:
         """Fit the body's sections to the first frame; returns the start pose (p,) to go on from."""
