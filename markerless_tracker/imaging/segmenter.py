@@ -169,6 +169,19 @@ class Segmenter:
         mask, zone = self._silhouette(image, region, 0)
         return mask[region.within(zone).slices]
 
+    def labels(self, image: Image) -> Mask:
+        """(h, w) uint8: 0 background, 127 shadow, 255 foreground, before any repair; to look at.
+
+        Raises:
+            ImageError: not an image of the background's size and channels; names the camera.
+        """
+        self._check(image)
+        if self.settings.exposure_compensation:
+            self._gain[:] = self._meter.gain(image.reshape(image.shape[0], image.shape[1], -1))
+        labels = self._labels(image, self._whole)
+        self._look_at_texture(image, labels, self._whole, self._whole)
+        return labels.copy()
+
     def observe(self, image: Image, stamp_ns: int, region: Region | None = None) -> Observation:
         """Silhouette and edge map of a region, or of the whole frame.
 

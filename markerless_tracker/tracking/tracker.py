@@ -12,7 +12,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import BackgroundModel, Image, Region
+from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
@@ -132,6 +132,10 @@ class Tracker:
         """
         margin_m = self._region_margin(stamp_ns)
         return self._evidence.regions(self.body, self._predict(stamp_ns), margin_m)
+
+    def segmenter(self, camera: str) -> Segmenter | None:
+        """What tells a camera's silhouettes from its background; None without one."""
+        return self._evidence.segmenters.get(camera)
 
     def step(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> TrackResult:
         """Find the pose that explains the views of one time.
