@@ -86,6 +86,7 @@ class Segmenter:
         sigma = float(np.sqrt(np.median(background.variance)))
         self._smooth = sigma > self.settings.denoise_sigma
         self._mean, self._scale = self._gaussians()
+        self._first = kernels.coarse(self._mean[0], self._scale[0])
         mean, variance = self._steady(background.mean, background.variance)
         if self._grey:
             self._grey_mean = np.ascontiguousarray(mean[:, :, 0])
@@ -122,6 +123,7 @@ class Segmenter:
         if self._adaptation is not None:
             self._adaptation.reset()
             self._mean[...] = self._gaussians()[0]
+            self._first = kernels.coarse(self._mean[0], self._scale[0])
         self._gain[:] = 1.0
 
     def _steady(self, mean: FloatImage, variance: FloatImage) -> tuple[FloatImage, FloatImage]:
@@ -215,6 +217,7 @@ class Segmenter:
             self._adaptation.follow(
                 values, mask, stamp_ns, self._gain, self._means_by_channel, self._scales_by_channel
             )
+            self._first = kernels.coarse(self._mean[0], self._scale[0])
         return Observation.from_mask(
             self.camera,
             stamp_ns,
@@ -315,8 +318,8 @@ class Segmenter:
         labels = self._scratch(0, window)
         label = kernels.label_grey if self._grey else kernels.label_colour
         label(
-            part[:, :, 0] if self._grey else part, self._mean, self._scale, self._gain, self._rule,
-            window.left, window.top, labels,
+            part[:, :, 0] if self._grey else part, *self._first, self._mean, self._scale,
+            self._gain, self._rule, window.left, window.top, labels,
         )  # fmt: skip
         return labels
 
