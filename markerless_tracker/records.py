@@ -216,6 +216,8 @@ class TrackResult:
         observations: the evidence each camera gave.
         warnings: what the user should know about this frame, one line each.
         confidence: how sure the pose is, None without contour refinement.
+        exposure: per camera whose image came, its brightness relative to its background's, by
+            channel.
     """
 
     stamp_ns: int
@@ -229,6 +231,7 @@ class TrackResult:
     observations: Mapping[str, Observation] = field(default_factory=dict, repr=False)
     warnings: tuple[str, ...] = ()
     confidence: Confidence | None = None
+    exposure: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("pose", "markers_m"):

@@ -76,7 +76,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--debug-images",
         type=Path,
         metavar="DIR",
-        help="per frame and camera: input, evidence, body",
+        help="per frame and camera: input, background, foreground and shadow, silhouette, edges, "
+        "body",
     )
     parser.add_argument(
         "--refine-calibration",
@@ -126,8 +127,13 @@ def run(args: argparse.Namespace) -> int:
                 state = tracked.result.state.value
                 states[state] = states.get(state, 0) + 1
                 if debug:
+                    tracker = setup.tracker
                     debug.write(
-                        tracked.images, tracked.result, setup.tracker.rig, setup.tracker.body
+                        tracked.images,
+                        tracked.result,
+                        tracker.rig,
+                        tracker.body,
+                        tracker.segmenter,
                     )
                 frames += 1
                 bars.update(

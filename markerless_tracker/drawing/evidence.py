@@ -17,8 +17,14 @@ def draw_evidence(
     camera: CameraModel,
     body: BodyModel | None = None,
     pose: FloatArray | None = None,
+    *,
+    background: Image | None = None,
+    labels: Image | None = None,
 ) -> Image:
     """A picture (h, 4 w, 3) BGR: the input, the mask, the edges, the body over the input.
+
+    The background and the labels (h, w), 0 background, 127 shadow, 255 foreground, come second and
+    third if they are given.
 
     Evidence outside the observation's region is dark grey; without a body or pose the last panel
     shows the input alone.
@@ -46,6 +52,7 @@ def draw_evidence(
         over = draw_overlay(image, camera, body, pose, mask=inside)
     panels = [
         plain,
+        *(as_colour(shown, camera) for shown in (background, labels) if shown is not None),
         cv2.cvtColor(mask, cv2.COLOR_GRAY2BGR),
         cv2.cvtColor(edges, cv2.COLOR_GRAY2BGR),
         over,

@@ -129,6 +129,7 @@ class ResultWriter:
                     "evaluations": r.evaluations,
                     "refinements": r.refinements,
                     "agreement": dict(r.agreement),
+                    "exposure": {name: list(gain) for name, gain in r.exposure.items()},
                     "parameters": None if r.pose is None else r.pose.tolist(),
                     **_confidence(r),
                 }

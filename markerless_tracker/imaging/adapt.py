@@ -55,8 +55,16 @@ class Adaptation:
 
     def reset(self) -> None:
         """Forget the times seen."""
-        self._stamp_ns: int | None = None
+        self._seen_ns: int | None = None
+        self._followed_ns: int | None = None
         self._turn = 0
+
+    def pass_over(self, stamp_ns: int) -> None:
+        """An image came that is not followed: time goes on."""
+        before, self._seen_ns = self._seen_ns, stamp_ns
+        if before is None or not 0 < stamp_ns - before <= GAP_NS:
+            self._followed_ns = None
+            self._turn = 0
 
     def follow(
         self,
@@ -68,9 +76,9 @@ class Adaptation:
         scale: np.ndarray[tuple[int, ...], np.dtype[np.float32]],
     ) -> None:
         """Let `mean` (k, h, w, c) follow the image (h, w, c), away from the mask (h, w)."""
-        before, self._stamp_ns = self._stamp_ns, stamp_ns
-        if before is None or not 0 < stamp_ns - before <= GAP_NS:
-            self._turn = 0
+        self.pass_over(stamp_ns)
+        before, self._followed_ns = self._followed_ns, stamp_ns
+        if before is None:
             return
         share = 1.0 - math.exp(-STRIDE * (stamp_ns - before) / self._tau_ns)
         keep_out = np.asarray(cv2.dilate(mask, self._brush), dtype=np.uint8)

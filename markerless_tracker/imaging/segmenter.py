@@ -86,6 +86,7 @@ class Segmenter:
         sigma = float(np.sqrt(np.median(background.variance)))
         self._smooth = sigma > self.settings.denoise_sigma
         self._mean, self._scale = self._gaussians()
+        self._first = kernels.coarse(self._mean[0], self._scale[0])
         mean, variance = self._steady(background.mean, background.variance)
         if self._grey:
             self._grey_mean = np.ascontiguousarray(mean[:, :, 0])
@@ -122,6 +123,7 @@ class Segmenter:
         if self._adaptation is not None:
             self._adaptation.reset()
             self._mean[...] = self._gaussians()[0]
+            self._first = kernels.coarse(self._mean[0], self._scale[0])
         self._gain[:] = 1.0
 
     def _steady(self, mean: FloatImage, variance: FloatImage) -> tuple[FloatImage, FloatImage]:
@@ -169,6 +171,19 @@ class Segmenter:
         mask, zone = self._silhouette(image, region, 0)
         return mask[region.within(zone).slices]
 
+    def labels(self, image: Image) -> Mask:
+        """(h, w) uint8: 0 background, 127 shadow, 255 foreground, before any repair; to look at.
+
+        Raises:
+            ImageError: not an image of the background's size and channels; names the camera.
+        """
+        self._check(image)
+        if self.settings.exposure_compensation:
+            self._gain[:] = self._meter.gain(image.reshape(image.shape[0], image.shape[1], -1))
+        labels = self._labels(image, self._whole)
+        self._look_at_texture(image, labels, self._whole, self._whole)
+        return labels.copy()
+
     def observe(self, image: Image, stamp_ns: int, region: Region | None = None) -> Observation:
         """Silhouette and edge map of a region, or of the whole frame.
 
@@ -195,11 +210,14 @@ class Segmenter:
         mask, zone = self._silhouette(image, region, edge_reach(self.settings))
         inside = region.within(zone).slices
         edges = edge_map(image[zone.slices], mask, self.settings)[inside]
-        if self._adaptation is not None and region == self._whole:
+        if self._adaptation is not None and region != self._whole:
+            self._adaptation.pass_over(stamp_ns)
+        elif self._adaptation is not None:
             values = (grey_of(image) if self._grey else image).reshape(*mask.shape, -1)
             self._adaptation.follow(
                 values, mask, stamp_ns, self._gain, self._means_by_channel, self._scales_by_channel
             )
+            self._first = kernels.coarse(self._mean[0], self._scale[0])
         return Observation.from_mask(
             self.camera,
             stamp_ns,
@@ -300,8 +318,8 @@ class Segmenter:
         labels = self._scratch(0, window)
         label = kernels.label_grey if self._grey else kernels.label_colour
         label(
-            part[:, :, 0] if self._grey else part, self._mean, self._scale, self._gain, self._rule,
-            window.left, window.top, labels,
+            part[:, :, 0] if self._grey else part, *self._first, self._mean, self._scale,
+            self._gain, self._rule, window.left, window.top, labels,
         )  # fmt: skip
         return labels
 

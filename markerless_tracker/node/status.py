@@ -127,6 +127,10 @@ class TrackerStatus:
             agreement: Mapping[str, float] = {} if result is None else result.agreement
             for name in cameras:
                 values[f"agreement/{name}"] = _number(agreement.get(name), 4)
+            exposure: Mapping[str, tuple[float, ...]] = {} if result is None else result.exposure
+            for name in cameras:
+                gain = float(np.mean(exposure[name])) if name in exposure else None
+                values[f"exposure/{name}"] = _number(gain, 3)
             for name in cameras:
                 values[f"refused/{name}"] = str(self._refused[name])
             for name in cameras:

@@ -133,6 +133,14 @@ class EvidenceMaker:
             for camera in self._rig
         }
 
+    def exposure(self, views: Mapping[str, Image | Observation]) -> dict[str, tuple[float, ...]]:
+        """How bright the images just gathered are beside their backgrounds, by channel."""
+        return {
+            name: self.segmenters[name].gain
+            for name, view in views.items()
+            if not isinstance(view, Observation)
+        }
+
     def _whole_frame_is_due(self, name: str) -> bool:
         """Cameras take turns, so that no frame costs much more than others."""
         shift = self._rig.names.index(name) * self._every // len(self._rig)

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import BackgroundModel, Image, Region
+from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
 from markerless_tracker.records import Confidence, Observation, TrackResult, TrackState
 from markerless_tracker.tracking.confidence import confidence_of
 from markerless_tracker.tracking.config import TrackerConfig
@@ -168,6 +169,10 @@ class Tracker:
         margin_m = self._region_margin(stamp_ns)
         return self._evidence.regions(self.body, self._predict(stamp_ns), margin_m)
 
+    def segmenter(self, camera: str) -> Segmenter | None:
+        """What tells a camera's silhouettes from its background; None without one."""
+        return self._evidence.segmenters.get(camera)
+
     def step(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> TrackResult:
         """Find the pose that explains the views of one time.
 
@@ -180,6 +185,10 @@ class Tracker:
             ImageError, CalibrationError: no view, one of an unknown camera, or one that does not
                 fit its calibration or background; names the camera.
         """
+        result = self._step(views, stamp_ns)
+        return replace(result, exposure=self._evidence.exposure(views))
+
+    def _step(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> TrackResult:
         predicted = self._predict(stamp_ns)
         if self._starter is not None:
             observed = self._evidence.observe(views, stamp_ns)

@@ -1,5 +1,6 @@
 """One picture per frame and camera: the input, the evidence, the body over it."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -9,6 +10,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import FrameSet
 from markerless_tracker.drawing import draw_evidence
 from markerless_tracker.errors import DatasetError
+from markerless_tracker.imaging import Segmenter
 from markerless_tracker.records import TrackResult
 
 
@@ -26,10 +28,34 @@ class DebugImages:
         except OSError as error:
             raise DatasetError(f"{folder}: cannot be made: {error.strerror}") from error
 
-    def write(self, images: FrameSet, result: TrackResult, rig: CameraRig, body: BodyModel) -> None:
-        """Write the pictures of one frame."""
+    def write(
+        self,
+        images: FrameSet,
+        result: TrackResult,
+        rig: CameraRig,
+        body: BodyModel,
+        segmenter: Callable[[str], Segmenter | None] = lambda camera: None,
+    ) -> None:
+        """Write the pictures of one frame.
+
+        Args:
+            images: what the tracker saw.
+            result: what it found.
+            rig: its cameras.
+            body: its body.
+            segmenter: what segmented a camera's images, to show the steps before the silhouette.
+        """
         for name, observation in result.observations.items():
-            picture = draw_evidence(images.images[name], observation, rig[name], body, result.pose)
+            image, steps = images.images[name], segmenter(name)
+            picture = draw_evidence(
+                image,
+                observation,
+                rig[name],
+                body,
+                result.pose,
+                background=None if steps is None else steps.background.image,
+                labels=None if steps is None else steps.labels(image),
+            )
             path = self.folder / name / f"{images.index:06d}.jpg"
             try:
                 path.parent.mkdir(exist_ok=True)

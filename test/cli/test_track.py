@@ -136,7 +136,7 @@ def test_debug_images_for_every_frame_and_camera(track, walk, tmp_path):
     written = sorted(p.relative_to(tmp_path / "see").as_posix() for p in tmp_path.rglob("*.jpg"))
     assert written == [f"cam0{c}/{i:06d}.jpg" for c in range(1, 5) for i in range(FRAMES)]
     picture = cv2.imread(str(tmp_path / "see" / "cam01" / "000000.jpg"))
-    assert picture.shape == (144, 4 * 192, 3)
+    assert picture.shape == (144, 6 * 192, 3)
 
 
 def test_the_same_result_without_debug_images(track, walk, tmp_path):

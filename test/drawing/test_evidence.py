@@ -40,6 +40,18 @@ def test_four_panels() -> None:
     np.testing.assert_array_equal(over, draw_overlay(IMAGE, CAMERA, BODY, POSE, mask=full))
 
 
+def test_background_and_labels_come_after_the_input() -> None:
+    background, labels = IMAGE[::-1], np.full((90, 120), 127, np.uint8)
+    observation = region()[2]
+    four = draw_evidence(IMAGE, observation, CAMERA)
+    six = draw_evidence(IMAGE, observation, CAMERA, background=background, labels=labels)
+    assert six.shape == (90, 720, 3)
+    np.testing.assert_array_equal(six[:, :120], four[:, :120])
+    np.testing.assert_array_equal(six[:, 120:240], background)
+    assert (six[:, 240:360] == 127).all()
+    np.testing.assert_array_equal(six[:, 360:], four[:, 120:])
+
+
 def test_without_a_pose_the_last_panel_is_the_input() -> None:
     picture = draw_evidence(IMAGE[..., 0], region()[2], CAMERA, BODY, None)
     np.testing.assert_array_equal(picture[:, 360:], np.repeat(IMAGE[..., :1], 3, axis=2))

@@ -127,6 +127,13 @@ def test_the_evidence_is_not_kept(tmp_path, body, config):
     assert not writer._results[0].observations
 
 
+def test_exposure_is_written(tmp_path, body, config):
+    with ResultWriter(tmp_path / "out", body, config, fps=60.0) as writer:
+        writer.add(result(0, exposure={"cam01": (1.25, 1.0, 0.75)}))
+    frame = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["frames"][0]
+    assert frame["exposure"] == {"cam01": [1.25, 1.0, 0.75]}
+
+
 def test_no_frame_at_all_is_a_result_too(tmp_path, body, config):
     with ResultWriter(tmp_path / "out", body, config, fps=60.0):
         pass

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.imaging import ImagingSettings, Segmenter, learn_background
+from markerless_tracker.imaging import ImagingSettings, Region, Segmenter, learn_background
 
 FOLLOW = ImagingSettings(background_follow_s=2.0, exposure_compensation=False, texture_radius_px=0)
 STILL = ImagingSettings(exposure_compensation=False, texture_radius_px=0)
@@ -60,3 +60,21 @@ def test_nothing_is_learned_across_a_gap_or_backwards() -> None:
     for i in range(4):
         segmenter.observe(shot(5.0, False, 3, 3), 3_100_000_000 + i)
     assert (segmenter._mean != before).any()
+
+
+def test_regions_in_between_do_not_count_as_a_gap() -> None:
+    """Two whole images 2 s apart, with regions between them: the background follows."""
+    empty = [shot(0.0, False, i, 3) for i in range(10)]
+    lit = [shot(6.0, False, 50 + i, 3) for i in range(400)]
+    levels = {}
+    for every in (0, 20):
+        segmenter = Segmenter("cam01", learn_background(empty), FOLLOW)
+        for i, image in enumerate(lit):
+            whole = every == 0 and i % 20 == 0
+            if every == 0 and not whole:
+                continue
+            region = None if i % 20 == 0 else Region(0, 0, 20, 20)
+            segmenter.observe(image, i * 100_000_000, region)
+        levels[every] = float(segmenter._mean[0, :, :, :40].mean())
+    assert levels[0] == pytest.approx(110.0, abs=0.5)
+    assert levels[20] == pytest.approx(116.0, abs=0.5)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.imaging import ImagingSettings
-from markerless_tracker.imaging.kernels import label_colour, label_grey
+from markerless_tracker.imaging.kernels import coarse, label_colour, label_grey
 from markerless_tracker.imaging.shadow import shadow_rule
 
 SAME = np.ones(3, np.float32)
@@ -16,6 +16,11 @@ SAME = np.ones(3, np.float32)
 def planes(image: np.ndarray) -> np.ndarray:
     """(h, w, c) as (1, c, h, w)."""
     return np.ascontiguousarray(image.transpose(2, 0, 1)[None])
+
+
+def first(mean: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.float32]:
+    """What the first Gaussians (h, w, c) are told from."""
+    return coarse(planes(mean)[0], planes(scale)[0])
 
 
 def twin_colour(
@@ -58,7 +63,17 @@ def test_colour_agrees_with_the_twin(removal: bool, seed: int) -> None:
     options = ImagingSettings(shadow_removal=removal)
     image, mean, scale = scene(seed)
     labels = np.empty((40, 50), np.uint8)
-    label_colour(image, planes(mean), planes(scale), SAME, shadow_rule(options), 0, 0, labels)
+    label_colour(
+        image,
+        *first(mean, scale),
+        planes(mean),
+        planes(scale),
+        SAME,
+        shadow_rule(options),
+        0,
+        0,
+        labels,
+    )
     twin = twin_colour(image, mean, scale, options)
     # float32 against float64 may fall on the other side of a threshold now and then.
     assert (labels != twin).mean() < 2e-3
@@ -74,7 +89,17 @@ def test_grey_is_the_ratio_alone(seed: int) -> None:
     image = np.ascontiguousarray(image)
     labels = np.empty((40, 50), np.uint8)
     rule = shadow_rule(options, grey=True)
-    label_grey(image, mean[None, None], scale[None, None], SAME[:1], rule, 0, 0, labels)
+    label_grey(
+        image,
+        *coarse(mean[None], scale[None]),
+        mean[None, None],
+        scale[None, None],
+        SAME[:1],
+        rule,
+        0,
+        0,
+        labels,
+    )
     value = image.astype(float)
     shadow = value >= options.shadow_grey_value_min * mean
     shadow &= value <= options.shadow_grey_value_max * mean
@@ -100,7 +125,17 @@ def test_shadows_of_a_red_wall(pixel: tuple[int, int, int], shadow: bool) -> Non
     image = np.array([[pixel]], np.uint8)
     labels = np.empty((1, 1), np.uint8)
     rule = shadow_rule(ImagingSettings())
-    label_colour(image, planes(mean), planes(np.ones_like(mean)), SAME, rule, 0, 0, labels)
+    label_colour(
+        image,
+        *first(mean, np.ones_like(mean)),
+        planes(mean),
+        planes(np.ones_like(mean)),
+        SAME,
+        rule,
+        0,
+        0,
+        labels,
+    )
     assert labels[0, 0] == (127 if shadow else 255)
 
 
@@ -110,5 +145,15 @@ def test_black_is_defined() -> None:
     rule = shadow_rule(ImagingSettings())
     for level in (0.0, 120.0):
         mean = np.full((2, 2, 3), level, np.float32)
-        label_colour(image, planes(mean), planes(np.ones_like(mean)), SAME, rule, 0, 0, labels)
+        label_colour(
+            image,
+            *first(mean, np.ones_like(mean)),
+            planes(mean),
+            planes(np.ones_like(mean)),
+            SAME,
+            rule,
+            0,
+            0,
+            labels,
+        )
         assert (labels == (0 if level == 0.0 else 255)).all()

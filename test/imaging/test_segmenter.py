@@ -80,6 +80,17 @@ def test_grey_cameras_in_one_or_three_channels(channels: int) -> None:
     assert overlap(observation.mask, mask) > 0.95
 
 
+def test_labels_tell_body_shadow_and_room() -> None:
+    empty = room()
+    image, mask = person(shaded(empty, 0.65), (200, 60, 20))
+    segmenter = Segmenter("cam01", model(empty))
+    labels = segmenter.labels(with_noise(image, 99))
+    assert labels[55, 80] == 255 and labels[100, 30] == 127 and labels[20, 140] == 0
+    assert (labels[mask > 0] == 255).mean() > 0.9
+    segmenter.observe(empty, 0)
+    assert labels[55, 80] == 255
+
+
 def test_an_empty_room_gives_an_empty_silhouette() -> None:
     empty = room()
     observation = Segmenter("cam01", model(empty)).observe(with_noise(empty, 99), 0)

@@ -89,6 +89,22 @@ def seen_in(mask, region: Region) -> Observation:
     )
 
 
+def test_exposure_is_told_per_camera(make_tracker, frames, swarm_settings) -> None:
+    tracker = make_tracker(swarm_settings, evaluations=100)
+    for frame, gain in zip(frames[:2], (1.0, 1.2), strict=True):
+        views = {
+            name: np.clip(image * gain, 0, 255).astype(np.uint8)
+            for name, image in frame.images.items()
+        }
+        exact = dict(views)
+        last = next(reversed(exact))
+        exact[last] = frame.observations[last]
+        told = tracker.step(exact, frame.stamp_ns).exposure
+        assert set(told) == set(views) - {last}
+        for values in told.values():
+            assert values == pytest.approx((gain,) * 3, rel=0.02)
+
+
 def test_the_region_holds_the_body_and_its_margin(camera, body, pose):
     mask = np.asarray(silhouette(body, pose, camera)).astype(np.uint8)
     box = cv2.boundingRect(mask)

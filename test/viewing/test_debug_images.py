@@ -7,6 +7,7 @@ import pytest
 from markerless_tracker.body import load_body
 from markerless_tracker.datasets import FrameSet
 from markerless_tracker.errors import DatasetError
+from markerless_tracker.imaging import Segmenter, learn_background
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.synthesis import ring_rig
 from markerless_tracker.viewing.debug_images import DebugImages
@@ -74,6 +75,22 @@ def test_input_evidence_and_body_side_by_side(tmp_path, body, rig):
     # Only the body distinguishes the last panels.
     assert np.abs(panels[3] - np.split(without, 4, axis=1)[3]).max() > 50
     assert np.abs(panels[0] - np.split(without, 4, axis=1)[0]).max() < 10
+
+
+def test_the_steps_before_the_silhouette_where_they_are_known(tmp_path, body, rig):
+    images = frame(4)
+    empty = np.full((60, 80, 3), 90, np.uint8)
+    segmenter = Segmenter("cam01", learn_background([empty]))
+    known = {"cam01": segmenter}
+    DebugImages(tmp_path).write(images, result(body), rig, body, known.get)
+    with_steps, without = (
+        cv2.imread(str(tmp_path / name / "000004.jpg")) for name in ("cam01", "cam02")
+    )
+    assert with_steps.shape == (60, 6 * 80, 3) and without.shape == (60, 4 * 80, 3)
+    panels = np.split(with_steps.astype(int), 6, axis=1)
+    assert abs(panels[1] - 90).mean() < 2.0
+    labels = segmenter.labels(images.images["cam01"])
+    assert abs(panels[2].mean() - labels.mean()) < 5.0
 
 
 def test_folders_that_cannot_be_made(tmp_path, body, rig):
