@@ -7,8 +7,10 @@ joint's centre is, and for a person known by the stature only how long the bones
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
-from markerless_tracker.body import BodyModel, markers, root_transform
+from markerless_tracker.body import BodyModel, markers, transforms
+from markerless_tracker.body.model import IntArray
 from markerless_tracker.errors import SearchError
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.fitness.shape import CORRELATION_M
@@ -26,7 +28,8 @@ _LEVER_M = 0.25
 """Errors of joints' centres turn limbs about as long as this."""
 _REACH_M = 0.035
 _LEAST_SIGMA_M = 0.002
-_STEP = 1e-5
+_SLIDES = 3
+"""Kinds of nodes from here on are translations."""
 
 
 def confidence_of(
@@ -63,7 +66,7 @@ def confidence_of(
     of_root = by_root @ covariance @ by_root.T
     of_root[np.diag_indices(6)] += np.repeat([floor**2, (floor / _LEVER_M) ** 2], 3)
     moving = body.node_kind[[int(np.flatnonzero(body.node_parameter == k)[0])
-                             for k in range(body.size)]] >= 3  # fmt: skip
+                             for k in range(body.size)]] >= _SLIDES  # fmt: skip
     floors = np.where(moving, floor, floor / _LEVER_M)
     return Confidence(
         pose_sd=np.sqrt(np.diag(covariance) + floors**2),
@@ -77,15 +80,28 @@ def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     The root's turn is a small rotation about the world's axes.
     """
-    here, root = markers(body, pose), root_transform(body, pose)
-    by_marker = np.empty((here.size, body.size))
-    by_root = np.empty((6, body.size))
-    for k in range(body.size):
-        moved = pose.copy()
-        moved[k] += _STEP
-        by_marker[:, k] = (markers(body, moved) - here).ravel() / _STEP
-        other = root_transform(body, moved)
-        turn = other[:3, :3] @ root[:3, :3].T
-        by_root[:3, k] = (other[:3, 3] - root[:3, 3]) / _STEP
-        by_root[3:, k] = np.array([turn[2, 1], turn[0, 2], turn[1, 0]]) / _STEP
-    return by_marker, by_root
+    nodes = transforms(body, pose)
+    root = body.frames[body.root_frame]
+    points = np.concatenate([markers(body, pose), nodes[root, None, :, 3]])
+    moved = np.flatnonzero(body.node_kind >= 0)
+    kind, parameter = body.node_kind[moved], body.node_parameter[moved]
+    axes = body.node_sign[moved, None] * nodes[moved, :, kind % 3]
+    turned = np.cross(axes, points[:, None] - nodes[moved, :, 3])
+    moves = np.where((kind >= _SLIDES)[:, None], axes, turned)
+    carried = np.array([_is_above(body, moved, int(n)) for n in (*body.marker_node, root)])
+    moves *= carried[:, :, None]
+    turning = axes * (carried[-1] & (kind < _SLIDES))[:, None]
+    slopes, turns = np.zeros((len(points), body.size, 3)), np.zeros((body.size, 3))
+    for n, k in enumerate(parameter.tolist()):
+        slopes[:, k] += moves[:, n]
+        turns[k] += turning[n]
+    by_marker = slopes[:-1].transpose(0, 2, 1).reshape(-1, body.size)
+    return by_marker, np.concatenate([slopes[-1].T, turns.T])
+
+
+def _is_above(body: BodyModel, nodes: IntArray, node: int) -> NDArray[np.bool_]:
+    """Which of some nodes carry a node: are it, or above it."""
+    chain = {node}
+    while (node := int(body.node_parent[node])) >= 0:
+        chain.add(node)
+    return np.isin(nodes, list(chain))
