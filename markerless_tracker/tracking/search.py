@@ -122,15 +122,16 @@ class FrameSearch:
         that is stuck, the refinement sharpens the swarm. A stage may ask for a gain in f.
         """
         # A contour stage looks at every parameter and every cone.
-        judge = next((stage for stage in stages if stage.algorithm == CONTOUR), None)
-        cost = self._cost(judge, self.pose) if judge is not None else np.inf
+        whole = next((stage for stage in stages if stage.algorithm == CONTOUR), None)
+        judge = None if whole is None else self._searcher.fitness.prepare(self._views, whole)
+        cost = np.inf if judge is None else float(judge(self.pose[None])[0])
         for stage in stages:
             centred = replace(stage, centre=self.pose)
             found = self._refine(centred) if stage.algorithm == CONTOUR else self._swarm(centred)
             if judge is None:
                 self.pose = found
                 continue
-            found_cost = self._cost(judge, found)
+            found_cost = float(judge(found[None])[0])
             if found_cost < cost - stage.gain:
                 self.pose, cost = found, found_cost
         return self.pose
@@ -138,10 +139,6 @@ class FrameSearch:
     def terms(self) -> dict[str, ViewTerms]:
         """How well the estimate explains each view."""
         return self._searcher.fitness.terms(self._views, self.pose)
-
-    def _cost(self, stage: Stage, pose: FloatArray) -> float:
-        evaluator = self._searcher.fitness.prepare(self._views, stage)
-        return float(evaluator(pose[None, stage.active])[0])
 
     def _swarm(self, stage: Stage) -> FloatArray:
         searcher = self._searcher
