@@ -141,7 +141,12 @@ def test_samples_lie_on_the_outline_and_cover_it(posed) -> None:
         assert off.max() <= SEAM_PX
         gap = cKDTree(pixels).query(outline)[0]
         assert (gap <= 2.0 * posed.spacing_px).mean() >= 0.98
-        assert gap.max() <= 4.0 * posed.spacing_px
+        # Between legs that nearly touch, the free step ends in the other leg.
+        reach = np.ones((2 * int(STEP_PX) + 3,) * 2, np.uint8)
+        filled = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, reach)
+        near_gap = cv2.dilate(filled - mask.view(np.uint8), reach)
+        column, row = np.round(outline).astype(int).T
+        assert gap[near_gap[row, column] == 0].max() <= 4.0 * posed.spacing_px
 
 
 def test_normals_point_out_of_the_body(posed) -> None:
