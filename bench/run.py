@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT.parent / "shared" / "data"
 # Full size has four times the pixels and hardly a millimetre more to say.
 RECORDINGS = {"render_walk": "1", "balance_real": "0.5"}
-PARTS = ("accuracy", "start", "speed")
+STATURES = {"render_walk": "1.72", "balance_real": "1.70"}
+PARTS = ("accuracy", "start", "automatic", "recovery", "speed")
 # Hours: only when named.
 LONG = ("papers",)
 
@@ -43,6 +44,11 @@ def bench(parts: list[str], data: Path, out: Path, seeds: int) -> None:
             for noise in ("10", "20"):
                 where = str(out / f"{name}_start_{noise}")
                 run([*tables, where, "--preset", "tuned", "--start-noise", noise])
+        told = ["--stature", STATURES[name], "--scale", RECORDINGS[name], "--seeds", "5"]
+        if "automatic" in parts:
+            run(["benchmark", "start", str(data / name), *told])
+        if "recovery" in parts and name == "render_walk":
+            run(["benchmark", "recovery", str(data / name), *told])
     if "speed" in parts:
         run(["benchmark", "speed"])
 
