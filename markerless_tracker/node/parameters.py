@@ -16,7 +16,7 @@ class NodeSettings:
     Attributes:
         cameras: names of the cameras, all of `calibration_file` if empty.
         calibration_file: `calibration.toml` of the images as they come; camera_info and TF if None.
-        background_dir: folder of empty-scene images, one image, clip or folder per camera.
+        background_dir: the empty scene: an image, clip, folder or learned NAME.npz per camera.
         subject_file: sizes of the person.
         stature: the person's stature in m, for those who have no subject file.
         start_file: TRC or pose YAML to begin with; without one, somebody is looked for.
