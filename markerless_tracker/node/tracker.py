@@ -25,7 +25,7 @@ from markerless_tracker.node.declared import declare_effective, given_parameters
 from markerless_tracker.node.images import decode_image
 from markerless_tracker.node.inputs import PATIENCE_S, CameraInput
 from markerless_tracker.node.learning import Learning
-from markerless_tracker.node.outputs import Overlays, ResultFile
+from markerless_tracker.node.outputs import Pictures, ResultFile
 from markerless_tracker.node.qos import image_qos, latched_qos, output_qos
 from markerless_tracker.node.setup import RigSource, build
 from markerless_tracker.node.status import TrackerStatus
@@ -203,7 +203,7 @@ class TrackerNode(Node):
         sizes_px = {camera.name: camera.size_px for camera in scaled}
         self._tracker = setup.tracker
         self._result_file.open(setup.tracker)
-        self._overlays = Overlays(self, scaled)
+        self._pictures = Pictures(self, scaled)
         self._describe(setup.tracker.body)
         self._fitting = Fitting(setup.tracker, setup.start_stamp_ns, partial(_decode, sizes_px))
 
@@ -244,7 +244,7 @@ class TrackerNode(Node):
         elif not self._no_pose_shown:
             self._markers.publish(messages.no_markers(stamp_ns))
             self._no_pose_shown = True
-        self._overlays.publish(fitted, body)
+        self._pictures.publish(fitted, self._tracker)
         self._publish_state()
 
     def _describe(self, body: BodyModel) -> None:

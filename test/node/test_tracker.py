@@ -349,6 +349,26 @@ def test_overlays_are_drawn_while_somebody_looks(live: Live) -> None:
     assert stamp_of(overlays[-1]) <= stamp_of(live.joints[-1])
 
 
+def test_the_evidence_is_drawn_while_somebody_looks(live: Live) -> None:
+    strips = live.peer.collect(Image, "debug/cam03/evidence", image_qos())
+
+    def drawn() -> bool:
+        live.track()
+        return bool(strips)
+
+    live.until(drawn, "the evidence")
+    assert (strips[-1].width, strips[-1].height) == (6 * 328, 245)
+    assert strips[-1].header.frame_id == "cam03_optical_frame"
+    panels = np.frombuffer(strips[-1].data, np.uint8).reshape(245, 6, 328, 3)
+    image, background, labels, mask, edges, _ = panels.transpose(1, 0, 2, 3).astype(int)
+    person = mask[:, :, 0] == 255
+    assert 500 < person.sum() < person.size / 4
+    assert (labels[:, :, 0][person] == 255).mean() > 0.8
+    difference = abs(image - background).max(axis=2)
+    assert np.median(difference[person]) > 20 > np.median(difference[mask[:, :, 0] == 0])
+    assert edges.max() > 100
+
+
 def test_parameters_show_what_is_in_effect(live: Live) -> None:
     from rcl_interfaces.srv import GetParameters
 
