@@ -160,7 +160,7 @@ class ImagingSettings:
         most=20,
     )
     level_set_radius_px: int = setting(
-        8, "distance within which those colours are compared", least=1, most=100
+        5, "distance within which those colours are compared", least=1, most=100
     )
     mask_hole_share: float = setting(
         2e-4, "holes up to this share of the image are filled", least=0.0, most=1.0
