@@ -1,0 +1,64 @@
+"""A second person who crosses one view is kept out of what is fitted, and told of."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from markerless_tracker.records import TrackState
+
+CAMERA = "cam02"
+
+
+def crossing(frames, gap_px: int) -> Iterator[tuple[object, np.ndarray]]:
+    """The frames with the person's double walking through one view, and the double's mask (h, w).
+
+    Never nearer to the person than `gap_px`; from the left, then on the right.
+    """
+    steps = len(frames)
+    for index, frame in enumerate(frames):
+        mask = frame.masks[CAMERA] > 0
+        left, _, width, _ = cv2.boundingRect(mask.astype(np.uint8))
+        room_left, room_right = left - gap_px - width, mask.shape[1] - left - 2 * width - gap_px
+        assert room_left > 0 and room_right > 0
+        # From its edge of the image up to the person, then on from his other side.
+        before = steps // 2
+        if index < before:
+            shift = room_left * (index + 1) // before - left
+        else:
+            share = (index - before) / max(steps - before - 1, 1)
+            shift = width + gap_px + int(room_right * share)
+        double = np.roll(mask, shift, axis=1)
+        near = cv2.dilate(mask.astype(np.uint8), np.ones((2 * gap_px - 1,) * 2, np.uint8))
+        assert not (double & (near > 0)).any()
+        images = dict(frame.images)
+        image = images[CAMERA].copy()
+        image[double] = np.roll(images[CAMERA], shift, axis=1)[double]
+        images[CAMERA] = image
+        yield replace(frame, images=images), double
+
+
+@pytest.mark.parametrize("every", [1, 1000], ids=["whole images", "regions"])
+def test_a_second_person_crossing_a_view_changes_nothing(
+    make_tracker, frames, refined_settings, every
+) -> None:
+    settings = dict(refined_settings, evaluations=250, fit_shape=False, full_frame_every=every)
+    alone = make_tracker(settings, edge_weight=0.0)
+    beside = make_tracker(settings, edge_weight=0.0)
+    gap = beside.config.component_margin_px + 6
+    told = []
+    for frame, (crossed, double) in zip(frames, crossing(frames, gap), strict=True):
+        expected = alone.step(frame.images, frame.stamp_ns)
+        result = beside.step(crossed.images, frame.stamp_ns)
+        seen = result.observations[CAMERA]
+        u, v = seen.offset_px
+        used = np.zeros(double.shape, bool)
+        used[v : v + seen.height, u : u + seen.width] = seen.mask
+        assert not (used & double).any()
+        assert result.state is TrackState.TRACKING
+        assert result.pose.tobytes() == expected.pose.tobytes()
+        told.append(any(w.startswith(f"{CAMERA}: ") for w in result.warnings))
+    # Whoever is outside the region that is looked at is not seen at all.
+    assert all(told) if every == 1 else any(told)
