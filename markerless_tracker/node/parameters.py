@@ -23,6 +23,7 @@ class NodeSettings:
         start_file: TRC or pose YAML to begin with; without one, somebody is looked for.
         scale: factor by which images are made smaller on arrival.
         result_file: NAME of NAME.trc and NAME.json; none are written if None.
+        wait_for_background: start without backgrounds and wait for the service learn_background.
         learn_background_sets: sets of images that the service learn_background learns from.
         sync_tolerance: s by which the stamps of one set may differ; 0 means equal stamps.
         config: the tracker's settings.
@@ -36,6 +37,7 @@ class NodeSettings:
     start_file: Path | None = None
     scale: float = 1.0
     result_file: Path | None = None
+    wait_for_background: bool = False
     learn_background_sets: int = 20
     sync_tolerance: float = 0.0
     config: TrackerConfig
@@ -69,6 +71,10 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
     for name, (least, most) in ranges.items():
         if name in values:
             own[name] = declared.number(name, values[name], least, most)
+    if "wait_for_background" in values:
+        own["wait_for_background"] = declared.flag(
+            "wait_for_background", values["wait_for_background"]
+        )
     if "learn_background_sets" in values:
         own["learn_background_sets"] = declared.count(
             "learn_background_sets", values["learn_background_sets"], 2, MAX_FRAMES

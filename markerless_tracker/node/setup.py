@@ -124,16 +124,21 @@ def build(settings: NodeSettings, rig: CameraRig, scaled: CameraRig) -> TrackerS
 def _backgrounds(
     settings: NodeSettings, rig: CameraRig, scaled: CameraRig
 ) -> dict[str, BackgroundModel]:
-    if settings.background_dir is None:
+    folder = settings.background_dir
+    if settings.wait_for_background and not (folder and folder.is_dir()):
+        return {}
+    if folder is None:
         raise ConfigError(
             "background_dir: not given, expected a folder with an image, clip or learned model of "
             f"the empty scene for each of {', '.join(rig.names)}"
         )
     sizes_px = {camera.name: camera.size_px for camera in rig}
-    folder = settings.background_dir
     models = read_background_models(folder, scaled, stored_sizes_px=sizes_px)
     frames = read_background(folder, scaled, stored_sizes_px=sizes_px)
     missing = [name for name in rig.names if name not in models and name not in frames]
+    if missing and settings.wait_for_background:
+        # What some have would be replaced together with what the others lack.
+        return {}
     if missing:
         raise ConfigError(
             f"background_dir: {folder} holds nothing for {', '.join(missing)}, "

@@ -205,7 +205,12 @@ class TrackerNode(Node):
         self._result_file.open(setup.tracker)
         self._pictures = Pictures(self, scaled)
         self._describe(setup.tracker.body)
-        self._fitting = Fitting(setup.tracker, setup.start_stamp_ns, partial(_decode, sizes_px))
+        self._fitting = Fitting(
+            setup.tracker,
+            setup.start_stamp_ns,
+            partial(_decode, sizes_px),
+            waits=setup.tracker.segmenter(scaled.names[0]) is None,
+        )
 
     # outputs
 

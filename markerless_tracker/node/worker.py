@@ -82,11 +82,13 @@ class Fitting:
         tracker: steps on the images.
         start_ns: see `StartGate`.
         decode: a set's view of a camera to the image that the tracker wants.
+        waits: the tracker has no backgrounds; sets are dropped until they are learned.
     """
 
     tracker: Stepper
     start_ns: int | None
     decode: Callable[[str, Any], NDArray[np.uint8]]
+    waits: bool = False
 
 
 class FitWorker:
@@ -124,6 +126,7 @@ class FitWorker:
         self._stop = Event()
         self._reset = Event()
         self._learning: Learning | None = None
+        self._waits = False
         self.fatal: str | None = None
         # A compiler at work cannot be interrupted; it must not keep the process from ending.
         self._thread = Thread(target=self._run, name="fit", daemon=True)
@@ -171,6 +174,7 @@ class FitWorker:
         self._status.dropped("before_ready", self._sets.start_counting().complete)
         self._status.doing("waiting for images", ready=True)
         gate = StartGate(fitting.start_ns)
+        self._waits = fitting.waits
         while not self._stop.is_set():
             matched = self._sets.take(_POLL_S)
             if matched is not None:
@@ -207,11 +211,16 @@ class FitWorker:
                 return
             images = {name: fitting.decode(name, view) for name, view in matched.views.items()}
             learning = self._learning
+            if learning is None and self._waits:
+                self._status.dropped("while_learning")
+                self._status.doing("waiting for learn_background")
+                return
             if learning is not None:
                 self._status.doing("learning the background")
                 learning.take(images)
-                if not learning.looks and not learning.answered:
+                if self._waits or not (learning.looks or learning.answered):
                     self._status.dropped("while_learning")
+                    self._learn(fitting, learning, matched.stamp_ns)
                     return
             else:
                 self._status.doing("tracking")
@@ -230,14 +239,13 @@ class FitWorker:
         except Exception as error:
             self._trouble(matched.stamp_ns, error)
         if learning is not None:
-            self._learn(fitting, learning, result, matched.stamp_ns)
-
-    def _learn(
-        self, fitting: Fitting, learning: Learning, result: TrackResult, stamp_ns: int
-    ) -> None:
-        try:
             learning.saw(result.state)
+            self._learn(fitting, learning, matched.stamp_ns)
+
+    def _learn(self, fitting: Fitting, learning: Learning, stamp_ns: int) -> None:
+        try:
             if learning.finish_if_complete(fitting.tracker):
+                self._waits = False
                 self._status.restarted()
         except Exception as error:
             learning.refuse(one_line(error))

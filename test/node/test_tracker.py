@@ -418,6 +418,29 @@ def test_the_background_is_learned_when_nobody_is_there(
     assert all(float(live.value(f"agreement/{name}")) > 0.8 for name in live.camera.names)
 
 
+def test_a_node_without_background_waits_for_one(
+    world: World, tmp_path: Path, other_domain: None, start: Any, peer: Any
+) -> None:
+    folder = tmp_path / "background"
+    parameters = {**world.parameters(), "background_dir": folder, "learn_background_sets": 3}
+    live = Live(peer, start("tracker_node", **parameters, wait_for_background=True), world)
+    live.send_without_pose()
+    live.until(lambda: live.value("activity") == "waiting for learn_background", "to wait")
+    client = peer.node.create_client(Trigger, "tracker/learn_background")
+    live.until(client.service_is_ready, "the service")
+    future = client.call_async(Trigger.Request())
+    live.camera.scene = Refurnished(world.scene, empty=True)
+    while not future.done():
+        live.send_without_pose()
+        end_s = time.monotonic() + 0.3
+        live.until(lambda end_s=end_s: future.done() or time.monotonic() > end_s, "a turn")
+    assert future.result().success, future.result().message
+    assert len(list(folder.glob("*.npz"))) == len(live.camera.names)
+    live.camera.scene = Refurnished(world.scene, empty=False)
+    live.track()
+    assert live.value("state") == "TRACKING" and live.value("dropped_on_error") == "0"
+
+
 class Refurnished:
     """A scene after a cupboard was put into all views, with or without the person."""
 

@@ -1,6 +1,7 @@
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -291,3 +292,19 @@ def test_trouble_answers_a_request(bench: Bench) -> None:
     waiting = learn(bench)
     assert bench.worker.stop(20)
     assert waiting.message == "nothing learned: the tracker ends"
+
+
+def test_without_backgrounds_sets_are_dropped_until_they_are_learned(bench: Bench) -> None:
+    assert bench.prepared is not None
+    bench.prepared = replace(bench.prepared, waits=True)
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    offer_one_by_one(bench, 1, 2)
+    assert not bench.tracker.seen
+    assert bench.values()["activity"] == "waiting for learn_background"
+    learning = learn(bench, 2)
+    offer_one_by_one(bench, 3, 4)
+    bench.until(lambda: learning.answered)
+    assert learning.success and set(bench.tracker.backgrounds) == {"a", "b"}
+    offer_one_by_one(bench, 5)
+    assert [stamp for stamp, _ in bench.tracker.seen] == [5]
