@@ -409,7 +409,7 @@ def test_the_background_is_learned_when_nobody_is_there(
     assert answer.success, answer.message
     model = read_background_model(folder / "cam02.npz")
     assert abs(model.mean[moved.window] - moved.colour).max() < 4.0
-    assert live.value("state") == "SEARCHING"
+    live.until(lambda: live.value("state") == "SEARCHING", "a new beginning")
 
     live.camera.scene = Refurnished(world.scene, empty=False)
     for _ in range(3):
