@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from markerless_tracker.records import TrackState
+from markerless_tracker.records import Observation, TrackState
 
 CAMERA = "cam02"
 
@@ -62,3 +62,24 @@ def test_a_second_person_crossing_a_view_changes_nothing(
         told.append(any(w.startswith(f"{CAMERA}: ") for w in result.warnings))
     # Whoever is outside the region that is looked at is not seen at all.
     assert all(told) if every == 1 else any(told)
+
+
+@pytest.mark.parametrize("overlap_px", [6, 20])
+def test_a_second_person_who_touches_him_in_one_view_costs_little(
+    make_tracker, frames, refined_settings, overlap_px
+) -> None:
+    settings = dict(refined_settings, fit_shape=False, edge_weight=0.0)
+    alone, beside = make_tracker(settings), make_tracker(settings)
+    errors_mm = np.zeros((2, len(frames)))
+    for index, frame in enumerate(frames):
+        views = frame.observations
+        mask = frame.masks[CAMERA] > 0
+        width = cv2.boundingRect(mask.astype(np.uint8))[2]
+        both = mask | np.roll(mask, width - overlap_px, axis=1)
+        assert cv2.connectedComponents(both.astype(np.uint8))[0] == 2
+        edges = np.zeros(mask.shape, np.uint8)
+        joined = {**views, CAMERA: Observation.from_mask(CAMERA, frame.stamp_ns, both, edges)}
+        for row, (tracker, seen) in enumerate(((alone, views), (beside, joined))):
+            found = tracker.step(seen, frame.stamp_ns).markers_m
+            errors_mm[row, index] = 1e3 * np.linalg.norm(found - frame.markers_m, axis=1).mean()
+    assert errors_mm[1].mean() < errors_mm[0].mean() + 2.0, errors_mm
