@@ -28,7 +28,8 @@ from markerless_tracker.datasets.recording import BACKGROUND, FrameSet, Recordin
 from markerless_tracker.datasets.target import new_folder
 from markerless_tracker.datasets.writer import write_background
 from markerless_tracker.errors import ConfigError, DatasetError
-from markerless_tracker.imaging import Image
+from markerless_tracker.imaging import Image, write_background_model
+from markerless_tracker.imaging.model_file import SUFFIX as MODEL_SUFFIX
 
 COMPRESSIONS = ("none", "zstd", "jpeg")
 # Stamps of ROS are int32 seconds; earlier or later ones cannot be written.
@@ -67,7 +68,8 @@ def write_bag(
 
     Topics per camera: `/NAME/image_raw` (or `/NAME/image_raw/compressed` for jpeg) and
     `/NAME/camera_info`; once `/tf_static` with `map` -> NAME_optical_frame. Beside the MCAP lie
-    `calibration.toml` and `background/`, scaled as the images and lossless whatever `compress` is.
+    `calibration.toml` and `background/`, scaled as the images and lossless whatever `compress` is,
+    with the recording's learned backgrounds.
     The folder appears when it is complete; nothing is left of one that failed.
 
     Args:
@@ -111,6 +113,8 @@ def write_bag(
         frames = recording.background_frames() if backgrounds is None else backgrounds
         for name, images in frames.items():
             write_background(folder / BACKGROUND, recording.rig[name], images)
+        for name, model in recording.background_models().items():
+            write_background_model(folder / BACKGROUND / f"{name}{MODEL_SUFFIX}", model)
         size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     return BagSummary(Path(out), len(stamps), stamps[0], stamps[-1], size)
 

@@ -68,7 +68,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scale", type=float, default=1.0, metavar="S", help="factor for the images"
     )
     parser.add_argument(
-        "--background", type=Path, metavar="DIR", help="empty-scene images per camera"
+        "--background",
+        type=Path,
+        metavar="DIR",
+        help="empty-scene images, or learned backgrounds (.npz), per camera",
     )
     parser.add_argument("--seed", type=int, metavar="N", help="seed of all random draws")
     parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")

@@ -1,6 +1,6 @@
 """Recordings, markers and calibrations from disk, whatever their format."""
 
-from markerless_tracker.datasets.background import read_background
+from markerless_tracker.datasets.background import read_background, read_background_models
 from markerless_tracker.datasets.folder import FolderRecording
 from markerless_tracker.datasets.markers import MarkerTrack
 from markerless_tracker.datasets.pose2sim import Pose2SimRecording
@@ -31,6 +31,7 @@ __all__ = [
     "new_recording",
     "open_recording",
     "read_background",
+    "read_background_models",
     "read_trc",
     "stamp_of",
     "tidy_fps",

@@ -1,4 +1,4 @@
-"""Images of the empty scene: `background/NAME.{png,jpg,mp4}`, or a folder NAME of such images."""
+"""The empty scene: `background/NAME.{png,jpg,mp4}`, a folder NAME of images, learned `NAME.npz`."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +12,14 @@ from markerless_tracker.datasets.video import (
     read_image,
 )
 from markerless_tracker.errors import DatasetError, ImageError
-from markerless_tracker.imaging import Image, scale_image
+from markerless_tracker.imaging import (
+    BackgroundModel,
+    Image,
+    read_background_model,
+    scale_background_model,
+    scale_image,
+)
+from markerless_tracker.imaging.model_file import SUFFIX as MODEL_SUFFIX
 
 # More empty images than this teach nothing new and would not fit memory at full size.
 MAX_FRAMES = 120
@@ -41,16 +48,13 @@ def read_background(
             sources for one camera.
         ImageError: an image's size is neither the stored nor the rig's.
     """
-    folder = Path(folder)
-    if not folder.is_dir():
-        raise DatasetError(f"{folder}: no such folder of backgrounds")
+    folder = _existing(folder)
     sources: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):
         if not (path.is_dir() or path.suffix.lower() in IMAGE_SUFFIXES + VIDEO_SUFFIXES):
             continue
         name = path.name if path.is_dir() else path.stem
-        if name not in rig.names:
-            raise DatasetError(f"{path}: {name} is no camera, expected {', '.join(rig.names)}")
+        _check_name(path, name, rig)
         if name in sources:
             raise DatasetError(f"{path}: {name} has another background, {sources[name].name}")
         sources[name] = path
@@ -62,17 +66,64 @@ def read_background(
     }
 
 
+def read_background_models(
+    folder: str | Path,
+    rig: CameraRig,
+    *,
+    stored_sizes_px: Mapping[str, tuple[int, int]] | None = None,
+) -> dict[str, BackgroundModel]:
+    """Read the learned backgrounds (`NAME.npz`) among the empty scenes of a rig.
+
+    They hold more than an image does, and may lie beside images: whoever finds both for a camera
+    takes the model.
+
+    Args:
+        folder: as in `read_background`.
+        rig: the cameras of the (scaled) images wanted.
+        stored_sizes_px: as in `read_background`; a model of images in that size is made smaller.
+
+    Returns:
+        Camera name -> model in the rig's size; a camera without one is not there.
+
+    Raises:
+        DatasetError: no such folder, or a name that is no camera's.
+        ImageError: no model, or one whose size is neither the stored nor the rig's.
+    """
+    models: dict[str, BackgroundModel] = {}
+    for path in sorted(_existing(folder).glob(f"*{MODEL_SUFFIX}")):
+        _check_name(path, path.stem, rig)
+        model = read_background_model(path)
+        size_px = rig[path.stem].size_px
+        _check_size(path, model.size_px, size_px, (stored_sizes_px or {}).get(path.stem))
+        models[path.stem] = scale_background_model(model, size_px)
+    return {name: models[name] for name in rig.names if name in models}
+
+
+def _existing(folder: str | Path) -> Path:
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise DatasetError(f"{folder}: no such folder of backgrounds")
+    return folder
+
+
+def _check_name(path: Path, name: str, rig: CameraRig) -> None:
+    if name not in rig.names:
+        raise DatasetError(f"{path}: {name} is no camera, expected {', '.join(rig.names)}")
+
+
+def _check_size(
+    path: Path, came: tuple[int, int], size_px: tuple[int, int], stored_px: tuple[int, int] | None
+) -> None:
+    sizes = dict.fromkeys((stored_px or size_px, size_px))
+    if came not in sizes:
+        expected = " or ".join(f"{w}x{h}" for w, h in sizes)
+        raise ImageError(f"{path}: background of {came[0]}x{came[1]} px, expected {expected} px")
+
+
 def _load(path: Path, size_px: tuple[int, int], stored_px: tuple[int, int] | None) -> list[Image]:
     images = []
     for image in _images(path):
-        came = (int(image.shape[1]), int(image.shape[0]))
-        if came not in (size_px, stored_px or size_px):
-            expected = " or ".join(
-                f"{w}x{h}" for w, h in dict.fromkeys((stored_px or size_px, size_px))
-            )
-            raise ImageError(
-                f"{path}: background of {came[0]}x{came[1]} px, expected {expected} px"
-            )
+        _check_size(path, (int(image.shape[1]), int(image.shape[0])), size_px, stored_px)
         images.append(scale_image(image, size_px))
     return images
 

@@ -13,7 +13,8 @@ FRAMES = 36
 def backgrounds_of(recording: Recording, folder: Path | None = None) -> dict[str, list[Image]]:
     """Camera name -> empty-scene images (scaled) of every camera of a recording.
 
-    Images come from `folder`, or the recording's own `background/`. Cameras without any get one
+    Images come from `folder`, or the recording's own `background/`; of a camera with nothing but a
+    learned background there, it is that one's mean. Cameras without any get one
     learned from the recording's stills of the room and its own frames; a warning of the recording
     says from what, and what that costs. The same frames give the same image, whatever they are
     stored in.
@@ -21,7 +22,9 @@ def backgrounds_of(recording: Recording, folder: Path | None = None) -> dict[str
     Raises:
         DatasetError, ImageError: the images cannot be read.
     """
-    found = recording.background_frames(folder)
+    found = {
+        name: [model.image] for name, model in recording.background_models(folder).items()
+    } | recording.background_frames(folder)
     missing = [name for name in recording.rig.names if name not in found]
     if not missing:
         return found

@@ -7,9 +7,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.datasets.background import read_background
+from markerless_tracker.datasets.background import read_background, read_background_models
 from markerless_tracker.errors import ConfigError, DatasetError
-from markerless_tracker.imaging import Image
+from markerless_tracker.imaging import BackgroundModel, Image
 
 BACKGROUND = "background"
 
@@ -108,11 +108,24 @@ class Recording(ABC):
 
         Cameras without any are not there; {} without that folder. Raises as `read_background` does.
         """
+        folder = folder or self._own_backgrounds()
         if folder is None:
-            folder = self.path / BACKGROUND
-            if not folder.is_dir():
-                return {}
+            return {}
         return read_background(folder, self.rig, stored_sizes_px=self._stored_sizes_px)
+
+    def background_models(self, folder: Path | None = None) -> dict[str, BackgroundModel]:
+        """Camera name -> learned background (`NAME.npz`, scaled) from a folder, or its own.
+
+        As `background_frames`; raises as `read_background_models` does.
+        """
+        folder = folder or self._own_backgrounds()
+        if folder is None:
+            return {}
+        return read_background_models(folder, self.rig, stored_sizes_px=self._stored_sizes_px)
+
+    def _own_backgrounds(self) -> Path | None:
+        folder = self.path / BACKGROUND
+        return folder if folder.is_dir() else None
 
     def room_stills(self) -> dict[str, list[Image]]:
         """Camera name -> stills (scaled) of the room in which people may appear anywhere."""

@@ -22,9 +22,18 @@ class TrackedFrame:
 def recording_backgrounds(
     recording: Recording, settings: ImagingSettings, folder: Path | None = None
 ) -> dict[str, BackgroundModel]:
-    """Background models of all cameras: from a folder, or as the recording's own images allow."""
+    """Background models of all cameras: from a folder, or as the recording's own images allow.
+
+    Learned ones (`NAME.npz`) are taken as they are, before images.
+
+    Raises:
+        DatasetError, ImageError: files of backgrounds that cannot be used.
+    """
+    models = recording.background_models(folder)
+    if len(models) == len(recording.rig):
+        return models
     return {
-        name: learn_background(frames, settings)
+        name: models.get(name) or learn_background(frames, settings, camera=name)
         for name, frames in backgrounds_of(recording, folder).items()
     }
 

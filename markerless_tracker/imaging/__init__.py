@@ -3,6 +3,7 @@
 from markerless_tracker.imaging.background import BackgroundModel, Mode, learn_background
 from markerless_tracker.imaging.images import Image, check_image, scale_image
 from markerless_tracker.imaging.model_file import read_background_model, write_background_model
+from markerless_tracker.imaging.model_scale import scale_background_model
 from markerless_tracker.imaging.plate import Plate, background_plate
 from markerless_tracker.imaging.recording import learn_from_recording
 from markerless_tracker.imaging.region import Region
@@ -22,6 +23,7 @@ __all__ = [
     "learn_background",
     "learn_from_recording",
     "read_background_model",
+    "scale_background_model",
     "scale_image",
     "write_background_model",
 ]

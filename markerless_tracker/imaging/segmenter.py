@@ -25,6 +25,7 @@ from markerless_tracker.imaging.border import border_reach, trim_border
 from markerless_tracker.imaging.edges import edge_map, edge_reach
 from markerless_tracker.imaging.exposure import ExposureMeter
 from markerless_tracker.imaging.images import Image, check_image, grey_of
+from markerless_tracker.imaging.level_set import level_set_reach, refine_contour
 from markerless_tracker.imaging.morphology import (
     Mask,
     foreground_mask,
@@ -256,6 +257,9 @@ class Segmenter:
     def _try_silhouette(self, image: Image, need: Region, slack: int) -> tuple[Mask, Region] | None:
         """`_silhouette` with so much more around what is needed; None if that is too little."""
         size_px, options = self._size_px, self.settings
+        if options.level_set_iterations:
+            reach = level_set_reach(options.level_set_iterations, options.level_set_radius_px)
+            need = need.grown(reach, size_px)
         whole = need.grown(border_reach(options.mask_trim_px), size_px)
         zone = whole.grown(slack, size_px)
         unknown = _open_sides(zone, size_px)
@@ -282,6 +286,7 @@ class Segmenter:
         if fill_small(mask, largest, zone=inner, need=wanted, unknown=unknown):
             return None
         self._trim(image, mask, inner, window)
+        self._refine(image, mask, inner, window)
         return mask[inner.slices], zone
 
     def _trim(self, image: Image, mask: Mask, inner: Region, window: Region) -> None:
@@ -298,6 +303,24 @@ class Segmenter:
             self._pixels(image, place), self._mean[0], self._gain, part, place, layers=layers,
             least=_LEAST_CONTRAST * self._sigma,
         )  # fmt: skip
+        mask[box.slices] = part
+
+    def _refine(self, image: Image, mask: Mask, inner: Region, window: Region) -> None:
+        """Move the mask's contour to the local contrast, in place; outside `inner` it is not."""
+        options = self.settings
+        body = occupied(mask, inner)
+        if options.level_set_iterations == 0 or body.width <= 0:
+            return
+        margin = options.level_set_iterations + options.level_set_radius_px
+        box = body.grown(margin, (mask.shape[1], mask.shape[0]))
+        part = np.ascontiguousarray(mask[box.slices])
+        refine_contour(
+            self._pixels(image, box.moved(window.left, window.top)),
+            part,
+            iterations=options.level_set_iterations,
+            radius_px=options.level_set_radius_px,
+            least=_LEAST_CONTRAST * self._sigma,
+        )
         mask[box.slices] = part
 
     def _pixels(self, image: Image, region: Region) -> Image:

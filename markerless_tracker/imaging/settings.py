@@ -152,6 +152,16 @@ class ImagingSettings:
         least=0,
         most=20,
     )
+    level_set_iterations: int = setting(
+        0,
+        "steps of a pixel by which the silhouette's contour may move to where the colours beside "
+        "it change (localised active contour); 0 = leave it where the foreground test puts it",
+        least=0,
+        most=20,
+    )
+    level_set_radius_px: int = setting(
+        5, "distance within which those colours are compared", least=1, most=100
+    )
     mask_hole_share: float = setting(
         2e-4, "holes up to this share of the image are filled", least=0.0, most=1.0
     )

@@ -104,6 +104,17 @@ def names(name: str, value: Any) -> tuple[str, ...]:
     return values
 
 
+def count(name: str, value: Any, least: int, most: int) -> int:
+    """The value, if it is a whole number in that range.
+
+    Raises:
+        ConfigError: it is not; names the parameter.
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise ConfigError(f"{name}: got {value!r}, expected a whole number from {least} to {most}")
+    return value
+
+
 def number(name: str, value: Any, least: float, most: float) -> float:
     """The value, if it is a number in that range.
 

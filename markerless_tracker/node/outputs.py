@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 from sensor_msgs.msg import Image
 
-from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import tidy_fps
 from markerless_tracker.drawing import draw_overlay
 from markerless_tracker.evaluation.result import ResultWriter
+from markerless_tracker.imaging import Image as Picture
 from markerless_tracker.node.images import fill_image
 from markerless_tracker.node.messages import header, optical_frame
 from markerless_tracker.node.qos import output_qos
 from markerless_tracker.node.worker import FittedSet
 from markerless_tracker.records import TrackResult
 from markerless_tracker.tracking import Tracker
+from markerless_tracker.viewing.debug_images import draw_steps
 
 _LONE_RESULT_FPS = 60.0
 
@@ -78,8 +79,11 @@ class ResultFile:
             writer.close()
 
 
-class Overlays:
-    """``debug/NAME/overlay``: the body over each camera's image, drawn only while subscribed.
+class Pictures:
+    """Pictures of each camera, drawn only while subscribed.
+
+    ``debug/NAME/overlay`` is the body over the image; ``debug/NAME/evidence`` the image, its
+    background, foreground (white) and shadow (grey), silhouette, edges and the body, side by side.
 
     Args:
         node: creates the publishers.
@@ -89,17 +93,34 @@ class Overlays:
     def __init__(self, node: Any, rig: CameraRig) -> None:
         self._rig = rig
         self._publishers = {
-            name: node.create_publisher(Image, f"debug/{name}/overlay", output_qos())
+            (name, kind): node.create_publisher(Image, f"debug/{name}/{kind}", output_qos())
             for name in rig.names
+            for kind in ("overlay", "evidence")
         }
 
-    def publish(self, fitted: FittedSet, body: BodyModel) -> None:
+    def publish(self, fitted: FittedSet, tracker: Tracker) -> None:
         """Draw and publish those that somebody wants to see."""
-        for name, publisher in self._publishers.items():
+        for (name, kind), publisher in self._publishers.items():
             if not publisher.get_subscription_count() or name not in fitted.images:
                 continue
-            image = fitted.images[name]
-            if fitted.result.pose is not None:
-                image = draw_overlay(image, self._rig[name], body, fitted.result.pose)
-            message = Image(header=header(fitted.result.stamp_ns, optical_frame(name)))
-            publisher.publish(fill_image(message, image, f"debug/{name}/overlay"))
+            draw = self._overlay if kind == "overlay" else self._evidence
+            picture = draw(name, fitted, tracker)
+            if picture is not None:
+                message = Image(header=header(fitted.result.stamp_ns, optical_frame(name)))
+                publisher.publish(fill_image(message, picture, f"debug/{name}/{kind}"))
+
+    def _overlay(self, name: str, fitted: FittedSet, tracker: Tracker) -> Picture:
+        image = fitted.images[name]
+        if fitted.result.pose is None:
+            return image
+        return draw_overlay(image, self._rig[name], tracker.body, fitted.result.pose)
+
+    def _evidence(self, name: str, fitted: FittedSet, tracker: Tracker) -> Picture | None:
+        """None where nothing was made of the image."""
+        observation = fitted.result.observations.get(name)
+        if observation is None:
+            return None
+        return draw_steps(
+            fitted.images[name], observation, self._rig[name], tracker.body, fitted.result.pose,
+            tracker.segmenter(name),
+        )  # fmt: skip

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from markerless_tracker.datasets.background import MAX_FRAMES
 from markerless_tracker.node import declared
 from markerless_tracker.tracking import TrackerConfig
 
@@ -16,12 +17,14 @@ class NodeSettings:
     Attributes:
         cameras: names of the cameras, all of `calibration_file` if empty.
         calibration_file: `calibration.toml` of the images as they come; camera_info and TF if None.
-        background_dir: folder of empty-scene images, one image, clip or folder per camera.
+        background_dir: the empty scene: an image, clip, folder or learned NAME.npz per camera.
         subject_file: sizes of the person.
         stature: the person's stature in m, for those who have no subject file.
         start_file: TRC or pose YAML to begin with; without one, somebody is looked for.
         scale: factor by which images are made smaller on arrival.
         result_file: NAME of NAME.trc and NAME.json; none are written if None.
+        wait_for_background: start without backgrounds and wait for the service learn_background.
+        learn_background_sets: sets of images that the service learn_background learns from.
         sync_tolerance: s by which the stamps of one set may differ; 0 means equal stamps.
         config: the tracker's settings.
     """
@@ -34,6 +37,8 @@ class NodeSettings:
     start_file: Path | None = None
     scale: float = 1.0
     result_file: Path | None = None
+    wait_for_background: bool = False
+    learn_background_sets: int = 20
     sync_tolerance: float = 0.0
     config: TrackerConfig
 
@@ -66,6 +71,14 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
     for name, (least, most) in ranges.items():
         if name in values:
             own[name] = declared.number(name, values[name], least, most)
+    if "wait_for_background" in values:
+        own["wait_for_background"] = declared.flag(
+            "wait_for_background", values["wait_for_background"]
+        )
+    if "learn_background_sets" in values:
+        own["learn_background_sets"] = declared.count(
+            "learn_background_sets", values["learn_background_sets"], 2, MAX_FRAMES
+        )
     rest = {name: value for name, value in values.items() if name not in _OWN}
     return NodeSettings(config=TrackerConfig.from_mapping(rest), **own)
 

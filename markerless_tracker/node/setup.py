@@ -5,7 +5,7 @@ from typing import Any
 
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.calibration import read_calibration
-from markerless_tracker.datasets.background import read_background
+from markerless_tracker.datasets.background import read_background, read_background_models
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import BackgroundModel, learn_background
 from markerless_tracker.node.parameters import NodeSettings
@@ -124,17 +124,29 @@ def build(settings: NodeSettings, rig: CameraRig, scaled: CameraRig) -> TrackerS
 def _backgrounds(
     settings: NodeSettings, rig: CameraRig, scaled: CameraRig
 ) -> dict[str, BackgroundModel]:
-    if settings.background_dir is None:
+    folder = settings.background_dir
+    if settings.wait_for_background and not (folder and folder.is_dir()):
+        return {}
+    if folder is None:
         raise ConfigError(
-            "background_dir: not given, expected a folder with an image or clip of the empty scene "
-            f"for each of {', '.join(rig.names)}"
+            "background_dir: not given, expected a folder with an image, clip or learned model of "
+            f"the empty scene for each of {', '.join(rig.names)}"
         )
     sizes_px = {camera.name: camera.size_px for camera in rig}
-    frames = read_background(settings.background_dir, scaled, stored_sizes_px=sizes_px)
-    missing = [name for name in rig.names if name not in frames]
+    models = read_background_models(folder, scaled, stored_sizes_px=sizes_px)
+    frames = read_background(folder, scaled, stored_sizes_px=sizes_px)
+    missing = [name for name in rig.names if name not in models and name not in frames]
+    if missing and settings.wait_for_background:
+        # What some have would be replaced together with what the others lack.
+        return {}
     if missing:
         raise ConfigError(
-            f"background_dir: {settings.background_dir} holds nothing for {', '.join(missing)}, "
-            "expected an image or clip named after each camera"
+            f"background_dir: {folder} holds nothing for {', '.join(missing)}, "
+            "expected an image, clip or learned model (.npz) named after each camera"
         )
-    return {name: learn_background(images, settings.config) for name, images in frames.items()}
+    learned = {
+        name: learn_background(images, settings.config, camera=name)
+        for name, images in frames.items()
+        if name not in models
+    }
+    return models | learned

@@ -47,6 +47,12 @@ class TrackerStatus:
         with self._lock:
             return TrackState.SEARCHING if self._result is None else self._result.state
 
+    @property
+    def activity(self) -> str:
+        """What goes on, in a few words."""
+        with self._lock:
+            return self._activity
+
     def doing(self, activity: str, *, ready: bool | None = None) -> None:
         """Say in a few words what goes on, and whether the tracker is ready."""
         with self._lock:
@@ -114,6 +120,7 @@ class TrackerStatus:
                     self._dropped["before_ready"] if self._ready else counts.complete
                 ),
                 "dropped_before_start": str(self._dropped["before_start"]),
+                "dropped_while_learning": str(self._dropped["while_learning"]),
                 "dropped_on_error": str(self._dropped["error"]),
                 "latency_median_ms": _number(np.median(latencies) if latencies.size else None, 1),
                 "latency_p95_ms": _number(

@@ -1,13 +1,15 @@
 """The node `tracker`: four image topics in, one person's pose out."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from threading import Lock
+from types import coroutine
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import String
@@ -22,7 +24,8 @@ from markerless_tracker.node import messages, parameters
 from markerless_tracker.node.declared import declare_effective, given_parameters
 from markerless_tracker.node.images import decode_image
 from markerless_tracker.node.inputs import PATIENCE_S, CameraInput
-from markerless_tracker.node.outputs import Overlays, ResultFile
+from markerless_tracker.node.learning import Learning
+from markerless_tracker.node.outputs import Pictures, ResultFile
 from markerless_tracker.node.qos import image_qos, latched_qos, output_qos
 from markerless_tracker.node.setup import RigSource, build
 from markerless_tracker.node.status import TrackerStatus
@@ -30,6 +33,7 @@ from markerless_tracker.node.synchronizer import Synchronizer
 from markerless_tracker.node.worker import FittedSet, Fitting, FitWorker
 
 STATE_PERIOD_S = 0.5
+_TURN_S = 0.002
 
 _NOTED = (
     "tracked",
@@ -37,6 +41,7 @@ _NOTED = (
     "incomplete",
     "dropped_before_ready",
     "dropped_before_start",
+    "dropped_while_learning",
     "dropped_on_error",
     "latency_median_ms",
     "latency_p95_ms",
@@ -126,6 +131,13 @@ class TrackerNode(Node):
             )
         self._source.listen(self)
         self.create_service(Trigger, "~/reset", self._on_reset)
+        # Images have to come in while this one is being answered.
+        self.create_service(
+            Trigger,
+            "~/learn_background",
+            self._on_learn,
+            callback_group=ReentrantCallbackGroup(),
+        )
         self.create_timer(STATE_PERIOD_S, self._tick)
 
     def _listen_to(self, source: CameraInput, *, reliable: bool) -> None:
@@ -156,6 +168,22 @@ class TrackerNode(Node):
         response.message = "the next set of images is tracked as if it were the first"
         return response
 
+    async def _on_learn(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        learning = Learning(
+            self._source.names,
+            self._settings.learn_background_sets,
+            self._settings.config,
+            self._settings.background_dir,
+            clock=self._seconds,
+        )
+        self._worker.learn(learning)
+        while not learning.answered:
+            # The executor asks a waiting coroutine again after every callback, without a pause.
+            time.sleep(_TURN_S)
+            await _next_turn()
+        self.get_logger().info(f"learn_background: {learning.message}")
+        return learning.answer(response)
+
     # work, in the worker's thread unless there is a calibration file
 
     def _prepare(self) -> Fitting | None:
@@ -175,9 +203,14 @@ class TrackerNode(Node):
         sizes_px = {camera.name: camera.size_px for camera in scaled}
         self._tracker = setup.tracker
         self._result_file.open(setup.tracker)
-        self._overlays = Overlays(self, scaled)
+        self._pictures = Pictures(self, scaled)
         self._describe(setup.tracker.body)
-        self._fitting = Fitting(setup.tracker, setup.start_stamp_ns, partial(_decode, sizes_px))
+        self._fitting = Fitting(
+            setup.tracker,
+            setup.start_stamp_ns,
+            partial(_decode, sizes_px),
+            waits=setup.tracker.segmenter(scaled.names[0]) is None,
+        )
 
     # outputs
 
@@ -216,7 +249,7 @@ class TrackerNode(Node):
         elif not self._no_pose_shown:
             self._markers.publish(messages.no_markers(stamp_ns))
             self._no_pose_shown = True
-        self._overlays.publish(fitted, body)
+        self._pictures.publish(fitted, self._tracker)
         self._publish_state()
 
     def _describe(self, body: BodyModel) -> None:
@@ -251,6 +284,12 @@ class TrackerNode(Node):
 
     def _warn(self, text: str) -> None:
         self.get_logger().warning(text)
+
+
+@coroutine
+def _next_turn() -> Generator[None, None, None]:
+    """Let the executor do other things."""
+    yield
 
 
 def _decode(sizes_px: dict[str, tuple[int, int]], name: str, message: Image) -> Any:

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.errors import TrackerError
+from markerless_tracker.imaging import BackgroundModel
+from markerless_tracker.node.learning import Learning
 from markerless_tracker.node.status import TrackerStatus
 from markerless_tracker.node.synchronizer import MatchedSet, Synchronizer
 from markerless_tracker.records import TrackResult
@@ -34,6 +36,9 @@ class Stepper(Protocol):
 
     def reset(self) -> None:
         """Forget the person."""
+
+    def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
+        """Tell the person from other empty scenes from now on, and forget him."""
 
 
 class StartGate:
@@ -77,11 +82,13 @@ class Fitting:
         tracker: steps on the images.
         start_ns: see `StartGate`.
         decode: a set's view of a camera to the image that the tracker wants.
+        waits: the tracker has no backgrounds; sets are dropped until they are learned.
     """
 
     tracker: Stepper
     start_ns: int | None
     decode: Callable[[str, Any], NDArray[np.uint8]]
+    waits: bool = False
 
 
 class FitWorker:
@@ -118,6 +125,8 @@ class FitWorker:
         self._clock = clock
         self._stop = Event()
         self._reset = Event()
+        self._learning: Learning | None = None
+        self._waits = False
         self.fatal: str | None = None
         # A compiler at work cannot be interrupted; it must not keep the process from ending.
         self._thread = Thread(target=self._run, name="fit", daemon=True)
@@ -129,6 +138,18 @@ class FitWorker:
     def reset(self) -> None:
         """Forget the person before the next set."""
         self._reset.set()
+
+    def learn(self, learning: Learning) -> None:
+        """Let the next sets of images become the backgrounds.
+
+        The request is refused before the worker is ready and while there is another.
+        """
+        if not self._status.ready:
+            learning.refuse("the tracker is not ready yet")
+        elif self._learning is not None and not self._learning.answered:
+            learning.refuse("the backgrounds are being learned already")
+        else:
+            self._learning = learning
 
     def stop(self, timeout_s: float) -> bool:
         """Finish the set at hand and end; returns whether the thread ended in time."""
@@ -153,10 +174,20 @@ class FitWorker:
         self._status.dropped("before_ready", self._sets.start_counting().complete)
         self._status.doing("waiting for images", ready=True)
         gate = StartGate(fitting.start_ns)
+        self._waits = fitting.waits
         while not self._stop.is_set():
             matched = self._sets.take(_POLL_S)
             if matched is not None:
                 self._handle(fitting, gate, matched)
+            self._end_learning()
+        if self._learning is not None:
+            self._learning.refuse("the tracker ends")
+
+    def _end_learning(self) -> None:
+        if self._learning is not None:
+            self._learning.refuse_if_overdue(self._status.activity)
+            if self._learning.answered:
+                self._learning = None
 
     def _make(self) -> Fitting | None:
         while not self._stop.is_set():
@@ -178,12 +209,27 @@ class FitWorker:
                 self._status.dropped("before_start")
                 self._status.doing("waiting for the start frame")
                 return
-            self._status.doing("tracking")
             images = {name: fitting.decode(name, view) for name, view in matched.views.items()}
+            learning = self._learning
+            if learning is None and self._waits:
+                self._status.dropped("while_learning")
+                self._status.doing("waiting for learn_background")
+                return
+            if learning is not None:
+                self._status.doing("learning the background")
+                learning.take(images)
+                if self._waits or not (learning.looks or learning.answered):
+                    self._status.dropped("while_learning")
+                    self._learn(fitting, learning, matched.stamp_ns)
+                    return
+            else:
+                self._status.doing("tracking")
             result = fitting.tracker.step(images, matched.stamp_ns)
             finished_s = self._clock()
         except Exception as error:
             # Whatever one set provokes, the next may be fine; the node goes on and says so.
+            if self._learning is not None:
+                self._learning.refuse(one_line(error))
             self._status.dropped("error")
             self._trouble(matched.stamp_ns, error)
             return
@@ -192,6 +238,18 @@ class FitWorker:
             self._publish(FittedSet(result, images))
         except Exception as error:
             self._trouble(matched.stamp_ns, error)
+        if learning is not None:
+            learning.saw(result.state)
+            self._learn(fitting, learning, matched.stamp_ns)
+
+    def _learn(self, fitting: Fitting, learning: Learning, stamp_ns: int) -> None:
+        try:
+            if learning.finish_if_complete(fitting.tracker):
+                self._waits = False
+                self._status.restarted()
+        except Exception as error:
+            learning.refuse(one_line(error))
+            self._trouble(stamp_ns, error)
 
     def _trouble(self, stamp_ns: int, error: Exception) -> None:
         text = one_line(error)

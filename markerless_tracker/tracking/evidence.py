@@ -35,13 +35,23 @@ class EvidenceMaker:
         pool: ThreadPoolExecutor,
     ) -> None:
         self._rig = rig
+        self._config = config
         self._margin_px = config.component_margin_px
         self._clear_px = edge_reach(config) + config.component_margin_px
         self._every = config.full_frame_every
         self._turn = 0
         self._pool = pool
         self.segmenters: dict[str, Segmenter] = {}
-        for camera in rig:
+        self.take_backgrounds(backgrounds)
+
+    def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
+        """Tell people from other empty scenes from now on.
+
+        Raises:
+            ImageError: a background does not fit its camera; all stays as it was.
+        """
+        segmenters: dict[str, Segmenter] = {}
+        for camera in self._rig:
             background = backgrounds.get(camera.name)
             if background is None:
                 continue
@@ -51,7 +61,8 @@ class EvidenceMaker:
                     f"{background.size_px[1]} px, its calibration says "
                     f"{camera.size_px[0]}x{camera.size_px[1]}"
                 )
-            self.segmenters[camera.name] = Segmenter(camera.name, background, config)
+            segmenters[camera.name] = Segmenter(camera.name, background, self._config)
+        self.segmenters = segmenters
 
     def observe(
         self, views: Mapping[str, Image | Observation], stamp_ns: int

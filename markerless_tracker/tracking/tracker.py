@@ -161,6 +161,18 @@ class Tracker:
             self.step(views, 0)
             self.reset()
 
+    def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
+        """Tell the person from other empty scenes from now on; then `warm_up`, which resets.
+
+        Args:
+            backgrounds: by camera; cameras without one take ready-made observations only.
+
+        Raises:
+            ImageError: a background does not fit its camera; all stays as it was.
+        """
+        self._evidence.take_backgrounds(backgrounds)
+        self.warm_up()
+
     def regions(self, stamp_ns: int) -> dict[str, Region | None]:
         """Where in each camera's image `step` would look at a time; None for all of it.
 

@@ -1,7 +1,9 @@
 """The real node as a process of its own, made-up images over the real middleware."""
 
 import json
+import shutil
 import signal
+import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -35,6 +37,7 @@ from markerless_tracker.camera import write_calibration
 from markerless_tracker.datasets import read_trc
 from markerless_tracker.errors import TrackerError
 from markerless_tracker.geometry import rotation_from_quaternion
+from markerless_tracker.imaging import read_background_model
 from markerless_tracker.node.camera_info import info_of
 from markerless_tracker.node.images import fill_image
 from markerless_tracker.node.messages import header, optical_frame
@@ -346,6 +349,26 @@ def test_overlays_are_drawn_while_somebody_looks(live: Live) -> None:
     assert stamp_of(overlays[-1]) <= stamp_of(live.joints[-1])
 
 
+def test_the_evidence_is_drawn_while_somebody_looks(live: Live) -> None:
+    strips = live.peer.collect(Image, "debug/cam03/evidence", image_qos())
+
+    def drawn() -> bool:
+        live.track()
+        return bool(strips)
+
+    live.until(drawn, "the evidence")
+    assert (strips[-1].width, strips[-1].height) == (6 * 328, 245)
+    assert strips[-1].header.frame_id == "cam03_optical_frame"
+    panels = np.frombuffer(strips[-1].data, np.uint8).reshape(245, 6, 328, 3)
+    image, background, labels, mask, edges, _ = panels.transpose(1, 0, 2, 3).astype(int)
+    person = mask[:, :, 0] == 255
+    assert 500 < person.sum() < person.size / 4
+    assert (labels[:, :, 0][person] == 255).mean() > 0.8
+    difference = abs(image - background).max(axis=2)
+    assert np.median(difference[person]) > 20 > np.median(difference[mask[:, :, 0] == 0])
+    assert edges.max() > 100
+
+
 def test_parameters_show_what_is_in_effect(live: Live) -> None:
     from rcl_interfaces.srv import GetParameters
 
@@ -355,6 +378,88 @@ def test_parameters_show_what_is_in_effect(live: Live) -> None:
     live.until(future.done, "the answer")
     body, seed, scale = future.result().values
     assert (body.string_value, seed.integer_value, scale.double_value) == ("balan31", 0, 1.0)
+
+
+def test_the_background_is_learned_when_nobody_is_there(
+    world: World, tmp_path: Path, other_domain: None, start: Any, peer: Any
+) -> None:
+    folder = tmp_path / "background"
+    shutil.copytree(world.folder / "background", folder)
+    parameters = {**world.parameters(), "background_dir": folder, "learn_background_sets": 4}
+    live = Live(peer, start("tracker_node", **parameters), world)
+    client = peer.node.create_client(Trigger, "tracker/learn_background")
+    live.until(client.service_is_ready, "the service")
+
+    def learn(scene: Any) -> Any:
+        future = client.call_async(Trigger.Request())
+        while not future.done():
+            live.camera.scene = scene
+            live.send_without_pose()
+            end_s = time.monotonic() + 0.3
+            live.until(lambda end_s=end_s: future.done() or time.monotonic() > end_s, "a turn")
+        return future.result()
+
+    live.track()
+    answer = learn(world.scene)
+    assert not answer.success and "somebody stands there" in answer.message, answer
+    assert not list(folder.glob("*.npz"))
+
+    moved = Refurnished(world.scene, empty=True)
+    answer = learn(moved)
+    assert answer.success, answer.message
+    model = read_background_model(folder / "cam02.npz")
+    assert abs(model.mean[moved.window] - moved.colour).max() < 4.0
+    live.until(lambda: live.value("state") == "SEARCHING", "a new beginning")
+
+    live.camera.scene = Refurnished(world.scene, empty=False)
+    for _ in range(3):
+        live.track()
+    assert live.value("state") == "TRACKING" and live.value("warnings") == ""
+    assert all(float(live.value(f"agreement/{name}")) > 0.8 for name in live.camera.names)
+
+
+def test_a_node_without_background_waits_for_one(
+    world: World, tmp_path: Path, other_domain: None, start: Any, peer: Any
+) -> None:
+    folder = tmp_path / "background"
+    parameters = {**world.parameters(), "background_dir": folder, "learn_background_sets": 3}
+    live = Live(peer, start("tracker_node", **parameters, wait_for_background=True), world)
+    live.send_without_pose()
+    live.until(lambda: live.value("activity") == "waiting for learn_background", "to wait")
+    client = peer.node.create_client(Trigger, "tracker/learn_background")
+    live.until(client.service_is_ready, "the service")
+    future = client.call_async(Trigger.Request())
+    live.camera.scene = Refurnished(world.scene, empty=True)
+    while not future.done():
+        live.send_without_pose()
+        end_s = time.monotonic() + 0.3
+        live.until(lambda end_s=end_s: future.done() or time.monotonic() > end_s, "a turn")
+    assert future.result().success, future.result().message
+    assert len(list(folder.glob("*.npz"))) == len(live.camera.names)
+    live.camera.scene = Refurnished(world.scene, empty=False)
+    live.track()
+    assert live.value("state") == "TRACKING" and live.value("dropped_on_error") == "0"
+
+
+class Refurnished:
+    """A scene after a cupboard was put into all views, with or without the person."""
+
+    window = np.s_[60:140, 20:60]
+    colour = np.array([40.0, 160.0, 230.0])
+
+    def __init__(self, scene: SyntheticScene, *, empty: bool) -> None:
+        self._scene, self._empty = scene, empty
+        self.rig, self.stamp_ns = scene.rig, scene.stamp_ns
+        self._rooms = {name: images[0] for name, images in scene.backgrounds(1).items()}
+
+    def frame(self, index: int) -> tuple[dict[str, Any]]:
+        images, masks, _ = self._scene.frame(index)
+        shown = {}
+        for name, image in images.items():
+            shown[name] = (self._rooms[name] if self._empty else image).copy()
+            behind = np.ones(image.shape[:2], dtype=bool) if self._empty else masks[name] == 0
+            shown[name][self.window][behind[self.window]] = self.colour
+        return (shown,)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -1,12 +1,15 @@
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from markerless_tracker.errors import ConfigError, ImageError
+from markerless_tracker.imaging import ImagingSettings
+from markerless_tracker.node.learning import Learning
 from markerless_tracker.node.status import TrackerStatus
 from markerless_tracker.node.synchronizer import Synchronizer
 from markerless_tracker.node.worker import FittedSet, Fitting, FitWorker, StartGate, one_line
@@ -28,6 +31,8 @@ class FakeTracker:
         self.free = threading.Event()
         self.free.set()
         self.error: Exception | None = None
+        self.state = TrackState.TRACKING
+        self.backgrounds: dict[str, Any] = {}
 
     def warm_up(self) -> None:
         self.threads.add(threading.get_ident())
@@ -41,12 +46,15 @@ class FakeTracker:
         if self.error:
             raise self.error
         self.seen.append((stamp_ns, dict(views)))
-        return TrackResult(
-            stamp_ns, TrackState.TRACKING, np.zeros(3), np.zeros((15, 3)), 1.5, {"a": 0.5}, 7
-        )
+        return TrackResult(stamp_ns, self.state, np.zeros(3), np.zeros((15, 3)), 1.5, {"a": 0.5}, 7)
 
     def reset(self) -> None:
         self.resets += 1
+
+    def take_backgrounds(self, backgrounds: Any) -> None:
+        if self.error:
+            raise self.error
+        self.backgrounds = dict(backgrounds)
 
 
 class Bench:
@@ -223,3 +231,80 @@ def test_stop_does_not_wait_for_ever() -> None:
 def test_start_gate(start_ns: int | None, stamps: list[int], admitted: list[bool]) -> None:
     gate = StartGate(start_ns)
     assert [gate.admits(stamp) for stamp in stamps] == admitted
+
+
+def learn(bench: Bench, sets: int = 4) -> Learning:
+    learning = Learning(("a", "b"), sets, ImagingSettings(), None)
+    bench.worker.learn(learning)
+    return learning
+
+
+def offer_one_by_one(bench: Bench, *stamps: int) -> None:
+    for stamp in stamps:
+        before = {key: bench.values()[key] for key in ("tracked", "dropped_while_learning")}
+        bench.offer(stamp)
+        bench.until(lambda before=before: any(bench.values()[k] != v for k, v in before.items()))
+
+
+def test_sets_become_backgrounds_and_the_tracker_looks_at_the_first_and_the_last(
+    bench: Bench,
+) -> None:
+    early = learn(bench)
+    assert early.answered and early.message == "nothing learned: the tracker is not ready yet"
+    bench.tracker.state = TrackState.SEARCHING
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    learning = learn(bench)
+    second = learn(bench)
+    assert second.answered and "already" in second.message
+    offer_one_by_one(bench, 1, 2, 3, 4)
+    bench.until(lambda: learning.answered)
+    assert learning.success and learning.message == "a, b learned from 4 images each"
+    assert [stamp for stamp, _ in bench.tracker.seen] == [1, 4]
+    assert bench.values()["dropped_while_learning"] == "2"
+    assert bench.tracker.backgrounds["b"].note == "learned live from 4 images"
+    assert (bench.tracker.backgrounds["b"].mean == 7.0).all()
+    offer_one_by_one(bench, 5)
+    assert bench.tracker.seen[-1][0] == 5
+
+
+def test_a_tracked_person_is_not_learned(bench: Bench) -> None:
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    learning = learn(bench)
+    offer_one_by_one(bench, 1)
+    bench.until(lambda: learning.answered)
+    assert not learning.success and "somebody stands there" in learning.message
+    assert not bench.tracker.backgrounds
+    # The next request is a new one.
+    bench.until(lambda: "somebody" not in learn(bench).message)
+
+
+def test_trouble_answers_a_request(bench: Bench) -> None:
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    bench.tracker.error = ImageError("a: too dark")
+    learning = learn(bench)
+    bench.offer(1)
+    bench.until(lambda: learning.answered)
+    assert learning.message == "nothing learned: a: too dark"
+    bench.tracker.error = None
+    waiting = learn(bench)
+    assert bench.worker.stop(20)
+    assert waiting.message == "nothing learned: the tracker ends"
+
+
+def test_without_backgrounds_sets_are_dropped_until_they_are_learned(bench: Bench) -> None:
+    assert bench.prepared is not None
+    bench.prepared = replace(bench.prepared, waits=True)
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    offer_one_by_one(bench, 1, 2)
+    assert not bench.tracker.seen
+    assert bench.values()["activity"] == "waiting for learn_background"
+    learning = learn(bench, 2)
+    offer_one_by_one(bench, 3, 4)
+    bench.until(lambda: learning.answered)
+    assert learning.success and set(bench.tracker.backgrounds) == {"a", "b"}
+    offer_one_by_one(bench, 5)
+    assert [stamp for stamp, _ in bench.tracker.seen] == [5]
