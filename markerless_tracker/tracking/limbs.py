@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.camera import CameraRig, project_camera
@@ -83,17 +84,19 @@ def limb_shares(
     Points outside a view's region count as outside, those outside its frame not at all.
     """
     placed = cone_transforms(body, pose)
+    along = (body.cone_length[:, None] * _ALONG)[:, :, None]
+    points = (placed[:, None, :, 3] + along * placed[:, None, :, 2]).reshape(-1, 3)
+    seen = [_look(points, observation, rig) for observation in observations.values()]
     shares = {}
     for name in body.limbs:
         nodes = np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name]))
-        below = _below(body, nodes)
-        cones = [c for c, node in enumerate(body.cone_node) if int(node) in below]
-        points = np.concatenate(
-            [placed[c, :, 3] + _ALONG[:, None] * body.cone_length[c] * placed[c, :, 2]
-             for c in cones] or [np.empty((0, 3))]
-        )  # fmt: skip
-        seen = [_inside(points, observations[n], rig) for n in observations]
-        values = [value for value in seen if np.isfinite(value)]
+        below = np.isin(body.cone_node, list(_below(body, nodes)))
+        own = np.repeat(below, _ALONG.size)
+        values = [
+            float(inside[own].sum()) / float(framed[own].sum())
+            for framed, inside in seen
+            if framed[own].any()
+        ]
         if values:
             shares[name] = float(np.mean(values))
     return shares
@@ -107,16 +110,18 @@ def _below(body: BodyModel, nodes: np.ndarray[tuple[int], np.dtype[np.int64]]) -
     return below
 
 
-def _inside(points: FloatArray, observation: Observation, rig: CameraRig) -> float:
-    """Share of points (n, 3) inside a silhouette, of those in the frame; NaN for none."""
+def _look(
+    points: FloatArray, observation: Observation, rig: CameraRig
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which of the points (n, 3) a view has in its frame, and which in its silhouette."""
     pixels = project_camera(points, rig[observation.camera])
     with np.errstate(invalid="ignore"):
         framed = (pixels >= 0.0).all(axis=1) & (pixels <= np.array(observation.size_px) - 1).all(
             axis=1
         )
-    if not framed.any():
-        return float("nan")
+    inside = np.zeros(len(points), dtype=np.bool_)
     mask = observation.mask
     u, v = (np.round(pixels[framed]) - observation.offset_px).astype(np.int64).T
     there = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
-    return float(mask[v[there], u[there]].sum()) / float(framed.sum())
+    inside[np.flatnonzero(framed)[there]] = mask[v[there], u[there]]
+    return np.asarray(framed), inside
