@@ -9,8 +9,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.cli.benchmark.arguments import count, positive, progress_bars
-from markerless_tracker.cli.benchmark.start import each, list_of_each
+from markerless_tracker.cli.benchmark.arguments import count, progress_bars
+from markerless_tracker.cli.benchmark.recordings import add_recordings, each
 from markerless_tracker.cli.track import read_config
 from markerless_tracker.evaluation import recovery
 from markerless_tracker.evaluation.machine import machine
@@ -25,15 +25,7 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         description="Black views and missing frames, and how soon the person is tracked again.",
         epilog="example: markerless_tracker benchmark recovery WALK --stature 1.72",
     )
-    parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
-    parser.add_argument(
-        "--stature", type=list_of_each(positive), default=(), metavar="LIST",
-        help="of the persons, m: one for all recordings or one each; default: unknown",
-    )  # fmt: skip
-    parser.add_argument(
-        "--scale", type=list_of_each(positive), default=(1.0,), metavar="LIST",
-        help="factor for the images, one for all recordings or one each",
-    )  # fmt: skip
+    add_recordings(parser)
     parser.add_argument("--seeds", type=count, default=5, metavar="N", help="seeds 0..N-1 (5)")
     parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")

@@ -9,9 +9,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.cli.benchmark.arguments import count, list_of, positive, progress_bars
+from markerless_tracker.cli.benchmark.arguments import count, progress_bars
+from markerless_tracker.cli.benchmark.recordings import add_recordings, each
 from markerless_tracker.cli.track import read_config
-from markerless_tracker.errors import ConfigError
 from markerless_tracker.evaluation import starts
 from markerless_tracker.evaluation.machine import machine
 from markerless_tracker.evaluation.result import versions
@@ -25,15 +25,7 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         description="Starts without a start pose, judged by the truth after some frames.",
         epilog="example: markerless_tracker benchmark start WALK BALANCE --stature 1.72,1.70",
     )
-    parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
-    parser.add_argument(
-        "--stature", type=list_of_each(positive), default=(), metavar="LIST",
-        help="of the persons, m: one for all recordings or one each; default: unknown",
-    )  # fmt: skip
-    parser.add_argument(
-        "--scale", type=list_of_each(positive), default=(1.0,), metavar="LIST",
-        help="factor for the images, one for all recordings or one each",
-    )  # fmt: skip
+    add_recordings(parser)
     parser.add_argument(
         "--every", type=count, default=10, metavar="N", help="a start from each N-th frame (10)"
     )
@@ -84,31 +76,6 @@ def run(args: argparse.Namespace) -> int:
         highlight=False,
     )
     return 0
-
-
-def list_of_each(kind: Any) -> Any:
-    """Parser of a list with commas that keeps values standing twice."""
-
-    def parse(text: str) -> tuple[Any, ...]:
-        return tuple(list_of(kind)(word)[0] for word in text.split(","))
-
-    return parse
-
-
-def each(values: tuple[Any, ...], sources: list[Path], option: str) -> tuple[Any, ...]:
-    """A value per source, from one for all or one each.
-
-    Raises:
-        ConfigError: neither.
-    """
-    if len(values) == 1:
-        return values * len(sources)
-    if len(values) != len(sources):
-        raise ConfigError(
-            f"{option}: {len(values)} values for {len(sources)} recordings, expected one or "
-            f"{len(sources)}"
-        )
-    return values
 
 
 def _rendered(rows: list[dict[str, Any]], frames: int) -> Table:
