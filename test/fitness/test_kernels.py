@@ -10,23 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.fitness import EDGE_RULES, Fitness
-from markerless_tracker.fitness.edge_samples import EdgeRule, sample_side
-from markerless_tracker.fitness.fill import clear_used, fill_outline
-from markerless_tracker.fitness.outline import LANES, make_outlines, outlines_of, scan_edges
 from markerless_tracker.fitness.terms import EDGE_COUNT, EDGE_SUM, EDGE_TOP, OVERLAP, PROJECTED
-from markerless_tracker.records import Observation, unpack_mask
+from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import look_at
 
 STRIP_PX = 0.06
 END_ON_STRIP_PX = 0.1
-LANE = 3
-"""Which of the polygons that are worked on side by side the tests fill."""
 
 
 def check_silhouettes(
@@ -190,126 +183,6 @@ def test_silhouette_cones_choose_what_is_drawn(twin, make_pose, make_observation
         drawn = slow.silhouette(arms).sum()
         assert abs(row[PROJECTED] - drawn) <= STRIP_PX * slow.perimeter()
         assert row[OVERLAP] == row[PROJECTED] > 0
-
-
-def fill(points, width: int, height: int):
-    """Words (w, h) and mask (h, w) that `fill_outline` sets, and the rows it says it used."""
-    words = (width + 63) // 64
-    bits = np.zeros(words * height, dtype=np.uint64)
-    used = np.empty((words, 2), dtype=np.int64)
-    clear_used(words, height, used)
-    out = outlines_of(make_outlines(1, height), 0)
-    for i, (u, v) in enumerate(np.asarray(points, dtype=np.float64)):
-        out.u[i * LANES + LANE], out.v[i * LANES + LANE] = u, v
-    # Whatever an earlier polygon left behind must not matter.
-    out.left[:], out.right[:] = 7.0, 20.0
-    scan_edges(LANE + 1, len(points), height, out.u, out.v, out.first, out.slope, out.box)
-    fill_outline(LANE, len(points), out, width, height, bits, used)
-    frame = bits.reshape(words, height)
-    return frame, unpack_mask(np.ascontiguousarray(frame.T), width), used
-
-
-def inside_convex(points, width: int, height: int):
-    """Pixel centres strictly inside, and those within 1e-6 px of the boundary, (h, w) both."""
-    u, v = np.meshgrid(np.arange(width), np.arange(height))
-    following = np.roll(points, -1, axis=0)
-    area = np.sum(points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0])
-    least = np.full((height, width), np.inf)
-    for (pu, pv), (qu, qv) in zip(points, following, strict=True):
-        length = np.hypot(qu - pu, qv - pv)
-        side = np.sign(area) * ((qu - pu) * (v - pv) - (qv - pv) * (u - pu)) / length
-        least = np.minimum(least, side)
-    return least > 1e-6, np.abs(least) <= 1e-6
-
-
-@settings(deadline=None)
-@given(
-    st.integers(0, 2**32 - 1),
-    st.integers(3, 14),
-    st.floats(0.3, 120.0),
-    st.tuples(st.floats(-40.0, 190.0), st.floats(-40.0, 110.0)),
-    st.booleans(),
-)
-def test_convex_polygons_fill_exactly_the_pixel_centres_inside(seed, corners, size, at, clockwise):
-    width, height = 150, 70
-    rng = np.random.default_rng(seed)
-    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, corners))
-    stretch = rng.uniform(0.2, 1.0, 2)
-    points = np.stack([np.cos(angle), np.sin(angle)], axis=1) * stretch * size + at
-    points = points[::-1] if clockwise else points
-    if np.min(np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1)) < 1e-3:
-        return
-    words, filled, used = fill(points, width, height)
-    inside, undecided = inside_convex(points, width, height)
-    np.testing.assert_array_equal(filled[~undecided], inside[~undecided])
-    # Only what is said to be used is wiped afterwards.
-    for column, (first, last) in zip(words, used, strict=True):
-        assert not column[:first].any() and not column[last + 1 :].any()
-
-
-def test_two_polygons_that_share_an_edge_leave_no_gap():
-    """Between the pixels of two halves lies none that neither holds."""
-    left = np.array([[10.2, 5.1], [30.7, 8.3], [25.4, 40.9], [8.8, 33.3]])
-    right = np.array([[30.7, 8.3], [55.5, 3.2], [60.1, 44.4], [25.4, 40.9]])
-    whole = inside_convex(left, 80, 60)[0] | inside_convex(right, 80, 60)[0]
-    assert not (whole & ~(fill(left, 80, 60)[1] | fill(right, 80, 60)[1])).any()
-
-
-@pytest.mark.parametrize(
-    "points",
-    [
-        [[1e300, -1e300], [1e300, 1e300], [-1e300, 1e300]],
-        [[np.nan, 3.0], [4.0, 5.0], [6.0, np.nan]],
-        [[np.inf, 3.0], [-np.inf, 5.0], [6.0, 9.0]],
-        [[5.5, 5.5], [5.5, 5.5], [5.5, 5.5]],
-    ],
-    ids=["huge", "nan", "infinite", "empty"],
-)
-def test_polygons_that_are_none_stay_inside_the_frame(points):
-    words, _, _ = fill(np.array(points), 70, 30)
-    padding = unpack_mask(np.ascontiguousarray(words.T), 128)[:, 70:]
-    assert not padding.any()
-
-
-def sample(p, q, edges, rule: str, *, bits=None, outward=1.0, spacing=5.0, squared=False):
-    height, width = edges.shape
-    rows = np.zeros((height, (width + 63) // 64), dtype=np.uint64) if bits is None else bits
-    total, number, _ = sample_side(
-        float(p[0]), float(p[1]), float(q[0]), float(q[1]), outward, rows.T.ravel(),
-        np.empty(0, dtype=np.uint64), 0, edges.ravel(), 0, width, height,
-        EdgeRule(EDGE_RULES[rule], spacing, 2.0, squared), np.empty((0, 2), dtype=np.int64), 0,
-    )  # fmt: skip
-    return number, total / EDGE_TOP ** (2 if squared else 1)
-
-
-def test_samples_of_one_side_by_hand():
-    edges = np.zeros((40, 60), dtype=np.uint8)
-    edges[10, 20:30] = 255
-    # Nine samples at 12.5, 17.5 .. 52.5 px; two of them, at 22.5 and 27.5, meet the edge.
-    assert sample([10, 10], [55, 10], edges, "sides") == (9, 2.0)
-    assert sample([10, 10], [55, 10], edges, "sides", squared=True) == (9, 7.0)
-    # Never fewer than four: 10.375, 11.125, 11.875, 12.625.
-    assert sample([10, 20], [13, 20], edges, "sides")[0] == 4
-    # Those outside the frame do not count: 52.5, 57.5 of 50 .. 80 remain.
-    assert sample([50, 10], [80, 10], edges, "sides")[0] == 2
-    assert sample([-50, 10], [-5, 10], edges, "sides")[0] == 0
-    assert sample([5, 5], [5, 5], edges, "sides") == (0, 0.0)
-    assert sample([np.nan, 5], [5, 5], edges, "sides") == (0, 0.0)
-
-
-def test_what_hides_a_sample():
-    edges = np.zeros((40, 64), dtype=np.uint8)
-    body = Observation.from_mask("c", 0, np.zeros((40, 64), bool), edges).mask_words.copy()
-    body[20:, :] = np.uint64(2**64 - 1)
-    p, q = [10, 19], [30, 19]
-    # Row 19 is free, rows 20 and on are body.
-    assert sample(p, q, edges, "visible", bits=body)[0] == 4
-    assert sample([10, 20], [30, 20], edges, "visible", bits=body)[0] == 0
-    # Outline: from row 19, two px outwards lies row 21 or row 17.
-    assert sample(p, q, edges, "outline", bits=body, outward=1.0)[0] == 0
-    assert sample(p, q, edges, "outline", bits=body, outward=-1.0)[0] == 4
-    # Beyond the frame's border nothing hides.
-    assert sample([10, 39], [30, 39], edges, "outline", bits=body, outward=1.0)[0] == 4
 
 
 def test_a_camera_in_the_middle_of_the_body_draws_what_is_in_front(make_pose, body):

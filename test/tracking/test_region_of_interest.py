@@ -56,7 +56,8 @@ def test_the_pose_is_that_of_whole_images(
     full = 256 * 192
     # The first frame looks everywhere, later ones but for the cameras whose turn it is do not.
     assert sizes[0] == [full] * 4
-    assert all(sum(size == full for size in row) in (1, 2) for row in sizes[1:]) or things
+    if not things:
+        assert all(sum(size == full for size in row) in (1, 2) for row in sizes[1:])
     assert any(size < full // 2 for row in sizes[1:] for size in row)
 
 
