@@ -104,7 +104,7 @@ def test_a_known_shape_is_found_again(case) -> None:
     # Ends inside other parts are not seen; all others are.
     radii, offsets = error[:, :, :2], error[:, :, 2:]
     assert radii.mean() < 4.0 < 7.0 < before[:, :, :2].mean()
-    assert np.quantile(radii, 0.75) < 4.5
+    assert np.quantile(radii, 0.75) < 4.8
     assert offsets.mean() < 3.0 and np.quantile(offsets, 0.9) < 6.0
 
 
