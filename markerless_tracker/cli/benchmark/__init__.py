@@ -2,10 +2,19 @@
 
 import argparse
 
-from markerless_tracker.cli.benchmark import recovery, silhouettes, speed, start, tables
+from markerless_tracker.cli.benchmark import (
+    calm,
+    cameras,
+    recovery,
+    silhouettes,
+    speed,
+    start,
+    tables,
+)
 
 HELP = (
-    "Measure accuracy (tables), automatic starts (start), recovery, silhouettes or speed (speed). "
+    "Measure accuracy (tables), fewer cameras (cameras), automatic starts (start), recovery, "
+    "jitter and lag (calm), silhouettes or speed (speed). "
     "Recordings have a ground_truth.trc: in tables its first row is the start and gives the "
     "lengths; its rows are the truth."
 )
@@ -17,6 +26,8 @@ _KINDS = {
     "silhouettes": silhouettes,
     "start": start,
     "recovery": recovery,
+    "cameras": cameras,
+    "calm": calm,
 }
 
 

@@ -11,12 +11,17 @@ from markerless_tracker.errors import ConfigError
 T = TypeVar("T")
 
 
-def add_recordings(parser: argparse.ArgumentParser) -> None:
-    """Declare the recordings, the persons' statures and the images' scales."""
+def add_recordings(parser: argparse.ArgumentParser, *, without: str = "unknown") -> None:
+    """Declare the recordings, the persons' statures and the images' scales.
+
+    Args:
+        parser: takes the arguments.
+        without: what holds without a stature, for the help.
+    """
     parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
     parser.add_argument(
         "--stature", type=list_of_each(positive), default=(), metavar="LIST",
-        help="of the persons, m: one for all recordings or one each; default: unknown",
+        help=f"of the persons, m: one for all recordings or one each; default: {without}",
     )  # fmt: skip
     parser.add_argument(
         "--scale", type=list_of_each(positive), default=(1.0,), metavar="LIST",

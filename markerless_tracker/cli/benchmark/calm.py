@@ -1,0 +1,96 @@
+"""`benchmark calm`: what the filter of the results takes from jitter and costs in time."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from markerless_tracker.cli.benchmark.arguments import progress_bars
+from markerless_tracker.cli.benchmark.recordings import add_recordings, each
+from markerless_tracker.cli.track import read_config
+from markerless_tracker.evaluation import calm
+from markerless_tracker.evaluation.judged import Beginning
+from markerless_tracker.evaluation.machine import machine
+from markerless_tracker.evaluation.result import versions
+
+
+def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
+    """Declare the arguments."""
+    parser = kinds.add_parser(
+        "calm",
+        help="jitter of who stands and lag of who moves, without and with the filter",
+        description="Jitter, lag and error, without and with smoothing: one_euro.",
+        epilog="example: markerless_tracker synthesize STAND --motion stand --seconds 3 && "
+        "markerless_tracker benchmark calm STAND WALK",
+    )
+    add_recordings(parser, without="start and lengths from the first row of the truth")
+    parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print; returns the exit status."""
+    flags = {} if args.threads is None else {"threads": args.threads}
+    config = read_config(args.config, flags)
+    statures = each(args.stature or (None,), args.sources, "--stature")
+    scales = each(args.scale, args.sources, "--scale")
+    rows = []
+    with progress_bars() as bars:
+        task = bars.add_task("reading", total=None)
+        for source, stature_m, scale in zip(args.sources, statures, scales, strict=True):
+            rows.append(
+                calm.measure_calm(
+                    source,
+                    config,
+                    beginning=Beginning(stature_m is None, stature_m),
+                    scale=scale,
+                    report=lambda part, done, total: bars.update(
+                        task, description=part, completed=done, total=total
+                    ),
+                )
+            )
+    if args.json:
+        table = {"machine": machine(), "versions": versions(), "rows": rows}
+        json.dump(table, sys.stdout, indent=2, allow_nan=False)
+        sys.stdout.write("\n")
+        return 0
+    console = Console(width=None if sys.stdout.isatty() else 150)
+    console.print(_rendered(rows))
+    console.print(
+        "Jitter: rms of what a joint centre does faster than its mean over "
+        f"{calm.SLOW_S:g} s, the true motion taken off; mean over the joints. Lag: behind the "
+        "unfiltered track, frames; worst: of one joint.",
+        highlight=False,
+    )
+    return 0
+
+
+def _rendered(rows: list[dict[str, Any]]) -> Table:
+    table = Table(title="Calm and in time")
+    for title in ("recording", "start", "smoothing"):
+        table.add_column(title)
+    for title in (
+        "frames", "m/s", "mean mm", "jitter mm", "worst joint", "lag", "worst lag",
+    ):  # fmt: skip
+        table.add_column(title, justify="right")
+    for row in rows:
+        for name in calm.FILTERS:
+            figures = row[name]
+            table.add_row(
+                row["recording"],
+                row["start"],
+                name,
+                str(row["frames"]),
+                f"{row['speed_m_s']:.2f}",
+                f"{figures['mean_mm']:.1f}",
+                f"{figures['jitter_mm']:.2f}",
+                f"{figures['worst_jitter_mm']:.1f} ({figures['worst_joint']})",
+                f"{figures['lag_frames']:.2f}",
+                f"{figures['worst_lag_frames']:.2f}",
+            )
+    return table

@@ -1,0 +1,129 @@
+"""`benchmark cameras`: the error with every choice of fewer cameras."""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from markerless_tracker.cli.benchmark.arguments import count, list_of, progress_bars
+from markerless_tracker.cli.benchmark.recordings import add_recordings, each
+from markerless_tracker.cli.track import read_config
+from markerless_tracker.evaluation import cameras
+from markerless_tracker.evaluation.judged import Beginning
+from markerless_tracker.evaluation.machine import machine
+from markerless_tracker.evaluation.result import versions
+from markerless_tracker.evaluation.runs import LOST_LIMB_MM
+
+_STARTS = ("measured", "automatic")
+
+
+def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
+    """Declare the arguments."""
+    parser = kinds.add_parser(
+        "cameras",
+        help="error with every choice of fewer cameras, and how many times that of all it is",
+        description="Whole runs with all cameras and with every choice of some of them.",
+        epilog="example: markerless_tracker benchmark cameras WALK --stature 1.72",
+    )
+    add_recordings(parser)
+    parser.add_argument(
+        "--each", type=list_of(count), default=(3, 2), metavar="LIST",
+        help="numbers of cameras; every choice of as many is run (3,2)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--start", type=list_of(str), default=_STARTS, metavar="LIST",
+        help="measured: start and lengths from the first row of the truth; automatic: nothing is "
+        f"told but --stature, judged after {cameras.SETTLED_FRAMES} frames (both)",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all draws (0)")
+    parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print; returns the exit status."""
+    unknown = sorted(set(args.start) - set(_STARTS))
+    if unknown:
+        print(
+            f"--start: {', '.join(unknown)}, expected some of {', '.join(_STARTS)}",
+            file=sys.stderr,
+        )
+        return 1
+    flags = {"seed": args.seed, **({} if args.threads is None else {"threads": args.threads})}
+    config = read_config(args.config, flags)
+    statures = each(args.stature or (None,), args.sources, "--stature")
+    scales = each(args.scale, args.sources, "--scale")
+    rows = []
+    with progress_bars() as bars:
+        task = bars.add_task("reading", total=None)
+        for source, stature_m, scale in zip(args.sources, statures, scales, strict=True):
+            rows.append(
+                cameras.measure_cameras(
+                    source,
+                    config,
+                    beginnings=[Beginning(name == "measured", stature_m) for name in args.start],
+                    counts=args.each,
+                    scale=scale,
+                    report=lambda part, done, total: bars.update(
+                        task, description=part, completed=done, total=total
+                    ),
+                )
+            )
+    if args.json:
+        table = {"machine": machine(), "versions": versions(), "rows": rows}
+        json.dump(table, sys.stdout, indent=2, allow_nan=False)
+        sys.stdout.write("\n")
+        return 0
+    console = Console(width=None if sys.stdout.isatty() else 150)
+    for row in rows:
+        console.print(_rendered(row))
+        for line in _summary(row):
+            console.print(line, highlight=False, markup=False)
+    return 0
+
+
+def _rendered(row: dict[str, Any]) -> Table:
+    table = Table(title=f"{row['recording']}, scale {row['scale']:g}: fewer cameras")
+    for title in ("start", "cameras"):
+        table.add_column(title)
+    for title in (
+        "mean mm", "x all", "max frame", "worst joint", f"> {LOST_LIMB_MM:g} mm", "found"
+    ):  # fmt: skip
+        table.add_column(title, justify="right")
+    for one in row["runs"]:
+        table.add_row(
+            one["start"],
+            " ".join(one["cameras"]),
+            *(_number(one[key], form) for key, form in (
+                ("mean_mm", ".1f"), ("ratio", ".2f"), ("max_mm", ".1f"), ("worst_joint_mm", ".0f")
+            )),
+            str(one["lost_run"]),
+            f"{one['found']:.0%}",
+        )  # fmt: skip
+    return table
+
+
+def _summary(row: dict[str, Any]) -> Iterator[str]:
+    """A line per start and number of cameras: mean, best and worst choice."""
+
+    def key(one: dict[str, Any]) -> tuple[str, int]:
+        return one["start"], len(one["cameras"])
+
+    for (start, number), group in groupby(row["runs"], key):
+        ratios = [one["ratio"] for one in group if one["ratio"] is not None]
+        if ratios:
+            yield (
+                f"{start}, {number} cameras: {sum(ratios) / len(ratios):.2f} times the error of "
+                f"all on average, best {min(ratios):.2f}, worst {max(ratios):.2f}"
+            )
+
+
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else f"{value:{form}}"
