@@ -53,7 +53,7 @@ def measure_calm(
             found[name] = tracked_markers(results)
             if report is not None:
                 report(f"runs on {recording.name}", number + 1, len(FILTERS))
-    kept = longest_whole(np.isfinite(found["none"]).all(axis=(1, 2)))
+    kept = longest_whole(np.asarray(np.isfinite(found["none"]).all(axis=(1, 2))))
     names = np.flatnonzero(np.isfinite(truth[kept]).all(axis=(0, 2)))
     if kept.stop - kept.start < 4.0 * MOST_LAG or names.size == 0:
         raise DatasetError(

@@ -78,9 +78,9 @@ def judge(points_m: NDArray[np.float64], truth_m: NDArray[np.float64]) -> dict[s
     `worst_joint_mm`, `lost_run` (longest run of frames with any joint more than `LOST_LIMB_MM`
     off), `found` (share of the frames with a truth that have a pose).
     """
-    apart_mm = np.linalg.norm(points_m - truth_m, axis=2) * MM_PER_M
-    known = np.isfinite(truth_m).all(axis=2).any(axis=1)
-    seen = np.isfinite(apart_mm).any(axis=1)
+    apart_mm: NDArray[np.float64] = np.linalg.norm(points_m - truth_m, axis=2) * MM_PER_M
+    known = np.asarray(np.isfinite(truth_m).all(axis=2)).any(axis=1)
+    seen = np.asarray(np.isfinite(apart_mm).any(axis=1))
     if not seen.any():
         return {"mean_mm": None, "max_mm": None, "worst_joint_mm": None, "lost_run": 0,
                 "found": 0.0}  # fmt: skip
@@ -89,6 +89,6 @@ def judge(points_m: NDArray[np.float64], truth_m: NDArray[np.float64]) -> dict[s
         "mean_mm": float(frame_mm.mean()),
         "max_mm": float(frame_mm.max()),
         "worst_joint_mm": float(np.nanmax(apart_mm)),
-        "lost_run": longest_run((apart_mm > LOST_LIMB_MM).any(axis=1)),
+        "lost_run": longest_run(np.asarray((apart_mm > LOST_LIMB_MM).any(axis=1))),
         "found": float(seen.sum() / known.sum()),
     }

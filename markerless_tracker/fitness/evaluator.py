@@ -15,7 +15,7 @@ from markerless_tracker.fitness.arrays import Views, body_arrays, lay_out_views
 from markerless_tracker.fitness.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule
 from markerless_tracker.fitness.outline import make_outlines
 from markerless_tracker.fitness.still import Drawing, divide
-from markerless_tracker.fitness.terms import CostRule, view_terms
+from markerless_tracker.fitness.terms import OVERLAP, PROJECTED, CostRule, view_terms
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, Stage
@@ -29,11 +29,18 @@ _CONE_S = 0.4e-6
 
 @dataclass(frozen=True)
 class ViewTerms:
-    """How well a pose explains one view: f_s and f_e in [0, 1], overlap (IoU) of silhouettes."""
+    """How well a pose explains one view.
+
+    Attributes:
+        silhouette, edges: f_s and f_e in [0, 1].
+        overlap: IoU of body and silhouette.
+        pixels: what either of them covers.
+    """
 
     silhouette: float
     edges: float
     overlap: float
+    pixels: float
 
 
 class Fitness:
@@ -128,11 +135,12 @@ class Fitness:
         """f_s, f_e and overlap of one pose (p,), by the names of the cameras that see."""
         every = np.ones(len(self.body.cone_names), dtype=np.bool_)
         counts = self.count(views, np.ascontiguousarray(pose[None]), every, every)[0]
-        observed = views.arrays.observed
-        return {
-            name: ViewTerms(*map(float, view_terms(row, seen, self._rule.squared)))
-            for name, row, seen in zip(views.names, counts, observed, strict=True)
-        }
+        found = {}
+        for name, row, seen in zip(views.names, counts, views.arrays.observed, strict=True):
+            silhouette, edges, overlap = view_terms(row, seen, self._rule.squared)
+            covered = row[PROJECTED] + seen - row[OVERLAP]
+            found[name] = ViewTerms(float(silhouette), float(edges), float(overlap), float(covered))
+        return found
 
     def _run(
         self,

@@ -1,7 +1,9 @@
 """Whether the body is still tracked: a pure test on how well the silhouettes agree."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from markerless_tracker.fitness import ViewTerms
 from markerless_tracker.records import TrackState
 
 LOST_BELOW = 0.40
@@ -11,6 +13,17 @@ LOST_SHARE, REGAINED_SHARE = 0.75, 0.85
 PATIENCE_NS = 100_000_000
 """How long a body may be lost before it is looked for anew."""
 _MEMORY = 0.05
+
+
+def shared_overlap(views: Iterable[ViewTerms]) -> float:
+    """Overlap (IoU) of body and silhouettes in some views together.
+
+    Views count by what they show: a hand at the edge of one hardly does, nobody in one not at all.
+    1 if nobody is in any, nor should be.
+    """
+    seen = list(views)
+    pixels = sum(view.pixels for view in seen)
+    return sum(view.overlap * view.pixels for view in seen) / pixels if pixels > 0.0 else 1.0
 
 
 def next_state(state: TrackState, overlap: float, usual: float = 0.0) -> TrackState:

@@ -20,7 +20,7 @@ from markerless_tracker.tracking.evidence import EvidenceMaker
 from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first_frame
 from markerless_tracker.tracking.limbs import LimbWatch
 from markerless_tracker.tracking.limits import joint_limits
-from markerless_tracker.tracking.loss import Track
+from markerless_tracker.tracking.loss import Track, shared_overlap
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.smoothing import OneEuro
 from markerless_tracker.tracking.stages import frame_stages
@@ -318,8 +318,7 @@ class Tracker:
         warnings: tuple[str, ...],
     ) -> TrackResult:
         terms = search.terms()
-        overlap = float(np.mean([t.overlap for t in terms.values()]))
-        self._track.note(overlap, stamp_ns)
+        self._track.note(shared_overlap(terms.values()), stamp_ns)
         elapsed_ns = stamp_ns - self._stamp_ns if self._stamp_ns is not None else 0
         moving = elapsed_ns > 0 and self.state is TrackState.TRACKING
         change = search.pose - self._pose

@@ -245,3 +245,21 @@ def test_what_a_recording_is_too_short_for_is_left_out(walk, capsys) -> None:
     assert main(["benchmark", *words]) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
     assert row["runs"] == [] and len(row["usual_mm"]) == 1
+
+
+def test_fewer_cameras(walk, capsys) -> None:
+    words = ["cameras", walk, "--each", "2", "--start", "measured", "--threads", "1"]
+    assert main(["benchmark", *words, "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert [len(run["cameras"]) for run in row["runs"]] == [3, 2, 2, 2]
+    assert main(["benchmark", *words]) == 0
+    out = capsys.readouterr().out
+    assert "cam01 cam03" in out and "measured, 2 cameras" in out
+    assert main(["benchmark", "cameras", walk, "--start", "guessed"]) == 1
+    assert "--start: guessed, expected some of measured, automatic" in capsys.readouterr().err
+
+
+def test_calm_needs_some_frames(walk, capsys) -> None:
+    assert main(["benchmark", "calm", walk, "--threads", "1"]) == 1
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "tracked for 4 frames in a row" in last and "expected 32 frames" in last

@@ -2,6 +2,7 @@
 
 import pytest
 
+from markerless_tracker.fitness import ViewTerms
 from markerless_tracker.records import TrackState
 from markerless_tracker.tracking.loss import (
     LOST_BELOW,
@@ -9,6 +10,7 @@ from markerless_tracker.tracking.loss import (
     REGAINED_ABOVE,
     Track,
     next_state,
+    shared_overlap,
 )
 
 SEARCHING, TRACKING, LOST = TrackState.SEARCHING, TrackState.TRACKING, TrackState.LOST
@@ -64,3 +66,11 @@ def test_patience_begins_with_the_first_lost_frame_in_a_row():
     track.note(0.8, 20)
     track.note(0.0, 30)
     assert not track.given_up(10 + PATIENCE_NS) and track.given_up(30 + PATIENCE_NS)
+
+
+def test_views_count_by_what_they_show() -> None:
+    well, badly = ViewTerms(0.9, 0.0, 0.9, 3000.0), ViewTerms(0.0, 0.0, 0.0, 1000.0)
+    assert shared_overlap([well, badly]) == pytest.approx(0.675)
+    edge, nobody = ViewTerms(0.0, 0.0, 0.0, 3.0), ViewTerms(1.0, 0.0, 1.0, 0.0)
+    assert shared_overlap([well, well, edge, nobody]) == pytest.approx(0.9, abs=1e-3)
+    assert shared_overlap([nobody]) == 1.0

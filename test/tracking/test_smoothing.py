@@ -82,3 +82,26 @@ def test_what_was_taken_is_not_changed(body) -> None:
     for i in range(3):
         smooth(first, i * FRAME_NS)
     np.testing.assert_array_equal(first, body.neutral)
+
+
+def test_the_tracker_filters_what_it_shows_and_nothing_else(
+    make_tracker, frames, refined_settings
+) -> None:
+    plain, calm = (
+        make_tracker({**refined_settings, "smoothing": name}) for name in ("none", "one_euro")
+    )
+    raw, shown = (
+        [tracker.step(frame.observations, frame.stamp_ns) for frame in frames]
+        for tracker in (plain, calm)
+    )
+    smooth = OneEuro(calm.body)
+    for one, other in zip(raw, shown, strict=True):
+        expected = smooth(one.pose, one.stamp_ns)
+        np.testing.assert_allclose(other.pose, expected, atol=1e-12)
+        np.testing.assert_allclose(other.markers_m, markers(calm.body, other.pose), atol=1e-12)
+        assert other.fitness == one.fitness
+    assert np.abs(shown[-1].pose - raw[-1].pose).max() > 1e-6
+    calm.reset()
+    again = calm.step(frames[2].observations, frames[2].stamp_ns)
+    fresh = make_tracker(refined_settings).step(frames[2].observations, frames[2].stamp_ns)
+    np.testing.assert_array_equal(again.pose, fresh.pose)

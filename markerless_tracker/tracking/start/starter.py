@@ -14,6 +14,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull, find_hulls, hulls_part
+from markerless_tracker.tracking.start.in_view import LEAST_IN_VIEW, share_in_view
 from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
 from markerless_tracker.tracking.start.postures import put_at
 
@@ -151,7 +152,12 @@ class Starter:
         return Found(self._searcher, pose, observations, settled, notes)
 
     def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> Found | None:
+        looking = [self._cameras[name] for name in observed]
         for hull in find_hulls(self._cameras, observed):
+            # A search takes long: not for somebody who is hardly in view yet.
+            stands = put_at(self._body, hull, self._body.neutral)
+            if share_in_view(self._body, stands, looking) < LEAST_IN_VIEW:
+                continue
             observations = {
                 name: hulls_part(observation, self._cameras[name], hull)
                 for name, observation in observed.items()
@@ -160,12 +166,14 @@ class Starter:
             if found is None:
                 continue
             frame, population = found
+            assert self._searcher is not None
+            if share_in_view(self._searcher.body, population.poses[0], looking) < LEAST_IN_VIEW:
+                continue
             self._population = population
             self._way = float(population.headings[0])
             self._begun_ns = stamp_ns
             self._note(frame, population)
             self._from_m = self._trunk(population.poses[0])
-            assert self._searcher is not None
             return Found(self._searcher, population.poses[0], observations, False)
         return None
 

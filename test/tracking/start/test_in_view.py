@@ -1,0 +1,65 @@
+"""Who is hardly in view is waited for."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import load_body
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.records import Observation, TrackState
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.synthesis.rig import ring_rig
+from markerless_tracker.tracking import TrackerConfig, build_tracker
+from markerless_tracker.tracking.start.in_view import share_in_view
+
+
+@pytest.fixture(scope="module")
+def body():
+    return load_body("person31", 1.72)
+
+
+def standing(body, x_m: float):
+    pose = body.neutral.copy()
+    pose[body.index("pelvis_tx")] = x_m
+    pose[body.index("pelvis_tz")] = 0.95
+    return pose
+
+
+def test_in_the_middle_everything_is_seen(body) -> None:
+    assert share_in_view(body, standing(body, 0.0), ring_rig(4)) == 1.0
+
+
+def test_two_cameras_must_see_it(body) -> None:
+    rig = ring_rig(4)
+    assert share_in_view(body, standing(body, 0.0), rig.cameras[:1]) == 0.0
+    assert share_in_view(body, standing(body, 0.0), rig.cameras[:2]) == 1.0
+
+
+def test_the_share_falls_towards_the_edge(body) -> None:
+    places = np.linspace(0.0, 4.0, 81)
+    shares = [share_in_view(body, standing(body, x), ring_rig(3)) for x in places]
+    assert shares[0] == 1.0 and shares[-1] == 0.0
+    assert any(0.2 < share < 0.8 for share in shares)
+
+
+def test_nobody_is_started_from_an_outline_and_a_hand() -> None:
+    """One camera sees all of him, the other's frame ends where he begins."""
+    scene = SyntheticScene(body="person31", motion="stand", size_px=(200, 152), seed=2)
+    masks = scene.frame(0)[1]
+    whole, beside = (scene.rig[name] for name in ("cam01", "cam02"))
+    columns = np.flatnonzero(masks["cam02"].any(axis=0))
+
+    def first_state(width: int) -> TrackState:
+        narrow = CameraModel(
+            "cam02", (width, 152), beside.matrix, beside.distortion, beside.T_cam_world
+        )
+        seen = {"cam01": masks["cam01"], "cam02": np.ascontiguousarray(masks["cam02"][:, :width])}
+        rig = CameraRig((whole, narrow))
+        tracker = build_tracker(rig, TrackerConfig(threads=1), stature=1.72).tracker
+        views = {
+            name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+            for name, mask in seen.items()
+        }
+        return tracker.step(views, 0).state
+
+    assert first_state(200) is TrackState.TRACKING
+    assert first_state(int(columns[0] + 0.3 * columns.size)) is TrackState.SEARCHING
