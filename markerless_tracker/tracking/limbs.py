@@ -19,6 +19,12 @@ FOUND_ABOVE = 0.75
 """Shares of a limb's axis inside the silhouettes, mean over the views."""
 GAIN = 0.002
 """How much of f_s a limb found elsewhere must bring."""
+FEW_VIEWS = 3
+"""With so many views or fewer a limb may hide in the others' outlines: each is checked in turn."""
+CHECK_EVERY = 3
+"""Frames from one limb's turn to the next one's."""
+CHECK_GAIN = 0.003
+"""How much of f_s a limb found elsewhere must bring if it did not look lost."""
 _DRAWS = 400
 _REFINED = 8
 _REFINE = (4, (0.12, 0.035))
@@ -34,11 +40,12 @@ class LimbWatch:
 
     def __init__(self, rig: CameraRig) -> None:
         self._rig = rig
-        self._lost: frozenset[str] = frozenset()
+        self.reset()
 
     def reset(self) -> None:
         """Forget which limbs are lost."""
-        self._lost = frozenset()
+        self._lost: frozenset[str] = frozenset()
+        self._frames = 0
 
     def mend(
         self,
@@ -57,20 +64,28 @@ class LimbWatch:
         }
         notes = tuple(f"{name}: lost, looked for alone" for name in sorted(lost - self._lost))
         self._lost = frozenset(lost)
-        if not lost:
-            return pose, ()
+        checked = self._in_turn(tuple(shares)) if len(observations) <= FEW_VIEWS else None
+        gains = {**({checked: CHECK_GAIN} if checked else {}), **dict.fromkeys(lost, GAIN)}
+        if not gains:
+            return pose, notes
         frame = FramePopulation(searcher, observations, stamp_ns, pose)
         breeder = Breeder(body, searcher.limits)
         cost = float(frame.costs(pose[None])[0])
-        for name in sorted(lost):
+        for name, gain in sorted(gains.items()):
             rng = keyed_generator(searcher.config.seed, stamp_ns, f"lost {name}")
             drawn = breeder.with_limb(pose, body.subspaces[name], _DRAWS, rng)
             best = np.argsort(frame.costs(drawn), kind="stable")[:_REFINED]
             tried = frame.refined(drawn[best], *_REFINE)
             costs = frame.costs(tried)
-            if costs.min() < cost - GAIN:
+            if costs.min() < cost - gain:
                 pose, cost = tried[int(costs.argmin())], float(costs.min())
         return pose, notes
+
+    def _in_turn(self, limbs: tuple[str, ...]) -> str | None:
+        """The limb whose turn it is in this frame, if any's."""
+        self._frames += 1
+        turn, rest = divmod(self._frames, CHECK_EVERY)
+        return limbs[turn % len(limbs)] if limbs and rest == 0 else None
 
 
 def limb_shares(
