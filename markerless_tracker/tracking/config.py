@@ -18,6 +18,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         "edge_form": "published",
         "edge_rule": "visible",
         "edge_weight": 1.0,
+        "fit_lengths": False,
         "fit_shape": False,
         "prediction": 0.0,
         "refinement": "none",
@@ -140,6 +141,11 @@ class TrackerConfig(ImagingSettings):
     fit_shape: bool = setting(
         True,
         "fit the body's sections to the first frame's silhouettes, unless the subject has them",
+    )
+    fit_lengths: bool = setting(
+        True,
+        "with fit_shape: fit lengths that were not measured, and the sections with them, to the "
+        "first tracked frames",
     )
     seed: int = setting(0, "seed of all random draws", least=0, most=2**63 - 1)
     threads: int = setting(

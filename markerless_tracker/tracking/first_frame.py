@@ -10,10 +10,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from markerless_tracker.body import BodyModel, cone_transforms, markers
+from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body.sizes import Sizes
 from markerless_tracker.fitness.contours import ContourFrame
+from markerless_tracker.fitness.outline_rows import outline_rows, surface
 from markerless_tracker.fitness.shape import CORRELATION_M, fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
@@ -38,12 +39,12 @@ class StartMarkers:
     Attributes:
         positions_m: (15, 3) world frame, in the order of `MARKER_NAMES`, NaN where missing.
         noise_m: how far they may be off, per coordinate.
-        resized: the body with other segment lengths (m, by name) and the sections of a body.
+        sizes: makes the body of other lengths.
     """
 
     positions_m: FloatArray
     noise_m: float
-    resized: Callable[[Mapping[str, float], BodyModel], BodyModel]
+    sizes: Sizes
 
 
 def start_noise_m(lengths_m: Mapping[str, float]) -> float:
@@ -83,7 +84,7 @@ def shape_of_first_frame(
     if start is not None and start.noise_m > TRUSTED_M:
         nearly = fit_shape(body, [(contours(body, pose), pose)], tightness=_TIGHT)
         lengths, pose = _settled(nearly, pose, start, contours(nearly, pose), config, limits)
-        body = start.resized(lengths, body)
+        body = start.sizes.body(lengths, body)
     return fit_shape(body, [(contours(body, pose), pose)]), pose
 
 
@@ -94,48 +95,32 @@ def _settled(
     contours: ContourFrame,
     config: TrackerConfig,
     limits: FloatArray,
-) -> tuple[dict[str, float], FloatArray]:
-    """Lengths and pose (p,) that fit contours and markers; both sides' lengths stay alike."""
+) -> tuple[FloatArray, FloatArray]:
+    """Free lengths (k,) and pose (p,) that fit contours and markers."""
     scale = 1.0 / (CORRELATION_M * config.refine_sigma_m**2)
-    names = sorted({_side_free(name) for name in body.lengths_m})
-    begin = np.array([body.lengths_m.get(n, body.lengths_m.get("l_" + n, 0.0)) for n in names])
+    begin = start.sizes.of(body)
     seen = np.isfinite(start.positions_m).all(axis=1)
     p = body.size
 
-    def lengths(z: FloatArray) -> dict[str, float]:
-        values = dict(zip(names, z[p:], strict=True))
-        return {name: float(values[_side_free(name)]) for name in body.lengths_m}
-
-    def points(z: FloatArray, model: BodyModel) -> tuple[FloatArray, FloatArray]:
-        found = [
-            _surface(model, z[:p], contours.samples.cone[v, rows], contours.samples.shape[v, rows])
-            for v, rows in enumerate(_rows(contours))
-        ]
-        return np.concatenate(found), markers(model, z[:p])[seen]
-
     def equations(z: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
-        model = start.resized(lengths(z), body)
+        model = start.sizes.body(z[p:], body)
         contours.collect(z[:p], reach_m, model)
-        surface, joints = points(z, model)
-        r = contours.residuals
-        counts = [int(n) for n in r.count]
-        gradient = np.concatenate([r.gradient[v, :n] for v, n in enumerate(counts)])
-        value = np.concatenate([r.value[v, :n] for v, n in enumerate(counts)])
-        weight = np.concatenate([r.weight[v, :n] for v, n in enumerate(counts)]) * scale
-        rows = np.empty((value.size, z.size))
+        rows = outline_rows(contours)
+        points, joints = surface(model, z[:p], rows), markers(model, z[:p])[seen]
+        slopes = np.empty((rows.value.size, z.size))
         marks = np.empty((joints.size, z.size))
         for i in range(z.size):
             moved = z.copy()
             moved[i] += _STEP
-            changed = model if i < p else start.resized(lengths(moved), body)
-            there, other = points(moved, changed)
-            rows[:, i] = np.einsum("ni,ni->n", gradient, there - surface) / _STEP
-            marks[:, i] = (other - joints).ravel() / _STEP
+            changed = model if i < p else start.sizes.body(moved[p:], body)
+            gap = surface(changed, moved[:p], rows) - points
+            slopes[:, i] = np.einsum("ni,ni->n", rows.gradient, gap) / _STEP
+            marks[:, i] = (markers(changed, moved[:p])[seen] - joints).ravel() / _STEP
         gap = (joints - start.positions_m[seen]).ravel()
-        trust = 1.0 / start.noise_m**2
+        trust, weight = 1.0 / start.noise_m**2, scale * rows.weight
         return (
-            rows.T @ (weight[:, None] * rows) + trust * marks.T @ marks,
-            rows.T @ (weight * value) + trust * marks.T @ gap,
+            slopes.T @ (weight[:, None] * slopes) + trust * marks.T @ marks,
+            slopes.T @ (weight * rows.value) + trust * marks.T @ gap,
         )
 
     z = refine(
@@ -151,29 +136,4 @@ def _settled(
         iterations=_ITERATIONS,
         reach=(config.refine_reach_m, config.refine_reach_end_m),
     )
-    return lengths(z), z[:p]
-
-
-def _side_free(name: str) -> str:
-    return name[2:] if name[:2] in ("l_", "r_") else name
-
-
-def _rows(contours: ContourFrame) -> list[NDArray[np.int64]]:
-    """Per view the samples that its residuals belong to."""
-    r = contours.residuals
-    return [r.sample[v, : int(n)] for v, n in enumerate(r.count)]
-
-
-def _surface(
-    body: BodyModel, pose: FloatArray, cone: NDArray[np.int64], shape: FloatArray
-) -> FloatArray:
-    """World points (n, 3) of outline samples (see `Samples.shape`) on a body at a pose (p,)."""
-    placed = cone_transforms(body, pose)[cone]
-    ends = []
-    for end in range(2):
-        rx, ry, ox, oy = np.moveaxis(body.cone_shape[cone, end], 1, 0)
-        cos, sin = shape[:, 2 * end], shape[:, 2 * end + 1]
-        ends.append(np.stack([ox + rx * cos, oy + ry * sin, end * body.cone_length[cone]], axis=1))
-    t = shape[:, 4:]
-    local = (1.0 - t) * ends[0] + t * ends[1]
-    return np.asarray(np.einsum("nij,nj->ni", placed[:, :, :3], local) + placed[:, :, 3])
+    return z[p:], z[:p]

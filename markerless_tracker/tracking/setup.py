@@ -1,14 +1,13 @@
 """From files and settings to a tracker: what the node and the offline verbs share."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from markerless_tracker.body import (
     MARKER_NAMES,
-    BodyModel,
     Subject,
     load_description,
     pose_from_markers,
@@ -19,6 +18,7 @@ from markerless_tracker.body import (
 )
 from markerless_tracker.body.build import build_body
 from markerless_tracker.body.description import BodyDescription
+from markerless_tracker.body.sizes import USUAL_STATURE_M, Sizes
 from markerless_tracker.body.subject import complete_markers, measured_lengths
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import read_trc
@@ -27,11 +27,9 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.first_frame import StartMarkers, start_noise_m
+from markerless_tracker.tracking.fitting import Unmeasured
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.tracker import Tracker
-
-_USUAL_STATURE_M = 1.72
-"""What an unknown person is taken for until somebody is found."""
 
 
 @dataclass(frozen=True)
@@ -88,20 +86,19 @@ def build_tracker(
         if start_file is not None and start_file.suffix.lower() == ".trc"
         else None
     )
-    sized: Callable[[float], BodyModel] | None = None
+    person: Unmeasured | None = None
     if subject_file is not None:
         subject = read_subject(subject_file)
     elif stature is not None:
         subject = subject_from_stature(description, stature)
+        person = Unmeasured(Sizes(description), stature)
     elif subject_from is not None:
         subject = subject_from_markers(description, first_row(subject_from).markers_m)
     elif start is not None:
         subject = subject_from_markers(description, start.markers_m)
     elif start_file is None:
-        subject = subject_from_stature(description, _USUAL_STATURE_M)
-
-        def sized(stature_m: float) -> BodyModel:
-            return build_body(description, subject_from_stature(description, stature_m))
+        subject = subject_from_stature(description, USUAL_STATURE_M)
+        person = Unmeasured(Sizes(description), None)
     else:
         raise ConfigError(
             f"{start_file} gives a pose but no subject: name one "
@@ -123,8 +120,7 @@ def build_tracker(
         start_markers=(
             None if named or start is None else _start_markers(description, subject, start)
         ),
-        sized=sized,
-        lengths_measured=stature is None and sized is None,
+        person=person,
     )
     return TrackerSetup(tracker, None if start is None else start.stamp_ns)
 
@@ -151,12 +147,8 @@ def _start_markers(
     missing = np.full(3, np.nan)
     known = complete_markers(start.markers_m)
 
-    def resized(lengths_m: Mapping[str, float], like: BodyModel) -> BodyModel:
-        sized = build_body(description, Subject(subject.name, lengths_m))
-        return replace(sized, cone_shape=like.cone_shape)
-
     return StartMarkers(
         np.array([known.get(name, missing) for name in MARKER_NAMES]),
         start_noise_m(measured_lengths(description, start.markers_m)),
-        resized,
+        Sizes(description),
     )

@@ -1,7 +1,7 @@
 """The one door: `Tracker.step` turns the views of one time into a pose."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -18,6 +18,7 @@ from markerless_tracker.tracking.confidence import confidence_of
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence import EvidenceMaker
 from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first_frame
+from markerless_tracker.tracking.fitting import BodyFitting, Unmeasured
 from markerless_tracker.tracking.limbs import LimbWatch
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.loss import Track, shared_overlap
@@ -51,8 +52,7 @@ class Tracker:
             they are fitted to the first frame's silhouettes with the start pose held.
         start_markers: the markers that gave the start pose; noisy ones are settled on the first
             frame's silhouettes before the shape is fitted.
-        sized: makes the body of a stature (m), if the person's is unknown and looked for.
-        lengths_measured: whether the body's lengths are the person's, not those of a stature.
+        person: what is known of a person whose lengths were not measured; None if they were.
 
     Raises:
         BodyModelError: the start pose has another size, is not finite or breaks a joint limit.
@@ -70,12 +70,11 @@ class Tracker:
         backgrounds: Mapping[str, BackgroundModel] | None = None,
         shape_known: bool = False,
         start_markers: StartMarkers | None = None,
-        sized: Callable[[float], BodyModel] | None = None,
-        lengths_measured: bool = True,
+        person: Unmeasured | None = None,
     ) -> None:
         self.rig = rig
         self.config = config
-        self._measured = lengths_measured
+        self._person = person
         self._smooth = OneEuro(body) if config.smoothing == "one_euro" else None
         self._track = Track()
         self._views = ViewWatch(rig)
@@ -101,9 +100,10 @@ class Tracker:
         self._searcher = self._searcher_for(body)
         self._first_starter = None if given else Starter(
             rig, body, self._searcher_for, self._evidence.select,
-            sized=sized, fit_shape=self._fit_shape,
+            sized=None if person is None else person.sized, fit_shape=self._fit_shape,
         )  # fmt: skip
         self._starter = self._first_starter
+        self._fitting = self._new_fitting()
         low, high = self._searcher.limits
         for name, value, a, b in zip(body.parameter_names, self._start, low, high, strict=True):
             if given and not a <= value <= b:
@@ -140,6 +140,7 @@ class Tracker:
         if self._fit_shape:
             self._shape_fitted = False
             self._searcher = self._searcher_for(self._generic)
+        self._fitting = self._new_fitting()
 
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
@@ -227,6 +228,8 @@ class Tracker:
             )
             notes += found
         result = self._conclude(search, stamp_ns, observations, notes + warnings)
+        if self._fitting is not None and self.state is TrackState.TRACKING:
+            self._fit_body(self._fitting, search)
         if self.config.search_again and self._track.given_up(stamp_ns):
             self._look_again()
         return result
@@ -310,6 +313,20 @@ class Tracker:
         self._searcher = self._searcher_for(body)
         return pose
 
+    def _new_fitting(self) -> BodyFitting | None:
+        if self._person is None or not (self._fit_shape and self.config.fit_lengths):
+            return None
+        return BodyFitting(self._person, self._searcher.limits)
+
+    def _fit_body(self, fitting: BodyFitting, search: FrameSearch) -> None:
+        """Take a tracked frame for the fit of lengths and sections; go on with what they become."""
+        fitted = fitting.add(self.body, search.contours, search.pose)
+        if fitted is None:
+            return
+        self._fitting = None
+        self._searcher = self._searcher_for(fitted.body)
+        self._pose = np.clip(self._pose + fitted.moved, *self._searcher.limits)
+
     def _conclude(
         self,
         search: FrameSearch,
@@ -345,7 +362,7 @@ class Tracker:
     def _confidence(self, search: FrameSearch) -> Confidence | None:
         if self.config.refinement == "none":
             return None
-        return confidence_of(self.body, search.pose, search.contours, measured=self._measured)
+        return confidence_of(self.body, search.pose, search.contours, measured=self._person is None)
 
     def _predict(self, stamp_ns: int) -> FloatArray:
         """The pose (p,) expected at a time: the last one moved on, with damped velocity."""

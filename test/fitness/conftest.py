@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms, load_body
 from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.drawing import silhouette
+from markerless_tracker.fitness import Fitness
+from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
@@ -250,5 +253,27 @@ def smooth_edges() -> Callable[..., NDArray[np.uint8]]:
         field = cv2.GaussianBlur(noise, (0, 0), 6.0)
         field = (field - field.min()) / (field.max() - field.min())
         return np.asarray(np.rint(255.0 * field), dtype=np.uint8)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def contours_of() -> Callable[..., ContourFrame]:
+    """``contours_of(person, pose, rig, body)``: a person's silhouettes, as evidence for a body."""
+
+    def make(person: BodyModel, pose: FloatArray, rig: CameraRig, body: BodyModel) -> ContourFrame:
+        observations = {}
+        for camera in rig:
+            mask = silhouette(person, pose, camera).astype(np.uint8)
+            observations[camera.name] = Observation.from_mask(
+                camera.name, 0, mask, np.zeros(mask.shape, np.uint8)
+            )
+        return ContourFrame(
+            body,
+            {camera.name: camera for camera in rig},
+            observations,
+            Fitness(body, rig.cameras).lay_out(observations),
+            pixels_per_m={camera.name: camera.matrix[0, 0] / 4.5 for camera in rig},
+        )
 
     return make

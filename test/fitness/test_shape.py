@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
-from markerless_tracker.body import BodyModel, cone_transforms, load_body
+from markerless_tracker.body import BodyModel, load_body
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
-from markerless_tracker.fitness import shape as module
 from markerless_tracker.fitness.contours import ContourFrame
-from markerless_tracker.fitness.shape import OFFSET_RANGE_M, RADIUS_RANGE, fit_shape
+from markerless_tracker.fitness.sections import OFFSET_RANGE_M, RADIUS_RANGE
+from markerless_tracker.fitness.shape import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
@@ -209,57 +209,3 @@ def test_the_published_body_can_be_fitted_too() -> None:
     view = seen(true, open_pose(9))
     fitted = fit_shape(body, [(view.frame(body), view.pose)])
     assert view.f_s(body) < 0.95 < 0.985 < view.f_s(fitted)
-
-
-# --- derivatives ----------------------------------------------------------------------------
-
-
-def surface(body, pose, cone, place) -> FloatArray:
-    """World points (n, 3) of places (n, 5) on cones (n,): cos, sin on both ends, share of end 1."""
-    placed = cone_transforms(body, pose)[cone]
-    t = place[:, 4:]
-    ends = []
-    for e in range(2):
-        radius, offset = body.cone_shape[cone, e, :2], body.cone_shape[cone, e, 2:]
-        flat = offset + radius * place[:, 2 * e : 2 * e + 2]
-        ends.append(np.column_stack([flat, e * body.cone_length[cone]]))
-    local = (1.0 - t) * ends[0] + t * ends[1]
-    return np.einsum("nij,nj->ni", placed[:, :, :3], local) + placed[:, :, 3]
-
-
-def test_rows_are_the_surface_points_derivatives() -> None:
-    """Each residual's change by every shape parameter, against finite differences."""
-    true = somebody(10)
-    view = seen(true, open_pose(10))
-    frame = view.frame()
-    frame.collect(view.pose, 0.1)
-    ties = module._tie(GENERIC)
-    assert ties.size < GENERIC.cone_shape.size
-    start = module._gather(GENERIC.cone_shape, ties)
-    np.testing.assert_array_equal(
-        module._with_shape(GENERIC, start, ties).cone_shape, GENERIC.cone_shape
-    )
-    h, touched = 1e-6, np.zeros(ties.size, bool)
-    for v in range(len(RIG)):
-        rows, value, weight = module._rows(frame, v, GENERIC, view.pose, ties)
-        n = int(frame.residuals.count[v])
-        assert rows.shape == (n, ties.size) and n > 300
-        np.testing.assert_array_equal(value, frame.residuals.value[v, :n])
-        np.testing.assert_array_equal(weight, frame.residuals.weight[v, :n])
-        sample = frame.residuals.sample[v, :n]
-        cone, place = frame.samples.cone[v, sample], frame.samples.shape[v, sample]
-        np.testing.assert_allclose(
-            surface(GENERIC, view.pose, cone, place), frame.samples.world[v, sample], atol=1e-12
-        )
-        for k in range(ties.size):
-            step = h * np.eye(ties.size)[k]
-            moved = [
-                surface(module._with_shape(GENERIC, start + s, ties), view.pose, cone, place)
-                for s in (step, -step)
-            ]
-            change = (moved[0] - moved[1]) / (2 * h)
-            slow = (change * frame.residuals.gradient[v, :n]).sum(axis=1)
-            np.testing.assert_allclose(rows[:, k], slow, atol=1e-7)
-            touched[k] |= bool(np.abs(slow).max() > 0.05)
-    # Nearly every section is seen by some camera.
-    assert touched.mean() > 0.9

@@ -7,7 +7,8 @@ import pytest
 
 from markerless_tracker.body import MARKER_NAMES, load_description, markers, pose_from_markers
 from markerless_tracker.body.build import build_body
-from markerless_tracker.body.subject import Subject, measured_lengths, subject_from_markers
+from markerless_tracker.body.sizes import Sizes
+from markerless_tracker.body.subject import measured_lengths, subject_from_markers
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
@@ -50,11 +51,9 @@ def start_of(named, noise_m):
     subject = subject_from_markers(DESCRIPTION, named)
     body = build_body(DESCRIPTION, subject)
 
-    def resized(lengths_m, like):
-        return replace(build_body(DESCRIPTION, Subject("s", lengths_m)), cone_shape=like.cone_shape)
-
     positions = np.array([named[name] for name in MARKER_NAMES])
-    return body, pose_from_markers(body, named), StartMarkers(positions, noise_m, resized)
+    begun = StartMarkers(positions, noise_m, Sizes(DESCRIPTION))
+    return body, pose_from_markers(body, named), begun
 
 
 def settled(start, contours):
