@@ -36,20 +36,23 @@ class Disturbance:
     Attributes:
         name: for tables.
         seconds: how long.
-        blind: how many cameras see black, the first ones; None = all.
+        blind: how many cameras see black; None = all.
         keep_hz: rate of the frames that come, None = all of them.
+        stopped: how many cameras send nothing.
     """
 
     name: str
     seconds: float
     blind: int | None = 0
     keep_hz: float | None = None
+    stopped: int = 0
 
 
 DISTURBANCES = (
     Disturbance("all views black, 0.5 s", 0.5, None),
     Disturbance("all views black, 2 s", 2.0, None),
     Disturbance("two cameras black, 1 s", 1.0, 2),
+    Disturbance("one camera stops, 1 s", 1.0, stopped=1),
     Disturbance("10 frames/s, 1 s", 1.0, 0, 10.0),
 )
 
@@ -65,13 +68,15 @@ def measure_recovery(
 ) -> dict[str, Any]:
     """Disturb runs on a recording with a `ground_truth.trc`, which only judges.
 
-    Each seed is disturbed at another moment. What a recording is too short for is left out.
+    Each seed is disturbed at another moment, from another camera on. What a recording is too short
+    for is left out.
 
     Returns:
         `recording`, `usual_mm` (per seed), and `runs`: one entry per disturbance and seed with
         `frames_until_back` (frames seen again until the error is at most the usual one +
         `OVER_USUAL_MM` and stays so; None if it never is) and `back` (whether that is within
-        `WITHIN_FRAMES`).
+        `WITHIN_FRAMES`); `meanwhile_mm` and `worst_mm`: mean error of the disturbed frames that have
+        a pose (None if none has), and greatest frame error afterwards.
 
     Raises:
         TrackerError: the recording cannot be read or has no truth.
@@ -110,7 +115,9 @@ def measure_recovery(
                 last = ends + WITHIN_FRAMES + _STAYS
                 if last > len(frames):
                     continue
-                seen = disturbed(frames[:last], begins, ends, disturbance, recording.fps)
+                seen = disturbed(
+                    frames[:last], begins, ends, disturbance, recording.fps, first=seed
+                )
                 errors = _errors(tracker, seen, truth)
                 until = frames_until(errors[ends:], usual[-1] + OVER_USUAL_MM)
                 runs.append(
@@ -120,6 +127,7 @@ def measure_recovery(
                         "begins": begins,
                         "frames_until_back": until,
                         "back": until is not None and until <= WITHIN_FRAMES,
+                        "meanwhile_mm": _mean(errors[begins:ends]),
                         "worst_mm": float(np.nanmax(errors[ends:], initial=0.0)),
                     }
                 )
@@ -129,9 +137,12 @@ def measure_recovery(
 
 
 def disturbed(
-    frames: Frames, begins: int, ends: int, disturbance: Disturbance, fps: float
+    frames: Frames, begins: int, ends: int, disturbance: Disturbance, fps: float, *, first: int = 0
 ) -> list[tuple[int, Views] | None]:
-    """The frames with a disturbance from one index up to another; None where no frame comes."""
+    """The frames with a disturbance from one index up to another; None where no frame comes.
+
+    Cameras are disturbed from the `first` one on, in a circle.
+    """
     every = 1 if disturbance.keep_hz is None else max(1, round(fps / disturbance.keep_hz))
     out: list[tuple[int, Views] | None] = []
     for index, (stamp_ns, views) in enumerate(frames):
@@ -140,8 +151,14 @@ def disturbed(
         elif (index - begins + 1) % every:
             out.append(None)
         else:
-            blind = list(views)[: disturbance.blind]
-            out.append((stamp_ns, {n: _black(v) if n in blind else v for n, v in views.items()}))
+            names = [*views][first % len(views) :] + [*views][: first % len(views)]
+            blind, gone = names[: disturbance.blind], names[: disturbance.stopped]
+            kept = {
+                name: _black(view) if name in blind else view
+                for name, view in views.items()
+                if name not in gone
+            }
+            out.append((stamp_ns, kept))
     return out
 
 
@@ -152,6 +169,11 @@ def frames_until(errors_mm: NDArray[np.float64], limit_mm: float) -> int | None:
         if good[first : first + _STAYS].all():
             return first + 1
     return None
+
+
+def _mean(errors_mm: NDArray[np.float64]) -> float | None:
+    known = errors_mm[np.isfinite(errors_mm)]
+    return float(known.mean()) if known.size else None
 
 
 def _black(view: Observation) -> Observation:

@@ -26,6 +26,21 @@ def test_black_views_are_silhouette_all_over(blind, names) -> None:
             assert view.mask.sum() == (8 * 70 if black else 1)
 
 
+@pytest.mark.parametrize(("first", "left"), [(0, "bc"), (2, "ab"), (4, "ac")])
+def test_a_camera_that_stops_sends_nothing(first, left) -> None:
+    out = disturbed(frames(6), 2, 4, Disturbance("x", 0.1, stopped=1), 30.0, first=first)
+    for index, frame in enumerate(out):
+        assert frame is not None
+        assert "".join(frame[1]) == (left if 2 <= index < 4 else "abc")
+        assert all(view.mask.sum() == 1 for view in frame[1].values())
+
+
+def test_cameras_are_blinded_from_another_one_on() -> None:
+    out = disturbed(frames(2), 0, 2, Disturbance("x", 0.1, 2), 30.0, first=2)
+    black = [name for name, view in out[0][1].items() if view.mask.sum() > 1]
+    assert black == ["a", "c"]
+
+
 def test_frames_of_a_lower_rate() -> None:
     out = disturbed(frames(40), 10, 34, Disturbance("x", 0.4, 0, 10.0), 60.0)
     assert [i for i, frame in enumerate(out) if frame is None] == [

@@ -229,6 +229,19 @@ class TestViews:
             assert set(result.agreement) == set(views)
             assert errors_mm(result, frame).mean() < 30.0
 
+    def test_who_stops_and_comes_back_is_named(self, make_tracker, frames, refined_settings):
+        tracker = make_tracker(refined_settings)
+        said = []
+        for number, frame in enumerate(frames):
+            seen = frame.observations
+            if number in (2, 3):
+                del seen["cam02"]
+            result = tracker.step(seen, frame.stamp_ns)
+            assert result.state is TrackState.TRACKING and set(result.agreement) == set(seen)
+            assert errors_mm(result, frame).mean() < 30.0
+            said.append(tuple(note for note in result.warnings if "cam02" in note))
+        assert said == [(), (), ("cam02: left out, no image",), (), ("cam02: taken back",)]
+
     def test_one_view_is_enough_to_go_on(self, make_tracker, frames, refined_settings):
         result = make_tracker(refined_settings).step({"cam02": frames[0].images["cam02"]}, 0)
         assert set(result.agreement) == {"cam02"}

@@ -62,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
     console = Console(width=None if sys.stdout.isatty() else 120)
     console.print(_rendered(rows))
     console.print(
+        "Mean error, mm: usual: undisturbed; meanwhile: of the disturbed frames that have a pose. "
         f"Back: the error is at most the undisturbed run's mean + {recovery.OVER_USUAL_MM:g} mm, "
         f"within {recovery.WITHIN_FRAMES} frames.",
         highlight=False,
@@ -73,7 +74,7 @@ def _rendered(rows: list[dict[str, Any]]) -> Table:
     table = Table(title="Recovery")
     for title in ("recording", "disturbance"):
         table.add_column(title)
-    for title in ("usual mm", "runs", "back", "frames until back", "worst mm after"):
+    for title in ("usual mm", "runs", "meanwhile", "back", "frames until back", "worst after"):
         table.add_column(title, justify="right")
     for row in rows:
         usual = sum(row["usual_mm"]) / len(row["usual_mm"])
@@ -81,12 +82,14 @@ def _rendered(rows: list[dict[str, Any]]) -> Table:
             runs = [run for run in row["runs"] if run["disturbance"] == disturbance.name]
             if not runs:
                 continue
+            meanwhile = [run["meanwhile_mm"] for run in runs if run["meanwhile_mm"] is not None]
             until = [run["frames_until_back"] for run in runs]
             table.add_row(
                 row["recording"],
                 disturbance.name,
                 f"{usual:.1f}",
                 str(len(runs)),
+                f"{sum(meanwhile) / len(meanwhile):.1f}" if meanwhile else "-",
                 str(sum(run["back"] for run in runs)),
                 ", ".join("never" if n is None else str(n) for n in until),
                 f"{max(run['worst_mm'] for run in runs):.0f}",
