@@ -12,7 +12,8 @@ DATA = ROOT.parent / "shared" / "data"
 # Full size has four times the pixels and hardly a millimetre more to say.
 RECORDINGS = {"render_walk": "1", "balance_real": "0.5"}
 STATURES = {"render_walk": "1.72", "balance_real": "1.70"}
-PARTS = ("accuracy", "start", "automatic", "recovery", "speed")
+PARTS = ("accuracy", "start", "automatic", "cameras", "recovery", "calm", "speed")
+STAND = "--motion stand --seconds 3 --body person31 --noise 8 --seed 2".split()
 # Hours: only when named.
 LONG = ("papers",)
 
@@ -47,8 +48,16 @@ def bench(parts: list[str], data: Path, out: Path, seeds: int) -> None:
         told = ["--stature", STATURES[name], "--scale", RECORDINGS[name], "--seeds", "5"]
         if "automatic" in parts:
             run(["benchmark", "start", str(data / name), *told])
+        if "cameras" in parts:
+            run(["benchmark", "cameras", str(data / name), *told[:4]])
         if "recovery" in parts and name == "render_walk":
             run(["benchmark", "recovery", str(data / name), *told])
+    if "calm" in parts:
+        stand = out / "stand"
+        if not stand.exists():
+            run(["synthesize", str(stand), *STAND])
+        walks = [str(data / name) for name in found if name == "render_walk"]
+        run(["benchmark", "calm", str(stand), *walks])
     if "speed" in parts:
         run(["benchmark", "speed"])
 

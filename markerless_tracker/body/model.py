@@ -41,8 +41,10 @@ class BodyModel:
         root_frame: name of the frame that carries the body.
         sigma: (p,) greatest change between frames at 60 fps (SPPSO Eq 1).
         neutral: (p,) standing, arms hanging; the root at the origin.
-        spread: (p,) how far people's poses scatter about neutral, infinite for the root: a weak
-            belief for refinement, where the images do not tell.
+        usual: (p,) what people's poses scatter about; neutral, but for elbows, which nobody keeps
+            straight.
+        spread: (p,) how far they scatter about it, infinite for the root: a weak belief for
+            refinement, where the images do not tell.
         limits: (2, p) anatomical lower and upper limits, infinite where free.
         walking_limits: (2, p) published limits, learned from one walk.
         marker_node, marker_offset: (15,) and (15, 3), markers in their nodes' frames.
@@ -69,6 +71,7 @@ class BodyModel:
     root_frame: str
     sigma: FloatArray
     neutral: FloatArray
+    usual: FloatArray
     spread: FloatArray
     limits: FloatArray
     walking_limits: FloatArray

@@ -65,7 +65,13 @@ _ENTRIES: Mapping[str, tuple[Mapping[str, tuple[str, Check]], Mapping[str, tuple
     "lengths": ({"stature": _POSITIVE}, {"markers": _PAIR}),
     "parameters": (
         {"sigma": _POSITIVE},
-        {"neutral": _NUMBER, "spread": _POSITIVE, "limits": _RANGE, "walking": _RANGE},
+        {
+            "neutral": _NUMBER,
+            "usual": _NUMBER,
+            "spread": _POSITIVE,
+            "limits": _RANGE,
+            "walking": _RANGE,
+        },
     ),
     "frames": ({"parent": _TEXT, "chain": _TEXT}, {}),
     "markers": ({"frame": _TEXT}, {"chain": _TEXT}),

@@ -75,7 +75,7 @@ def measure_recovery(
         `recording`, `usual_mm` (per seed), and `runs`: one entry per disturbance and seed with
         `frames_until_back` (frames seen again until the error is at most the usual one +
         `OVER_USUAL_MM` and stays so; None if it never is) and `back` (whether that is within
-        `WITHIN_FRAMES`); `meanwhile_mm` and `worst_mm`: mean error of the disturbed frames that have
+        `WITHIN_FRAMES`); `meanwhile_mm`, `worst_mm`: mean error of the disturbed frames that have
         a pose (None if none has), and greatest frame error afterwards.
 
     Raises:

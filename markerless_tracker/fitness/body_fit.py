@@ -133,7 +133,7 @@ class BodyFit:
         usual = 1.0 / (AMONG * body.spread**2)
         own = weighted.T @ by_pose + np.diag(usual + 1e-9)
         own[np.diag_indices_from(own)] *= 1.0 + _DAMPING
-        pull = weighted.T @ rows.value + usual * (frame.pose - body.neutral)
+        pull = weighted.T @ rows.value + usual * (frame.pose - body.usual)
         weighted_body = weight[:, None] * by_body
         return (
             own, weighted.T @ by_body, pull, weighted_body.T @ by_body,

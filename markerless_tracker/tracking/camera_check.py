@@ -162,7 +162,7 @@ def _refined(
     return refine(
         equations,
         result.pose,
-        priors=(Prior(searcher.body.neutral, 1.0 / searcher.body.spread**2),),
+        priors=(Prior(searcher.body.usual, 1.0 / searcher.body.spread**2),),
         bounds=searcher.limits,
         iterations=_ITERATIONS,
         reach=_REACH_M,

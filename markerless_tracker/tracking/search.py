@@ -175,7 +175,7 @@ class FrameSearch:
             stage.centre,
             priors=(
                 Prior(self._predicted, 1.0 / stage.sigma**2),
-                Prior(searcher.body.neutral, 1.0 / searcher.body.spread**2),
+                Prior(searcher.body.usual, 1.0 / searcher.body.spread**2),
             ),
             bounds=searcher.limits,
             iterations=stage.iterations,

@@ -38,6 +38,16 @@ def cone(name) -> int:
 # --- the same skeleton as the published body -----------------------------------------------------
 
 
+def test_elbows_are_usually_bent_and_all_else_is_neutral() -> None:
+    for name in ("person31", "person34", "person35"):
+        body = load_body(name, 1.72)
+        elbows = [body.index("l_elbow"), body.index("r_elbow")]
+        bent = np.abs(body.usual - body.neutral)
+        np.testing.assert_allclose(bent[elbows], np.deg2rad(30.0))
+        assert np.count_nonzero(bent) == 2
+        assert (body.limits[0] < body.usual).all() and (body.usual < body.limits[1]).all()
+
+
 def test_parameters_are_the_published_bodys() -> None:
     assert BODY.parameter_names == PUBLISHED.parameter_names and BODY.size == 31
     for name in ("sigma", "walking_limits", "spread"):

@@ -62,11 +62,19 @@ class Breeder:
         count: int,
         rng: np.random.Generator,
     ) -> FloatArray:
-        """Poses (count, p): one with a limb's parameters drawn anew."""
+        """Poses (count, p): one with a limb's parameters drawn anew.
+
+        Every other one is drawn anywhere, the rest about the limb's known postures, which find a
+        hanging or swinging arm in a third of the draws.
+        """
         out = np.tile(pose, (count, 1))
-        for child in out:
-            self._draw(child, limb, rng)
-        return out
+        for number, child in enumerate(out):
+            if number % 2:
+                self._draw(child, limb, rng)
+            else:
+                usual = self._known[rng.integers(len(self._known))][limb]
+                child[limb] = usual + self._spread[limb] * rng.standard_normal(len(limb))
+        return np.clip(out, self._limits[0], self._limits[1], out=out)
 
     def _draw(
         self, child: FloatArray, limb: np.ndarray[tuple[int], np.dtype[np.int64]],

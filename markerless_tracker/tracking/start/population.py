@@ -126,7 +126,7 @@ class FramePopulation:
         """Poses (n, p), each refined on the contours."""
         searcher = self._searcher
         scale = 1.0 / (CORRELATION_M * searcher.config.refine_sigma_m**2)
-        usual = Prior(searcher.body.neutral, _PRIOR / searcher.body.spread**2)
+        usual = Prior(searcher.body.usual, _PRIOR / searcher.body.spread**2)
 
         def equations(pose: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
             sums = self.contours.equations(pose, reach_m)
