@@ -215,12 +215,12 @@ def test_refinement_is_told_limits_beliefs_and_reach(person, monkeypatch) -> Non
     for kwargs in told:
         assert kwargs["reach"] == (0.2, 0.05) and kwargs["iterations"] == 3
         np.testing.assert_array_equal(kwargs["bounds"], person.body.limits)
-        predicted, neutral = kwargs["priors"]
+        predicted, usual = kwargs["priors"]
         np.testing.assert_array_equal(predicted.mean, person.predicted)
         np.testing.assert_allclose(predicted.precision, (3.0 * person.body.sigma) ** -2.0)
-        np.testing.assert_array_equal(neutral.mean, person.body.neutral)
-        assert not neutral.precision[person.body.root].any()
-        assert (neutral.precision[person.body.joints] > 0).all()
+        np.testing.assert_array_equal(usual.mean, person.body.usual)
+        assert not usual.precision[person.body.root].any()
+        assert (usual.precision[person.body.joints] > 0).all()
 
 
 def test_what_was_spent_with_refinement(person) -> None:
