@@ -23,7 +23,7 @@ FEW_VIEWS = 3
 """With so many views or fewer a limb may hide in the others' outlines: each is checked in turn."""
 CHECK_EVERY = 2
 """Frames from one limb's turn to the next one's."""
-CHECK_GAIN = 0.002
+CHECK_GAIN = 0.0015
 """How much of f_s a limb found elsewhere must bring if it did not look lost."""
 _DRAWS = 400
 _REFINED = 8

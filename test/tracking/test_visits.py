@@ -14,9 +14,9 @@ from markerless_tracker.tracking import TrackerConfig, build_tracker
 
 FPS = 30.0
 WALK_M_S = 1.5
-BEFORE, FIRST, BETWEEN, SECOND = range(2), range(2, 44), range(44, 50), range(50, 60)
+BEFORE, FIRST, BETWEEN, SECOND = range(2), range(2, 28), range(28, 34), range(34, 44)
 """Frames: nobody, somebody walks in until all see him, nobody, he is there on the other side."""
-FIRST_TO_MIDDLE, SECOND_TO_MIDDLE = 77, 20
+FIRST_TO_MIDDLE, SECOND_TO_MIDDLE = 52, 20
 """Frames from the first of a visit to the middle of the room."""
 
 
@@ -27,7 +27,7 @@ class Visits(SyntheticScene):
         """Pose (p,) of a frame of one of the visits."""
         first = index in FIRST
         visit, left = (FIRST, FIRST_TO_MIDDLE) if first else (SECOND, SECOND_TO_MIDDLE)
-        way = 0.0 if first else 2.7
+        way = 0.4 if first else 2.7
         away_m = (left - (index - visit.start)) / self.fps * WALK_M_S
         pose = super().pose(index).copy()
         tx, ty, rz = (self.body.index(f"pelvis_{name}") for name in ("tx", "ty", "rz"))
@@ -90,8 +90,9 @@ def test_he_is_tracked_where_he_is(visits) -> None:
     def error_mm(index: int) -> float:
         return 1e3 * float(np.linalg.norm(results[index].markers_m - truth[index], axis=1).mean())
 
-    # At first two cameras see half of him.
-    assert max(error_mm(index) for index in FIRST[-3:]) < 70.0
-    assert max(error_mm(index) for index in SECOND) < 70.0
+    tracked = [index for index in FIRST if results[index].pose is not None]
+    # At first one camera sees him and another half of him: that is no start.
+    assert FIRST[4] < tracked[0] < FIRST[-8]
+    assert max(error_mm(index) for index in (*tracked, *SECOND)) < 70.0
     apart_m = np.linalg.norm(truth[FIRST[-1]][0] - truth[SECOND[0]][0])
     assert apart_m > 1.0

@@ -14,7 +14,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull, find_hulls, hulls_part
-from markerless_tracker.tracking.start.in_view import LEAST_IN_VIEW, share_in_view
+from markerless_tracker.tracking.start.in_view import Patience
 from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
 from markerless_tracker.tracking.start.postures import put_at
 
@@ -113,10 +113,12 @@ class Starter:
         self._sized = sized
         self._fit_shape = fit_shape
         self._last_pose = last_pose
+        self._patience = Patience()
         self.reset()
 
     def reset(self) -> None:
         """Forget whom it was about to find."""
+        self._patience.reset()
         self._population: Population | None = None
         self._searcher: Searcher | None = None
         self._way = 0.0
@@ -156,7 +158,7 @@ class Starter:
         for hull in find_hulls(self._cameras, observed):
             # A search takes long: not for somebody who is hardly in view yet.
             stands = put_at(self._body, hull, self._body.neutral)
-            if share_in_view(self._body, stands, looking) < LEAST_IN_VIEW:
+            if not self._patience.enough(self._body, stands, looking, stamp_ns):
                 continue
             observations = {
                 name: hulls_part(observation, self._cameras[name], hull)
@@ -167,7 +169,8 @@ class Starter:
                 continue
             frame, population = found
             assert self._searcher is not None
-            if share_in_view(self._searcher.body, population.poses[0], looking) < LEAST_IN_VIEW:
+            best = population.poses[0]
+            if not self._patience.enough(self._searcher.body, best, looking, stamp_ns):
                 continue
             self._population = population
             self._way = float(population.headings[0])

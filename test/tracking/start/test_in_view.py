@@ -9,7 +9,7 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.synthesis.rig import ring_rig
 from markerless_tracker.tracking import TrackerConfig, build_tracker
-from markerless_tracker.tracking.start.in_view import share_in_view
+from markerless_tracker.tracking.start.in_view import PATIENCE_NS, Patience, share_in_view
 
 
 @pytest.fixture(scope="module")
@@ -25,20 +25,36 @@ def standing(body, x_m: float):
 
 
 def test_in_the_middle_everything_is_seen(body) -> None:
-    assert share_in_view(body, standing(body, 0.0), ring_rig(4)) == 1.0
+    assert share_in_view(body, standing(body, 0.0), ring_rig(4), 4) == 1.0
 
 
 def test_two_cameras_must_see_it(body) -> None:
     rig = ring_rig(4)
-    assert share_in_view(body, standing(body, 0.0), rig.cameras[:1]) == 0.0
-    assert share_in_view(body, standing(body, 0.0), rig.cameras[:2]) == 1.0
+    assert share_in_view(body, standing(body, 0.0), rig.cameras[:1], 2) == 0.0
+    assert share_in_view(body, standing(body, 0.0), rig.cameras[:2], 2) == 1.0
 
 
 def test_the_share_falls_towards_the_edge(body) -> None:
     places = np.linspace(0.0, 4.0, 81)
-    shares = [share_in_view(body, standing(body, x), ring_rig(3)) for x in places]
+    shares = [share_in_view(body, standing(body, x), ring_rig(3), 2) for x in places]
     assert shares[0] == 1.0 and shares[-1] == 0.0
     assert any(0.2 < share < 0.8 for share in shares)
+
+
+def test_a_third_camera_is_waited_for_a_while(body) -> None:
+    rig, pose = ring_rig(4), standing(body, 0.0)
+    aside = standing(body, 2.6)
+    assert share_in_view(body, aside, rig, 2) == 1.0 > 0.5 > share_in_view(body, aside, rig, 3)
+    assert Patience().enough(body, pose, rig, 0)
+    # Others do not look: two are all there are.
+    assert Patience().enough(body, pose, rig.cameras[:2], 0)
+    patience = Patience()
+    assert not patience.enough(body, aside, rig, 5)
+    assert not patience.enough(body, aside, rig, PATIENCE_NS)
+    assert patience.enough(body, aside, rig, 5 + PATIENCE_NS)
+    patience.reset()
+    assert not patience.enough(body, aside, rig, 6 + PATIENCE_NS)
+    assert not patience.enough(body, standing(body, 9.0), rig, 9 * PATIENCE_NS)
 
 
 def test_nobody_is_started_from_an_outline_and_a_hand() -> None:
