@@ -7,9 +7,9 @@ sections happen rarely and want the rows.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms, transforms
+from markerless_tracker.body.kinematics import carried
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
@@ -76,17 +76,6 @@ def pose_slopes(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatAr
     moments = np.cross(surface(body, pose, rows), rows.gradient)
     turns = moments @ axes.T - rows.gradient @ np.cross(axes, placed[moved, :, 3]).T
     slopes = np.where(kind >= _SLIDES, rows.gradient @ axes.T, turns)
-    slopes *= _carried(body, moved)[body.cone_node[rows.cone]]
+    slopes *= carried(body, moved)[body.cone_node[rows.cone]]
     parameter = np.eye(body.size)[body.node_parameter[moved]]
     return np.asarray(slopes @ parameter)
-
-
-def _carried(body: BodyModel, moved: IntArray) -> NDArray[np.float64]:
-    """(m, k) 1 where a node hangs on, or is, one of k nodes."""
-    nodes = body.node_parent.size
-    above = np.zeros((nodes, nodes))
-    for node, parent in enumerate(body.node_parent.tolist()):
-        if parent >= 0:
-            above[node] = above[parent]
-        above[node, node] = 1.0
-    return above[:, moved]
