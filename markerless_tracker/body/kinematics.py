@@ -94,3 +94,14 @@ def cone_transforms(body: BodyModel, pose: FloatArray) -> FloatArray:
     out = nodes[:, :, :3] @ body.cone_fixed
     out[:, :, 3] += nodes[:, :, 3]
     return np.asarray(out)
+
+
+def carried(body: BodyModel, nodes: IntArray) -> FloatArray:
+    """(m, k) 1 where a node is, or hangs on, one of k nodes, else 0."""
+    count = body.node_parent.size
+    above = np.zeros((count, count))
+    for node, parent in enumerate(body.node_parent.tolist()):
+        if parent >= 0:
+            above[node] = above[parent]
+        above[node, node] = 1.0
+    return above[:, nodes]

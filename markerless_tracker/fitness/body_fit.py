@@ -14,6 +14,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.body.sizes import LengthBelief, Sizes
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.fitness.outline_rows import outline_rows, pose_slopes, surface
+from markerless_tracker.fitness.row_kernels import eliminated, normal_equations, solved
 from markerless_tracker.fitness.sections import Sections
 from markerless_tracker.fitness.shape import CORRELATION_M, RESIDUAL_SIGMA_M
 from markerless_tracker.geometry import FloatArray
@@ -83,20 +84,17 @@ class BodyFit:
         hessian, slope = self._believed()
         parts = []
         for frame in self._frames:
-            own, cross, pull, shared, shared_pull = self._equations(frame, body, longer, reach_m)
-            solved = np.linalg.solve(own, np.column_stack([cross, pull]))
-            hessian += shared - cross.T @ solved[:, :-1]
-            slope += shared_pull - cross.T @ solved[:, -1]
-            parts.append(solved)
+            own, pull = self._equations(frame, body, longer, reach_m)
+            parts.append(eliminated(own, pull, body.size, hessian, slope))
         hessian[np.diag_indices_from(hessian)] *= 1.0 + _DAMPING
-        step = -np.linalg.solve(hessian, slope)
+        step = solved(hessian, slope)
         split = len(self._lengths)
         step[:split] = np.clip(step[:split], -_LONGEST_STEP, _LONGEST_STEP)
         numbers = np.clip(self._numbers + step[split:], *self._sections.bounds)
         step[split:] = numbers - self._numbers
         self._lengths, self._numbers = self._lengths + step[:split], numbers
-        for frame, solved in zip(self._frames, parts, strict=True):
-            moved = frame.pose - solved[:, -1] - solved[:, :-1] @ step
+        for frame, part in zip(self._frames, parts, strict=True):
+            moved = frame.pose - part @ np.append(step, 1.0)
             frame.pose = np.clip(moved, *self._limits)
 
     def _made(self, log_lengths: FloatArray) -> BodyModel:
@@ -117,8 +115,8 @@ class BodyFit:
 
     def _equations(
         self, frame: _Frame, body: BodyModel, longer: list[BodyModel], reach_m: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """One frame's: of its pose (p, p), mixed (p, k), slope (p,), of the body (k, k), (k,)."""
+    ) -> tuple[FloatArray, FloatArray]:
+        """One frame's normal equations (p + k, p + k) and (p + k,): of its pose, of the body."""
         frame.contours.collect(frame.pose, reach_m, body)
         rows = outline_rows(frame.contours)
         points = surface(body, frame.pose, rows)
@@ -126,16 +124,13 @@ class BodyFit:
             np.einsum("ni,ni->n", rows.gradient, surface(other, frame.pose, rows) - points) / _STEP
             for other in longer
         ]
-        by_body = np.column_stack([*by_length, self._sections.slopes(body, frame.pose, rows)])
         by_pose = pose_slopes(body, frame.pose, rows)
+        by_section = self._sections.slopes(body, frame.pose, rows)
+        slopes = np.column_stack([by_pose, *by_length, by_section])
         weight = rows.weight / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG * AMONG)
-        weighted = weight[:, None] * by_pose
+        hessian, slope = normal_equations(slopes, weight, rows.value)
         usual = 1.0 / (AMONG * body.spread**2)
-        own = weighted.T @ by_pose + np.diag(usual + 1e-9)
-        own[np.diag_indices_from(own)] *= 1.0 + _DAMPING
-        pull = weighted.T @ rows.value + usual * (frame.pose - body.usual)
-        weighted_body = weight[:, None] * by_body
-        return (
-            own, weighted.T @ by_body, pull, weighted_body.T @ by_body,
-            weighted_body.T @ rows.value,
-        )  # fmt: skip
+        pose = np.arange(body.size)
+        hessian[pose, pose] = (hessian[pose, pose] + usual + 1e-9) * (1.0 + _DAMPING)
+        slope[pose] += usual * (frame.pose - body.usual)
+        return hessian, slope

@@ -7,10 +7,11 @@ sections happen rarely and want the rows.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms, transforms
+from markerless_tracker.body.kinematics import carried
 from markerless_tracker.body.model import IntArray
+from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
 
@@ -53,16 +54,10 @@ def outline_rows(frame: ContourFrame) -> OutlineRows:
 
 def surface(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
     """World points (n, 3) at the rows' places on a body at a pose (p,)."""
-    placed = cone_transforms(body, pose)[rows.cone]
-    ends = []
-    for end in range(2):
-        rx, ry, ox, oy = np.moveaxis(body.cone_shape[rows.cone, end], 1, 0)
-        cos, sin = rows.place[:, 2 * end], rows.place[:, 2 * end + 1]
-        along = end * body.cone_length[rows.cone]
-        ends.append(np.stack([ox + rx * cos, oy + ry * sin, along], axis=1))
-    t = rows.place[:, 4:]
-    local = (1.0 - t) * ends[0] + t * ends[1]
-    return np.asarray(np.einsum("nij,nj->ni", placed[:, :, :3], local) + placed[:, :, 3])
+    out = np.empty((len(rows.cone), 3))
+    placed = cone_transforms(body, pose)
+    _surface(placed, body.cone_shape, body.cone_length, rows.cone, rows.place, out)
+    return out
 
 
 def pose_slopes(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
@@ -71,22 +66,43 @@ def pose_slopes(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatAr
     moved = np.flatnonzero(body.node_kind >= 0)
     kind = body.node_kind[moved]
     axes = body.node_sign[moved, None] * placed[moved, :, kind % 3]
-    # A turn about an axis a through o moves a point P by a x (P - o): along the gradient g that
-    # is a.(P x g) - g.(a x o).
-    moments = np.cross(surface(body, pose, rows), rows.gradient)
-    turns = moments @ axes.T - rows.gradient @ np.cross(axes, placed[moved, :, 3]).T
-    slopes = np.where(kind >= _SLIDES, rows.gradient @ axes.T, turns)
-    slopes *= _carried(body, moved)[body.cone_node[rows.cone]]
-    parameter = np.eye(body.size)[body.node_parameter[moved]]
-    return np.asarray(slopes @ parameter)
+    out = np.zeros((len(rows.cone), body.size))
+    _pose_slopes(
+        surface(body, pose, rows), rows.gradient, axes,
+        np.ascontiguousarray(placed[moved, :, 3]), kind, body.node_parameter[moved],
+        carried(body, moved)[body.cone_node], rows.cone, out,
+    )  # fmt: skip
+    return out
 
 
-def _carried(body: BodyModel, moved: IntArray) -> NDArray[np.float64]:
-    """(m, k) 1 where a node hangs on, or is, one of k nodes."""
-    nodes = body.node_parent.size
-    above = np.zeros((nodes, nodes))
-    for node, parent in enumerate(body.node_parent.tolist()):
-        if parent >= 0:
-            above[node] = above[parent]
-        above[node, node] = 1.0
-    return above[:, moved]
+@kernel
+def _surface(placed, shape, length, cone, place, out):  # type: ignore[no-untyped-def]
+    for n in range(cone.size):
+        c = cone[n]
+        x = y = z = 0.0
+        for end in range(2):
+            share = place[n, 4] if end == 1 else 1.0 - place[n, 4]
+            x += share * (shape[c, end, 2] + shape[c, end, 0] * place[n, 2 * end])
+            y += share * (shape[c, end, 3] + shape[c, end, 1] * place[n, 2 * end + 1])
+            z += share * end * length[c]
+        for i in range(3):
+            t = placed[c, i]
+            out[n, i] = t[0] * x + t[1] * y + t[2] * z + t[3]
+
+
+@kernel
+def _pose_slopes(  # type: ignore[no-untyped-def]
+    points, gradient, axes, origins, kind, parameter, hang, cone, out
+):
+    for n in range(cone.size):
+        gx, gy, gz = gradient[n, 0], gradient[n, 1], gradient[n, 2]
+        for m in range(kind.size):
+            if hang[cone[n], m] == 0.0:
+                continue
+            x, y, z = axes[m, 0], axes[m, 1], axes[m, 2]
+            if kind[m] < _SLIDES:
+                # A turn about the axis moves a point P by axis x (P - origin).
+                u, v = points[n, 0] - origins[m, 0], points[n, 1] - origins[m, 1]
+                w = points[n, 2] - origins[m, 2]
+                x, y, z = y * w - z * v, z * u - x * w, x * v - y * u
+            out[n, parameter[m]] += gx * x + gy * y + gz * z

@@ -5,6 +5,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.fitness.outline_rows import outline_rows
+from markerless_tracker.fitness.row_kernels import normal_equations
 from markerless_tracker.fitness.sections import Sections
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
@@ -43,8 +44,9 @@ def fit_shape(
             frame.collect(pose, reach_m, shaped)
             rows = outline_rows(frame)
             slopes = sections.slopes(shaped, pose, rows)
-            hessian += slopes.T @ (rows.weight[:, None] * slopes)
-            slope += slopes.T @ (rows.weight * rows.value)
+            one = normal_equations(slopes, rows.weight, rows.value)
+            hessian += one[0]
+            slope += one[1]
         return hessian * scale, slope * scale
 
     prior = Prior(sections.generic, tightness / sections.spread**2)

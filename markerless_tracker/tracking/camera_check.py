@@ -19,7 +19,7 @@ from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.search import Searcher
 
-DISAGREES_M = 0.025
+DISAGREES_M = 0.030
 """A systematic shift of this much, at the body, is the calibration's."""
 EVERY_NS = 160_000_000
 LEAST_VIEWS = 3

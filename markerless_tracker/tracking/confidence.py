@@ -2,31 +2,34 @@
 
 The normal equations of the contour refinement say how far each parameter may move before the
 outlines fit worse (Gauss-Newton approximation of the posterior, noise as large as this frame's
-residuals). That is noise only. What the images cannot tell comes on top: where in the flesh the
-joint's centre is, and for a person known by the stature only how long the bones are.
+residuals). That is noise only. What views that disagree leave comes on top (a pose is a compromise
+between them), and what the images cannot tell: where in the flesh the joint's centre is, and for a
+person whom nobody measured how long the bones are.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, markers, transforms
-from markerless_tracker.body.model import IntArray
+from markerless_tracker.body.kinematics import carried
 from markerless_tracker.errors import SearchError
 from markerless_tracker.fitness.contours import ContourFrame
+from markerless_tracker.fitness.outline_rows import OutlineRows, outline_rows
 from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Confidence
 
-MEASURED_M = 0.012
+MEASURED_M = 0.007
 """Error, per axis, of a joint's centre in a body whose lengths were measured."""
-GENERIC_M = 0.020
-"""The same with the proportions of a stature."""
+UNMEASURED_M = 0.015
+"""The same with lengths that were fitted, or that are those of a stature."""
+DISAGREEMENT = 2.7
+"""A pose hides most of what views disagree by: its error is so many times what still shows."""
 CORRELATED = 9.0
 """A generic section is wrong along a whole limb: its residuals agree over some half a metre, not
 over the piece of outline that a refinement takes for independent."""
 _LEVER_M = 0.25
 """Errors of joints' centres turn limbs about as long as this."""
-_REACH_M = 0.035
+_REACH_M = 0.06
 _LEAST_SIGMA_M = 0.002
 _SLIDES = 3
 """Kinds of nodes from here on are translations."""
@@ -44,13 +47,11 @@ def confidence_of(
         measured: whether the body's lengths are the person's own.
     """
     sums = contours.equations(pose, _REACH_M)
-    r = contours.residuals
-    used = [slice(int(n)) for n in r.count]
-    weight = np.concatenate([r.weight[v, rows] for v, rows in enumerate(used)])
-    value = np.concatenate([r.value[v, rows] for v, rows in enumerate(used)])
-    total = float(weight.sum())
+    rows = outline_rows(contours)
+    total = float(rows.weight.sum())
     if total <= 0.0:
         return None
+    weight, value = rows.weight, rows.value
     variance = max(float((weight * value**2).sum()) / total, _LEAST_SIGMA_M**2)
     precision = sums.hessian / (CORRELATED * CORRELATION_M * variance)
     precision[np.diag_indices_from(precision)] += 1.0 / body.spread**2 + 1e-9
@@ -60,7 +61,8 @@ def confidence_of(
         return None
     if not np.isfinite(covariance).all():
         raise SearchError("the covariance of the pose is not finite")
-    floor = MEASURED_M if measured else GENERIC_M
+    unseen = MEASURED_M if measured else UNMEASURED_M
+    floor = float(np.hypot(unseen, DISAGREEMENT * disagreement_m(contours, rows)))
     by_marker, by_root = _slopes(body, pose)
     of_markers = np.einsum("ij,jk,ik->i", by_marker, covariance, by_marker)
     of_root = by_root @ covariance @ by_root.T
@@ -73,6 +75,30 @@ def confidence_of(
         markers_sd_m=np.sqrt(of_markers + floor**2).reshape(-1, 3),
         root_covariance=0.5 * (of_root + of_root.T),
     )
+
+
+def disagreement_m(contours: ContourFrame, rows: OutlineRows) -> float:
+    """How far the views' silhouettes still lie beside the body, m.
+
+    Root mean square, over views and both axes of the images, of the shift at the body that would
+    lay its outline over each silhouette.
+
+    Args:
+        contours: residuals collected at the pose.
+        rows: the same, one by one.
+    """
+    ends = np.cumsum(contours.residuals.count)
+    squares = []
+    for rotation, begin, end in zip(
+        contours.views.arrays.rotation, ends - contours.residuals.count, ends, strict=True
+    ):
+        weight = rows.weight[begin:end]
+        slopes = rows.gradient[begin:end] @ rotation[:2].T
+        normal = slopes.T @ (weight[:, None] * slopes)
+        if np.linalg.matrix_rank(normal) == 2:
+            shift = np.linalg.solve(normal, slopes.T @ (weight * rows.value[begin:end]))
+            squares.append(float(shift @ shift) / 2.0)
+    return float(np.sqrt(np.mean(squares))) if squares else 0.0
 
 
 def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -88,20 +114,12 @@ def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     axes = body.node_sign[moved, None] * nodes[moved, :, kind % 3]
     turned = np.cross(axes, points[:, None] - nodes[moved, :, 3])
     moves = np.where((kind >= _SLIDES)[:, None], axes, turned)
-    carried = np.array([_is_above(body, moved, int(n)) for n in (*body.marker_node, root)])
-    moves *= carried[:, :, None]
-    turning = axes * (carried[-1] & (kind < _SLIDES))[:, None]
+    hang = carried(body, moved)[[*body.marker_node, root]]
+    moves *= hang[:, :, None]
+    turning = axes * (hang[-1] * (kind < _SLIDES))[:, None]
     slopes, turns = np.zeros((len(points), body.size, 3)), np.zeros((body.size, 3))
     for n, k in enumerate(parameter.tolist()):
         slopes[:, k] += moves[:, n]
         turns[k] += turning[n]
     by_marker = slopes[:-1].transpose(0, 2, 1).reshape(-1, body.size)
     return by_marker, np.concatenate([slopes[-1].T, turns.T])
-
-
-def _is_above(body: BodyModel, nodes: IntArray, node: int) -> NDArray[np.bool_]:
-    """Which of some nodes carry a node: are it, or above it."""
-    chain = {node}
-    while (node := int(body.node_parent[node])) >= 0:
-        chain.add(node)
-    return np.isin(nodes, list(chain))

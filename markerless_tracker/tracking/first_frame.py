@@ -15,6 +15,7 @@ from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.sizes import Sizes
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.fitness.outline_rows import outline_rows, surface
+from markerless_tracker.fitness.row_kernels import normal_equations
 from markerless_tracker.fitness.shape import CORRELATION_M, fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
@@ -117,11 +118,9 @@ def _settled(
             slopes[:, i] = np.einsum("ni,ni->n", rows.gradient, gap) / _STEP
             marks[:, i] = (markers(changed, moved[:p])[seen] - joints).ravel() / _STEP
         gap = (joints - start.positions_m[seen]).ravel()
-        trust, weight = 1.0 / start.noise_m**2, scale * rows.weight
-        return (
-            slopes.T @ (weight[:, None] * slopes) + trust * marks.T @ marks,
-            slopes.T @ (weight * rows.value) + trust * marks.T @ gap,
-        )
+        trust = 1.0 / start.noise_m**2
+        hessian, slope = normal_equations(slopes, scale * rows.weight, rows.value)
+        return hessian + trust * marks.T @ marks, slope + trust * marks.T @ gap
 
     z = refine(
         equations,

@@ -91,3 +91,8 @@ class BodyFitting:
         if self._rounds < FRAMES + POLISH:
             return None
         return Fitted(self._fit.body, self._fit.poses[-1] - self._last)
+
+    def warm_up(self, body: BodyModel, contours: ContourFrame, pose: FloatArray) -> None:
+        """Compile what `add` needs; arguments as there. Forget this fit then."""
+        for _ in range(EVERY):
+            self.add(body, contours, pose)

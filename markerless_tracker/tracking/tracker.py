@@ -144,7 +144,7 @@ class Tracker:
 
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
-        blank: dict[str, Image | Observation] = {}
+        blank: dict[str, Observation] = {}
         for camera in self.rig:
             width, height = camera.size_px
             nothing = np.zeros((height, width), dtype=np.uint8)
@@ -160,6 +160,10 @@ class Tracker:
         for views in (blank, dict(list(blank.items())[:1])):
             self._starter = None
             self.step(views, 0)
+            self.reset()
+        if self._fitting is not None:
+            contours = self._searcher.frame(blank, 0, self._pose).contours
+            self._fitting.warm_up(self.body, contours, self._pose)
             self.reset()
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:

@@ -4,10 +4,17 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, markers, root_transform
+from markerless_tracker.fitness.outline_rows import outline_rows
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.confidence import GENERIC_M, MEASURED_M, _slopes, confidence_of
+from markerless_tracker.tracking.confidence import (
+    MEASURED_M,
+    UNMEASURED_M,
+    _slopes,
+    confidence_of,
+    disagreement_m,
+)
 from markerless_tracker.tracking.search import Searcher
 
 
@@ -48,8 +55,37 @@ def test_lengths_of_a_stature_are_less_sure(scene) -> None:
     generic = confidence_of(scene.body, pose, contours, measured=False)
     assert measured is not None and generic is not None
     assert (measured.markers_sd_m >= MEASURED_M).all()
-    assert (generic.markers_sd_m >= GENERIC_M).all()
+    assert (generic.markers_sd_m >= UNMEASURED_M).all()
     assert (generic.pose_sd > measured.pose_sd).all()
+
+
+def test_views_that_disagree_are_less_sure(scene) -> None:
+    """One silhouette 6 px beside the others: about its part of the mean square over the views."""
+    pose, contours = frame_of(scene, scene.rig.names)
+    contours.collect(pose, 0.05)
+    agreed = disagreement_m(contours, outline_rows(contours))
+    sure = confidence_of(scene.body, pose, contours, measured=True)
+    _, masks, _ = scene.frame(0)
+    first, *others = scene.rig.names
+    masks = {first: np.roll(masks[first], 6, axis=1), **{name: masks[name] for name in others}}
+    seen = {
+        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+    }
+    searcher = Searcher(
+        scene.rig, scene.body, TrackerConfig(threads=1), limits=scene.body.limits, threads=1
+    )
+    beside = searcher.frame(seen, 0, pose).contours
+    beside.collect(pose, 0.10)
+    camera = scene.rig[first]
+    depth = float(camera.T_cam_world[2] @ root_transform(scene.body, pose)[:, 3])
+    expected = 6.0 * depth / camera.matrix[0, 0] / np.sqrt(2 * len(scene.rig))
+    off = disagreement_m(beside, outline_rows(beside))
+    assert agreed < 0.003
+    assert off == pytest.approx(expected, rel=0.25)
+    unsure = confidence_of(scene.body, pose, beside, measured=True)
+    assert sure is not None and unsure is not None
+    assert unsure.markers_sd_m.mean() > 1.5 * sure.markers_sd_m.mean()
 
 
 def test_the_roots_covariance_is_one(scene) -> None:

@@ -1,8 +1,8 @@
 """Whether enough of a body is in view to start from: who comes in at the edge is waited for.
 
 One outline and a hand in another view leave depth, heading and most of the limbs open, and two
-whole outlines may still be explained by somebody who faces the other way. A start from too little is
-wrong and, worse, goes on to fit the body's sections to what is seen.
+whole outlines may still be explained by somebody who faces the other way. A start from too little
+is wrong and, worse, goes on to fit the body's sections to what is seen.
 """
 
 from collections.abc import Iterable

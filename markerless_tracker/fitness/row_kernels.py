@@ -1,0 +1,107 @@
+"""Normal equations of residuals that are written down row by row, and what is eliminated of them.
+
+Compiled: rows are mostly zeros, and results do not hang on how many threads a library takes.
+"""
+
+import numpy as np
+
+from markerless_tracker.compiled import kernel
+from markerless_tracker.geometry import FloatArray
+
+
+def normal_equations(
+    slopes: FloatArray, weight: FloatArray, value: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """JᵀWJ (k, k) and JᵀWr (k,) of rows (n, k), their weights (n,) and residuals (n,)."""
+    hessian, slope = np.zeros((slopes.shape[1], slopes.shape[1])), np.zeros(slopes.shape[1])
+    used = np.empty(slopes.shape[1], dtype=np.int64)
+    _accumulate(np.ascontiguousarray(slopes), weight, value, used, hessian, slope)
+    return hessian, slope
+
+
+def eliminated(
+    hessian: FloatArray,
+    slope: FloatArray,
+    first: int,
+    out_hessian: FloatArray,
+    out_slope: FloatArray,
+) -> FloatArray:
+    """Solve for the first unknowns, and add what is left of the equations to those of the others.
+
+    Args:
+        hessian: (f + k, f + k), positive definite in its first f rows and columns.
+        slope: (f + k,).
+        first: f.
+        out_hessian, out_slope: (k, k) and (k,), added to (Schur complement).
+
+    Returns:
+        (f, k + 1): the step of the first unknowns is minus (these @ [step of the others, 1]).
+    """
+    inner = np.concatenate([hessian[:first, first:], slope[:first, None]], axis=1)
+    _eliminate(hessian[:first, :first].copy(), inner)
+    out_hessian += hessian[first:, first:]
+    out_slope += slope[first:]
+    _reduce(np.ascontiguousarray(hessian[:first, first:]), inner, out_hessian, out_slope)
+    return inner
+
+
+def solved(hessian: FloatArray, slope: FloatArray) -> FloatArray:
+    """The step (k,) of positive definite equations (k, k) and (k,)."""
+    step = -slope[:, None]
+    _eliminate(hessian.copy(), step)
+    return step[:, 0]
+
+
+@kernel
+def _accumulate(slopes, weight, value, used, hessian, slope):  # type: ignore[no-untyped-def]
+    n, k = slopes.shape
+    for i in range(n):
+        count = 0
+        for a in range(k):
+            if slopes[i, a] != 0.0:
+                used[count] = a
+                count += 1
+        for p in range(count):
+            a = used[p]
+            scaled = weight[i] * slopes[i, a]
+            slope[a] += scaled * value[i]
+            for q in range(p + 1):
+                hessian[a, used[q]] += scaled * slopes[i, used[q]]
+    for a in range(k):
+        for b in range(a):
+            hessian[b, a] = hessian[a, b]
+
+
+@kernel
+def _eliminate(a, right):  # type: ignore[no-untyped-def]
+    """Replace right (f, m) by the solution of a (f, f) x = right; a becomes its Cholesky factor."""
+    f, m = right.shape
+    for i in range(f):
+        for j in range(i + 1):
+            total = a[i, j]
+            for p in range(j):
+                total -= a[i, p] * a[j, p]
+            a[i, j] = np.sqrt(total) if i == j else total / a[j, j]
+    for i in range(f):
+        for p in range(i):
+            for c in range(m):
+                right[i, c] -= a[i, p] * right[p, c]
+        for c in range(m):
+            right[i, c] /= a[i, i]
+    for i in range(f - 1, -1, -1):
+        for p in range(i + 1, f):
+            for c in range(m):
+                right[i, c] -= a[p, i] * right[p, c]
+        for c in range(m):
+            right[i, c] /= a[i, i]
+
+
+@kernel
+def _reduce(cross, solved, hessian, slope):  # type: ignore[no-untyped-def]
+    """Take crossᵀ solved (k, k + 1) from hessian and slope."""
+    f, k = cross.shape
+    for i in range(f):
+        for a in range(k):
+            for b in range(k):
+                hessian[a, b] -= cross[i, a] * solved[i, b]
+            slope[a] -= cross[i, a] * solved[i, k]
