@@ -380,6 +380,33 @@ def test_parameters_show_what_is_in_effect(live: Live) -> None:
     assert (body.string_value, seed.integer_value, scale.double_value) == ("balan31", 0, 1.0)
 
 
+def test_who_leaves_has_no_pose_and_is_tracked_when_he_is_back(live: Live) -> None:
+    live.track()
+    here = live.camera.scene
+    live.camera.scene = EmptyRoom(here)
+    try:
+        states = []
+
+        def gone() -> bool:
+            live.send_without_pose()
+            time.sleep(0.1)
+            states.append(live.value("state"))
+            return states[-1] == "SEARCHING"
+
+        live.until(gone, "the search for somebody")
+        assert "LOST" in states
+        counts = [len(got) for got in (live.joints, live.roots, live.poses)]
+        for _ in range(3):
+            gone()
+        assert [len(got) for got in (live.joints, live.roots, live.poses)] == counts
+    finally:
+        live.camera.scene = here
+    index = live.track()
+    assert live.value("state") == "TRACKING"
+    found = np.array([(p.position.x, p.position.y, p.position.z) for p in live.poses[-1].poses])
+    assert np.linalg.norm(found - here.markers(index), axis=1).mean() < 0.10
+
+
 def test_the_background_is_learned_when_nobody_is_there(
     world: World, tmp_path: Path, other_domain: None, start: Any, peer: Any
 ) -> None:
@@ -439,6 +466,17 @@ def test_a_node_without_background_waits_for_one(
     live.camera.scene = Refurnished(world.scene, empty=False)
     live.track()
     assert live.value("state") == "TRACKING" and live.value("dropped_on_error") == "0"
+
+
+class EmptyRoom:
+    """A scene that the person has left."""
+
+    def __init__(self, scene: SyntheticScene) -> None:
+        self.rig, self.stamp_ns = scene.rig, scene.stamp_ns
+        self._rooms = {name: images[0] for name, images in scene.backgrounds(1).items()}
+
+    def frame(self, index: int) -> tuple[dict[str, Any]]:
+        return (self._rooms,)
 
 
 class Refurnished:
