@@ -102,6 +102,7 @@ def test_a_black_view_is_fully_explained_by_a_body_outside_it(make_observation, 
     away[body.index("pelvis_tx")] = FAR_M
     for terms in fitness.terms(fitness.lay_out(black(rig, make_observation)), away).values():
         assert (terms.silhouette, terms.edges, terms.overlap) == (1.0, 0.0, 1.0)
+        assert terms.pixels == 0.0
 
 
 def test_an_observed_silhouette_is_not_explained_by_a_body_outside(body, rig, pose, observations):
@@ -109,8 +110,9 @@ def test_an_observed_silhouette_is_not_explained_by_a_body_outside(body, rig, po
     away = pose.copy()
     away[body.index("pelvis_ty")] = -FAR_M
     views = fitness.lay_out(observations)
-    for terms in fitness.terms(views, away).values():
+    for name, terms in fitness.terms(views, away).items():
         assert (terms.silhouette, terms.edges, terms.overlap) == (0.0, 0.0, 0.0)
+        assert terms.pixels == observations[name].mask.sum()
     assert fitness.prepare(views, stage(body, away))(away[None])[0] == 2.0
 
 
