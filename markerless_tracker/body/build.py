@@ -178,6 +178,7 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
         },
         hierarchies=d.hierarchies,
         lengths_m=lengths,
+        measured=subject.measured,
     )
 
 

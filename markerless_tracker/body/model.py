@@ -58,6 +58,7 @@ class BodyModel:
         hierarchies: named lists of steps in which a body may be searched; each step names the
             subspace that varies, then those that join softly.
         lengths_m: the subject's named lengths.
+        measured: whether these were measured on the person, not fitted or guessed.
     """
 
     name: str
@@ -87,6 +88,7 @@ class BodyModel:
     subspaces: Mapping[str, IntArray]
     hierarchies: Mapping[str, tuple[tuple[str, ...], ...]]
     lengths_m: Mapping[str, float]
+    measured: bool = True
 
     def __post_init__(self) -> None:
         for name, value in list(vars(self).items()):

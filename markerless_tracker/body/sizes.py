@@ -78,6 +78,8 @@ class Sizes:
     def body(self, lengths_m: FloatArray, like: BodyModel | None = None) -> BodyModel:
         """The body with free lengths (k,), with generic sections or those of another body.
 
+        Lengths count as measured if the other body's do.
+
         Raises:
             BodyModelError: a length is not between 0 and 3 m.
         """
@@ -85,8 +87,10 @@ class Sizes:
         named: Mapping[str, float] = {
             name: by_name[_side_free(name)] for name in self._description.lengths
         }
-        sized = build_body(self._description, Subject("fitted", named))
-        return sized if like is None else replace(sized, cone_shape=like.cone_shape)
+        sized = build_body(self._description, Subject("fitted", named, measured=False))
+        if like is None:
+            return sized
+        return replace(sized, cone_shape=like.cone_shape, measured=like.measured)
 
 
 def _side_free(name: str) -> str:

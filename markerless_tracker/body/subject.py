@@ -22,11 +22,13 @@ class Subject:
         lengths_m: segment lengths by the names of the body description.
         cones_m: (2, 4) per cone, start and end: radius x, radius y, offset x, offset y. Cones
             that are not named get the description's ratios to their length.
+        measured: whether the lengths were measured on the person, not fitted or guessed.
     """
 
     name: str
     lengths_m: Mapping[str, float]
     cones_m: Mapping[str, FloatArray] = field(default_factory=dict)
+    measured: bool = True
 
     def __post_init__(self) -> None:
         for key, value in self.lengths_m.items():
@@ -57,7 +59,7 @@ def subject_from_stature(description: BodyDescription, stature_m: float) -> Subj
     if not 0.5 <= stature_m <= 2.6:
         raise BodyModelError(f"stature is {stature_m} m, expected between 0.5 and 2.6")
     lengths = {name: float(v["stature"]) * stature_m for name, v in description.lengths.items()}
-    return Subject(f"stature {stature_m:g} m", lengths)
+    return Subject(f"stature {stature_m:g} m", lengths, measured=False)
 
 
 def subject_from_markers(
@@ -152,7 +154,7 @@ def complete_markers(markers_m: Mapping[str, FloatArray]) -> dict[str, FloatArra
 
 
 def read_subject(path: Path) -> Subject:
-    """Read a subject file (YAML: name, lengths_m, optional cones_m).
+    """Read a subject file (YAML: name, lengths_m, optional cones_m and measured).
 
     Raises:
         BodyModelError: it cannot be read, or holds unknown or impossible entries.
@@ -164,13 +166,18 @@ def read_subject(path: Path) -> Subject:
             f"{path}: cannot read the subject: {str(error).splitlines()[0]}"
         ) from error
     if not isinstance(data, dict) or not isinstance(data.get("lengths_m"), dict):
-        raise BodyModelError(f"{path}: expected name, lengths_m and optionally cones_m")
-    unknown = sorted(set(map(str, data)) - {"name", "lengths_m", "cones_m"})
+        raise BodyModelError(
+            f"{path}: expected name, lengths_m and optionally cones_m and measured"
+        )
+    unknown = sorted(set(map(str, data)) - {"name", "lengths_m", "cones_m", "measured"})
     if unknown:
         raise BodyModelError(f"{path}: unknown entry {', '.join(unknown)}")
+    measured = data.get("measured", True)
+    if not isinstance(measured, bool):
+        raise BodyModelError(f"{path}: measured is {measured!r}, expected true or false")
     shapes = _shapes(data, path)
     try:
-        return Subject(str(data.get("name", path.stem)), data["lengths_m"], shapes)
+        return Subject(str(data.get("name", path.stem)), data["lengths_m"], shapes, measured)
     except BodyModelError as error:
         raise BodyModelError(f"{path}: {error}") from error
 
@@ -181,6 +188,8 @@ def write_subject(path: Path, subject: Subject) -> None:
         "name": subject.name,
         "lengths_m": {name: float(v) for name, v in subject.lengths_m.items()},
     }
+    if not subject.measured:
+        data["measured"] = False
     if subject.cones_m:
         data["cones_m"] = {name: np.asarray(v).tolist() for name, v in subject.cones_m.items()}
     path.write_text(

@@ -103,7 +103,9 @@ class ResultWriter:
 
     def _subject(self) -> Subject:
         shapes = zip(self.body.cone_names, self.body.cone_shape, strict=True)
-        return Subject(self._source or "tracked", dict(self.body.lengths_m), dict(shapes))
+        return Subject(
+            self._source or "tracked", dict(self.body.lengths_m), dict(shapes), self.body.measured
+        )
 
     def _summary(self) -> dict[str, Any]:
         return {

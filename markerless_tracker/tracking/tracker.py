@@ -366,7 +366,7 @@ class Tracker:
     def _confidence(self, search: FrameSearch) -> Confidence | None:
         if self.config.refinement == "none":
             return None
-        return confidence_of(self.body, search.pose, search.contours, measured=self._person is None)
+        return confidence_of(self.body, search.pose, search.contours, measured=self.body.measured)
 
     def _predict(self, stamp_ns: int) -> FloatArray:
         """The pose (p,) expected at a time: the last one moved on, with damped velocity."""

@@ -221,3 +221,27 @@ def test_a_cone_of_another_body_is_named() -> None:
     lengths = subject_from_stature(DESCRIPTION, 1.7).lengths_m
     with pytest.raises(BodyModelError, match="subject one: body balan31 has no cone tail"):
         load_body("balan31", Subject("one", lengths, {"tail": np.ones((2, 4))}))
+
+
+# --- measured or not -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_file_tells_whether_its_lengths_were_measured(tmp_path, measured) -> None:
+    lengths = subject_from_stature(DESCRIPTION, 1.7).lengths_m
+    subject = Subject("one", lengths, measured=measured)
+    write_subject(tmp_path / "one.yaml", subject)
+    assert ("measured" in (tmp_path / "one.yaml").read_text()) is not measured
+    assert read_subject(tmp_path / "one.yaml").measured is measured
+
+
+def test_measured_is_true_or_false(tmp_path) -> None:
+    (tmp_path / "odd.yaml").write_text("lengths_m: {thigh: 0.4}\nmeasured: maybe\n")
+    with pytest.raises(BodyModelError, match=r"odd.yaml: measured is 'maybe', expected true"):
+        read_subject(tmp_path / "odd.yaml")
+
+
+def test_a_bodys_lengths_are_measured_or_of_a_stature() -> None:
+    assert not load_body("person31", 1.7).measured
+    points = named(markers(load_body("balan31", 1.7), load_body("balan31", 1.7).neutral))
+    assert subject_from_markers(DESCRIPTION, points).measured
