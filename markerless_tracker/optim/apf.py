@@ -82,6 +82,11 @@ class Apf(Optimizer):
         return self.best_x
 
     @property
+    def places(self) -> FloatArray:
+        """(n, d) the particles of the last layer, without weights."""
+        return self._particles
+
+    @property
     def memory(self) -> Cloud:
         """Particles and weights of the last layer, relative to the estimate."""
         return Cloud(self._particles - self.estimate, self._weights)

@@ -44,6 +44,11 @@ class Optimizer(ABC):
         return self.best_x
 
     @property
+    def places(self) -> FloatArray:
+        """(n, d) where the particles stand in the end, own bests if they keep any."""
+        return self.best_x[None]
+
+    @property
     def memory(self) -> Cloud | None:
         """What the next frame's search may go on from; None for most."""
         return None

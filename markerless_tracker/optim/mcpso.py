@@ -148,6 +148,11 @@ class Mcpso(Optimizer):
         self._phi = 0.5
 
     @property
+    def places(self) -> FloatArray:
+        """(n, d) the best positions of the sub-swarms' particles, then of the master's."""
+        return np.concatenate([self._subs.best, self._master.best])
+
+    @property
     def bars(self) -> FloatArray:
         """Own best cost of each particle that was asked for."""
         if self._iteration == 1:

@@ -105,6 +105,11 @@ class Pso(Optimizer):
         self._iteration = 1
 
     @property
+    def places(self) -> FloatArray:
+        """(n, d) the particles' own best positions."""
+        return self._swarm.best
+
+    @property
     def bars(self) -> FloatArray:
         """Each particle's own best cost."""
         return self._swarm.bars
