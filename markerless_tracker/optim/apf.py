@@ -82,9 +82,10 @@ class Apf(Optimizer):
         return self.best_x
 
     @property
-    def places(self) -> FloatArray:
-        """(n, d) the particles of the last layer, without weights."""
-        return self._particles
+    def scatter(self) -> FloatArray:
+        """(d,) standard deviation of the last layer's particles, weighted."""
+        around = self._particles - self._weights @ self._particles
+        return np.asarray(np.sqrt(self._weights @ around**2))
 
     @property
     def memory(self) -> Cloud:

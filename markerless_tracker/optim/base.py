@@ -44,9 +44,9 @@ class Optimizer(ABC):
         return self.best_x
 
     @property
-    def places(self) -> FloatArray:
-        """(n, d) where the particles stand in the end, own bests if they keep any."""
-        return self.best_x[None]
+    def scatter(self) -> FloatArray:
+        """(d,) standard deviation of the particles, of their own bests if they keep any."""
+        return np.zeros_like(self.best_x)
 
     @property
     def memory(self) -> Cloud | None:

@@ -148,9 +148,9 @@ class Mcpso(Optimizer):
         self._phi = 0.5
 
     @property
-    def places(self) -> FloatArray:
-        """(n, d) the best positions of the sub-swarms' particles, then of the master's."""
-        return np.concatenate([self._subs.best, self._master.best])
+    def scatter(self) -> FloatArray:
+        """(d,) standard deviation of all particles' own best positions, the master's included."""
+        return np.asarray(np.concatenate([self._subs.best, self._master.best]).std(axis=0))
 
     @property
     def bars(self) -> FloatArray:

@@ -105,9 +105,9 @@ class Pso(Optimizer):
         self._iteration = 1
 
     @property
-    def places(self) -> FloatArray:
-        """(n, d) the particles' own best positions."""
-        return self._swarm.best
+    def scatter(self) -> FloatArray:
+        """(d,) standard deviation of the particles' own best positions."""
+        return np.asarray(self._swarm.best.std(axis=0))
 
     @property
     def bars(self) -> FloatArray:

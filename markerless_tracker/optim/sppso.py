@@ -107,9 +107,9 @@ class Sppso(Optimizer):
         self._next = 0
 
     @property
-    def places(self) -> FloatArray:
-        """(n, d) the particles' own best positions."""
-        return self._best
+    def scatter(self) -> FloatArray:
+        """(d,) standard deviation of the particles' own best positions."""
+        return np.asarray(self._best.std(axis=0))
 
     @property
     def bars(self) -> FloatArray:

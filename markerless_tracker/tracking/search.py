@@ -160,7 +160,7 @@ class FrameSearch:
         best = optimizer.run(evaluator, early=True)
         self.evaluations += optimizer.evaluations
         with np.errstate(invalid="ignore", divide="ignore"):
-            self.scatter[stage.active] = optimizer.places.std(axis=0) / problem.sigma
+            self.scatter[stage.active] = optimizer.scatter / problem.sigma
         if optimizer.memory is not None:
             searcher.clouds[stage.name] = optimizer.memory
         return np.asarray(evaluator.poses(best[None])[0])
