@@ -6,7 +6,7 @@ import pytest
 from markerless_tracker.body import MARKER_NAMES, markers
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.limbs import TURN_NS, LimbWatch, limb_shares
 from markerless_tracker.tracking.loss import LIMB_LOST_BELOW, LIMB_REGAINED_ABOVE
 from markerless_tracker.tracking.search import Searcher
@@ -138,3 +138,22 @@ def test_the_same_search_gives_the_same_bytes_with_any_number_of_threads(standin
         contours = contours_of(searcher, seen, raised)
         poses.append(LimbWatch(scene.rig).mend(searcher, contours, seen, 0, raised)[0].tobytes())
     assert poses[0] == poses[1]
+
+
+@pytest.mark.parametrize("limb", ["l_arm", "r_arm"])
+def test_a_tracker_that_starts_with_a_wrong_arm_finds_it_in_a_quarter_of_a_second(limb) -> None:
+    scene = SyntheticScene(body="person31", motion="balance", size_px=SIZE_PX, seed=3)
+    body = scene.body
+    arm = [MARKER_NAMES.index(f"{limb[0].upper()}{name}") for name in ("Elbow", "Wrist")]
+    start = scene.frame(0)[2].copy()
+    start[body.subspaces[limb]] = body.neutral[body.subspaces[limb]]
+    tracker = Tracker(scene.rig, body, TrackerConfig(threads=1), start_pose=start, shape_known=True)
+    found = []
+    for frame in range(16):
+        _, masks, true = scene.frame(frame)
+        result = tracker.step(observed(masks), round(frame * 1e9 / 60))
+        found += [warning for warning in result.warnings if limb in warning]
+        assert set(result.limbs) == set(body.limbs)
+    assert f"{limb}: found elsewhere" in found
+    assert gaps(body, result.pose, true)[arm].max() < 0.08
+    assert result.limbs[limb].state is TRACKING
