@@ -21,8 +21,8 @@ from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.breeding import Breeder
 from markerless_tracker.tracking.start.population import FramePopulation
 
-TURN_NS = 45_000_000
-"""A limb that is not lost is looked for elsewhere this often: every third frame at 60 frames/s."""
+TURN_NS = 60_000_000
+"""A limb that is not lost is looked for elsewhere this often: every fourth frame at 60 frames/s."""
 _ALONG = np.linspace(0.1, 0.9, 5)
 
 
