@@ -43,6 +43,11 @@ class LimbWatch:
         self._turn = 0
         self._turned_ns: int | None = None
 
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Limbs that were lost when last judged."""
+        return tuple(n for n, track in self._tracks.items() if track.state is TrackState.LOST)
+
     def judge(
         self,
         body: BodyModel,
@@ -102,16 +107,15 @@ class LimbWatch:
 
     def _due(self, body: BodyModel, stamp_ns: int) -> list[str]:
         """Limbs to look for: the lost ones, and at its turn another."""
-        lost = [n for n in body.limbs if n in self._tracks and self._is_lost(n)]
+        if not body.limbs:
+            return []
+        lost = list(self.lost)
         if self._turned_ns is not None and 0 <= stamp_ns - self._turned_ns < TURN_NS:
             return lost
         self._turned_ns = stamp_ns
         name = body.limbs[self._turn % len(body.limbs)]
         self._turn += 1
         return lost if name in lost else [*lost, name]
-
-    def _is_lost(self, name: str) -> bool:
-        return self._tracks[name].state is TrackState.LOST
 
 
 def limb_shares(

@@ -330,7 +330,9 @@ class Tracker:
         self._velocity_per_ns = change / elapsed_ns if moving else np.zeros(change.size)
         self._pose = search.pose
         self._stamp_ns = stamp_ns
+        lost = self._limbs.lost
         limbs = self._limbs.judge(self.body, search.pose, observations, search.scatter)
+        warnings += tuple(f"{name}: lost" for name in self._limbs.lost if name not in lost)
         shown = search.pose
         if self._smooth is not None:
             shown = np.clip(self._smooth(shown, stamp_ns), *self._searcher.limits)

@@ -1,5 +1,7 @@
 """Which limbs are lost; finding those outside the silhouettes, and those wrong inside them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,7 @@ def test_states_name_the_limb_that_is_off(standing) -> None:
         states = watch.judge(scene.body, at, seen, scatter)
         assert states.pop("l_arm").state is expected
         assert {limb.state for limb in states.values()} == {TRACKING}
+        assert watch.lost == (("l_arm",) if expected is LOST else ())
         assert {limb.scatter for limb in states.values()} == {0.25}
 
 
@@ -113,6 +116,16 @@ def test_limbs_in_their_place_are_left_alone(balancing) -> None:
     for stamp_ns in range(0, 4 * TURN_NS, TURN_NS):
         contours = contours_of(searcher, seen, pose)
         assert watch.mend(searcher, contours, seen, stamp_ns, pose) == (pose, ())
+
+
+def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
+    scene, seen, pose, _ = standing
+    body = replace(scene.body, hierarchies={"twelve": scene.body.hierarchies["twelve"]})
+    searcher = Searcher(scene.rig, body, TrackerConfig(threads=1), limits=body.limits, threads=1)
+    watch = LimbWatch(scene.rig)
+    assert watch.judge(body, pose, seen, np.zeros(body.size)) == {}
+    contours = contours_of(searcher, seen, pose)
+    assert watch.mend(searcher, contours, seen, 0, pose) == (pose, ())
 
 
 def test_turns_come_by_time_and_depend_on_nothing_else(balancing) -> None:
@@ -157,3 +170,14 @@ def test_a_tracker_that_starts_with_a_wrong_arm_finds_it_in_a_quarter_of_a_secon
     assert f"{limb}: found elsewhere" in found
     assert gaps(body, result.pose, true)[arm].max() < 0.08
     assert result.limbs[limb].state is TRACKING
+
+
+def test_a_limb_that_gets_lost_is_told_once_also_without_refinement(standing) -> None:
+    """The swarm is too narrow to find it."""
+    scene, seen, _, raised = standing
+    config = TrackerConfig(threads=1, refinement="none", sigma_scale=0.01, evaluations=100)
+    tracker = Tracker(scene.rig, scene.body, config, start_pose=raised, shape_known=True)
+    first, second = (tracker.step(seen, round(k * 1e9 / 60)) for k in range(2))
+    assert first.limbs["l_arm"].state is second.limbs["l_arm"].state is LOST
+    assert first.limbs["l_arm"].scatter > 0.0
+    assert "l_arm: lost" in first.warnings and "l_arm: lost" not in second.warnings
