@@ -180,6 +180,23 @@ class TrackState(Enum):
     LOST = "LOST"
 
 
+@dataclass(frozen=True)
+class LimbState:
+    """How well one limb is tracked.
+
+    Attributes:
+        state: TRACKING or LOST.
+        share: of its axis, how much lies inside the silhouettes, mean over the views; NaN if it
+            lies outside all frames.
+        scatter: standard deviation of the swarm's particles in the end, as a share of the spread
+            that they began with; NaN without a swarm.
+    """
+
+    state: TrackState
+    share: float
+    scatter: float
+
+
 @dataclass(frozen=True, eq=False)
 class Confidence:
     """How sure a pose of p parameters is: standard deviations, in m and rad.
@@ -216,6 +233,7 @@ class TrackResult:
         observations: the evidence each camera gave.
         warnings: what the user should know about this frame, one line each.
         confidence: how sure the pose is, None without contour refinement.
+        limbs: per limb, how well it is tracked; empty without an estimate.
         exposure: per camera whose image came, its brightness relative to its background's, by
             channel.
     """
@@ -231,6 +249,7 @@ class TrackResult:
     observations: Mapping[str, Observation] = field(default_factory=dict, repr=False)
     warnings: tuple[str, ...] = ()
     confidence: Confidence | None = None
+    limbs: Mapping[str, LimbState] = field(default_factory=dict)
     exposure: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

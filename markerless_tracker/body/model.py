@@ -109,7 +109,12 @@ class BodyModel:
 
     @property
     def limbs(self) -> tuple[str, ...]:
-        """Subspaces of the limbs: the steps of hierarchy 'six' after root, torso and head."""
+        """Subspaces of the limbs: the steps of hierarchy 'six' after root, torso and head.
+
+        None where other hierarchies are declared, and 'six' is not.
+        """
+        if self.hierarchies and "six" not in self.hierarchies:
+            return ()
         return tuple(step[0] for step in self.steps("six")[2:])
 
     def steps(self, hierarchy: str) -> tuple[tuple[str, ...], ...]:

@@ -134,6 +134,7 @@ class ResultWriter:
                     "exposure": {name: list(gain) for name, gain in r.exposure.items()},
                     "parameters": None if r.pose is None else r.pose.tolist(),
                     **_confidence(r),
+                    **_limbs(r),
                 }
                 for r in self._results
             ],
@@ -150,6 +151,25 @@ def _confidence(result: TrackResult) -> dict[str, Any]:
         "parameters_sd": np.round(sure.pose_sd, 5).tolist(),
         "markers_sd_mm": dict(zip(MARKER_NAMES, in_mm, strict=True)),
     }
+
+
+def _limbs(result: TrackResult) -> dict[str, Any]:
+    """Per limb its state, the share of it inside the silhouettes, the scatter of its swarm."""
+    if not result.limbs:
+        return {}
+    limbs = {
+        name: {
+            "state": limb.state.value,
+            "share": _rounded(limb.share),
+            "scatter": _rounded(limb.scatter),
+        }
+        for name, limb in result.limbs.items()
+    }
+    return {"limbs": limbs}
+
+
+def _rounded(value: float) -> float | None:
+    return round(value, 3) if math.isfinite(value) else None
 
 
 def versions() -> dict[str, str]:

@@ -7,7 +7,7 @@ from threading import Lock
 import numpy as np
 
 from markerless_tracker.node.synchronizer import SyncCounts
-from markerless_tracker.records import TrackResult, TrackState
+from markerless_tracker.records import LimbState, TrackResult, TrackState
 
 WINDOW = 300
 """Frames over which latency and rate are taken."""
@@ -138,6 +138,9 @@ class TrackerStatus:
             for name in cameras:
                 gain = float(np.mean(exposure[name])) if name in exposure else None
                 values[f"exposure/{name}"] = _number(gain, 3)
+            limbs: Mapping[str, LimbState] = {} if result is None else result.limbs
+            lost = [name for name, limb in limbs.items() if limb.state is TrackState.LOST]
+            values["lost_limbs"] = ", ".join(lost)
             for name in cameras:
                 values[f"refused/{name}"] = str(self._refused[name])
             for name in cameras:

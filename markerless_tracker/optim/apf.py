@@ -82,6 +82,12 @@ class Apf(Optimizer):
         return self.best_x
 
     @property
+    def scatter(self) -> FloatArray:
+        """(d,) standard deviation of the last layer's particles, weighted."""
+        around = self._particles - self._weights @ self._particles
+        return np.asarray(np.sqrt(self._weights @ around**2))
+
+    @property
     def memory(self) -> Cloud:
         """Particles and weights of the last layer, relative to the estimate."""
         return Cloud(self._particles - self.estimate, self._weights)

@@ -44,6 +44,11 @@ class Optimizer(ABC):
         return self.best_x
 
     @property
+    def scatter(self) -> FloatArray:
+        """(d,) standard deviation of the particles, of their own bests if they keep any."""
+        return np.zeros_like(self.best_x)
+
+    @property
     def memory(self) -> Cloud | None:
         """What the next frame's search may go on from; None for most."""
         return None

@@ -148,6 +148,11 @@ class Mcpso(Optimizer):
         self._phi = 0.5
 
     @property
+    def scatter(self) -> FloatArray:
+        """(d,) standard deviation of all particles' own best positions, the master's included."""
+        return np.asarray(np.concatenate([self._subs.best, self._master.best]).std(axis=0))
+
+    @property
     def bars(self) -> FloatArray:
         """Own best cost of each particle that was asked for."""
         if self._iteration == 1:

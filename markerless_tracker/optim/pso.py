@@ -105,6 +105,11 @@ class Pso(Optimizer):
         self._iteration = 1
 
     @property
+    def scatter(self) -> FloatArray:
+        """(d,) standard deviation of the particles' own best positions."""
+        return np.asarray(self._swarm.best.std(axis=0))
+
+    @property
     def bars(self) -> FloatArray:
         """Each particle's own best cost."""
         return self._swarm.bars

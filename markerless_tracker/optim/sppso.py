@@ -107,6 +107,11 @@ class Sppso(Optimizer):
         self._next = 0
 
     @property
+    def scatter(self) -> FloatArray:
+        """(d,) standard deviation of the particles' own best positions."""
+        return np.asarray(self._best.std(axis=0))
+
+    @property
     def bars(self) -> FloatArray:
         """Each particle's own best cost; one that broke a constraint cannot win at all."""
         bars = self._best_costs[self._rows].copy()

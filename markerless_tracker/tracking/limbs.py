@@ -1,4 +1,8 @@
-"""A limb that is lost while the rest is tracked: it lies outside the silhouettes."""
+"""Limbs that are lost while the rest is tracked: which they are, and finding them again.
+
+A limb outside the silhouettes is seen to be lost. One that lies inside them and is wrong all the
+same is not, so all limbs take turns to be looked for elsewhere.
+"""
 
 from collections.abc import Mapping
 
@@ -7,32 +11,23 @@ from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.camera import CameraRig, project_camera
+from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
-from markerless_tracker.records import Observation
+from markerless_tracker.records import LimbState, Observation, TrackState
+from markerless_tracker.tracking.limb_search import other_limb
+from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.breeding import Breeder
 from markerless_tracker.tracking.start.population import FramePopulation
 
-LOST_BELOW = 0.55
-FOUND_ABOVE = 0.75
-"""Shares of a limb's axis inside the silhouettes, mean over the views."""
-GAIN = 0.002
-"""How much of f_s a limb found elsewhere must bring."""
-FEW_VIEWS = 3
-"""With so many views or fewer a limb may hide in the others' outlines: each is checked in turn."""
-CHECK_EVERY = 2
-"""Frames from one limb's turn to the next one's."""
-CHECK_GAIN = 0.0015
-"""How much of f_s a limb found elsewhere must bring if it did not look lost."""
-_DRAWS = 400
-_REFINED = 8
-_REFINE = (4, (0.12, 0.035))
+TURN_NS = 60_000_000
+"""A limb that is not lost is looked for elsewhere this often: every fourth frame at 60 frames/s."""
 _ALONG = np.linspace(0.1, 0.9, 5)
 
 
 class LimbWatch:
-    """Tells which limbs lie outside the silhouettes, and looks for those alone.
+    """Tells which limbs are lost, and looks for limbs alone: for lost ones, and for all in turn.
 
     Args:
         rig: the cameras.
@@ -43,49 +38,84 @@ class LimbWatch:
         self.reset()
 
     def reset(self) -> None:
-        """Forget which limbs are lost."""
-        self._lost: frozenset[str] = frozenset()
-        self._frames = 0
+        """Forget the limbs so far."""
+        self._tracks: dict[str, LimbTrack] = {}
+        self._turn = 0
+        self._turned_ns: int | None = None
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Limbs that were lost when last judged."""
+        return tuple(n for n, track in self._tracks.items() if track.state is TrackState.LOST)
+
+    def judge(
+        self,
+        body: BodyModel,
+        pose: FloatArray,
+        observations: Mapping[str, Observation],
+        scatter: FloatArray,
+    ) -> dict[str, LimbState]:
+        """By limb, its state at a pose (p,).
+
+        Args:
+            body: the body.
+            pose: the estimate.
+            observations: the silhouettes.
+            scatter: (p,) as in `FrameSearch`.
+        """
+        shares = limb_shares(body, pose, observations, self._rig)
+        states = {}
+        for name in body.limbs:
+            share = shares.get(name, float("nan"))
+            wide = float(np.sqrt(np.mean(scatter[body.subspaces[name]] ** 2)))
+            track = self._tracks.setdefault(name, LimbTrack())
+            state = track.note(share, wide) if name in shares else track.state
+            states[name] = LimbState(state, share, wide)
+        return states
 
     def mend(
         self,
         searcher: Searcher,
+        contours: ContourFrame,
         observations: Mapping[str, Observation],
         stamp_ns: int,
         pose: FloatArray,
     ) -> tuple[FloatArray, tuple[str, ...]]:
-        """The pose (p,) with lost limbs found again, and a line for each limb that gets lost."""
-        body = searcher.body
-        shares = limb_shares(body, pose, observations, self._rig)
-        lost = {
-            name
-            for name, share in shares.items()
-            if share < (FOUND_ABOVE if name in self._lost else LOST_BELOW)
-        }
-        notes = tuple(f"{name}: lost, looked for alone" for name in sorted(lost - self._lost))
-        self._lost = frozenset(lost)
-        checked = self._in_turn(tuple(shares)) if len(observations) <= FEW_VIEWS else None
-        gains = {**({checked: CHECK_GAIN} if checked else {}), **dict.fromkeys(lost, GAIN)}
-        if not gains:
-            return pose, notes
-        frame = FramePopulation(searcher, observations, stamp_ns, pose)
+        """Look for limbs that `judge` called lost, and for the one whose turn it is.
+
+        A limb is taken from elsewhere if f_s rises as clearly as a swarm's result must
+        (`swarm_gain`).
+
+        Returns:
+            The pose (p,), and the names of the limbs that were taken from elsewhere.
+        """
+        body, config = searcher.body, searcher.config
+        due = self._due(body, stamp_ns)
+        if not due:
+            return pose, ()
+        frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
         breeder = Breeder(body, searcher.limits)
         cost = float(frame.costs(pose[None])[0])
-        for name, gain in sorted(gains.items()):
-            rng = keyed_generator(searcher.config.seed, stamp_ns, f"lost {name}")
-            drawn = breeder.with_limb(pose, body.subspaces[name], _DRAWS, rng)
-            best = np.argsort(frame.costs(drawn), kind="stable")[:_REFINED]
-            tried = frame.refined(drawn[best], *_REFINE)
-            costs = frame.costs(tried)
-            if costs.min() < cost - gain:
-                pose, cost = tried[int(costs.argmin())], float(costs.min())
-        return pose, notes
+        found = []
+        for name in due:
+            rng = keyed_generator(config.seed, stamp_ns, f"{name} elsewhere")
+            other, other_cost = other_limb(frame, breeder, pose, body.subspaces[name], rng)
+            if other_cost < cost - config.swarm_gain:
+                pose, cost = other, other_cost
+                found.append(name)
+        return pose, tuple(found)
 
-    def _in_turn(self, limbs: tuple[str, ...]) -> str | None:
-        """The limb whose turn it is in this frame, if any's."""
-        self._frames += 1
-        turn, rest = divmod(self._frames, CHECK_EVERY)
-        return limbs[turn % len(limbs)] if limbs and rest == 0 else None
+    def _due(self, body: BodyModel, stamp_ns: int) -> list[str]:
+        """Limbs to look for: the lost ones, and at its turn another."""
+        if not body.limbs:
+            return []
+        lost = list(self.lost)
+        if self._turned_ns is not None and 0 <= stamp_ns - self._turned_ns < TURN_NS:
+            return lost
+        self._turned_ns = stamp_ns
+        name = body.limbs[self._turn % len(body.limbs)]
+        self._turn += 1
+        return lost if name in lost else [*lost, name]
 
 
 def limb_shares(

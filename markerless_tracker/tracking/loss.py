@@ -1,5 +1,6 @@
-"""Whether the body is still tracked: a pure test on how well the silhouettes agree."""
+"""Whether the body, or a limb, is still tracked: pure tests on how well the silhouettes agree."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -12,6 +13,11 @@ LOST_SHARE, REGAINED_SHARE = 0.75, 0.85
 """The same as shares of the overlap that this track usually has."""
 PATIENCE_NS = 100_000_000
 """How long a body may be lost before it is looked for anew."""
+LIMB_LOST_BELOW = 0.55
+LIMB_REGAINED_ABOVE = 0.75
+"""Shares of a limb's axis inside the silhouettes, mean over the views."""
+DISAGREEING = 1.5
+"""A swarm whose particles scatter by this much more than usual in the end does not agree."""
 _MEMORY = 0.05
 
 
@@ -41,6 +47,50 @@ def next_state(state: TrackState, overlap: float, usual: float = 0.0) -> TrackSt
     if overlap >= regained or (overlap >= lost and state is not TrackState.LOST):
         return TrackState.TRACKING
     return TrackState.LOST
+
+
+def next_limb_state(
+    state: TrackState, share: float, scatter: float = math.nan, usual: float = math.nan
+) -> TrackState:
+    """State of a limb after a frame.
+
+    A limb outside the silhouettes is lost, one inside them is tracked. In between the state stays,
+    but for a limb whose swarm does not agree where it is: that one is lost, too.
+
+    Args:
+        state: before the frame.
+        share: of the limb's axis, how much lies inside the silhouettes.
+        scatter: of the particles in the end, as a share of the spread that they began with; NaN
+            without a swarm.
+        usual: the scatter that this limb usually has, NaN if unknown.
+    """
+    if share >= LIMB_REGAINED_ABOVE:
+        return TrackState.TRACKING
+    disagreeing = scatter > DISAGREEING * usual
+    if share < LIMB_LOST_BELOW or disagreeing or state is TrackState.LOST:
+        return TrackState.LOST
+    return TrackState.TRACKING
+
+
+@dataclass
+class LimbTrack:
+    """What a limb's frames were like, for `next_limb_state`.
+
+    Attributes:
+        state: after the last frame.
+        usual: mean scatter of the tracked frames, recent ones counting more; NaN before the first.
+    """
+
+    state: TrackState = TrackState.TRACKING
+    usual: float = math.nan
+
+    def note(self, share: float, scatter: float) -> TrackState:
+        """Take a frame's share and scatter, see `next_limb_state`; returns the state after it."""
+        self.state = next_limb_state(self.state, share, scatter, self.usual)
+        if self.state is TrackState.TRACKING and math.isfinite(scatter):
+            known = math.isfinite(self.usual)
+            self.usual = self.usual + _MEMORY * (scatter - self.usual) if known else scatter
+        return self.state
 
 
 @dataclass

@@ -78,6 +78,8 @@ class FrameSearch:
     Attributes:
         pose: (p,) the estimate so far.
         evaluations, refinements: what was spent.
+        scatter: (p,) standard deviation of the particles in the end, as a share of the spread
+            that they began with, in the last swarm that varied a parameter; NaN without one.
     """
 
     def __init__(
@@ -91,6 +93,7 @@ class FrameSearch:
         self._predicted = predicted
         self.evaluations = 0
         self.refinements = 0
+        self.scatter = np.full(searcher.body.size, np.nan)
         self._searcher = searcher
         self._observations = observations
         self._stamp_ns = stamp_ns
@@ -156,6 +159,8 @@ class FrameSearch:
         optimizer = ALGORITHMS[stage.algorithm](problem, **stage.options)
         best = optimizer.run(evaluator, early=True)
         self.evaluations += optimizer.evaluations
+        with np.errstate(invalid="ignore", divide="ignore"):
+            self.scatter[stage.active] = optimizer.scatter / problem.sigma
         if optimizer.memory is not None:
             searcher.clouds[stage.name] = optimizer.memory
         return np.asarray(evaluator.poses(best[None])[0])

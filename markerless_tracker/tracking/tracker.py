@@ -226,12 +226,16 @@ class Tracker:
         search = self._searcher.frame(observations, stamp_ns, predicted)
         sigma = self.body.sigma * self._rate_factor(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
+        elsewhere: tuple[str, ...] = ()
         if self._mends:
-            search.pose, found = self._limbs.mend(
-                self._searcher, observations, stamp_ns, search.pose
+            search.pose, elsewhere = self._limbs.mend(
+                self._searcher, search.contours, observations, stamp_ns, search.pose
             )
-            notes += found
+            notes += tuple(f"{name}: found elsewhere" for name in elsewhere)
         result = self._conclude(search, stamp_ns, observations, notes + warnings)
+        # A limb found elsewhere has not moved there.
+        for name in elsewhere:
+            self._velocity_per_ns[self.body.subspaces[name]] = 0.0
         if self._fitting is not None and self.state is TrackState.TRACKING:
             self._fit_body(self._fitting, search)
         if self.config.search_again and self._track.given_up(stamp_ns):
@@ -346,6 +350,9 @@ class Tracker:
         self._velocity_per_ns = change / elapsed_ns if moving else np.zeros(change.size)
         self._pose = search.pose
         self._stamp_ns = stamp_ns
+        lost = self._limbs.lost
+        limbs = self._limbs.judge(self.body, search.pose, observations, search.scatter)
+        warnings += tuple(f"{name}: lost" for name in self._limbs.lost if name not in lost)
         shown = search.pose
         if self._smooth is not None:
             shown = np.clip(self._smooth(shown, stamp_ns), *self._searcher.limits)
@@ -361,6 +368,7 @@ class Tracker:
             observations=observations,
             warnings=warnings,
             confidence=self._confidence(search),
+            limbs=limbs,
         )
 
     def _confidence(self, search: FrameSearch) -> Confidence | None:

@@ -11,7 +11,7 @@ from markerless_tracker.body import MARKER_NAMES, load_body, read_subject
 from markerless_tracker.datasets import read_trc
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.evaluation.result import ResultWriter, versions
-from markerless_tracker.records import Confidence, Observation, TrackResult, TrackState
+from markerless_tracker.records import Confidence, LimbState, Observation, TrackResult, TrackState
 from markerless_tracker.tracking import TrackerConfig
 
 
@@ -191,3 +191,19 @@ def test_standard_deviations_stand_beside_the_pose(tmp_path, body, config):
     assert with_them["parameters_sd"] == [0.1] * body.size
     assert with_them["markers_sd_mm"]["LKnee"] == [12.3, 12.3, 12.3]
     assert "markers_sd_mm" not in without
+
+
+def test_each_limb_has_its_state_where_there_is_an_estimate(tmp_path, body, config):
+    limbs = {
+        "l_arm": LimbState(TrackState.LOST, 0.41239, float("nan")),
+        "r_arm": LimbState(TrackState.TRACKING, 1.0, 0.25),
+    }
+    with ResultWriter(tmp_path / "out", body, config, fps=60.0) as writer:
+        writer.add(result(0, limbs=limbs))
+        writer.add(result(1, None))
+    with_them, without = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["frames"]
+    assert with_them["limbs"] == {
+        "l_arm": {"state": "LOST", "share": 0.412, "scatter": None},
+        "r_arm": {"state": "TRACKING", "share": 1.0, "scatter": 0.25},
+    }
+    assert "limbs" not in without

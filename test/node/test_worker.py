@@ -13,7 +13,7 @@ from markerless_tracker.node.learning import Learning
 from markerless_tracker.node.status import TrackerStatus
 from markerless_tracker.node.synchronizer import Synchronizer
 from markerless_tracker.node.worker import FittedSet, Fitting, FitWorker, StartGate, one_line
-from markerless_tracker.records import TrackResult, TrackState
+from markerless_tracker.records import LimbState, TrackResult, TrackState
 
 FRAME_NS = 16_666_667
 KEYS = ("tracked", "dropped_before_start")
@@ -46,7 +46,11 @@ class FakeTracker:
         if self.error:
             raise self.error
         self.seen.append((stamp_ns, dict(views)))
-        return TrackResult(stamp_ns, self.state, np.zeros(3), np.zeros((15, 3)), 1.5, {"a": 0.5}, 7)
+        lost, fine = (LimbState(s, 0.5, 0.5) for s in (TrackState.LOST, TrackState.TRACKING))
+        return TrackResult(
+            stamp_ns, self.state, np.zeros(3), np.zeros((15, 3)), 1.5, {"a": 0.5}, 7,
+            limbs={"l_arm": lost, "r_arm": fine, "l_leg": lost},
+        )  # fmt: skip
 
     def reset(self) -> None:
         self.resets += 1
@@ -114,6 +118,7 @@ def test_sets_are_decoded_tracked_and_published_in_one_thread(bench: Bench) -> N
     values = bench.values()
     assert values["state"] == "TRACKING" and values["tracked"] == "1"
     assert values["agreement/a"] == "0.5000" and values["agreement/b"] == "nan"
+    assert values["lost_limbs"] == "l_arm, l_leg"
     assert float(values["latency_median_ms"]) >= 0.0
 
 

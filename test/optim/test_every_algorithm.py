@@ -68,6 +68,17 @@ def test_it_gets_nearer_to_the_minimum(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_particles_scatter_less_where_costs_tell_them_where_to_be(name):
+    """The first parameter decides the cost, the second does not matter at all."""
+    search = ALGORITHMS[name](
+        problem(d=2, particles=60, iterations=1 if name == "pf" else 6, sigma=0.3)
+    )
+    search.run(lambda x: 30.0 * (x[:, 0] - 1.8) ** 2)
+    assert search.scatter.shape == (2,)
+    assert 0.0 < search.scatter[0] < 0.7 * search.scatter[1]
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_the_same_seed_gives_the_same_bytes_and_another_another(name):
     """The minimum is inside: in a corner of the bounds two runs may end on the same point."""
 

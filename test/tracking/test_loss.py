@@ -5,10 +5,15 @@ import pytest
 from markerless_tracker.fitness import ViewTerms
 from markerless_tracker.records import TrackState
 from markerless_tracker.tracking.loss import (
+    DISAGREEING,
+    LIMB_LOST_BELOW,
+    LIMB_REGAINED_ABOVE,
     LOST_BELOW,
     PATIENCE_NS,
     REGAINED_ABOVE,
+    LimbTrack,
     Track,
+    next_limb_state,
     next_state,
     shared_overlap,
 )
@@ -74,3 +79,40 @@ def test_views_count_by_what_they_show() -> None:
     edge, nobody = ViewTerms(0.0, 0.0, 0.0, 3.0), ViewTerms(1.0, 0.0, 1.0, 0.0)
     assert shared_overlap([well, well, edge, nobody]) == pytest.approx(0.9, abs=1e-3)
     assert shared_overlap([nobody]) == 1.0
+
+
+LIMB_MIDDLE = 0.5 * (LIMB_LOST_BELOW + LIMB_REGAINED_ABOVE)
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("state", "share", "scatter", "expected"),
+    [
+        (TRACKING, LIMB_LOST_BELOW - 1e-9, 0.1, LOST),
+        (TRACKING, LIMB_LOST_BELOW, 0.1, TRACKING),
+        (TRACKING, LIMB_MIDDLE, 0.1 * DISAGREEING - 1e-9, TRACKING),
+        (TRACKING, LIMB_MIDDLE, 0.1 * DISAGREEING + 1e-9, LOST),
+        (TRACKING, LIMB_MIDDLE, NAN, TRACKING),
+        (TRACKING, LIMB_REGAINED_ABOVE, 9.0, TRACKING),
+        (LOST, LIMB_MIDDLE, 0.0, LOST),
+        (LOST, LIMB_REGAINED_ABOVE - 1e-9, 0.1, LOST),
+        (LOST, LIMB_REGAINED_ABOVE, 0.1, TRACKING),
+        (TRACKING, NAN, 0.1, TRACKING),
+    ],
+)
+def test_a_limbs_transitions(state, share, scatter, expected):
+    assert next_limb_state(state, share, scatter, usual=0.1) is expected
+
+
+def test_a_swarm_does_not_count_until_its_usual_scatter_is_known():
+    assert next_limb_state(TRACKING, LIMB_MIDDLE, 9.0) is TRACKING
+
+
+def test_a_limb_remembers_the_scatter_of_the_frames_that_were_tracked():
+    limb = LimbTrack()
+    assert limb.note(1.0, 0.1) is TRACKING and limb.usual == pytest.approx(0.1)
+    assert limb.note(1.0, NAN) is TRACKING and limb.usual == pytest.approx(0.1)
+    assert limb.note(0.9, 0.14) is TRACKING and limb.usual == pytest.approx(0.102)
+    assert limb.note(LIMB_MIDDLE, 0.2) is LOST and limb.usual == pytest.approx(0.102)
+    assert limb.note(LIMB_MIDDLE, 0.1) is LOST
+    assert limb.note(0.9, 0.1) is TRACKING and limb.usual < 0.102

@@ -283,3 +283,18 @@ def test_same_seed_same_bytes_with_any_threads(person, refinement) -> None:
     assert one.tobytes() == again.tobytes() == two.tobytes()
     other = searched(person, settings(refinement="none", seed=4)).pose
     assert other.tobytes() != searched(person, settings(refinement="none")).pose.tobytes()
+
+
+def test_scatter_is_that_of_the_last_swarm_that_varied_a_parameter(person) -> None:
+    config = settings()
+    root, body = sppso_stages(person.body, config, person.predicted, 0.5 * person.body.sigma)
+    limb = next(s for s in stages(person, config) if s.name == "l_arm")
+    alone = searched(person, config, (root,)).scatter
+    varied = np.zeros(person.body.size, dtype=bool)
+    varied[root.active] = True
+    assert np.isnan(alone[~varied]).all() and (alone[varied] > 0.0).all()
+    whole = searched(person, config, (root, body)).scatter
+    assert np.isfinite(whole).all()
+    both = searched(person, config, (root, body, limb)).scatter
+    changed = both != whole
+    assert changed[limb.active].all() and not np.delete(changed, limb.active).any()

@@ -7,6 +7,7 @@ is drawn on the same silhouette: so limbs change as wholes, and the good ones ar
 import numpy as np
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.start.postures import joint_spread, postures
 
@@ -56,30 +57,31 @@ class Breeder:
         return np.clip(out, self._limits[0], self._limits[1], out=out)
 
     def with_limb(
-        self,
-        pose: FloatArray,
-        limb: np.ndarray[tuple[int], np.dtype[np.int64]],
-        count: int,
-        rng: np.random.Generator,
+        self, pose: FloatArray, limb: IntArray, count: int, rng: np.random.Generator
     ) -> FloatArray:
-        """Poses (count, p): one with a limb's parameters drawn anew.
-
-        Every other one is drawn anywhere, the rest about the limb's known postures, which find a
-        hanging or swinging arm in a third of the draws.
-        """
+        """Poses (count, p): one with a limb's parameters drawn anew, all alike likely."""
+        low, high = self._low[limb], self._high[limb]
         out = np.tile(pose, (count, 1))
-        for number, child in enumerate(out):
-            if number % 2:
-                self._draw(child, limb, rng)
-            else:
-                usual = self._known[rng.integers(len(self._known))][limb]
-                child[limb] = usual + self._spread[limb] * rng.standard_normal(len(limb))
+        out[:, limb] = low + (high - low) * rng.random((count, len(limb)))
+        return out
+
+    def with_usual_limb(
+        self, pose: FloatArray, limb: IntArray, count: int, rng: np.random.Generator
+    ) -> FloatArray:
+        """Poses (count, p): one with a limb as people usually hold it."""
+        usual = np.tile(pose, (count, 1))
+        usual[:, limb] = self._body.neutral[limb]
+        return self.with_limb_near(usual, limb, 1.0, rng)
+
+    def with_limb_near(
+        self, poses: FloatArray, limb: IntArray, share: float, rng: np.random.Generator
+    ) -> FloatArray:
+        """Poses (n, p), each with its limb moved by a share of how far people's joints scatter."""
+        out = poses.copy()
+        out[:, limb] += share * self._spread[limb] * rng.standard_normal((len(poses), len(limb)))
         return np.clip(out, self._limits[0], self._limits[1], out=out)
 
-    def _draw(
-        self, child: FloatArray, limb: np.ndarray[tuple[int], np.dtype[np.int64]],
-        rng: np.random.Generator,
-    ) -> None:  # fmt: skip
+    def _draw(self, child: FloatArray, limb: IntArray, rng: np.random.Generator) -> None:
         low, high = self._low[limb], self._high[limb]
         child[limb] = low + (high - low) * rng.random(len(limb))
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.anatomy import heading, turned_by
+from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, keyed_generator, refine
@@ -64,6 +65,7 @@ class FramePopulation:
         observations: the evidence.
         stamp_ns: keys the draws, together with the seed.
         near: (p,) a pose whose root is about where the body is.
+        contours: the frame's contour evidence, if it was made already.
     """
 
     def __init__(
@@ -72,10 +74,12 @@ class FramePopulation:
         observations: Mapping[str, Observation],
         stamp_ns: int,
         near: FloatArray,
+        *,
+        contours: ContourFrame | None = None,
     ) -> None:
         self._searcher = searcher
         self._stamp_ns = stamp_ns
-        self.contours = searcher.frame(observations, stamp_ns, near).contours
+        self.contours = contours or searcher.frame(observations, stamp_ns, near).contours
         every = np.ones(len(searcher.body.cone_names), dtype=np.bool_)
         stage = Stage(
             name="start", algorithm=CONTOUR, active=np.arange(near.size), centre=near,
