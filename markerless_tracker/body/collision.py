@@ -22,6 +22,7 @@ from markerless_tracker.records import locked
 RULES = ("elliptic", "published", "none")
 MARGIN_M = 0.030
 _MOST_SPHERES = 20
+_NONE = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,15 +89,20 @@ class Feasibility:
         return self.around(np.arange(self.body.size), self.body.neutral)(poses)
 
     def around(
-        self, active: IntArray, centre: FloatArray
+        self, active: IntArray, centre: FloatArray, *, forgive: bool = False
     ) -> Callable[[FloatArray], NDArray[np.bool_]]:
         """The same test of points (n, d): values of some parameters, the others are at a centre.
 
         What the active parameters (d,) do not move is tested once, at the centre (p,).
+
+        Args:
+            active: (d,) the parameters that vary.
+            centre: (p,) values of the others.
+            forgive: leave out pairs of cones that inter-penetrate at the centre. For centres that
+                images speak for: there the sections are too wide, and would refuse every point.
         """
         body, spheres, pairs = self.body, self._spheres, self._pairs
         moves = moving_nodes(body, active)
-        either = moves[body.cone_node[pairs]].any(axis=1)
         nodes = transforms(body, centre)
         pose = np.array(centre, dtype=np.float64)
 
@@ -113,11 +119,21 @@ class Feasibility:
             )  # fmt: skip
             return out
 
+        if forgive:
+            pairs = _apart(lambda some: bool(test(centre[None, :0], _NONE, _NONE, some)[0]), pairs)
+        either = moves[body.cone_node[pairs]].any(axis=1)
         rest = np.setdiff1d(np.arange(body.size), active)
-        if not test(centre[None, rest], rest, np.empty(0, dtype=np.int64), pairs[~either])[0]:
+        if not test(centre[None, rest], rest, _NONE, pairs[~either])[0]:
             return lambda points: np.zeros(len(points), dtype=np.bool_)
         moving, touching = np.flatnonzero(moves), np.ascontiguousarray(pairs[either])
         return lambda points: test(points, active, moving, touching)
+
+
+def _apart(keeps: Callable[[IntArray], bool], pairs: IntArray) -> IntArray:
+    """Those of pairs (k, 2) that keep a rule."""
+    if keeps(pairs):
+        return pairs
+    return pairs[[keeps(pairs[k : k + 1]) for k in range(len(pairs))]]
 
 
 @kernel

@@ -152,7 +152,9 @@ class FrameSearch:
             sigma=stage.sigma[stage.active],
             particles=stage.particles,
             iterations=stage.iterations,
-            feasible=searcher.feasible.around(stage.active, stage.centre),
+            feasible=searcher.feasible.around(
+                stage.active, stage.centre, forgive=searcher.config.collision == "elliptic"
+            ),
             rng=keyed_generator(searcher.config.seed, self._stamp_ns, stage.name),
             memory=searcher.clouds.get(stage.name),
         )

@@ -12,7 +12,7 @@ from markerless_tracker.tracking.partitions import STAGES
 from markerless_tracker.tracking.partitions.sppso import translations
 from markerless_tracker.tracking.partitions.stage import swarm_stage
 
-LIMB_SWARM = (10, 5)
+LIMB_SWARM = (6, 4)
 """Particles and iterations of each limb's own swarm at a budget of 1000."""
 
 

@@ -206,3 +206,27 @@ def test_points_around_a_centre_are_tested_as_whole_poses_are(seed, part, rule) 
     poses = np.tile(centre, (20, 1))
     poses[:, active] = points
     np.testing.assert_array_equal(feasible.around(active, centre)(points), feasible(poses))
+
+
+def test_a_pair_that_inter_penetrates_at_the_centre_may_be_forgiven() -> None:
+    """An arm inside the belly, as images have it: it may stay there, the other arm may not go."""
+    rng = np.random.default_rng(1)
+    feasible = Feasibility(BODY, BODY.limits, "elliptic")
+    poses = BODY.neutral + 0.5 * rng.standard_normal((4000, BODY.size))
+    poses = np.clip(poses, *np.where(np.isfinite(BODY.limits), BODY.limits, [[-1.0], [1.0]]))
+    pairs = {}
+    for k, pair in enumerate(BODY.collisions):
+        alone = dataclasses.replace(BODY, collisions=BODY.collisions[k : k + 1])
+        pairs[tuple(pair)] = ~Feasibility(alone, BODY.limits, "elliptic")(poses)
+    left = [pair for pair in pairs if BODY.cone_names[pair[0]].startswith("l_f")][0]
+    others = np.any([hit for pair, hit in pairs.items() if pair != left], axis=0)
+    centre = poses[np.flatnonzero(pairs[left] & ~others)[0]]
+    every = np.arange(BODY.size)
+    assert not feasible(centre[None])[0]
+    assert feasible.around(every, centre, forgive=True)(centre[None])[0]
+    np.testing.assert_array_equal(feasible.around(every, centre, forgive=True)(poses), ~others)
+    # Nothing to forgive: the same test as without.
+    fine = poses[np.flatnonzero(feasible(poses))[0]]
+    np.testing.assert_array_equal(
+        feasible.around(every, fine, forgive=True)(poses), feasible(poses)
+    )

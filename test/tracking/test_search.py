@@ -226,7 +226,7 @@ def test_refinement_is_told_limits_beliefs_and_reach(person, monkeypatch) -> Non
 def test_what_was_spent_with_refinement(person) -> None:
     config = settings(evaluations=1000, refine_iterations=5)
     frame = searched(person, config)
-    assert (frame.evaluations, frame.refinements) == (400, 10)
+    assert (frame.evaluations, frame.refinements) == (200 + 4 * 24, 10)
 
 
 @pytest.mark.parametrize("dark", [["cam02"], list(RIG.names)])

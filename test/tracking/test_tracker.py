@@ -57,7 +57,7 @@ class TestFollowing:
 
     def test_refinement_says_what_it_spent(self, make_tracker, frames, refined_settings):
         result = make_tracker(refined_settings).step(frames[0].observations, 0)
-        assert (result.evaluations, result.refinements) == (400, 6)
+        assert (result.evaluations, result.refinements) == (200 + 4 * 24, 6)
 
     @pytest.mark.parametrize("update", ["iteration", "particle"])
     def test_both_updates_track(self, make_tracker, frames, swarm_settings, update):
