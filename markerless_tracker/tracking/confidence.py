@@ -18,7 +18,7 @@ from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Confidence
 
-MEASURED_M = 0.006
+MEASURED_M = 0.0055
 """Error, per axis, of a joint's centre in a body whose lengths were measured."""
 UNMEASURED_M = 0.015
 """The same with lengths that were fitted, or that are those of a stature."""
