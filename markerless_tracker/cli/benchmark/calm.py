@@ -1,7 +1,6 @@
 """`benchmark calm`: what the filter of the results takes from jitter and costs in time."""
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -9,13 +8,16 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.cli.benchmark.arguments import progress_bars
-from markerless_tracker.cli.benchmark.recordings import add_recordings, each
+from markerless_tracker.cli.benchmark.recordings import (
+    Report,
+    Row,
+    add_recordings,
+    measure_each,
+    print_json,
+)
 from markerless_tracker.cli.track import read_config
 from markerless_tracker.evaluation import calm
 from markerless_tracker.evaluation.judged import Beginning
-from markerless_tracker.evaluation.machine import machine
-from markerless_tracker.evaluation.result import versions
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
@@ -28,36 +30,20 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         "markerless_tracker benchmark calm STAND WALK",
     )
     add_recordings(parser, without="start and lengths from the first row of the truth")
-    parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status."""
     flags = {} if args.threads is None else {"threads": args.threads}
     config = read_config(args.config, flags)
-    statures = each(args.stature or (None,), args.sources, "--stature")
-    scales = each(args.scale, args.sources, "--scale")
-    rows = []
-    with progress_bars() as bars:
-        task = bars.add_task("reading", total=None)
-        for source, stature_m, scale in zip(args.sources, statures, scales, strict=True):
-            rows.append(
-                calm.measure_calm(
-                    source,
-                    config,
-                    beginning=Beginning(stature_m is None, stature_m),
-                    scale=scale,
-                    report=lambda part, done, total: bars.update(
-                        task, description=part, completed=done, total=total
-                    ),
-                )
-            )
+
+    def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:
+        beginning = Beginning(stature_m is None, stature_m)
+        return calm.measure_calm(source, config, beginning=beginning, scale=scale, report=report)
+
+    rows = measure_each(args, measure)
     if args.json:
-        table = {"machine": machine(), "versions": versions(), "rows": rows}
-        json.dump(table, sys.stdout, indent=2, allow_nan=False)
-        sys.stdout.write("\n")
+        print_json(rows)
         return 0
     console = Console(width=None if sys.stdout.isatty() else 150)
     console.print(_rendered(rows))

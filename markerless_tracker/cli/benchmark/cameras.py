@@ -1,7 +1,6 @@
 """`benchmark cameras`: the error with every choice of fewer cameras."""
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator
 from itertools import groupby
@@ -11,13 +10,17 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.cli.benchmark.arguments import count, list_of, progress_bars
-from markerless_tracker.cli.benchmark.recordings import add_recordings, each
+from markerless_tracker.cli.benchmark.arguments import count, list_of
+from markerless_tracker.cli.benchmark.recordings import (
+    Report,
+    Row,
+    add_recordings,
+    measure_each,
+    print_json,
+)
 from markerless_tracker.cli.track import read_config
 from markerless_tracker.evaluation import cameras
 from markerless_tracker.evaluation.judged import Beginning
-from markerless_tracker.evaluation.machine import machine
-from markerless_tracker.evaluation.result import versions
 from markerless_tracker.evaluation.runs import LOST_LIMB_MM
 
 _STARTS = ("measured", "automatic")
@@ -42,9 +45,6 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         f"told but --stature, judged after {cameras.SETTLED_FRAMES} frames (both)",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all draws (0)")
-    parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -58,28 +58,20 @@ def run(args: argparse.Namespace) -> int:
         return 1
     flags = {"seed": args.seed, **({} if args.threads is None else {"threads": args.threads})}
     config = read_config(args.config, flags)
-    statures = each(args.stature or (None,), args.sources, "--stature")
-    scales = each(args.scale, args.sources, "--scale")
-    rows = []
-    with progress_bars() as bars:
-        task = bars.add_task("reading", total=None)
-        for source, stature_m, scale in zip(args.sources, statures, scales, strict=True):
-            rows.append(
-                cameras.measure_cameras(
-                    source,
-                    config,
-                    beginnings=[Beginning(name == "measured", stature_m) for name in args.start],
-                    counts=args.each,
-                    scale=scale,
-                    report=lambda part, done, total: bars.update(
-                        task, description=part, completed=done, total=total
-                    ),
-                )
-            )
+
+    def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:
+        return cameras.measure_cameras(
+            source,
+            config,
+            beginnings=[Beginning(name == "measured", stature_m) for name in args.start],
+            counts=args.each,
+            scale=scale,
+            report=report,
+        )
+
+    rows = measure_each(args, measure)
     if args.json:
-        table = {"machine": machine(), "versions": versions(), "rows": rows}
-        json.dump(table, sys.stdout, indent=2, allow_nan=False)
-        sys.stdout.write("\n")
+        print_json(rows)
         return 0
     console = Console(width=None if sys.stdout.isatty() else 150)
     for row in rows:

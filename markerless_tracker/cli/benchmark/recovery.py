@@ -1,7 +1,6 @@
 """`benchmark recovery`: how soon the tracker is back after it saw nothing."""
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -9,12 +8,16 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.cli.benchmark.arguments import count, progress_bars
-from markerless_tracker.cli.benchmark.recordings import add_recordings, each
+from markerless_tracker.cli.benchmark.arguments import count
+from markerless_tracker.cli.benchmark.recordings import (
+    Report,
+    Row,
+    add_recordings,
+    measure_each,
+    print_json,
+)
 from markerless_tracker.cli.track import read_config
 from markerless_tracker.evaluation import recovery
-from markerless_tracker.evaluation.machine import machine
-from markerless_tracker.evaluation.result import versions
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
@@ -27,37 +30,21 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     )
     add_recordings(parser)
     parser.add_argument("--seeds", type=count, default=5, metavar="N", help="seeds 0..N-1 (5)")
-    parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status."""
     flags = {} if args.threads is None else {"threads": args.threads}
     config = read_config(args.config, flags)
-    statures = each(args.stature or (None,), args.sources, "--stature")
-    scales = each(args.scale, args.sources, "--scale")
-    rows = []
-    with progress_bars() as bars:
-        task = bars.add_task("reading", total=None)
-        for source, stature_m, scale in zip(args.sources, statures, scales, strict=True):
-            rows.append(
-                recovery.measure_recovery(
-                    source,
-                    config,
-                    stature_m=stature_m,
-                    scale=scale,
-                    seeds=args.seeds,
-                    progress=lambda part, done, total: bars.update(
-                        task, description=part, completed=done, total=total
-                    ),
-                )
-            )
+
+    def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:
+        return recovery.measure_recovery(
+            source, config, stature_m=stature_m, scale=scale, seeds=args.seeds, progress=report
+        )
+
+    rows = measure_each(args, measure)
     if args.json:
-        table = {"machine": machine(), "versions": versions(), "rows": rows}
-        json.dump(table, sys.stdout, indent=2, allow_nan=False)
-        sys.stdout.write("\n")
+        print_json(rows)
         return 0
     console = Console(width=None if sys.stdout.isatty() else 120)
     console.print(_rendered(rows))
