@@ -75,6 +75,7 @@ class BodyFit:
         """One damped Gauss-Newton step of lengths, sections and all poses.
 
         The poses are eliminated first (Schur complement): each meets the others only by the body.
+        Equations that cannot be solved change nothing.
 
         Args:
             reach_m: outline further than this from a silhouette's edge is an outlier.
@@ -88,6 +89,8 @@ class BodyFit:
             parts.append(eliminated(own, pull, body.size, hessian, slope))
         hessian[np.diag_indices_from(hessian)] *= 1.0 + _DAMPING
         step = solved(hessian, slope)
+        if not np.isfinite(step).all():
+            return
         split = len(self._lengths)
         step[:split] = np.clip(step[:split], -_LONGEST_STEP, _LONGEST_STEP)
         numbers = np.clip(self._numbers + step[split:], *self._sections.bounds)

@@ -101,6 +101,28 @@ def test_without_evidence_the_belief_stays(contours_of) -> None:
     np.testing.assert_allclose(fit.body.cone_shape, SIZES.of_stature(1.9).cone_shape, rtol=1e-9)
 
 
+def test_a_frame_without_silhouettes_says_nothing(contours_of) -> None:
+    pose = poses(0)[0]
+    away = pose.copy()
+    away[GENERIC.index("pelvis_tx")] = 500.0
+    fit = BodyFit(SIZES, GENERIC, SIZES.usual(None), LIMITS)
+    fit.add(contours_of(GENERIC, away, RIG, GENERIC), pose)
+    for _ in range(3):
+        fit.iterate(0.1)
+    np.testing.assert_allclose(SIZES.of(fit.body), SIZES.of(GENERIC), rtol=1e-6)
+    np.testing.assert_allclose(fit.poses[0, GENERIC.root], pose[GENERIC.root], atol=1e-6)
+
+
+def test_equations_that_are_not_finite_change_nothing(contours_of) -> None:
+    fit = BodyFit(SIZES, GENERIC, SIZES.usual(None), LIMITS)
+    pose = poses(0)[0]
+    frame = contours_of(GENERIC, pose, RIG, GENERIC)
+    fit.add(frame, np.where(np.arange(pose.size) == 3, np.nan, pose))
+    before = SIZES.of(fit.body)
+    fit.iterate(0.1)
+    np.testing.assert_array_equal(SIZES.of(fit.body), before)
+
+
 def test_a_told_stature_holds_the_lengths_back(contours_of) -> None:
     """Told 1.60 m of somebody of 1.80 m: the outlines win, but by less than if it was unknown."""
     true, moves = person(0), poses(0)[:2]
