@@ -7,10 +7,11 @@ fit to 1000 evaluations, whose work hardly differs between frames, is one of lea
 """
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -257,11 +258,11 @@ def _frames(
                     segmenters[name].observe(images[name], 0, regions[name])
 
                 taken = {
-                    "background": _seconds(lambda f=label: list(pool.map(f, segmenters))),  # type: ignore[misc]
-                    "edges": _seconds(lambda f=edges: list(pool.map(f, segmenters))),  # type: ignore[misc]
-                    "imaging": _seconds(lambda f=observe: list(pool.map(f, segmenters))),  # type: ignore[misc]
-                    "fitness": _seconds(lambda v=observed[i], s=stamp_ns: fit.step(v, s)),  # type: ignore[misc]
-                    "total": _seconds(lambda v=images, s=stamp_ns: whole.step(v, s)),  # type: ignore[misc]
+                    "background": _seconds(partial(_all, pool, label, segmenters)),
+                    "edges": _seconds(partial(_all, pool, edges, segmenters)),
+                    "imaging": _seconds(partial(_all, pool, observe, segmenters)),
+                    "fitness": _seconds(partial(fit.step, observed[i], stamp_ns)),
+                    "total": _seconds(partial(whole.step, images, stamp_ns)),
                 }
                 if i == 0:
                     thousand = _thousand(scene, fit.body, config)
@@ -322,6 +323,10 @@ def _observations(
         {name: s.observe(frame.images[name], frame.stamp_ns) for name, s in segmenters.items()}
         for frame in scene.frames
     ]
+
+
+def _all(pool: ThreadPoolExecutor, work: Callable[[str], None], names: Iterable[str]) -> None:
+    list(pool.map(work, names))
 
 
 def _seconds(work: Callable[[], Any]) -> float:

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from markerless_tracker.body import BodyModel, load_body
+from markerless_tracker.camera import CameraModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image, learn_background
 from markerless_tracker.records import Observation
-from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.synthesis import SyntheticScene, ring_rig
 from markerless_tracker.tracking import Tracker, TrackerConfig
 
 SWARM: Mapping[str, Any] = {
@@ -107,3 +109,21 @@ def make_tracker(scene, backgrounds) -> Callable[..., Tracker]:
         )
 
     return make
+
+
+@pytest.fixture(scope="module")
+def body() -> BodyModel:
+    return load_body("balan31", 1.75)
+
+
+@pytest.fixture(scope="module")
+def camera() -> CameraModel:
+    return ring_rig(1, (240, 180)).cameras[0]
+
+
+@pytest.fixture
+def pose(body) -> FloatArray:
+    """Standing on the floor."""
+    standing = body.neutral.copy()
+    standing[body.index("pelvis_tz")] = 0.95
+    return standing

@@ -6,11 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from markerless_tracker.body import load_body
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation, TrackState
-from markerless_tracker.synthesis import ring_rig
 from markerless_tracker.tracking.selection import (
     body_region,
     explained_in_region,
@@ -59,23 +57,6 @@ def test_the_pose_is_that_of_whole_images(
     if not things:
         assert all(sum(size == full for size in row) in (1, 2) for row in sizes[1:])
     assert any(size < full // 2 for row in sizes[1:] for size in row)
-
-
-@pytest.fixture(scope="module")
-def body():
-    return load_body("balan31", 1.75)
-
-
-@pytest.fixture(scope="module")
-def camera():
-    return ring_rig(1, (240, 180)).cameras[0]
-
-
-@pytest.fixture
-def pose(body):
-    standing = body.neutral.copy()
-    standing[body.index("pelvis_tz")] = 0.95
-    return standing
 
 
 def seen_in(mask, region: Region) -> Observation:

@@ -3,28 +3,10 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.body import load_body
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
 from markerless_tracker.tracking.selection import explained_part
-
-
-@pytest.fixture(scope="module")
-def body():
-    return load_body("balan31", 1.75)
-
-
-@pytest.fixture(scope="module")
-def camera():
-    return ring_rig(1, (240, 180)).cameras[0]
-
-
-@pytest.fixture
-def pose(body):
-    standing = body.neutral.copy()
-    standing[body.index("pelvis_tz")] = 0.95
-    return standing
 
 
 @pytest.fixture

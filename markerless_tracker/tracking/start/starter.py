@@ -7,6 +7,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.anatomy import turned_by
+from markerless_tracker.body.sizes import USUAL_STATURE_M
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.fitness.contours import ContourFrame
 from markerless_tracker.fitness.shape import fit_shape
@@ -26,7 +27,7 @@ STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
 """Statures that are tried for somebody unknown, in heights of the hull; raised arms make it
 higher than the person."""
 _STATURE_RANGE_M = (1.2, 2.1)
-_USUAL_STATURE_M, _STATURE_SD_M = 1.70, 0.10
+_STATURE_SD_M = 0.10
 _STATURE_BELIEF = 0.002
 """A stature one standard deviation from the usual one must raise f_s by this much more."""
 LEAST_FIT = 0.62
@@ -298,4 +299,4 @@ class Starter:
 
 def _unusual(stature_m: float) -> float:
     """What a stature costs for being unusual, in units of f_s."""
-    return _STATURE_BELIEF * ((stature_m - _USUAL_STATURE_M) / _STATURE_SD_M) ** 2
+    return _STATURE_BELIEF * ((stature_m - USUAL_STATURE_M) / _STATURE_SD_M) ** 2
