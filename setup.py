@@ -72,8 +72,8 @@ setup(
     entry_points={
         "console_scripts": [
             f"markerless_tracker = {NAME}.cli.main:main",
-            f"player = {NAME}.node.player_node:main",
-            f"tracker = {NAME}.node.tracker_node:main",
+            f"player = {NAME}.node.player.executable:main",
+            f"tracker = {NAME}.node.tracker.executable:main",
         ],
     },
     zip_safe=False,

@@ -13,9 +13,10 @@ SOURCE = Path(__file__).resolve().parent.parent / PACKAGE
 FLOORS = {
     "cli": 6,
     "node": 5,
-    "evaluation": 4,
-    "bags": 4,
-    "viewing": 4,
+    "benchmarks": 5,
+    "results": 4,
+    "bags": 5,
+    "viewing": 5,
     "tracking": 3,
     "fitness": 2,
     "datasets": 2,
@@ -29,7 +30,7 @@ FLOORS = {
 }
 GROUND = {"", "compiled", "geometry", "records", "errors", "resources", "settings"}
 CONFINED = {
-    "rosbags": ("bags/", "datasets/bag.py"),
+    "rosbags": ("bags/", "datasets/bag/"),
     "rclpy": ("node/",),
     "tf2_msgs": ("node/",),
     "sensor_msgs": ("node/",),
@@ -111,14 +112,14 @@ def test_imports_point_down(path: str) -> None:
     [
         ("optim/sppso.py", "from markerless_tracker.body import load_body"),
         ("camera/model.py", "from markerless_tracker import fitness"),
-        ("fitness/views.py", "def f():\n    import markerless_tracker.datasets.trc"),
-        ("tracking/tracker.py", "from ..node import tracker_node"),
+        ("fitness/views.py", "def f():\n    import markerless_tracker.datasets.markers.trc"),
+        ("tracking/tracker.py", "from ..node.tracker import executable"),
         ("tracking/tracker.py", "import rclpy.node"),
-        ("evaluation/score.py", "from rosbags.rosbag2 import Writer"),
+        ("results/score.py", "from rosbags.rosbag2 import Writer"),
         ("datasets/video.py", "import rosbags"),
         ("records.py", "import scipy"),
         ("geometry.py", "from markerless_tracker.camera import CameraModel"),
-        ("bags/write.py", "from markerless_tracker.evaluation import score"),
+        ("results/score.py", "from markerless_tracker.bags import write_bag"),
     ],
 )
 def test_a_fault_is_seen(path: str, source: str) -> None:
@@ -128,12 +129,12 @@ def test_a_fault_is_seen(path: str, source: str) -> None:
 @pytest.mark.parametrize(
     ("path", "source"),
     [
-        ("cli/track.py", "from markerless_tracker.node import tracker_node"),
+        ("cli/track.py", "from markerless_tracker.node.tracker import executable"),
         ("__main__.py", "from markerless_tracker.cli.main import main"),
         ("cli/main.py", "from markerless_tracker import __version__"),
         ("tracking/tracker.py", "from . import stages\nfrom .loss import lost"),
         ("fitness/views.py", "from ..camera.model import CameraRig\nimport numba"),
-        ("datasets/bag.py", "import rosbags.highlevel"),
+        ("datasets/bag/", "import rosbags.highlevel"),
         ("body/__init__.py", "from .markers import MARKER_NAMES"),
     ],
 )

@@ -16,8 +16,8 @@ from markerless_tracker import __version__
 NAME = "markerless_tracker"
 EXECUTABLES = {
     "markerless_tracker": "markerless_tracker.cli.main:main",
-    "player": "markerless_tracker.node.player_node:main",
-    "tracker": "markerless_tracker.node.tracker_node:main",
+    "player": "markerless_tracker.node.player.executable:main",
+    "tracker": "markerless_tracker.node.tracker.executable:main",
 }
 
 

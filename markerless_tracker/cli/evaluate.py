@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from markerless_tracker.datasets import read_trc
-from markerless_tracker.evaluation.score import Score, score
+from markerless_tracker.results.score import Score, score
 
 HELP = (
     "Compare two marker files, rows by their Time and markers by name, in mm. A missing Pelvis is "

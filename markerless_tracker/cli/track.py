@@ -15,9 +15,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from markerless_tracker.camera.calibration import write_calibration
 from markerless_tracker.datasets import Recording, open_recording
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.evaluation.result import ResultWriter
-from markerless_tracker.evaluation.run import recording_backgrounds, track_recording
 from markerless_tracker.records import TrackState
+from markerless_tracker.results.result import ResultWriter
+from markerless_tracker.results.run import recording_backgrounds, track_recording
 from markerless_tracker.tracking import OPTIMIZERS, PRESETS, TrackerConfig, build_tracker
 from markerless_tracker.tracking.camera_check import CameraCheck, Shift, corrected, describe
 from markerless_tracker.viewing.debug_images import DebugImages

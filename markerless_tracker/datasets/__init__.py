@@ -2,13 +2,13 @@
 
 from markerless_tracker.datasets.background import read_background, read_background_models
 from markerless_tracker.datasets.folder import FolderRecording
-from markerless_tracker.datasets.markers import MarkerTrack
+from markerless_tracker.datasets.markers.track import MarkerTrack
+from markerless_tracker.datasets.markers.trc import format_trc, read_trc, write_trc
 from markerless_tracker.datasets.pose2sim import Pose2SimRecording
-from markerless_tracker.datasets.rates import every_for_fps, stamp_of, tidy_fps
 from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.datasets.source import FORMATS, detect_format, open_recording
 from markerless_tracker.datasets.target import new_folder
-from markerless_tracker.datasets.trc import format_trc, read_trc, write_trc
+from markerless_tracker.datasets.video.rates import every_for_fps, stamp_of, tidy_fps
 from markerless_tracker.datasets.writer import (
     RecordingWriter,
     new_recording,

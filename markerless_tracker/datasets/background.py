@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.datasets.video import (
+from markerless_tracker.datasets.video.images import (
     IMAGE_SUFFIXES,
     VIDEO_SUFFIXES,
     numbered_files,
@@ -19,7 +19,7 @@ from markerless_tracker.imaging import (
     scale_background_model,
     scale_image,
 )
-from markerless_tracker.imaging.model_file import SUFFIX as MODEL_SUFFIX
+from markerless_tracker.imaging.background.model_file import SUFFIX as MODEL_SUFFIX
 
 # More empty images than this teach nothing new and would not fit memory at full size.
 MAX_FRAMES = 120

@@ -6,12 +6,17 @@ from pathlib import Path
 import numpy as np
 
 from markerless_tracker.camera import CameraRig, read_calibration
-from markerless_tracker.datasets.decode import read_together
-from markerless_tracker.datasets.markers import MarkerTrack
-from markerless_tracker.datasets.rates import stamp_of
+from markerless_tracker.datasets.markers.track import MarkerTrack
+from markerless_tracker.datasets.markers.trc import read_trc
 from markerless_tracker.datasets.recording import FrameSet, Recording
-from markerless_tracker.datasets.trc import read_trc
-from markerless_tracker.datasets.video import find_stream, numbered_files, open_stream, read_image
+from markerless_tracker.datasets.video.decode import read_together
+from markerless_tracker.datasets.video.images import (
+    find_stream,
+    numbered_files,
+    open_stream,
+    read_image,
+)
+from markerless_tracker.datasets.video.rates import stamp_of
 from markerless_tracker.errors import ConfigError, DatasetError, ImageError
 from markerless_tracker.imaging import Image, scale_image
 

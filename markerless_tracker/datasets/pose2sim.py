@@ -5,7 +5,7 @@ from pathlib import Path
 
 from markerless_tracker.camera import CameraModel, CameraRig, read_calibration, read_qca
 from markerless_tracker.datasets.folder import VideoRecording
-from markerless_tracker.datasets.video import (
+from markerless_tracker.datasets.video.images import (
     IMAGE_SUFFIXES,
     VIDEO_SUFFIXES,
     numbered_files,

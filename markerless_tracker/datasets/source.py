@@ -35,7 +35,7 @@ def open_recording(
     kind = format or detect_format(path)
     if kind == "bag":
         # rosbags and mcap take a moment to import; other formats do without.
-        from markerless_tracker.datasets.bag import BagRecording
+        from markerless_tracker.datasets.bag.recording import BagRecording
 
         return BagRecording(path, scale=scale)
     if kind == "folder":

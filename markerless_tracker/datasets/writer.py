@@ -10,10 +10,10 @@ import cv2
 
 from markerless_tracker.camera import CameraModel, CameraRig, write_calibration
 from markerless_tracker.datasets.folder import CALIBRATION
-from markerless_tracker.datasets.markers import MarkerTrack
+from markerless_tracker.datasets.markers.track import MarkerTrack
+from markerless_tracker.datasets.markers.trc import write_trc
 from markerless_tracker.datasets.recording import BACKGROUND
 from markerless_tracker.datasets.target import new_folder
-from markerless_tracker.datasets.trc import write_trc
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image, check_image
 

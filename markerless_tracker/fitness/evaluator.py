@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.fitness import kernels
 from markerless_tracker.fitness.arrays import Views, body_arrays, lay_out_views
-from markerless_tracker.fitness.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule
-from markerless_tracker.fitness.outline import make_outlines
-from markerless_tracker.fitness.still import Drawing, divide
+from markerless_tracker.fitness.raster import kernels
+from markerless_tracker.fitness.raster.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule
+from markerless_tracker.fitness.raster.outline import make_outlines
+from markerless_tracker.fitness.raster.static_layer import Drawing, divide
 from markerless_tracker.fitness.terms import OVERLAP, PROJECTED, CostRule, view_terms
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray

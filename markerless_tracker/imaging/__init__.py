@@ -1,13 +1,16 @@
 """From camera images to evidence: background, shadows, silhouette, edges."""
 
-from markerless_tracker.imaging.background import BackgroundModel, Mode, learn_background
+from markerless_tracker.imaging.background.model import BackgroundModel, Mode, learn_background
+from markerless_tracker.imaging.background.model_file import (
+    read_background_model,
+    write_background_model,
+)
+from markerless_tracker.imaging.background.model_scale import scale_background_model
+from markerless_tracker.imaging.background.plate import Plate, background_plate
+from markerless_tracker.imaging.background.recording import learn_from_recording
 from markerless_tracker.imaging.images import Image, check_image, scale_image
-from markerless_tracker.imaging.model_file import read_background_model, write_background_model
-from markerless_tracker.imaging.model_scale import scale_background_model
-from markerless_tracker.imaging.plate import Plate, background_plate
-from markerless_tracker.imaging.recording import learn_from_recording
 from markerless_tracker.imaging.region import Region
-from markerless_tracker.imaging.segmenter import Segmenter
+from markerless_tracker.imaging.segmentation.segmenter import Segmenter
 from markerless_tracker.imaging.settings import ImagingSettings
 
 __all__ = [

@@ -5,7 +5,7 @@ import numba
 import numpy as np
 
 from markerless_tracker.imaging.images import Image, grey_of
-from markerless_tracker.imaging.morphology import Mask
+from markerless_tracker.imaging.segmentation.morphology import Mask
 from markerless_tracker.imaging.settings import ImagingSettings
 
 

@@ -4,7 +4,7 @@ import os
 from types import TracebackType
 from typing import Any
 
-from markerless_tracker.node.ros import require_ros
+from markerless_tracker.node.ros.process import require_ros
 
 
 class StateWatch:
@@ -27,7 +27,7 @@ class StateWatch:
         from diagnostic_msgs.msg import DiagnosticArray
         from rclpy.executors import SingleThreadedExecutor
 
-        from markerless_tracker.node.qos import latched_qos
+        from markerless_tracker.node.ros.qos import latched_qos
 
         self._context = rclpy.Context()
         rclpy.init(args=[], context=self._context, domain_id=self._domain_id)

@@ -3,7 +3,7 @@
 from markerless_tracker.optim.apf import ESTIMATES, Apf
 from markerless_tracker.optim.base import Evaluate, Optimizer
 from markerless_tracker.optim.draws import keyed_generator
-from markerless_tracker.optim.levenberg import Prior, refine
+from markerless_tracker.optim.gauss_newton import Prior, refine
 from markerless_tracker.optim.mcpso import MASTER_TERMS, Mcpso, swarm_sizes
 from markerless_tracker.optim.pf import Pf
 from markerless_tracker.optim.problem import Cloud, Feasible, Problem, everything_feasible

@@ -26,9 +26,9 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.first_frame import StartMarkers, start_noise_m
-from markerless_tracker.tracking.fitting import Unmeasured
 from markerless_tracker.tracking.limits import joint_limits
+from markerless_tracker.tracking.person.body_fitting import Unmeasured
+from markerless_tracker.tracking.person.first_frame import StartMarkers, start_noise_m
 from markerless_tracker.tracking.tracker import Tracker
 
 

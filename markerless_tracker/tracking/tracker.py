@@ -10,23 +10,23 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import BodyModelError
-from markerless_tracker.fitness.contours import ContourFrame
+from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
 from markerless_tracker.records import Confidence, Observation, TrackResult, TrackState
 from markerless_tracker.tracking.confidence import confidence_of
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.evidence import EvidenceMaker
-from markerless_tracker.tracking.first_frame import StartMarkers, shape_of_first_frame
-from markerless_tracker.tracking.fitting import BodyFitting, Unmeasured
-from markerless_tracker.tracking.limbs import LimbWatch
+from markerless_tracker.tracking.evidence.gather import EvidenceMaker
+from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
+from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.loss import Track, shared_overlap
+from markerless_tracker.tracking.person.body_fitting import BodyFitting, Unmeasured
+from markerless_tracker.tracking.person.first_frame import StartMarkers, shape_of_first_frame
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.smoothing import OneEuro
 from markerless_tracker.tracking.stages import frame_stages
 from markerless_tracker.tracking.start.starter import Starter
-from markerless_tracker.tracking.views import ViewWatch, anybody
 
 TRAINING_RATE_HZ = 60.0
 """The published spreads are changes between frames at this rate."""

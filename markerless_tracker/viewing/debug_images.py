@@ -6,13 +6,12 @@ from pathlib import Path
 import cv2
 
 from markerless_tracker.body import BodyModel
-from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import FrameSet
-from markerless_tracker.drawing import draw_evidence
+from markerless_tracker.drawing.steps import draw_steps
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import Image, Segmenter
-from markerless_tracker.records import Observation, TrackResult
+from markerless_tracker.imaging import Segmenter
+from markerless_tracker.records import TrackResult
 
 
 class DebugImages:
@@ -57,34 +56,3 @@ class DebugImages:
                 raise DatasetError(f"{path.parent}: cannot be made: {error.strerror}") from error
             if not cv2.imwrite(str(path), picture):
                 raise DatasetError(f"{path}: cannot be written")
-
-
-def draw_steps(
-    image: Image,
-    observation: Observation,
-    camera: CameraModel,
-    body: BodyModel,
-    pose: FloatArray | None,
-    segmenter: Segmenter | None,
-) -> Image:
-    """All that was made of an image, side by side (h, 6 w, 3) BGR: see `draw_evidence`.
-
-    Args:
-        image: what the camera saw.
-        observation: what the tracker used of it.
-        camera: its camera.
-        body, pose: what the tracker found, None if nobody.
-        segmenter: what segmented the image; without one background and foreground are left out.
-
-    Raises:
-        ImageError: image or observation does not fit the camera.
-    """
-    return draw_evidence(
-        image,
-        observation,
-        camera,
-        body,
-        pose,
-        background=None if segmenter is None else segmenter.background.image,
-        labels=None if segmenter is None else segmenter.labels(image),
-    )

@@ -5,8 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
+from markerless_tracker.benchmarks.tables.papers import read_papers
 from markerless_tracker.cli.benchmark.layout import full_table, paper_table, printed
-from markerless_tracker.evaluation.papers import read_papers
 
 ROW = {
     "preset": "paper", "optimizer": "hmcpso", "body": "humaneva34", "refinement": "none",

@@ -12,7 +12,7 @@ import yaml
 from markerless_tracker.cli.main import main
 from markerless_tracker.cli.synthesize import synthesize
 from markerless_tracker.datasets import read_trc
-from markerless_tracker.evaluation.score import score
+from markerless_tracker.results.score import score
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 

@@ -18,13 +18,13 @@ from markerless_tracker.datasets import (
 from markerless_tracker.datasets.background import MAX_FRAMES
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.errors import DatasetError, ImageError
-from markerless_tracker.evaluation.run import recording_backgrounds
 from markerless_tracker.imaging import (
     BackgroundModel,
     ImagingSettings,
     Mode,
     write_background_model,
 )
+from markerless_tracker.results.run import recording_backgrounds
 
 IMAGE = np.full((48, 64, 3), 90, np.uint8)
 

@@ -9,7 +9,8 @@ import pytest
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.errors import ConfigError, ImageError
-from markerless_tracker.fitness import COSTS, EDGE_RULES, EDGE_TERMS, Fitness, kernels
+from markerless_tracker.fitness import COSTS, EDGE_RULES, EDGE_TERMS, Fitness
+from markerless_tracker.fitness.raster import kernels
 from markerless_tracker.geometry import rotation_from_rodrigues, transform
 from markerless_tracker.records import Observation, Stage
 

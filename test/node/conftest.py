@@ -33,7 +33,7 @@ os.environ["ROS_DOMAIN_ID"] = str(_domain())
 
 @pytest.fixture(scope="session", autouse=True)
 def _ros_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    from markerless_tracker.node.profile import apply_profile
+    from markerless_tracker.node.ros.profile import apply_profile
 
     old = dict(os.environ)
     os.environ["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("ros_log"))
@@ -107,7 +107,7 @@ def run_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 class Process:
     """An executable of this package as a process of its own."""
 
-    def __init__(self, module: str, log: Path, parameters: dict[str, Any]) -> None:
+    def __init__(self, node: str, log: Path, parameters: dict[str, Any]) -> None:
         arguments = ["--ros-args"]
         for name, value in parameters.items():
             text = str(value).lower() if isinstance(value, bool) else str(value)
@@ -115,7 +115,7 @@ class Process:
         self.log = log
         with log.open("wb") as sink:
             self._popen = subprocess.Popen(
-                [sys.executable, "-m", f"markerless_tracker.node.{module}", *arguments],
+                [sys.executable, "-m", f"markerless_tracker.node.{node}.executable", *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=sink,
                 stderr=subprocess.STDOUT,
@@ -150,9 +150,9 @@ class Process:
 def start(tmp_path: Path) -> Iterator[Callable[..., Process]]:
     started: list[Process] = []
 
-    def begin(module: str, **parameters: Any) -> Process:
+    def begin(node: str, **parameters: Any) -> Process:
         pytest.importorskip("rclpy", reason="ROS 2 is not installed")
-        process = Process(module, tmp_path / f"{module}{len(started)}.log", parameters)
+        process = Process(node, tmp_path / f"{node}{len(started)}.log", parameters)
         started.append(process)
         return process
 

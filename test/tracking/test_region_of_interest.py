@@ -9,7 +9,7 @@ import pytest
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation, TrackState
-from markerless_tracker.tracking.selection import (
+from markerless_tracker.tracking.evidence.selection import (
     body_region,
     explained_in_region,
     explained_part,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.errors import BodyModelError, CalibrationError, ImageError
-from markerless_tracker.fitness import contours
+from markerless_tracker.fitness.contour import frame as contours
 from markerless_tracker.imaging import Segmenter
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.tracking import Tracker, TrackerConfig

@@ -3,8 +3,8 @@
 import argparse
 
 from markerless_tracker.cli.benchmark import (
-    calm,
     cameras,
+    jitter,
     recovery,
     silhouettes,
     speed,
@@ -14,7 +14,7 @@ from markerless_tracker.cli.benchmark import (
 
 HELP = (
     "Measure accuracy (tables), fewer cameras (cameras), automatic starts (start), recovery, "
-    "jitter and lag (calm), silhouettes or speed (speed). "
+    "jitter and lag (jitter), silhouettes or speed (speed). "
     "Recordings have a ground_truth.trc: in tables its first row is the start and gives the "
     "lengths; its rows are the truth."
 )
@@ -27,7 +27,7 @@ _KINDS = {
     "start": start,
     "recovery": recovery,
     "cameras": cameras,
-    "calm": calm,
+    "jitter": jitter,
 }
 
 

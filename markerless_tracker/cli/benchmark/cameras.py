@@ -10,6 +10,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from markerless_tracker.benchmarks import cameras
+from markerless_tracker.benchmarks.judged import Beginning
+from markerless_tracker.benchmarks.tables.runs import LOST_LIMB_MM
 from markerless_tracker.cli.benchmark.arguments import count, list_of
 from markerless_tracker.cli.benchmark.recordings import (
     Report,
@@ -19,9 +22,6 @@ from markerless_tracker.cli.benchmark.recordings import (
     print_json,
 )
 from markerless_tracker.cli.track import read_config
-from markerless_tracker.evaluation import cameras
-from markerless_tracker.evaluation.judged import Beginning
-from markerless_tracker.evaluation.runs import LOST_LIMB_MM
 
 _STARTS = ("measured", "automatic")
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import yaml
 
+from markerless_tracker.benchmarks.tables.papers import PaperRow, PaperTable
 from markerless_tracker.cli.track import read_config
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.evaluation.papers import PaperRow, PaperTable
 from markerless_tracker.tracking import PRESETS, TrackerConfig
 
 

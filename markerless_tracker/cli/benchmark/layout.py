@@ -6,8 +6,8 @@ from typing import Any
 
 from rich.table import Table
 
-from markerless_tracker.evaluation.papers import PaperRow, PaperTable
-from markerless_tracker.evaluation.runs import LOST_LIMB_MM
+from markerless_tracker.benchmarks.tables.papers import PaperRow, PaperTable
+from markerless_tracker.benchmarks.tables.runs import LOST_LIMB_MM
 
 Row = Mapping[str, Any]
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+from markerless_tracker.benchmarks.machine import machine
 from markerless_tracker.cli.benchmark.arguments import list_of, positive, progress_bars
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.evaluation.machine import machine
-from markerless_tracker.evaluation.result import versions
+from markerless_tracker.results.result import versions
 
 T = TypeVar("T")
 Row = dict[str, Any]

@@ -51,9 +51,9 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
 def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status."""
     # Takes a moment to import; `--help` does without.
+    from markerless_tracker.benchmarks.silhouettes.masks import measure
+    from markerless_tracker.benchmarks.silhouettes.scene import made_up_scene, recorded_scene
     from markerless_tracker.datasets import write_image
-    from markerless_tracker.evaluation.silhouette_scene import made_up_scene, recorded_scene
-    from markerless_tracker.evaluation.silhouettes import measure
 
     config = read_config(args.config, {})
     results = []

@@ -37,8 +37,8 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
 def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status."""
     # Takes a moment to import; `--help` does without.
-    from markerless_tracker.evaluation.speed import measure
-    from markerless_tracker.evaluation.speed_scene import made_up_scene, recorded_scene
+    from markerless_tracker.benchmarks.speed.parts import measure
+    from markerless_tracker.benchmarks.speed.scene import made_up_scene, recorded_scene
 
     # The first frame fits the shape and is not timed.
     frames = args.frames + 1

@@ -8,6 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from markerless_tracker.benchmarks import starts
 from markerless_tracker.cli.benchmark.arguments import count
 from markerless_tracker.cli.benchmark.recordings import (
     Report,
@@ -17,7 +18,6 @@ from markerless_tracker.cli.benchmark.recordings import (
     print_json,
 )
 from markerless_tracker.cli.track import read_config
-from markerless_tracker.evaluation import starts
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:

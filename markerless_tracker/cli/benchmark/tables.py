@@ -10,6 +10,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from markerless_tracker.benchmarks.machine import machine, usable_cores
+from markerless_tracker.benchmarks.tables import accuracy
+from markerless_tracker.benchmarks.tables.papers import PaperRow, choose, read_papers
+from markerless_tracker.benchmarks.tables.plots import write_plot
+from markerless_tracker.benchmarks.tables.variants import variants
 from markerless_tracker.cli.benchmark.arguments import (
     count,
     list_of,
@@ -20,12 +25,7 @@ from markerless_tracker.cli.benchmark.arguments import (
 from markerless_tracker.cli.benchmark.choices import Group, every_config, groups, varied
 from markerless_tracker.cli.benchmark.layout import LEGEND, full_table, legend_of, paper_table
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.evaluation import tables
-from markerless_tracker.evaluation.machine import machine, usable_cores
-from markerless_tracker.evaluation.papers import PaperRow, choose, read_papers
-from markerless_tracker.evaluation.plots import write_plot
-from markerless_tracker.evaluation.result import versions
-from markerless_tracker.evaluation.variants import variants
+from markerless_tracker.results.result import versions
 from markerless_tracker.tracking import TrackerConfig
 
 
@@ -111,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
     """Make the tables, print and write them; returns the exit status."""
     chosen = groups(args, choose(read_papers(), args.table) if args.table else ())
     configs = every_config(chosen)
-    plan = tables.Plan(
+    plan = accuracy.Plan(
         configs=configs,
         rates=args.fps,
         seeds=args.seeds,
@@ -125,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         args.out.mkdir(parents=True, exist_ok=True)
     with _Bars() as bars:
-        rows = tables.make_table(args.sources, plan, store=args.out, progress=bars)
+        rows = accuracy.make_table(args.sources, plan, store=args.out, progress=bars)
     table = {
         "machine": machine(),
         "versions": versions(),
@@ -138,7 +138,7 @@ def run(args: argparse.Namespace) -> int:
     }
     parts = list(_pieces(args, chosen, configs, rows))
     if args.out is not None:
-        tables.write_table(args.out, table)
+        accuracy.write_table(args.out, table)
         _plot(args.out / "plots", parts)
     if args.json:
         json.dump(table, sys.stdout, indent=2, allow_nan=False)
@@ -227,7 +227,7 @@ def _pieces(
             yield f"{name}{size}, {seeds}{noise}", _Part(group, own)
 
 
-class _Bars(tables.Progress):
+class _Bars(accuracy.Progress):
     """Progress on standard error."""
 
     def __init__(self) -> None:

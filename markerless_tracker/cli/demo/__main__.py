@@ -21,7 +21,7 @@ from markerless_tracker.cli.demo.scene import Scene, made_up_scene, real_scene
 from markerless_tracker.datasets import open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.errors import DatasetError, TrackerError
-from markerless_tracker.node.ros import require_ros
+from markerless_tracker.node.ros.process import require_ros
 
 SLOW_RATE = 0.04
 """First try of a pace at which nothing is skipped: 2.4 sets a second of a 60 fps recording. The

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from markerless_tracker.cli.demo.processes import NodeError, NodeProcess
-from markerless_tracker.node.profile import apply_profile
+from markerless_tracker.node.ros.profile import apply_profile
 from markerless_tracker.node.watch import StateWatch
 
 READY_S = 240.0
@@ -78,7 +78,7 @@ def replay(
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     apply_profile()
     node = NodeProcess(
-        "markerless_tracker.node.tracker_node",
+        "markerless_tracker.node.tracker.executable",
         {**tracker, "result_file": result},
         log=log_dir / f"tracker_{result.name}.log",
         domain_id=domain_id,
@@ -86,7 +86,7 @@ def replay(
     with node, StateWatch(domain_id) as watch:
         _until_ready(node, watch, report)
         player = NodeProcess(
-            "markerless_tracker.node.player_node",
+            "markerless_tracker.node.player.executable",
             {"bag": bag, "rate": float(rate), "wait_for_subscribers": True},
             log=log_dir / f"player_{result.name}.log",
             domain_id=domain_id,

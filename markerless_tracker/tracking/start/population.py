@@ -7,15 +7,15 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.anatomy import heading, turned_by
-from markerless_tracker.fitness.contours import ContourFrame
-from markerless_tracker.fitness.shape import CORRELATION_M
+from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, keyed_generator, refine
 from markerless_tracker.records import CONTOUR, Observation, Stage
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.breeding import Breeder
 from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.postures import first_guesses
+from markerless_tracker.tracking.start.recombination import Breeder
 
 PER_QUARTER = 4
 """Poses that are kept of each quarter of the headings, seen from the best."""

@@ -1,0 +1,145 @@
+"""What the filter of the results does: how calm who stands becomes, how late who moves."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize_scalar
+
+from markerless_tracker.benchmarks.judged import Beginning, Report, judged, tracked_markers
+from markerless_tracker.body import MARKER_NAMES
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.results.score import MM_PER_M
+from markerless_tracker.tracking import TrackerConfig
+
+SLOW_S = 1.0
+"""What the mean over as much time shows is motion, what it leaves is jitter."""
+MOST_LAG = 8.0
+"""Lags are looked for up to so many frames."""
+FILTERS = ("none", "one_euro")
+
+Points = NDArray[np.float64]
+
+
+def measure_calm(
+    source: Path,
+    config: TrackerConfig,
+    *,
+    beginning: Beginning,
+    scale: float = 1.0,
+    report: Report | None = None,
+) -> dict[str, Any]:
+    """Track a recording with a `ground_truth.trc` without and with the filter.
+
+    Frames before the longest run of frames with a pose, or after it, are left out.
+
+    Returns:
+        `recording`, `start`, `scale`, `fps`, `frames`, `speed_m_s` (mean of the true markers) and
+        per filter (`none`, `one_euro`) `mean_mm`, `jitter_mm` (mean over the joints, see
+        `jitter_mm`), `worst_jitter_mm`, `worst_joint`, `lag_frames`, `worst_lag_frames` (of one
+        joint): behind the unfiltered track, see `lag_frames`.
+
+    Raises:
+        TrackerError: the recording cannot be read, has no truth, or nobody was tracked.
+    """
+    found: dict[str, Points] = {}
+    with judged(source, config, scale=scale, report=report) as recording:
+        for number, name in enumerate(FILTERS):
+            results, truth = recording.run(replace(config, smoothing=name), beginning)
+            found[name] = tracked_markers(results)
+            if report is not None:
+                report(f"runs on {recording.name}", number + 1, len(FILTERS))
+    kept = longest_whole(np.asarray(np.isfinite(found["none"]).all(axis=(1, 2))))
+    names = np.flatnonzero(np.isfinite(truth[kept]).all(axis=(0, 2)))
+    if kept.stop - kept.start < 4.0 * MOST_LAG or names.size == 0:
+        raise DatasetError(
+            f"{source}: tracked for {kept.stop - kept.start} frames in a row with "
+            f"{names.size} markers of the truth, expected {4.0 * MOST_LAG:g} frames or more"
+        )
+    true = truth[kept][:, names]
+    tracks = {name: points[kept][:, names] for name, points in found.items()}
+    window = max(3, round(SLOW_S * recording.fps))
+    return {
+        "recording": recording.name,
+        "source": str(source),
+        "start": beginning.name,
+        "scale": scale,
+        "fps": recording.fps,
+        "frames": len(true),
+        "speed_m_s": float(np.linalg.norm(np.diff(true, axis=0), axis=2).mean() * recording.fps),
+        **{
+            name: _figures(points, tracks["none"], true, window, names)
+            for name, points in tracks.items()
+        },
+    }
+
+
+def _figures(
+    points: Points, unfiltered: Points, true: Points, window: int, names: NDArray[np.int64]
+) -> Mapping[str, Any]:
+    each = jitter_mm(points - true, window)
+    worst = int(each.argmax())
+    joints = range(points.shape[1])
+    return {
+        "mean_mm": float(np.linalg.norm(points - true, axis=2).mean() * MM_PER_M),
+        "jitter_mm": float(each.mean()),
+        "worst_jitter_mm": float(each[worst]),
+        "worst_joint": MARKER_NAMES[int(names[worst])],
+        "lag_frames": lag_frames(points, unfiltered),
+        "worst_lag_frames": max(lag_frames(points[:, [j]], unfiltered[:, [j]]) for j in joints),
+    }
+
+
+def jitter_mm(points_m: Points, window: int) -> NDArray[np.float64]:
+    """Jitter (m,) of tracks (n, m, 3) in m: rms distance from their own slow motion, mm.
+
+    Given offsets from the truth, what the person really does is no jitter.
+
+    Args:
+        points_m: tracks, or their offsets from the truth.
+        window: frames over whose mean is slow, centred on each frame; fewer at the ends, as many
+            on both sides.
+    """
+    count = len(points_m)
+    sums = np.concatenate([np.zeros((1, *points_m.shape[1:])), np.cumsum(points_m, axis=0)])
+    index = np.arange(count)
+    half = np.minimum(window // 2, np.minimum(index, count - 1 - index))
+    widths = (2 * half + 1)[:, None, None]
+    quick = points_m - (sums[index + half + 1] - sums[index - half]) / widths
+    return np.asarray(np.sqrt((quick**2).sum(axis=2).mean(axis=0)) * MM_PER_M)
+
+
+def lag_frames(points: Points, reference: Points) -> float:
+    """By how many frames tracks (n, m, 3) are behind others: the shift with the least squares left.
+
+    A fraction counts (cubic interpolation); each coordinate's constant offset does not. Tracks that
+    run ahead are below 0.
+    """
+    count = len(points)
+    times = np.arange(count)
+    behind = CubicSpline(times, reference.reshape(count, -1))
+    kept = times[int(MOST_LAG) : count - int(MOST_LAG)]
+    flat = points.reshape(count, -1)[kept]
+
+    def left(shift: float) -> float:
+        gap = flat - behind(kept - shift)
+        return float(((gap - gap.mean(axis=0)) ** 2).sum())
+
+    found = minimize_scalar(
+        left, bounds=(-MOST_LAG, MOST_LAG), method="bounded", options={"xatol": 1e-3}
+    )
+    return float(found.x)
+
+
+def longest_whole(flags: NDArray[np.bool_]) -> slice:
+    """Where the longest run of true values in (n,) is; empty without any."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    if edges.size == 0:
+        return slice(0, 0)
+    starts, ends = edges[::2], edges[1::2]
+    longest = int((ends - starts).argmax())
+    return slice(int(starts[longest]), int(ends[longest]))

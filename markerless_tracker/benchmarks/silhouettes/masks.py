@@ -1,0 +1,244 @@
+"""How good silhouettes are: against exact masks, or against the body posed at the reference.
+
+Side by side with OpenCV's background subtractors MOG2 and KNN on the same frames. Those learn the
+same empty-scene images, do not learn on while judged, remove shadows their own way and get the
+same repairs afterwards (`imaging.morphology.clean_mask`), which they need. One thread each; times
+are image to repaired silhouette, without the edge map.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.benchmarks.machine import machine
+from markerless_tracker.benchmarks.silhouettes.scene import JudgedSet, SilhouetteScene
+from markerless_tracker.body import BodyModel
+from markerless_tracker.imaging import Image, ImagingSettings, Segmenter, learn_background
+from markerless_tracker.imaging.segmentation.morphology import clean_mask
+from markerless_tracker.records import Observation
+from markerless_tracker.results.result import versions
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.evidence.selection import explained_part
+
+LEAK_PX = 5
+"""False positives further than this from the exact mask count as leaked shadow."""
+
+Mask = NDArray[np.bool_]
+Judge = Callable[[Image], Mask]
+Picture = Callable[[str, int, Image], None]
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How a mask agrees with the exact one, each in 0..1 but `shadow_leak`, which may exceed 1."""
+
+    iou: float
+    precision: float
+    recall: float
+    shadow_leak: float
+
+
+def agreement(mask: Mask, exact: Mask) -> Agreement:
+    """Compare two masks (h, w); a share of nothing is 1, a leak beside nothing is 0."""
+    both = int((mask & exact).sum())
+    either = int((mask | exact).sum())
+    found, true = int(mask.sum()), int(exact.sum())
+    away = cv2.distanceTransform((~exact).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    # Without a single pixel of body there is no distance to it.
+    leaked = int((mask & (np.asarray(away) > LEAK_PX)).sum()) if true else found
+    return Agreement(
+        iou=both / either if either else 1.0,
+        precision=both / found if found else 1.0,
+        recall=both / true if true else 1.0,
+        shadow_leak=leaked / true if true else 0.0,
+    )
+
+
+@dataclass
+class _Tally:
+    """What one judge got, by camera."""
+
+    rows: dict[str, list[Agreement]] = field(default_factory=dict)
+    selected: dict[str, list[float]] = field(default_factory=dict)
+    ms: dict[str, list[float]] = field(default_factory=dict)
+
+    def mean(self, camera: str, key: str) -> float:
+        return float(np.mean([getattr(row, key) for row in self.rows[camera]]))
+
+    @property
+    def iou_mean(self) -> float:
+        return float(np.mean([self.mean(camera, "iou") for camera in self.rows]))
+
+    @property
+    def median_ms(self) -> float:
+        return float(np.median([value for values in self.ms.values() for value in values]))
+
+
+def measure(
+    scene: SilhouetteScene,
+    config: TrackerConfig | None = None,
+    *,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    picture: Picture | None = None,
+) -> dict[str, Any]:
+    """Judge silhouettes; keys as `benchmark silhouettes --json` prints them.
+
+    With exact masks `cameras` holds iou, precision, recall, shadow_leak and ms. Without them it
+    holds `overlap`, the IoU of the silhouette with the body posed at the reference,
+    `overlap_selected`, the same for the components that this body explains, and ms; and `body` says
+    whose sections were drawn. Means over the frames, ms their median.
+
+    Args:
+        scene: what is judged.
+        config: settings of the imaging and of the choice of components; defaults if None.
+        progress: told how many frames of how many are done.
+        picture: given camera, frame and a picture of every silhouette: false positives red, false
+            negatives blue, the rest of the silhouette green.
+
+    Raises:
+        TrackerError: the recording cannot be read, or its images do not fit its background.
+    """
+    config = config or TrackerConfig()
+    judges = {name: _judges(name, frames, config) for name, frames in scene.empty.items()}
+    tallies = {judge: _Tally() for judge in ("own", "mog2", "knn")}
+    with _one_thread():
+        for count, views in enumerate(scene.frames()):
+            for camera, exact in views.masks(scene.rig).items():
+                image = views.images[camera]
+                for judge, tally in tallies.items():
+                    mask, ms = _timed(judges[camera][judge], image)
+                    tally.rows.setdefault(camera, []).append(agreement(mask, exact))
+                    tally.ms.setdefault(camera, []).append(ms)
+                    if judge == "own":
+                        if not views.exact:
+                            selected = _selected(mask, scene, views, camera, config)
+                            tally.selected.setdefault(camera, []).append(
+                                agreement(selected, exact).iou
+                            )
+                        if picture is not None:
+                            picture(camera, views.index, draw_agreement(image, mask, exact))
+            progress(count + 1, scene.frame_count)
+    return _figures(scene, tallies)
+
+
+def _figures(scene: SilhouetteScene, tallies: Mapping[str, _Tally]) -> dict[str, Any]:
+    own = tallies["own"]
+    cameras: dict[str, dict[str, float]] = {}
+    for camera in own.rows:
+        ms = {"ms": float(np.median(own.ms[camera]))}
+        if scene.exact:
+            keys = ("iou", "precision", "recall", "shadow_leak")
+            cameras[camera] = {key: own.mean(camera, key) for key in keys} | ms
+        else:
+            cameras[camera] = {
+                "overlap": own.mean(camera, "iou"),
+                "overlap_selected": float(np.mean(own.selected[camera])),
+            } | ms
+    mean = "iou_mean" if scene.exact else "overlap_mean"
+    figures: dict[str, Any] = {
+        "recording": scene.name,
+        "machine": machine(),
+        "versions": versions(),
+        "image_size": list(scene.rig.cameras[0].size_px),
+        "frames": list(scene.indices),
+        "exact": scene.exact,
+        "cameras": cameras,
+        mean: own.iou_mean,
+        "ms": own.median_ms,
+        "opencv": {
+            name: {mean: tallies[name].iou_mean, "ms": tallies[name].median_ms}
+            for name in ("mog2", "knn")
+        },
+    }
+    if not scene.exact:
+        figures["overlap_selected_mean"] = float(
+            np.mean([values["overlap_selected"] for values in cameras.values()])
+        )
+        figures["body"] = {"name": scene.body.name, "radii_mm": radii_mm(scene.body)}
+    return figures
+
+
+def radii_mm(body: BodyModel) -> dict[str, list[float]]:
+    """Half axes of each cone's two ends in mm: x and y of the base, x and y of the tip."""
+    return {
+        name: [round(float(value) * 1000.0, 1) for value in shape[:, :2].ravel()]
+        for name, shape in zip(body.cone_names, body.cone_shape, strict=True)
+    }
+
+
+def draw_agreement(image: Image, mask: Mask, exact: Mask) -> Image:
+    """The image (h, w, 3), darkened, with the silhouette green, too much red, missing blue."""
+    colour = image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+    out = np.asarray(colour // 2, dtype=np.uint8)
+    out[mask & exact, 1] += np.uint8(90)
+    out[mask & ~exact] = (0, 0, 255)
+    out[exact & ~mask] = (255, 80, 0)
+    return out
+
+
+def _judges(camera: str, empty: list[Image], settings: ImagingSettings) -> dict[str, Judge]:
+    segmenter = Segmenter(camera, learn_background(empty, settings, camera=camera), settings)
+
+    def own(image: Image) -> Mask:
+        return segmenter.mask(image) > 0
+
+    judges: dict[str, Judge] = {"own": own}
+    for name, make in (
+        ("mog2", cv2.createBackgroundSubtractorMOG2),
+        ("knn", cv2.createBackgroundSubtractorKNN),
+    ):
+        judges[name] = _subtractor(make(history=max(len(empty), 2), detectShadows=True), empty,
+                                   settings)  # fmt: skip
+    # Compiles what is compiled at first use, and fills caches.
+    for judge in judges.values():
+        judge(empty[0])
+    return judges
+
+
+def _subtractor(model: Any, empty: list[Image], settings: ImagingSettings) -> Judge:
+    # One still says little to a model with a memory of many frames.
+    for image in empty * max(1, -(-10 // len(empty))):
+        model.apply(image)
+
+    def judge(image: Image) -> Mask:
+        labels = model.apply(image, learningRate=0.0)
+        mask = np.asarray(cv2.threshold(labels, 127, 255, cv2.THRESH_BINARY)[1], dtype=np.uint8)
+        return clean_mask(mask, settings) > 0
+
+    return judge
+
+
+def _selected(
+    mask: Mask, scene: SilhouetteScene, views: JudgedSet, camera: str, config: TrackerConfig
+) -> Mask:
+    assert views.pose is not None
+    nothing = np.zeros(mask.shape, dtype=np.uint8)
+    observation = Observation.from_mask(camera, 0, mask, nothing)
+    margin_px = config.component_margin_px
+    return explained_part(observation, scene.rig[camera], scene.body, views.pose, margin_px)[0].mask
+
+
+def _timed(judge: Judge, image: Image) -> tuple[Mask, float]:
+    """The mask, and the lesser of two times: the first run meets cold caches."""
+    times = []
+    for _ in range(2):
+        start = time.perf_counter()
+        mask = judge(image)
+        times.append((time.perf_counter() - start) * 1e3)
+    return mask, min(times)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(threads)

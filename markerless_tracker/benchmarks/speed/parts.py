@@ -1,0 +1,339 @@
+"""How fast each part is, against a fixed reference timed in between.
+
+Every figure is taken several times, the parts taking turns, so that a busy moment of the machine
+meets all of them. View-evaluations and refinement: the least of the repeats. Frames: the least of
+the repeats of each frame, then median and 95th percentile over the frames; the ratio of the whole
+fit to 1000 evaluations, whose work hardly differs between frames, is one of least times.
+"""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from markerless_tracker.benchmarks.machine import machine, usable_cores
+from markerless_tracker.benchmarks.speed.reference import ReferenceFitness
+from markerless_tracker.benchmarks.speed.scene import SpeedScene
+from markerless_tracker.body import BodyModel
+from markerless_tracker.fitness import Fitness
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.imaging import BackgroundModel, Segmenter, learn_background
+from markerless_tracker.imaging.edges import edge_map
+from markerless_tracker.optim import keyed_generator
+from markerless_tracker.records import Observation
+from markerless_tracker.results.result import versions
+from markerless_tracker.tracking import Tracker, TrackerConfig
+from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.stages import contour_stage, frame_stages
+
+THOUSAND = 1000
+_ALONE = {"body": "balan31", "refinement": "none", "fit_shape": False, "edge_weight": 1.0}
+SWARMS: Mapping[str, Mapping[str, Any]] = {
+    "sppso_1000": {"optimizer": "sppso", "evaluations": 1000},
+    "hmcpso_3600": {"optimizer": "hmcpso", "evaluations": 3600},
+    "hmcpso_3600_hard": {"optimizer": "hmcpso", "evaluations": 3600, "partition": "hard"},
+}
+"""Swarms alone whose time per frame is told, all with the published body."""
+_REFERENCE_POSES, _POSES = 16, 256
+_SHORT, _LONG = 2, 42
+_HARD = ("l_clavicle_x", "l_clavicle_y", "l_shoulder_x", "l_shoulder_y", "l_shoulder_z", "l_elbow")
+_ARM = {"limb": _HARD, "limb_soft": ("thorax_y", "thorax_z", *_HARD)}
+"""An arm alone, and with the torso's joint, as a hard and a soft partition vary it."""
+
+Report = Callable[[str, int, int], None]
+
+
+def measure(
+    scene: SpeedScene,
+    *,
+    threads: int = 0,
+    repeats: int = 5,
+    progress: Report = lambda part, done, total: None,
+) -> dict[str, Any]:
+    """Time everything on a scene; keys as `benchmark speed --json` prints them.
+
+    Args:
+        scene: images and a start.
+        threads: of fitness, search and imaging; 0 = one per core. View-evaluations use one.
+        repeats: how often each figure is taken.
+        progress: told the part and how far it is.
+
+    Raises:
+        TrackerError: the scene does not fit its rig or start.
+    """
+    threads = threads or usable_cores()
+    tuned = TrackerConfig.from_mapping({"threads": threads})
+    swarms = {
+        name: TrackerConfig.from_mapping({**_ALONE, **settings, "threads": threads})
+        for name, settings in SWARMS.items()
+    }
+    backgrounds = {name: learn_background(images, tuned) for name, images in scene.empty.items()}
+    observed = _observations(scene, tuned, backgrounds)
+    views = _view_evaluations(scene, observed[0], repeats, progress)
+    swarm = {
+        name: _spread(_swarm(scene, config, observed, repeats, progress, name))
+        for name, config in swarms.items()
+    }
+    refine, contours = _refinement(scene, tuned, observed[0], repeats, progress)
+    frames = _frames(scene, tuned, backgrounds, observed, repeats, progress)
+    fit, thousand = np.array(frames["fitness"]), np.array(frames["thousand"])
+    return {
+        "machine": machine(),
+        "versions": versions(),
+        "threads": threads,
+        "source": scene.name,
+        "frames": len(scene.frames),
+        "image_size": list(scene.rig.cameras[0].size_px),
+        "cameras": len(scene.rig),
+        "view_evaluation_us": views,
+        "reference_ratio": views["reference"] / views["full"],
+        "limb_ratio": views["limb"] / views["full"],
+        "limb_soft_ratio": views["limb_soft"] / views["full"],
+        "person31_ratio": views["person31"] / views["full"],
+        "swarm_ms": swarm,
+        "swarm_ratio": {
+            name: figures["median"] / swarm["sppso_1000"]["median"]
+            for name, figures in swarm.items()
+            if name != "sppso_1000"
+        },
+        "refine_ms": refine,
+        "refine_setup_ms": contours,
+        "frame_ms": {
+            key: _spread(frames[key])
+            for key in ("background", "edges", "imaging", "fitness", "total")
+        },
+        "thousand_evaluations_ms": _spread(thousand),
+        "fit_vs_1000_evaluations": float(fit.min() / thousand.min()),
+    }
+
+
+def scattered(body: BodyModel, pose: FloatArray, count: int) -> FloatArray:
+    """Poses (count, p) with the published spreads around one; always the same."""
+    rng = keyed_generator(0, 0, "speed")
+    return pose + body.sigma * rng.standard_normal((count, body.size))
+
+
+def _view_evaluations(
+    scene: SpeedScene, observations: Mapping[str, Observation], repeats: int, progress: Report
+) -> dict[str, float]:
+    """µs per pose and view on one thread, kinematics, silhouettes and edges included."""
+    timed: dict[str, tuple[Callable[[FloatArray], Any], FloatArray]] = {}
+    views = len(scene.rig)
+    for key, name in (("full", "balan31"), ("person31", "person31")):
+        body = scene.body(name)
+        pose = scene.pose(body)
+        config = TrackerConfig.from_mapping({"body": name, "refinement": "none"})
+        fitness = _fitness(scene, body, config, threads=1)
+        seen = fitness.lay_out(observations)
+        poses = scattered(body, pose, _POSES)
+        # The swarm's second stage: every parameter, every cone.
+        stage = replace(frame_stages(body, config, pose, body.sigma)[-1], edge_weight=1.0)
+        timed[key] = (fitness.prepare(seen, stage), poses)
+        if key != "full":
+            continue
+        reference = ReferenceFitness(
+            body, scene.rig.cameras, observations, pose, spacing_px=config.edge_spacing_px
+        )
+        timed["reference"] = (reference, scattered(body, pose, _REFERENCE_POSES))
+        for part, active in _ARM.items():
+            indices = np.sort([body.index(parameter) for parameter in active])
+            limb = fitness.prepare(seen, replace(stage, active=indices))
+            timed[part] = (limb, np.ascontiguousarray(poses[:, indices]))
+    best = dict.fromkeys(timed, np.inf)
+    for turn in range(repeats + 1):
+        for key, (evaluate, poses) in timed.items():
+            seconds = _seconds(lambda e=evaluate, p=poses: e(p))  # type: ignore[misc]
+            # The first turn compiles.
+            if turn:
+                best[key] = min(best[key], seconds / (len(poses) * views) * 1e6)
+        progress("view-evaluations", turn + 1, repeats + 1)
+    return best
+
+
+def _swarm(
+    scene: SpeedScene,
+    config: TrackerConfig,
+    observed: Sequence[Mapping[str, Observation]],
+    repeats: int,
+    progress: Report,
+    name: str,
+) -> FloatArray:
+    """ms of fitness and swarm per frame (n,): the evidence is ready, the pose is found."""
+    body = scene.body(config.body)
+    with _searcher(scene, body, config) as searcher:
+        best = np.full(len(observed), np.inf)
+        for turn in range(repeats + 1):
+            pose = scene.pose(body)
+            for i, observations in enumerate(observed):
+                stages = frame_stages(body, config, pose, body.sigma)
+                started = time.perf_counter()
+                search = searcher.frame(observations, scene.frames[i].stamp_ns, pose)
+                pose = search.run(stages)
+                if turn:
+                    best[i] = min(best[i], (time.perf_counter() - started) * 1e3)
+            progress(f"swarm {name}", turn + 1, repeats + 1)
+    return best
+
+
+def _refinement(
+    scene: SpeedScene,
+    config: TrackerConfig,
+    observations: Mapping[str, Observation],
+    repeats: int,
+    progress: Report,
+) -> tuple[float, float]:
+    """ms of one iteration of contour refinement, and of preparing a frame's contours."""
+    body = scene.body(config.body)
+    pose = scene.pose(body)
+    stamp_ns = scene.frames[0].stamp_ns
+    stage = contour_stage("align", body, config, pose, body.sigma)
+    best = {_SHORT: np.inf, _LONG: np.inf}
+    setup = np.inf
+    with _searcher(scene, body, config) as searcher:
+        for turn in range(2 * repeats + 1):
+            search = searcher.frame(observations, stamp_ns, pose)
+            seconds = _seconds(lambda s=search: s.contours)  # type: ignore[misc]
+            if turn:
+                setup = min(setup, seconds)
+            for iterations in best:
+                search.pose = pose
+                stages = (replace(stage, iterations=iterations),)
+                seconds = _seconds(lambda s=search, st=stages: s.run(st))  # type: ignore[misc]
+                if turn:
+                    best[iterations] = min(best[iterations], seconds)
+            progress("refinement", turn + 1, 2 * repeats + 1)
+    # What both share, two evaluations, falls out.
+    return (best[_LONG] - best[_SHORT]) / (_LONG - _SHORT) * 1e3, setup * 1e3
+
+
+def _frames(
+    scene: SpeedScene,
+    config: TrackerConfig,
+    backgrounds: Mapping[str, BackgroundModel],
+    observed: Sequence[Mapping[str, Observation]],
+    repeats: int,
+    progress: Report,
+) -> dict[str, FloatArray]:
+    """ms per frame (n - 1,) of each part; the first frame, which fits the shape, is left out.
+
+    background: labels, shadows, repair; edges: the edge maps; imaging: both and their packing, as
+    the tracker has it done; all three around the body of the frame before, as while tracking.
+    fitness: from evidence to pose; total: images to pose; thousand: as many evaluations of the same
+    body on the same threads.
+    """
+    whole = _tracker(scene, config, backgrounds)
+    fit = _tracker(scene, config, {})
+    segmenters = {n: Segmenter(n, backgrounds[n], config) for n in backgrounds}
+    names = ("background", "edges", "imaging", "fitness", "total", "thousand")
+    best = {name: np.full(len(observed), np.inf) for name in names}
+    with ThreadPoolExecutor(max_workers=min(config.threads, len(segmenters))) as pool:
+        whole.warm_up()
+        fit.warm_up()
+        for turn in range(repeats):
+            whole.reset()
+            fit.reset()
+            for i, frame in enumerate(scene.frames):
+                images, stamp_ns = frame.images, frame.stamp_ns
+                masks: dict[str, Any] = {}
+
+                regions = whole.regions(stamp_ns)
+
+                def label(
+                    name: str, images: Any = images, masks: Any = masks, regions: Any = regions
+                ) -> None:
+                    masks[name] = segmenters[name].mask(images[name], regions[name])
+
+                def edges(
+                    name: str, images: Any = images, masks: Any = masks, regions: Any = regions
+                ) -> None:
+                    part = regions[name].slices if regions[name] else np.s_[:, :]
+                    edge_map(images[name][part], masks[name], config)
+
+                def observe(name: str, images: Any = images, regions: Any = regions) -> None:
+                    segmenters[name].observe(images[name], 0, regions[name])
+
+                taken = {
+                    "background": _seconds(partial(_all, pool, label, segmenters)),
+                    "edges": _seconds(partial(_all, pool, edges, segmenters)),
+                    "imaging": _seconds(partial(_all, pool, observe, segmenters)),
+                    "fitness": _seconds(partial(fit.step, observed[i], stamp_ns)),
+                    "total": _seconds(partial(whole.step, images, stamp_ns)),
+                }
+                if i == 0:
+                    thousand = _thousand(scene, fit.body, config)
+                taken["thousand"] = thousand(observed[i])
+                for name, seconds in taken.items():
+                    best[name][i] = min(best[name][i], seconds * 1e3)
+                progress("frames", turn * len(observed) + i + 1, repeats * len(observed))
+    return {name: values[1:] for name, values in best.items()}
+
+
+def _thousand(
+    scene: SpeedScene, body: BodyModel, config: TrackerConfig
+) -> Callable[[Mapping[str, Observation]], float]:
+    """Seconds that 1000 evaluations of a body take on a frame's evidence."""
+    fitness = _fitness(scene, body, config, threads=config.threads)
+    poses = scattered(body, scene.pose(body), THOUSAND)
+    every = np.ones(len(body.cone_names), dtype=np.bool_)
+
+    def run(observations: Mapping[str, Observation]) -> float:
+        views = fitness.lay_out(observations)
+        return _seconds(lambda: fitness.count(views, poses, every, every))
+
+    return run
+
+
+def _fitness(scene: SpeedScene, body: BodyModel, config: TrackerConfig, *, threads: int) -> Fitness:
+    return Fitness(
+        body,
+        scene.rig.cameras,
+        threads=threads,
+        edge_rule=config.edge_rule,
+        edge_term=config.edge_term,
+        edge_spacing_px=config.edge_spacing_px,
+        edge_step_px=config.edge_step_px,
+    )
+
+
+@contextmanager
+def _searcher(scene: SpeedScene, body: BodyModel, config: TrackerConfig) -> Iterator[Searcher]:
+    with ThreadPoolExecutor(max_workers=min(config.threads, len(scene.rig))) as pool:
+        yield Searcher(
+            scene.rig, body, config, limits=body.limits, threads=config.threads, mapper=pool.map
+        )
+
+
+def _tracker(
+    scene: SpeedScene, config: TrackerConfig, backgrounds: Mapping[str, BackgroundModel]
+) -> Tracker:
+    body = scene.body(config.body)
+    return Tracker(scene.rig, body, config, start_pose=scene.pose(body), backgrounds=backgrounds)
+
+
+def _observations(
+    scene: SpeedScene, config: TrackerConfig, backgrounds: Mapping[str, BackgroundModel]
+) -> list[dict[str, Observation]]:
+    segmenters = {name: Segmenter(name, backgrounds[name], config) for name in scene.rig.names}
+    return [
+        {name: s.observe(frame.images[name], frame.stamp_ns) for name, s in segmenters.items()}
+        for frame in scene.frames
+    ]
+
+
+def _all(pool: ThreadPoolExecutor, work: Callable[[str], None], names: Iterable[str]) -> None:
+    list(pool.map(work, names))
+
+
+def _seconds(work: Callable[[], Any]) -> float:
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started
+
+
+def _spread(values: FloatArray) -> dict[str, float]:
+    return {"median": float(np.median(values)), "p95": float(np.percentile(values, 95))}

@@ -1,0 +1,170 @@
+"""A recording's evidence, made once and read by many runs, in other processes too.
+
+Decoding and segmenting do not depend on body, seed or search, and cost more than either. The
+observations that `Tracker.step` would make are written to plain files, which the runs map into
+memory: a run fed with them gives the same numbers as one fed with the images.
+"""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.datasets import FrameSet, Recording, open_recording
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.imaging import ImagingSettings, Segmenter
+from markerless_tracker.records import Observation, locked
+from markerless_tracker.results.run import recording_backgrounds
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Observations of one recording under one set of imaging settings.
+
+    Attributes:
+        folder: where the files lie; whoever made it removes it.
+        rig: the cameras, scaled as the images were.
+        every: frames of the recording from one stored set to the next.
+        stamps_ns: one per stored set.
+    """
+
+    folder: Path
+    rig: CameraRig
+    every: int
+    stamps_ns: tuple[int, ...]
+
+    def frames(self, *, every: int) -> Iterator[tuple[int, dict[str, Observation]]]:
+        """Stamp (ns) and observations by camera, of every `every`-th frame of the recording.
+
+        Raises:
+            DatasetError: `every` is no multiple of what is stored.
+        """
+        if every < 1 or every % self.every:
+            raise DatasetError(
+                f"every {every}th frame was asked for, every {self.every}th has evidence"
+            )
+        count = len(self.stamps_ns)
+        masks, edges = {}, {}
+        for camera in self.rig:
+            width, height = camera.size_px
+            mask, edge = _files(self.folder, camera.name)
+            masks[camera.name] = np.memmap(
+                mask, np.uint64, "r", shape=(count, height, (width + 63) // 64)
+            )
+            edges[camera.name] = np.memmap(edge, np.uint8, "r", shape=(count, height, width))
+        for row in range(0, count, every // self.every):
+            stamp_ns = self.stamps_ns[row]
+            yield (
+                stamp_ns,
+                {
+                    camera.name: Observation(
+                        camera.name,
+                        stamp_ns,
+                        camera.size_px,
+                        (0, 0),
+                        locked(np.asarray(masks[camera.name][row]), np.uint64),
+                        locked(np.asarray(edges[camera.name][row]), np.uint8),
+                    )
+                    for camera in self.rig
+                },
+            )
+
+
+@dataclass(frozen=True)
+class EvidenceOrder:
+    """Which evidence to make, as a value that may travel to another machine.
+
+    Attributes:
+        source: the recording.
+        scale: factor for its images.
+        settings: of the imaging.
+        start, every, frames: as for `make_evidence`.
+    """
+
+    source: Path
+    scale: float
+    settings: ImagingSettings
+    start: int
+    every: int
+    frames: int | None
+
+    def make(
+        self,
+        folder: Path,
+        *,
+        recording: Recording | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> Evidence:
+        """Make it in an existing, empty folder; the recording is opened unless it is given.
+
+        Raises:
+            TrackerError: as `make_evidence`, or there is no such recording.
+        """
+        return make_evidence(
+            recording or open_recording(self.source, scale=self.scale),
+            self.settings,
+            folder,
+            start=self.start,
+            every=self.every,
+            frames=self.frames,
+            progress=progress,
+        )
+
+
+def make_evidence(
+    recording: Recording,
+    settings: ImagingSettings,
+    folder: Path,
+    *,
+    start: int = 0,
+    every: int = 1,
+    frames: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Evidence:
+    """Segment a recording into a folder (1.1 bytes per pixel, camera and frame).
+
+    Args:
+        recording: the images.
+        settings: of the imaging.
+        folder: an existing, empty folder.
+        start: first frame.
+        every: keep every k-th frame from there on.
+        frames: stop before this many frames (of the recording, not of those kept) are exceeded.
+        progress: called with the number of sets stored so far.
+
+    Raises:
+        TrackerError: the recording cannot be read, or an image does not fit its background.
+    """
+    backgrounds = recording_backgrounds(recording, settings)
+    segmenters = {name: Segmenter(name, backgrounds[name], settings) for name in backgrounds}
+    stamps: list[int] = []
+    with ExitStack() as stack:
+        pool = stack.enter_context(ThreadPoolExecutor(max_workers=len(segmenters)))
+        files = {
+            name: tuple(stack.enter_context(path.open("wb")) for path in _files(folder, name))
+            for name in segmenters
+        }
+
+        def observe(item: tuple[str, FrameSet]) -> None:
+            name, views = item
+            observation = segmenters[name].observe(views.images[name], views.stamp_ns)
+            mask, edges = files[name]
+            mask.write(observation.mask_words.tobytes())
+            edges.write(observation.edges.tobytes())
+
+        for views in recording.frames(start=start, every=every):
+            if frames is not None and views.index - start >= frames:
+                break
+            list(pool.map(observe, [(name, views) for name in segmenters]))
+            stamps.append(views.stamp_ns)
+            if progress is not None:
+                progress(len(stamps))
+    return Evidence(folder, recording.rig, every, tuple(stamps))
+
+
+def _files(folder: Path, camera: str) -> tuple[Path, Path]:
+    return folder / f"{camera}.mask", folder / f"{camera}.edges"

@@ -1,0 +1,73 @@
+"""How well the truth itself explains the images, next to what a search found."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.body import BodyModel, pose_from_markers
+from markerless_tracker.datasets import MarkerTrack
+from markerless_tracker.fitness import Fitness
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import TrackResult
+from markerless_tracker.results.score import match_rows
+from markerless_tracker.tracking import Tracker
+
+
+class TruthScore:
+    """Compares f at the reference's pose with f at a result's, frame by frame.
+
+    f is what the search maximises: the mean over the views of f_s + edge_weight f_e, both poses
+    with the tracked body. Negative differences mean that the model prefers a wrong pose; positive
+    ones that the search missed a better pose. A lost tracker may score above the truth as well, so
+    the difference is read together with the error.
+
+    Args:
+        tracker: the tracker whose results are compared.
+        reference: true markers; rows are taken by time.
+        stamps_ns: (n,) the stamps of all results to come, in order.
+    """
+
+    def __init__(
+        self, tracker: Tracker, reference: MarkerTrack, stamps_ns: NDArray[np.int64]
+    ) -> None:
+        self._tracker = tracker
+        self._reference = reference.with_pelvis()
+        blank = np.full((len(stamps_ns), 1, 3), np.nan)
+        rows, of = match_rows(MarkerTrack(("none",), stamps_ns, blank), self._reference)
+        self._row = {int(stamps_ns[r]): int(k) for r, k in zip(rows, of, strict=True)}
+        self._fitness: Fitness | None = None
+        self.differences: list[float] = []
+
+    def add(self, result: TrackResult) -> None:
+        """Take the newest result; frames without a reference or an estimate are left out."""
+        row = self._row.get(result.stamp_ns)
+        if row is None or result.pose is None:
+            return
+        markers_m = dict(zip(self._reference.names, self._reference.positions_m[row], strict=True))
+        if not all(np.isfinite(markers_m[name]).all() for name in ("LHip", "RHip", "Neck")):
+            return
+        truth = pose_from_markers(self._tracker.body, markers_m)
+        self.differences.append(self._f(truth, result) - self._f(result.pose, result))
+
+    @property
+    def mean(self) -> float:
+        """Mean of f(truth) - f(result) over the frames; NaN without any."""
+        return float(np.mean(self.differences)) if self.differences else float("nan")
+
+    def _f(self, pose: FloatArray, result: TrackResult) -> float:
+        fitness = self._fitness_of(self._tracker.body)
+        terms = fitness.terms(fitness.lay_out(result.observations), pose).values()
+        weight = self._tracker.config.edge_weight
+        return float(np.mean([t.silhouette + weight * t.edges for t in terms]))
+
+    def _fitness_of(self, body: BodyModel) -> Fitness:
+        if self._fitness is None or self._fitness.body is not body:
+            config = self._tracker.config
+            self._fitness = Fitness(
+                body,
+                self._tracker.rig.cameras,
+                edge_rule=config.edge_rule,
+                edge_term=config.edge_term,
+                edge_spacing_px=config.edge_spacing_px,
+                edge_step_px=config.edge_step_px,
+            )
+        return self._fitness

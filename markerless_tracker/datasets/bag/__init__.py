@@ -1,0 +1,4 @@
+"""Reading MCAP bags (rosbag2) without ROS.
+
+Messages in file order, image encodings, camera infos.
+"""

@@ -1,0 +1,279 @@
+"""Bags (rosbag2, MCAP): a rig's images as topics, `calibration.toml` and `background/` beside."""
+
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from rosbags.typesys import Stores, get_typestore
+
+from markerless_tracker.camera import CameraRig, read_calibration
+from markerless_tracker.datasets.bag.calibration import rig_from_messages
+from markerless_tracker.datasets.bag.encodings import decode_compressed, decode_raw
+from markerless_tracker.datasets.bag.stream import McapFiles, RawMessage
+from markerless_tracker.datasets.recording import FrameSet, Recording
+from markerless_tracker.datasets.video.rates import tidy_fps
+from markerless_tracker.errors import DatasetError, ImageError
+from markerless_tracker.imaging import Image, scale_image
+
+RAW_TYPE = "sensor_msgs/msg/Image"
+COMPRESSED_TYPE = "sensor_msgs/msg/CompressedImage"
+INFO_TYPE = "sensor_msgs/msg/CameraInfo"
+TF_TYPE = "tf2_msgs/msg/TFMessage"
+# Sets looked at to learn the rate.
+RATE_SETS = 30
+# Stamps that may wait for their other cameras, so that a silent camera cannot fill the memory.
+MAX_PENDING = 32
+LONE_SET_FPS = 60.0
+
+
+class BagRecording(Recording):
+    """A bag with the images of a rig on `NAME/image_raw` or `NAME/image_raw/compressed`.
+
+    Images of one stamp (of their headers) make a set; incomplete sets are skipped and counted in
+    `warnings`. Of a cut or damaged file everything before the damage is read. `frame_count` is an
+    upper bound unless the file is damaged. Without a `calibration.toml` beside it, the rig comes
+    from `NAME/camera_info` and `/tf_static`.
+
+    Args:
+        path: the bag's folder, or its `.mcap`.
+        scale: factor for all images.
+
+    Raises:
+        DatasetError: not a bag of this kind, topics are missing, or no set is complete.
+        CalibrationError: the calibration is missing or malformed.
+    """
+
+    def __init__(self, path: Path, *, scale: float = 1.0) -> None:
+        folder = path if path.is_dir() else path.parent
+        self._files = McapFiles(_mcap_files(path))
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        if self._files.counts is None:
+            for _ in self._files:  # a damaged bag tells its topics only while it is read
+                pass
+        calibration = folder / "calibration.toml"
+        if calibration.is_file():
+            rig = read_calibration(calibration)
+            names: tuple[str, ...] = rig.names
+        else:
+            names = self._cameras_with_images(path)
+            rig = self._rig_from_topics(path, names)
+        self._topics = {self._image_topic(path, name): name for name in names}
+        self._incomplete: Counter[str] = Counter()
+        self._late: Counter[str] = Counter()
+        stamps = [stamp for stamp, _ in islice(self._sets(path), RATE_SETS)]
+        if not stamps:
+            raise DatasetError(
+                f"{path}: no set of images is complete, expected one image of each of "
+                f"{', '.join(names)} with the same stamp"
+            )
+        super().__init__(folder, rig, scale=scale, fps=_rate(stamps), frame_count=self._count(path))
+        self._stored_rig = rig
+        self._where = path
+        if len(stamps) == 1:
+            self.warn(f"{self.name}: holds one set only, its rate is taken as {LONE_SET_FPS:g} fps")
+        if self._files.damage:
+            self.warn(self._files.damage)
+        elif self._files.counts is None:
+            self.warn(f"{self.name}: the file has no index, it was read through to find its topics")
+
+    def _read(self, start: int, every: int) -> Iterator[FrameSet]:
+        self._incomplete.clear()
+        self._late.clear()
+        with ThreadPoolExecutor(len(self.rig), thread_name_prefix="decode") as pool:
+            for index, (stamp, messages) in enumerate(self._sets(self._where)):
+                if index >= start and (index - start) % every == 0:
+                    images = pool.map(self._image, messages.values())
+                    yield FrameSet(index, stamp, dict(zip(self.rig.names, images, strict=True)))
+        if self._incomplete:
+            self.warn(
+                f"{self.name}: sets lacking a camera were skipped "
+                f"(missing: {_counts(self._incomplete)})"
+            )
+        if self._late:
+            self.warn(
+                f"{self.name}: images that came after later ones were skipped "
+                f"({_counts(self._late)})"
+            )
+        if self._files.damage:
+            self.warn(self._files.damage)
+
+    def _nearest(self, stamp_ns: int) -> tuple[int, int]:
+        best = (0, 0)
+        for index, (stamp, _) in enumerate(self._sets(self._where)):
+            if index == 0 or abs(stamp - stamp_ns) < abs(best[1] - stamp_ns):
+                best = (index, stamp)
+            if stamp >= stamp_ns:
+                break
+        return best
+
+    def _sets(self, path: Path) -> Iterator[tuple[int, dict[str, RawMessage]]]:
+        """Complete sets by increasing stamp; `_incomplete` counts who was missing in others."""
+        pending: dict[int, dict[str, RawMessage]] = {}
+        done = None
+        for message in self._files:
+            name = self._topics.get(message.topic)
+            if name is None:
+                continue
+            stamp = _stamp(message, path)
+            if done is not None and stamp <= done:
+                self._late[name] += 1
+                continue
+            pending.setdefault(stamp, {})[name] = message
+            if len(pending[stamp]) == len(self._topics):
+                complete = pending.pop(stamp)
+                for earlier in [other for other in pending if other < stamp]:
+                    self._drop(pending.pop(earlier))
+                done = stamp
+                yield stamp, {camera: complete[camera] for camera in self._topics.values()}
+            elif len(pending) > MAX_PENDING:
+                done = min(pending)
+                self._drop(pending.pop(done))
+        for rest in pending.values():
+            self._drop(rest)
+
+    def _drop(self, messages: dict[str, RawMessage]) -> None:
+        self._incomplete.update(name for name in self._topics.values() if name not in messages)
+
+    def _image(self, message: RawMessage) -> Image:
+        name = self._topics[message.topic]
+        where = f"{self.name}: {message.topic}"
+        content = self._decoded(message)
+        if message.type == RAW_TYPE:
+            image = decode_raw(
+                content.data,
+                encoding=content.encoding,
+                width=content.width,
+                height=content.height,
+                step=content.step,
+                where=where,
+            )
+        else:
+            image = decode_compressed(content.data, where=where)
+        stored = self._stored_rig[name].size_px
+        if (image.shape[1], image.shape[0]) != stored:
+            raise ImageError(
+                f"{where}: an image of {image.shape[1]}x{image.shape[0]} px, "
+                f"expected {stored[0]}x{stored[1]} px as {name} is calibrated"
+            )
+        return scale_image(image, self.rig[name].size_px)
+
+    def _decoded(self, message: RawMessage) -> Any:
+        try:
+            return self._store.deserialize_cdr(message.data, message.type)
+        except Exception as error:  # hostile bytes raise whatever they like
+            raise DatasetError(
+                f"{self._files.paths[0]}: {message.topic}: a message cannot be decoded as "
+                f"{message.type}"
+            ) from error
+
+    def _image_topic(self, path: Path, name: str) -> str:
+        for suffix, kind in (("image_raw", RAW_TYPE), ("image_raw/compressed", COMPRESSED_TYPE)):
+            for topic, found in self._files.types.items():
+                if found == kind and f"/{topic.strip('/')}".endswith(f"/{name}/{suffix}"):
+                    return topic
+        raise DatasetError(
+            f"{path}: no images of {name}, expected the topic /{name}/image_raw ({RAW_TYPE}) or "
+            f"/{name}/image_raw/compressed; the bag has {self._listed()}"
+        )
+
+    def _cameras_with_images(self, path: Path) -> tuple[str, ...]:
+        names = []
+        for topic, kind in self._files.types.items():
+            parts = topic.strip("/").removesuffix("/compressed").split("/")
+            if kind in (RAW_TYPE, COMPRESSED_TYPE) and len(parts) > 1 and parts[-1] == "image_raw":
+                names.append(parts[-2])
+        if not names:
+            raise DatasetError(
+                f"{path}: no images, expected topics NAME/image_raw ({RAW_TYPE}) or "
+                f"NAME/image_raw/compressed; the bag has {self._listed()}"
+            )
+        return tuple(sorted(set(names)))
+
+    def _rig_from_topics(self, path: Path, names: tuple[str, ...]) -> CameraRig:
+        infos: dict[str, Any] = {}
+        transforms: list[Any] = []
+        for message in self._files:
+            parts = message.topic.strip("/").split("/")
+            if message.type == TF_TYPE and parts[-1] == "tf_static":
+                transforms.extend(self._decoded(message).transforms)
+            elif message.type == INFO_TYPE and parts[-1] == "camera_info" and parts[-2:-1]:
+                if parts[-2] in names:
+                    infos.setdefault(parts[-2], self._decoded(message))
+        missing = [name for name in names if name not in infos]
+        if missing:
+            raise DatasetError(
+                f"{path}: no calibration of {', '.join(missing)}, expected calibration.toml beside "
+                f"the bag or the topic /{missing[0]}/camera_info; the bag has {self._listed()}"
+            )
+        return rig_from_messages({name: infos[name] for name in names}, transforms, where=str(path))
+
+    def _listed(self) -> str:
+        topics = ", ".join(f"{topic} ({kind})" for topic, kind in self._files.types.items())
+        damage = f"; {self._files.damage}" if self._files.damage else ""
+        return (topics or "no topics") + damage
+
+    def _count(self, path: Path) -> int:
+        if self._files.counts is not None:
+            return min(self._files.counts[topic] for topic in self._topics)
+        return sum(1 for _ in self._sets(path))
+
+
+def _mcap_files(path: Path) -> list[Path]:
+    if path.is_file():
+        return [path]
+    metadata = path / "metadata.yaml"
+    if metadata.is_file():
+        try:
+            content = yaml.safe_load(metadata.read_text(encoding="utf-8"))
+            information = content["rosbag2_bagfile_information"]
+            storage = information["storage_identifier"]
+            files = [path / str(name) for name in information["relative_file_paths"]]
+            packed = information.get("compression_mode") or "none"
+        except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
+            raise DatasetError(f"{metadata}: not a rosbag2 description: {_line(error)}") from error
+        if storage != "mcap":
+            raise DatasetError(
+                f"{path}: stored as {storage}, expected mcap (`ros2 bag convert` makes one)"
+            )
+        if str(packed).lower() in ("file", "message"):
+            raise DatasetError(
+                f"{path}: compressed by {packed}, expected none or compression inside the MCAP"
+            )
+        if not files:
+            raise DatasetError(f"{metadata}: names no file")
+        return files
+    files = sorted(path.glob("*.mcap"))
+    if not files:
+        raise DatasetError(f"{path}: no bag, expected a metadata.yaml or a .mcap file")
+    return files
+
+
+def _counts(counter: Counter[str]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in sorted(counter.items()))
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _stamp(message: RawMessage, path: Path) -> int:
+    """Stamp (ns) of a message that begins with a std_msgs/Header, without decoding the rest."""
+    if len(message.data) < 12:
+        raise DatasetError(
+            f"{path}: {message.topic}: a message of {len(message.data)} bytes has no header"
+        )
+    # Second byte of the encapsulation: 1 = little endian.
+    order: Any = "little" if message.data[1] & 1 else "big"
+    seconds = int.from_bytes(message.data[4:8], order, signed=True)
+    return seconds * 10**9 + int.from_bytes(message.data[8:12], order)
+
+
+def _rate(stamps: list[int]) -> float:
+    if len(stamps) < 2:
+        return LONE_SET_FPS
+    return tidy_fps(1e9 / float(np.median(np.diff(stamps))))

@@ -1,0 +1,159 @@
+"""OpenSim marker files (`.trc`), Y up as Pose2Sim writes them: world = (Z, X, Y) of the file."""
+
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+import numpy as np
+
+from markerless_tracker.datasets.markers.track import MarkerTrack
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.geometry import FloatArray
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+# Stamps beyond this would not fit 64 bits.
+LARGEST_TIME_S = Decimal(9_000_000_000)
+# The first line names a file; a constant keeps the content independent of where it is written.
+TITLE = "markerless_tracker.trc"
+
+
+def read_trc(path: str | Path) -> MarkerTrack:
+    """Read a `.trc` in m, cm or mm; the Time column (s) decides the stamps: round(time * 1e9) ns.
+
+    A blank, missing or NaN coordinate makes its marker missing (NaN) in that row.
+
+    Raises:
+        DatasetError: the file cannot be read or is malformed; the message names file and line.
+    """
+    path = Path(path)
+    try:
+        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
+    if not lines or not lines[0].startswith("PathFileType"):
+        raise DatasetError(f"{path}: line 1: not a marker file, expected PathFileType")
+    if len(lines) < 5:
+        raise DatasetError(f"{path}: ends after line {len(lines)}, expected 5 lines of header")
+    names = _names(path, lines[3])
+    factor = METRES[_units(path, lines[1], lines[2])]
+    stamps: list[int] = []
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines[5:], start=6):
+        if line.strip():
+            stamp, row = _row(path, number, line, len(names))
+            if stamps and stamp <= stamps[-1]:
+                raise DatasetError(
+                    f"{path}: line {number}: Time {stamp / 1e9} s does not come after "
+                    f"{stamps[-1] / 1e9} s"
+                )
+            stamps.append(stamp)
+            rows.append(row)
+    positions = np.array(rows, dtype=np.float64).reshape(len(rows), len(names), 3) * factor
+    return MarkerTrack(names, np.array(stamps, dtype=np.int64), positions[:, :, [2, 0, 1]])
+
+
+def write_trc(path: str | Path, track: MarkerTrack, fps: float) -> None:
+    """Write a `.trc` in m with 6 decimals (µm) and times with 9 (ns); missing markers are blank.
+
+    The text depends on the track and `fps` alone, not on the path.
+
+    Raises:
+        DatasetError: the file cannot be written.
+    """
+    path = Path(path)
+    try:
+        path.write_text(format_trc(track, fps), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def format_trc(track: MarkerTrack, fps: float) -> str:
+    """The text of a `.trc`; see `write_trc`.
+
+    Raises:
+        DatasetError: a marker's name cannot stand in the file (tab, line break or empty).
+    """
+    for name in track.names:
+        if not name.strip() or name != name.strip() or len(name.splitlines()) != 1 or "\t" in name:
+            raise DatasetError(f"marker name {name!r} cannot stand in a marker file")
+    count, rate = len(track.names), f"{fps:.10g}"
+    lines = [
+        f"PathFileType\t4\t(X/Y/Z)\t{TITLE}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame"
+        "\tOrigNumFrames",
+        f"{rate}\t{rate}\t{len(track)}\t{count}\tm\t{rate}\t1\t{len(track)}",
+        "Frame#\tTime\t" + "".join(f"{name}\t\t\t" for name in track.names),
+        "\t\t" + "".join(f"X{i}\tY{i}\tZ{i}\t" for i in range(1, count + 1)),
+    ]
+    for index, (stamp, row) in enumerate(
+        zip(track.stamps_ns, track.positions_m, strict=True), start=1
+    ):
+        cells = "\t".join(_cells(point) for point in row)
+        lines.append(f"{index}\t{_seconds(int(stamp))}\t{cells}")
+    return "\n".join(lines) + "\n"
+
+
+def _seconds(stamp_ns: int) -> str:
+    sign = "-" if stamp_ns < 0 else ""
+    return f"{sign}{abs(stamp_ns) // 10**9}.{abs(stamp_ns) % 10**9:09d}"
+
+
+def _cells(point: FloatArray) -> str:
+    if not np.isfinite(point).all():
+        return "\t\t"
+    x, y, z = point
+    # + 0.0 after rounding: no "-0.000000".
+    return "\t".join(f"{round(float(value), 6) + 0.0:.6f}" for value in (y, z, x))
+
+
+def _units(path: Path, keys: str, values: str) -> str:
+    header = dict(zip(keys.split("\t"), values.split("\t"), strict=False))
+    units = header.get("Units", "").strip()
+    if units not in METRES:
+        raise DatasetError(
+            f"{path}: line 3: Units is {units!r}, expected one of {', '.join(METRES)}"
+        )
+    return units
+
+
+def _names(path: Path, line: str) -> tuple[str, ...]:
+    cells = [cell.strip() for cell in line.rstrip().split("\t")]
+    if [cell.lower() for cell in cells[:2]] != ["frame#", "time"]:
+        raise DatasetError(f"{path}: line 4: starts with {cells[:2]}, expected Frame# and Time")
+    names = tuple(cells[2::3])
+    if not names or not all(names) or any(cells[3::3]) or any(cells[4::3]):
+        raise DatasetError(f"{path}: line 4: expected marker names three columns apart")
+    if len(set(names)) != len(names):
+        twice = sorted({name for name in names if names.count(name) > 1})
+        raise DatasetError(
+            f"{path}: line 4: marker names must be distinct, {', '.join(twice)} repeats"
+        )
+    return names
+
+
+def _row(path: Path, number: int, line: str, markers: int) -> tuple[int, list[float]]:
+    cells = line.rstrip("\r\n").split("\t")
+    coordinates = [cell.strip() for cell in cells[2:]]
+    if len(cells) < 2 or any(coordinates[3 * markers :]):
+        raise DatasetError(
+            f"{path}: line {number}: {len(cells)} columns, expected at most {2 + 3 * markers} "
+            f"(Frame#, Time and {markers} markers)"
+        )
+    try:
+        time = Decimal(cells[1].strip())
+        if not time.is_finite() or abs(time) > LARGEST_TIME_S:
+            raise ValueError
+        stamp = int((time * 10**9).to_integral_value())
+    except (InvalidOperation, ValueError):
+        raise DatasetError(
+            f"{path}: line {number}: Time is {cells[1].strip()!r}, expected seconds"
+        ) from None
+    row = [np.nan] * (3 * markers)
+    for column, cell in enumerate(coordinates[: 3 * markers]):
+        if cell:
+            try:
+                row[column] = float(cell)
+            except ValueError:
+                raise DatasetError(
+                    f"{path}: line {number}: column {column + 3} is {cell!r}, expected a number"
+                ) from None
+    return stamp, row

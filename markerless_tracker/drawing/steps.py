@@ -1,0 +1,39 @@
+"""The steps from an image to the body in one picture."""
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraModel
+from markerless_tracker.drawing.evidence import draw_evidence
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.imaging import Image, Segmenter
+from markerless_tracker.records import Observation
+
+
+def draw_steps(
+    image: Image,
+    observation: Observation,
+    camera: CameraModel,
+    body: BodyModel,
+    pose: FloatArray | None,
+    segmenter: Segmenter | None,
+) -> Image:
+    """All that was made of an image, side by side (h, 6 w, 3) BGR: see `draw_evidence`.
+
+    Args:
+        image: what the camera saw.
+        observation: what the tracker used of it.
+        camera: its camera.
+        body, pose: what the tracker found, None if nobody.
+        segmenter: what segmented the image; without one background and foreground are left out.
+
+    Raises:
+        ImageError: image or observation does not fit the camera.
+    """
+    return draw_evidence(
+        image,
+        observation,
+        camera,
+        body,
+        pose,
+        background=None if segmenter is None else segmenter.background.image,
+        labels=None if segmenter is None else segmenter.labels(image),
+    )

@@ -1,0 +1,108 @@
+"""The residuals of a contour frame one by one, for fits of more than a pose.
+
+Contour refinement sums its normal equations without ever writing down a row. Fits of lengths and
+sections happen rarely and want the rows.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel, cone_transforms, transforms
+from markerless_tracker.body.kinematics import carried
+from markerless_tracker.body.model import IntArray
+from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.geometry import FloatArray
+
+_SLIDES = 3
+"""Kinds of nodes from here on are translations."""
+
+
+@dataclass(frozen=True, eq=False)
+class OutlineRows:
+    """The n residuals of all views of a frame.
+
+    Attributes:
+        cone: (n,) the cone that a residual's outline point lies on.
+        place: (n, 5) where on the cone, as `Samples.shape`.
+        gradient: (n, 3) of the residual with respect to that point in the world.
+        value: (n,) residual, m.
+        weight: (n,) length of outline it stands for, m, times its robust weight.
+    """
+
+    cone: IntArray
+    place: FloatArray
+    gradient: FloatArray
+    value: FloatArray
+    weight: FloatArray
+
+
+def outline_rows(frame: ContourFrame) -> OutlineRows:
+    """What `ContourFrame.collect` collected last."""
+    r, samples = frame.residuals, frame.samples
+    used = [slice(int(n)) for n in r.count]
+    sample = [r.sample[v, rows] for v, rows in enumerate(used)]
+    return OutlineRows(
+        cone=np.concatenate([samples.cone[v, s] for v, s in enumerate(sample)]),
+        place=np.concatenate([samples.shape[v, s] for v, s in enumerate(sample)]),
+        gradient=np.concatenate([r.gradient[v, rows] for v, rows in enumerate(used)]),
+        value=np.concatenate([r.value[v, rows] for v, rows in enumerate(used)]),
+        weight=np.concatenate([r.weight[v, rows] for v, rows in enumerate(used)]),
+    )
+
+
+def surface(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
+    """World points (n, 3) at the rows' places on a body at a pose (p,)."""
+    out = np.empty((len(rows.cone), 3))
+    placed = cone_transforms(body, pose)
+    _surface(placed, body.cone_shape, body.cone_length, rows.cone, rows.place, out)
+    return out
+
+
+def pose_slopes(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
+    """Derivatives (n, p) of the residuals by the parameters of a pose (p,)."""
+    placed = transforms(body, pose)
+    moved = np.flatnonzero(body.node_kind >= 0)
+    kind = body.node_kind[moved]
+    axes = body.node_sign[moved, None] * placed[moved, :, kind % 3]
+    out = np.zeros((len(rows.cone), body.size))
+    _pose_slopes(
+        surface(body, pose, rows), rows.gradient, axes,
+        np.ascontiguousarray(placed[moved, :, 3]), kind, body.node_parameter[moved],
+        carried(body, moved)[body.cone_node], rows.cone, out,
+    )  # fmt: skip
+    return out
+
+
+@kernel
+def _surface(placed, shape, length, cone, place, out):  # type: ignore[no-untyped-def]
+    for n in range(cone.size):
+        c = cone[n]
+        x = y = z = 0.0
+        for end in range(2):
+            share = place[n, 4] if end == 1 else 1.0 - place[n, 4]
+            x += share * (shape[c, end, 2] + shape[c, end, 0] * place[n, 2 * end])
+            y += share * (shape[c, end, 3] + shape[c, end, 1] * place[n, 2 * end + 1])
+            z += share * end * length[c]
+        for i in range(3):
+            t = placed[c, i]
+            out[n, i] = t[0] * x + t[1] * y + t[2] * z + t[3]
+
+
+@kernel
+def _pose_slopes(  # type: ignore[no-untyped-def]
+    points, gradient, axes, origins, kind, parameter, hang, cone, out
+):
+    for n in range(cone.size):
+        gx, gy, gz = gradient[n, 0], gradient[n, 1], gradient[n, 2]
+        for m in range(kind.size):
+            if hang[cone[n], m] == 0.0:
+                continue
+            x, y, z = axes[m, 0], axes[m, 1], axes[m, 2]
+            if kind[m] < _SLIDES:
+                # A turn about the axis moves a point P by axis x (P - origin).
+                u, v = points[n, 0] - origins[m, 0], points[n, 1] - origins[m, 1]
+                w = points[n, 2] - origins[m, 2]
+                x, y, z = y * w - z * v, z * u - x * w, x * v - y * u
+            out[n, parameter[m]] += gx * x + gy * y + gz * z

@@ -1,0 +1,109 @@
+"""Filling outlines as bits: columns of words, each word 64 neighbouring pixels of one row.
+
+Word w of row v lies at w * height + v, so that a span of rows of one column of words is worked on
+with vector instructions. Rows are unsigned: an index that may be negative would prevent that.
+"""
+
+import numpy as np
+
+from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.raster.bits import ALL, popcount
+from markerless_tracker.fitness.raster.outline import LANES
+
+
+@kernel
+def fill_outline(c, count, out, width, height, bits, used):  # type: ignore[no-untyped-def]
+    """Set the pixels whose centres lie inside a convex polygon.
+
+    Args:
+        c: which of the polygons of `out` (see `find_outlines`).
+        count: number of its points.
+        bits: (words * height,) frame.
+        used: (words, 2) first and last row that hold bits in each column of words, widened.
+    """
+    if not (out.box[c] <= width - 1.0 and out.box[LANES + c] >= 0.0):
+        return
+    top = np.int64(out.box[2 * LANES + c])
+    bottom = np.int64(out.box[3 * LANES + c])
+    if top >= bottom:
+        return
+    left, right = out.left, out.right
+    before = (count - 1) * LANES + c
+    for i in range(count):
+        at = i * LANES + c
+        # Rows in [lower, upper) cross this edge; half-open, so a vertex counts once a side.
+        start, stop = np.uint64(out.first[before]), np.uint64(out.first[at])
+        if start != stop:
+            slope = out.slope[at]
+            u0 = out.u[at] - slope * out.v[at]
+            if start < stop:
+                for v in range(start, stop):
+                    left[v] = u0 + slope * v
+            else:
+                for v in range(stop, start):
+                    right[v] = u0 + slope * v
+        before = at
+    edge = width - 1.0
+    first = np.int64(max(out.box[c], 0.0)) >> 6
+    last = np.int64(min(out.box[LANES + c], edge)) >> 6
+    begin, end = np.uint64(top), np.uint64(bottom)
+    for w in range(first, last + 1):
+        base, offset = np.uint64(w * height), 64.0 * w
+        final = min(63.0, edge - offset)
+        for v in range(begin, end):
+            one, other = left[v] - offset, right[v] - offset
+            a, b = (one, other) if one < other else (other, one)
+            a = a if a > 0.0 else 0.0
+            a = a if a < 64.0 else 64.0
+            b = b if b < final else final
+            b = b if b > -1.0 else -1.0
+            low, high = np.int32(np.ceil(a)), np.int32(np.floor(b))
+            word = (ALL << np.uint64(low & 63)) & (ALL >> np.uint64((63 - high) & 63))
+            bits[base + v] |= word if low <= high else np.uint64(0)
+        used[w, 0] = min(used[w, 0], top)
+        used[w, 1] = max(used[w, 1], bottom - 1)
+
+
+@kernel
+def clear_used(words, height, used):  # type: ignore[no-untyped-def]
+    """No row holds bits."""
+    for w in range(words):
+        used[w, 0], used[w, 1] = height, -1
+
+
+@kernel
+def wipe(words, height, bits, used):  # type: ignore[no-untyped-def]
+    """Clear what `used` says was set."""
+    for w in range(words):
+        for v in range(used[w, 0], used[w, 1] + 1):
+            bits[w * height + v] = np.uint64(0)
+
+
+@kernel
+def count_and_wipe(words, height, bits, mask, start, used):  # type: ignore[no-untyped-def]
+    """Set bits that the mask, flat from `start` on, holds too, and all set bits; clears them."""
+    overlap = np.uint64(0)
+    projected = np.uint64(0)
+    for w in range(words):
+        base, there = np.uint64(w * height), np.uint64(start + w * height)
+        for v in range(np.uint64(used[w, 0]), np.uint64(used[w, 1] + 1)):
+            word = bits[base + v]
+            overlap += popcount(word & mask[there + v])
+            projected += popcount(word)
+            bits[base + v] = np.uint64(0)
+    return overlap, projected
+
+
+@kernel
+def count_beside_and_wipe(words, height, bits, mask, still, start, used):  # type: ignore[no-untyped-def]
+    """As `count_and_wipe`, of the set bits that are not among those of `still`, flat likewise."""
+    overlap = np.uint64(0)
+    projected = np.uint64(0)
+    for w in range(words):
+        base, there = np.uint64(w * height), np.uint64(start + w * height)
+        for v in range(np.uint64(used[w, 0]), np.uint64(used[w, 1] + 1)):
+            word = bits[base + v] & ~still[there + v]
+            overlap += popcount(word & mask[there + v])
+            projected += popcount(word)
+            bits[base + v] = np.uint64(0)
+    return overlap, projected

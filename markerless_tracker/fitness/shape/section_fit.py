@@ -1,0 +1,61 @@
+"""The body's shape from silhouettes, its pose known: sections and offsets of the cones."""
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour.outline_rows import outline_rows
+from markerless_tracker.fitness.contour.row_kernels import normal_equations
+from markerless_tracker.fitness.shape.sections import Sections
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import Prior, refine
+
+ITERATIONS = 12
+REACH_M = (0.10, 0.04)
+"""Outline further than this from the silhouette's edge is an outlier, at first and at last."""
+RESIDUAL_SIGMA_M = 0.010
+"""Noise believed of an outline's position, for pieces of outline `CORRELATION_M` long."""
+CORRELATION_M = 0.05
+
+
+def fit_shape(
+    body: BodyModel,
+    frames: list[tuple[ContourFrame, FloatArray]],
+    *,
+    tightness: float = 1.0,
+) -> BodyModel:
+    """The body with sections and offsets fitted to silhouettes, at known poses.
+
+    Bounded least squares on contour distances with a prior on the generic shape; left and right
+    are alike, the trunk and head symmetric. Poses are held: fitting both together drifts.
+
+    Args:
+        body: the body with generic sections (those of the subject's lengths).
+        frames: contour evidence of some frames and the pose (p,) in each.
+        tightness: factor on the prior's precision; higher trusts the generic shape more.
+    """
+    sections = Sections(body)
+    scale = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * len(frames))
+
+    def equations(shape: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
+        hessian, slope = np.zeros((sections.size, sections.size)), np.zeros(sections.size)
+        shaped = sections.put(body, shape)
+        for frame, pose in frames:
+            frame.collect(pose, reach_m, shaped)
+            rows = outline_rows(frame)
+            slopes = sections.slopes(shaped, pose, rows)
+            one = normal_equations(slopes, rows.weight, rows.value)
+            hessian += one[0]
+            slope += one[1]
+        return hessian * scale, slope * scale
+
+    prior = Prior(sections.generic, tightness / sections.spread**2)
+    fitted = refine(
+        equations,
+        sections.generic,
+        priors=(prior,),
+        bounds=sections.bounds,
+        iterations=ITERATIONS,
+        reach=REACH_M,
+    )
+    return sections.put(body, fitted)

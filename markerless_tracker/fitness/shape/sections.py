@@ -1,0 +1,99 @@
+"""What is free about a body's sections: radii and offsets, left and right alike."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.body import BodyModel, cone_transforms
+from markerless_tracker.fitness.contour.outline_rows import OutlineRows
+from markerless_tracker.geometry import FloatArray
+
+RADIUS_SPREAD = 0.20
+"""How far a person's radii deviate from the generic ones, as a share of them (prior)."""
+OFFSET_SPREAD_M = 0.015
+RADIUS_RANGE = (0.6, 1.6)
+"""Radii stay within this multiple of the generic ones (bounds)."""
+OFFSET_RANGE_M = 0.06
+
+
+class Sections:
+    """The k free numbers of a body's sections.
+
+    Limbs of both sides share theirs, offsets to the side mirrored; trunk and head are symmetric.
+
+    Args:
+        generic: the body with the sections that are believed in before anything is seen.
+
+    Attributes:
+        generic: (k,).
+        spread: (k,) how far people deviate from it.
+        bounds: (2, k).
+    """
+
+    def __init__(self, generic: BodyModel) -> None:
+        self._index, self._sign, self._size = _tie(generic)
+        self.generic = self.of(generic)
+        radius = np.zeros(self._size, dtype=np.bool_)
+        radius[self._index[:, :, :2].ravel()] = True
+        self.spread = np.where(radius, RADIUS_SPREAD * self.generic, OFFSET_SPREAD_M)
+        self.bounds = np.where(
+            radius,
+            np.outer(RADIUS_RANGE, self.generic),
+            self.generic + np.array([[-OFFSET_RANGE_M], [OFFSET_RANGE_M]]),
+        )
+
+    @property
+    def size(self) -> int:
+        """k."""
+        return self._size
+
+    def of(self, body: BodyModel) -> FloatArray:
+        """A body's numbers (k,); tied ones are averaged."""
+        used = self._index >= 0
+        index = self._index[used]
+        total = np.bincount(index, (self._sign * body.cone_shape)[used], self._size)
+        return np.asarray(total / np.bincount(index, minlength=self._size))
+
+    def put(self, body: BodyModel, numbers: FloatArray) -> BodyModel:
+        """The body with sections of these numbers (k,)."""
+        shape = body.cone_shape.copy()
+        used = self._index >= 0
+        shape[used] = self._sign[used] * numbers[self._index[used]]
+        return replace(body, cone_shape=shape)
+
+    def slopes(self, body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
+        """Derivatives (n, k) of residuals by the numbers, of a body at a pose (p,)."""
+        axes = cone_transforms(body, pose)[rows.cone, :, :2]
+        along = np.einsum("ni,nij->nj", rows.gradient, axes)
+        out = np.zeros((len(rows.cone), self._size))
+        every = np.arange(len(out))
+        for end, share in ((0, 1.0 - rows.place[:, 4]), (1, rows.place[:, 4])):
+            cos, sin = rows.place[:, 2 * end], rows.place[:, 2 * end + 1]
+            slopes = (cos * along[:, 0], sin * along[:, 1], along[:, 0], along[:, 1])
+            for entry, slope in enumerate(slopes):
+                index = self._index[rows.cone, end, entry]
+                free = index >= 0
+                value = share * slope * self._sign[rows.cone, end, entry]
+                # A row has one entry of each kind: no index comes twice in it.
+                out[every[free], index[free]] += value[free]
+        return out
+
+
+def _tie(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray, int]:
+    """Which number each entry (c, 2, 4) of `cone_shape` follows (-1: none), its sign, and k."""
+    index = np.full((len(body.cone_names), 2, 4), -1, dtype=np.int64)
+    sign = np.ones(index.shape)
+    known: dict[tuple[str, int, int], int] = {}
+    for c, name in enumerate(body.cone_names):
+        paired = name[:2] in ("l_", "r_")
+        for end in range(2):
+            for entry in range(4):
+                if entry == 3:
+                    # Offsets to the side: none on the middle line, mirrored on the limbs.
+                    if not paired:
+                        continue
+                    sign[c, end, entry] = 1.0 if name[0] == "l" else -1.0
+                key = (name[2:] if paired else name, end, entry)
+                index[c, end, entry] = known.setdefault(key, len(known))
+    return index, sign, len(known)

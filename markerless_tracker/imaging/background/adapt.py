@@ -1,0 +1,86 @@
+"""A background that follows slow changes of light where the body is not."""
+
+import math
+
+import cv2
+import numba
+import numpy as np
+
+from markerless_tracker.imaging.segmentation.morphology import Mask, disc
+
+# A longer gap, or time going backwards, is a new beginning: nothing is learned across it.
+GAP_NS = 1_000_000_000
+# Every frame takes each so many-th row, in turns.
+STRIDE = 4
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def adapt_means(image, gain, keep_out, mean, scale, share, first, stride):  # type: ignore[no-untyped-def]
+    """Move the Gaussian that explains a pixel towards it: mean += share (image / gain - mean).
+
+    Only rows first, first + stride, ..., and only pixels that `keep_out` (h, w) leaves and that
+    pass the background test. image (h, w, c); mean, scale (k, h, w, c); gain (c,).
+    """
+    modes, height, width, channels = mean.shape
+    for v in range(first, height, stride):
+        for u in range(width):
+            if keep_out[v, u] != 0:
+                continue
+            for k in range(modes):
+                distance = np.float32(0.0)
+                for c in range(channels):
+                    x = np.float32(image[v, u, c]) - gain[c] * mean[k, v, u, c]
+                    x *= scale[k, v, u, c]
+                    distance += x * x
+                if distance <= np.float32(1.0):
+                    for c in range(channels):
+                        value = np.float32(image[v, u, c])
+                        if value < np.float32(255.0):
+                            mean[k, v, u, c] += share * (value / gain[c] - mean[k, v, u, c])
+                    break
+
+
+class Adaptation:
+    """When and how fast the background of one camera follows.
+
+    Args:
+        time_constant_s: how long the background takes to follow a change by 63 %.
+        margin_px: distance from the silhouette that is left alone.
+    """
+
+    def __init__(self, time_constant_s: float, margin_px: int) -> None:
+        self._tau_ns = time_constant_s * 1e9
+        self._brush = disc(2 * margin_px + 1)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the times seen."""
+        self._seen_ns: int | None = None
+        self._followed_ns: int | None = None
+        self._turn = 0
+
+    def pass_over(self, stamp_ns: int) -> None:
+        """An image came that is not followed: time goes on."""
+        before, self._seen_ns = self._seen_ns, stamp_ns
+        if before is None or not 0 < stamp_ns - before <= GAP_NS:
+            self._followed_ns = None
+            self._turn = 0
+
+    def follow(
+        self,
+        image: Mask,
+        mask: Mask,
+        stamp_ns: int,
+        gain: np.ndarray[tuple[int], np.dtype[np.float32]],
+        mean: np.ndarray[tuple[int, ...], np.dtype[np.float32]],
+        scale: np.ndarray[tuple[int, ...], np.dtype[np.float32]],
+    ) -> None:
+        """Let `mean` (k, h, w, c) follow the image (h, w, c), away from the mask (h, w)."""
+        self.pass_over(stamp_ns)
+        before, self._followed_ns = self._followed_ns, stamp_ns
+        if before is None:
+            return
+        share = 1.0 - math.exp(-STRIDE * (stamp_ns - before) / self._tau_ns)
+        keep_out = np.asarray(cv2.dilate(mask, self._brush), dtype=np.uint8)
+        adapt_means(image, gain, keep_out, mean, scale, np.float32(share), self._turn, STRIDE)
+        self._turn = (self._turn + 1) % STRIDE

@@ -1,0 +1,297 @@
+"""An image of the empty scene, put together from clips and stills in which people appear."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.errors import ImageError
+from markerless_tracker.imaging.background.align import align_exposure, align_geometry
+from markerless_tracker.imaging.background.steady import (
+    ALONE_SHARE,
+    matching_frames,
+    motion,
+    steady_image,
+    thinned,
+)
+from markerless_tracker.imaging.images import Image, check_image
+from markerless_tracker.records import locked
+
+FloatImage = NDArray[np.float32]
+BoolImage = NDArray[np.bool_]
+
+# Frames kept of all clips together: enough for a mode, little enough for memory.
+_FRAMES = 36
+# Grey levels within which two pictures show the same thing.
+_REACH = 14.0
+# A change from frame to frame beyond this is a body's, not the light's.
+_ABRUPT = 28.0
+# Where things are covered for this share of the time, someone is burnt into the steady image.
+_RESTLESS = 0.15
+# A frame is calm around a pixel if less than this share of what is known there differs.
+_CALM = 0.05
+# A value shown in this share of the frames around nothing but scene is scene.
+_OFTEN = 0.35
+# Size of the neighbourhood that is judged together, as a share of the image's longer side.
+_WINDOW = 0.03
+# A value seen in this share of the frames was really there.
+_SEEN_SHARE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """The empty scene.
+
+    Attributes:
+        image: (h, w) or (h, w, 3) uint8, in the geometry and exposure of the first clip (or still).
+        unsure: (h, w) bool, pixels that only one source ever showed while others disagreed.
+        note: what it was made from, and what that costs.
+    """
+
+    image: Image
+    unsure: BoolImage
+    note: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "image", locked(self.image, np.uint8))
+        object.__setattr__(self, "unsure", locked(self.unsure, np.bool_))
+
+
+def background_plate(
+    clips: Sequence[Iterable[Image]] | Mapping[str, Iterable[Image]] = (),
+    stills: Sequence[Image] = (),
+    *,
+    camera: str = "background",
+) -> Plate:
+    """The empty scene of one camera from clips and stills in which people appear.
+
+    Where nothing moves in the clips, what they show is the scene: something that stands still all
+    the time cannot be told from furniture. Where something moves, the scene is
+    (a) what a still shows, if the clips show it too at some time;
+    (b) else what the clips show while everything around it is known to be scene;
+    (c) else what a still shows: the person never uncovered it in the clips;
+    (d) without stills, what the clips show most steadily.
+    A still may have another size, exposure and a slight misalignment; people in it do no harm where
+    the clips are calm or uncover the floor.
+
+    Args:
+        clips: frames of each clip, all of one camera; the first clip fixes size and exposure.
+        stills: further pictures of the scene.
+        camera: name for error messages.
+
+    Raises:
+        ImageError: neither clips nor stills, or frames that do not belong together.
+    """
+    sequences = list(clips.values()) if isinstance(clips, Mapping) else list(clips)
+    frames = _clip_frames(sequences, camera)
+    for number, still in enumerate(stills):
+        check_image(still, f"{camera}: still {number}")
+    if not frames and not stills:
+        raise ImageError(f"{camera}: neither a clip nor a still came, expected at least one frame")
+    reference = frames[0][0] if frames else stills[0]
+    for number, still in enumerate(stills):
+        if still.ndim != reference.ndim:
+            raise ImageError(
+                f"{camera}: still {number} is {still.shape}, expected channels as in "
+                f"{reference.shape}"
+            )
+    if not frames:
+        return _from_stills(stills)
+    stack = _stack(frames)
+    alone = len(frames) == 1 and not stills
+    steady, _ = steady_image(stack, share=ALONE_SHARE) if alone else steady_image(stack)
+    guide = np.clip(np.rint(steady), 0, 255).astype(np.uint8).reshape(reference.shape)
+    pictures = [align_exposure(_float(align_geometry(still, guide)), steady) for still in stills]
+    if not pictures:
+        note = (
+            f"{len(stack)} frames of {len(frames)} clip(s), no still: whoever covers a "
+            "place for most of the time is burnt in there"
+        )
+        return _finish(steady, np.zeros(steady.shape[:2], dtype=bool), reference, note)
+    filled, unsure = _fill(stack, steady, pictures)
+    note = (
+        f"{len(stack)} frames of {len(frames)} clip(s) and {len(stills)} still(s); "
+        f"{float(unsure.mean()):.1%} of the image is known from a still alone"
+    )
+    return _finish(filled, unsure, reference, note)
+
+
+def _clip_frames(sequences: Sequence[Iterable[Image]], camera: str) -> list[list[Image]]:
+    frames: list[list[Image]] = []
+    share = max(2, _FRAMES // max(1, len(sequences)))
+    for number, sequence in enumerate(sequences):
+        chosen: list[Image] = []
+        for index, frame in thinned(sequence, share):
+            what = f"{camera}: clip {number}, frame {index}"
+            check_image(frame, what)
+            first = frames[0][0] if frames else chosen[0] if chosen else frame
+            if frame.shape != first.shape:
+                raise ImageError(
+                    f"{what}: got an image of {frame.shape}, the first was {first.shape}"
+                )
+            chosen.append(frame)
+        if chosen:
+            frames.append(chosen)
+    return frames
+
+
+def _float(image: Image) -> FloatImage:
+    return image.reshape(image.shape[0], image.shape[1], -1).astype(np.float32)
+
+
+def _stack(frames: list[list[Image]]) -> Image:
+    """(n, h, w, c): all clips, the later ones in the exposure of the first."""
+    parts = [np.stack(clip).reshape(len(clip), *clip[0].shape[:2], -1) for clip in frames]
+    if len(parts) == 1:
+        return np.asarray(parts[0])
+    base, _ = steady_image(parts[0])
+    for index in range(1, len(parts)):
+        own, _ = steady_image(parts[index])
+        shift = align_exposure(own, base) - own
+        parts[index] = np.clip(np.rint(parts[index] + shift), 0, 255).astype(np.uint8)
+    return np.concatenate(parts)
+
+
+def _covered(
+    share: FloatImage, jump: FloatImage, steady: FloatImage, picture: FloatImage
+) -> BoolImage:
+    """Where the clips show a person and the still does not: they differ, the clips are restless.
+
+    How restless is averaged over the neighbourhood that differs: plain clothes show motion at their
+    outline only, and an arm that sweeps over a person of the still for a moment is outvoted.
+    """
+    apart = np.abs(picture - steady).max(axis=2)
+    differ = (apart > _REACH).astype(np.uint8)
+    differ = np.asarray(cv2.morphologyEx(differ, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)))
+    weight = differ.astype(np.float32)
+    sigma = _WINDOW * max(differ.shape)
+    restless = share * (jump > _ABRUPT) * weight
+    blurred = cv2.GaussianBlur(restless, (0, 0), sigma)
+    mass = cv2.GaussianBlur(weight, (0, 0), sigma)
+    covered = ((differ > 0) & (blurred > _RESTLESS * mass)).astype(np.uint8)
+    # The soft fringe of a person differs less than the person.
+    return np.asarray((cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0) & (apart > 0.5 * _REACH))
+
+
+def _fill(
+    stack: Image, steady: FloatImage, pictures: list[FloatImage]
+) -> tuple[FloatImage, BoolImage]:
+    """Replace who moves by what the stills show; returns the plate and where only a still knew."""
+    share, jump = motion(stack, steady, _REACH)
+    least = max(2.0, _SEEN_SHARE * len(stack))
+    filled = steady.copy()
+    best = np.zeros(steady.shape[:2])
+    covered = np.zeros(steady.shape[:2], dtype=bool)
+    doubtful = covered.copy()
+    for index, picture in enumerate(pictures):
+        matches, mean = matching_frames(stack, picture, _REACH)
+        others = sum(
+            (np.abs(picture - other).max(axis=2) <= _REACH).astype(float)
+            for place, other in enumerate(pictures)
+            if place != index
+        )
+        seen = matches >= least
+        here = _covered(share, jump, steady, picture)
+        score = 0.1 + np.where(seen, matches, 0.0) + 0.5 * least * others
+        better = here & (score > best)
+        filled[better] = np.where(seen[:, :, None], mean, picture)[better]
+        best[better] = score[better]
+        covered |= here
+        doubtful |= (np.abs(picture - steady).max(axis=2) > 2.0 * _REACH) & ~here
+    if not covered.any():
+        return filled, covered
+    return _grow(stack, filled, steady, covered, doubtful)
+
+
+def _grow(
+    stack: Image, filled: FloatImage, steady: FloatImage, covered: BoolImage, doubtful: BoolImage
+) -> tuple[FloatImage, BoolImage]:
+    """Work inward from what is known, with the frames in which all known pixels around are scene.
+
+    What such frames show confirms the still, or overrules it next to people of the still
+    (``doubtful``): a person of the still may stand behind the one in the clips.
+
+    Returns:
+        The plate, and where neither clips confirmed nor overruled the still.
+    """
+    longer = max(covered.shape)
+    side = max(5, round(0.25 * _WINDOW * longer) | 1)
+    # Islands that happen to agree inside a covered area are no knowledge.
+    brush = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * side + 1, 2 * side + 1))
+    closed = cv2.morphologyEx(covered.astype(np.uint8), cv2.MORPH_CLOSE, brush)
+    v, u = np.nonzero(closed)
+    box = (
+        slice(max(int(v.min()) - 3 * side, 0), int(v.max()) + 3 * side + 1),
+        slice(max(int(u.min()) - 3 * side, 0), int(u.max()) + 3 * side + 1),
+    )
+    plate, unknown = filled[box].copy(), closed[box] > 0
+    frames, doubt = stack[:, box[0], box[1]], doubtful[box].copy()
+    person = steady[box]
+    far = np.stack([np.abs(frame - plate).max(axis=2) > _REACH for frame in frames])
+    wide = 2 * side + 1
+    reach = np.ones((side, side), dtype=np.uint8)
+    for _ in range(4 * max(unknown.shape) // side):
+        known = (~unknown).astype(np.float32)
+        front = np.nonzero(unknown & (cv2.boxFilter(known, -1, (side, side)) > 0.3))
+        if not front[0].size:
+            break
+        mass = cv2.boxFilter(known, -1, (wide, wide))[front]
+        calm = np.stack(
+            [cv2.boxFilter(known * wrong, -1, (wide, wide))[front] < _CALM * mass for wrong in far]
+        )
+        agreeing = calm & ~far[:, front[0], front[1]]
+        values = frames[:, front[0], front[1]].astype(np.float32)
+        count, agreed_count = calm.sum(axis=0), agreeing.sum(axis=0)
+        shown, same = _mean(values, calm), _mean(values, agreeing)
+        # What the clips show most of the time may be a person: only if it is shown often around
+        # nothing but scene, or is something else, does it overrule a still.
+        apart = np.abs(shown - person[front]).max(axis=1) > 2.0 * _REACH
+        suspect = cv2.dilate(doubt.astype(np.uint8), reach)[front] > 0
+        agreed = (agreed_count >= 2) & (agreed_count >= 0.5 * count)
+        overruled = ~agreed & suspect & (count >= 2) & (apart | (count > _OFTEN * len(stack)))
+        settled = agreed | overruled
+        if not settled.any():
+            break
+        where = (front[0][settled], front[1][settled])
+        plate[where] = np.where(agreed[:, None], same, shown)[settled]
+        far[:, where[0], where[1]] = np.abs(values[:, settled] - plate[where]).max(axis=2) > _REACH
+        doubt[front[0][overruled], front[1][overruled]] = True
+        unknown[where] = False
+    filled = filled.copy()
+    filled[box] = np.where(covered[box][:, :, None], plate, filled[box])
+    unsure = np.zeros_like(covered)
+    unsure[box] = unknown & covered[box]
+    return filled, unsure
+
+
+def _mean(values: FloatImage, chosen: BoolImage) -> FloatImage:
+    """Mean over the frames chosen, per pixel: values (n, k, c), chosen (n, k); 0 where none is."""
+    total = np.einsum("nkc,nk->kc", values, chosen.astype(np.float32))
+    return np.asarray(total / np.maximum(chosen.sum(axis=0), 1)[:, None], dtype=np.float32)
+
+
+def _from_stills(stills: Sequence[Image]) -> Plate:
+    reference = stills[0]
+    base = _float(reference)
+    if len(stills) == 1:
+        unsure = np.zeros(base.shape[:2], dtype=bool)
+        return Plate(reference.copy(), unsure, "one still, taken as it is: whoever is in it stays")
+    aligned = [base] + [
+        align_exposure(_float(align_geometry(still, reference)), base) for still in stills[1:]
+    ]
+    apart = np.abs(np.stack([picture - base for picture in aligned[1:]])).max(axis=(0, 3)) > _REACH
+    if len(stills) == 2:
+        note = (
+            "two stills, the first taken as it is: where they differ nothing tells which is empty"
+        )
+        return Plate(reference.copy(), apart, note)
+    median = np.median(np.stack(aligned), axis=0).astype(np.float32)
+    note = f"median of {len(stills)} stills: whoever is at one place in half of them stays"
+    return _finish(median, apart & False, reference, note)
+
+
+def _finish(filled: FloatImage, unsure: BoolImage, reference: Image, note: str) -> Plate:
+    image = np.clip(np.rint(filled), 0, 255).astype(np.uint8).reshape(reference.shape)
+    return Plate(image, unsure, note)

@@ -1,0 +1,61 @@
+"""The player node's parameters."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.node.ros import declared
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlayerSettings:
+    """What a player does.
+
+    Attributes:
+        bag: the bag's folder, or its `.mcap`.
+        rate: 1 is the bag's own pace.
+        loop: begin anew at the end.
+        start_offset: s of the bag to leave out.
+        wait_for_subscribers: wait until every image topic has a subscriber and `state` says ready.
+    """
+
+    bag: Path
+    rate: float = 1.0
+    loop: bool = False
+    start_offset: float = 0.0
+    wait_for_subscribers: bool = False
+
+
+_NAMES = tuple(entry.name for entry in fields(PlayerSettings))
+
+
+def read_player_settings(given: Mapping[str, Any]) -> PlayerSettings:
+    """Settings from the parameters a user gave.
+
+    Raises:
+        ConfigError: no bag, an unknown name or an impossible value; names the parameter.
+    """
+    declared.check_names(given, _NAMES)
+    values = declared.present(given)
+    if "bag" not in values:
+        raise ConfigError("bag: not given, expected the folder of a bag (-p bag:=FOLDER)")
+    chosen: dict[str, Any] = {"bag": Path(declared.text("bag", values["bag"])).expanduser()}
+    for name, least, most in (("rate", 1e-3, 1e3), ("start_offset", 0.0, 1e9)):
+        if name in values:
+            chosen[name] = declared.number(name, values[name], least, most)
+    for name in ("loop", "wait_for_subscribers"):
+        if name in values:
+            chosen[name] = declared.flag(name, values[name])
+    return PlayerSettings(**chosen)
+
+
+def player_values(settings: PlayerSettings) -> dict[str, Any]:
+    """What every parameter is, as ROS can hold it."""
+    return {**asdict(settings), "bag": str(settings.bag)}
+
+
+def descriptions() -> dict[str, str]:
+    """One line about every parameter."""
+    return declared.attribute_lines(PlayerSettings)

@@ -1,0 +1,133 @@
+"""Results as ROS messages: pure functions, plain Python numbers in every field."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseWithCovarianceStamped, Quaternion
+from numpy.typing import NDArray
+from sensor_msgs.msg import JointState
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from markerless_tracker.body import BodyModel, cone_transforms, root_transform
+from markerless_tracker.geometry import quaternion_from_rotation
+from markerless_tracker.node.ros.stamps import time_message
+from markerless_tracker.records import Confidence, TrackState
+
+WORLD_FRAME = "map"
+"""Frame of everything in world coordinates (REP-105)."""
+
+FloatArray = NDArray[np.float64]
+
+_BODY_COLOUR = ColorRGBA(r=0.35, g=0.6, b=0.9, a=0.7)
+_JOINT_COLOUR = ColorRGBA(r=1.0, g=0.45, b=0.1, a=1.0)
+_JOINT_DIAMETER_M = 0.05
+
+
+def optical_frame(camera: str) -> str:
+    """Name of a camera's optical frame."""
+    return f"{camera}_optical_frame"
+
+
+def header(stamp_ns: int, frame: str = WORLD_FRAME) -> Header:
+    """A header with the images' time."""
+    return Header(stamp=time_message(stamp_ns), frame_id=frame)
+
+
+def joint_state(body: BodyModel, pose: FloatArray, stamp_ns: int) -> JointState:
+    """All joints of the body but the root's, named as in its URDF; rad (m for sliding joints)."""
+    return JointState(
+        header=header(stamp_ns, ""),
+        name=list(body.joint_names),
+        position=np.asarray(pose, dtype=np.float64)[body.joints].tolist(),
+    )
+
+
+def root_pose(
+    body: BodyModel, pose: FloatArray, stamp_ns: int, confidence: Confidence | None = None
+) -> PoseWithCovarianceStamped:
+    """Pose of the body's root frame in the world; the covariance is zero if it is unknown."""
+    message = PoseWithCovarianceStamped(header=header(stamp_ns))
+    message.pose.pose = _pose(root_transform(body, pose))
+    if confidence is not None:
+        message.pose.covariance = confidence.root_covariance.ravel().tolist()
+    return message
+
+
+def joint_deviations(body: BodyModel, confidence: Confidence, stamp_ns: int) -> JointState:
+    """Standard deviation of every joint, rad, where a joint state has the position."""
+    return JointState(
+        header=header(stamp_ns, ""),
+        name=list(body.joint_names),
+        position=confidence.pose_sd[body.joints].tolist(),
+    )
+
+
+def marker_poses(markers_m: FloatArray, stamp_ns: int) -> PoseArray:
+    """The 15 markers in order, world frame, with no rotation of their own."""
+    return PoseArray(
+        header=header(stamp_ns), poses=[Pose(position=_point(row)) for row in markers_m]
+    )
+
+
+def body_markers(
+    body: BodyModel, pose: FloatArray, markers_m: FloatArray, stamp_ns: int
+) -> MarkerArray:
+    """The body for viewers: a cylinder per cone (its mean radii) and a sphere per joint."""
+    shapes = body.cone_shape.mean(axis=1)
+    cylinders = []
+    for number, T_world_cone in enumerate(cone_transforms(body, pose)):
+        radius_x, radius_y, offset_x, offset_y = shapes[number].tolist()
+        length = float(body.cone_length[number])
+        T = np.vstack([T_world_cone, (0.0, 0.0, 0.0, 1.0)])
+        T[:3, 3] += T[:3, :3] @ (offset_x, offset_y, length / 2.0)
+        marker = Marker(header=header(stamp_ns), ns="body", id=number, type=Marker.CYLINDER)
+        marker.pose = _pose(T)
+        marker.scale.x, marker.scale.y, marker.scale.z = 2.0 * radius_x, 2.0 * radius_y, length
+        marker.color = _BODY_COLOUR
+        cylinders.append(marker)
+    joints = Marker(header=header(stamp_ns), ns="joints", id=0, type=Marker.SPHERE_LIST)
+    joints.pose.orientation.w = 1.0
+    joints.scale.x = joints.scale.y = joints.scale.z = _JOINT_DIAMETER_M
+    joints.color = _JOINT_COLOUR
+    joints.points = [_point(row) for row in markers_m]
+    return MarkerArray(markers=[*cylinders, joints])
+
+
+def no_markers(stamp_ns: int) -> MarkerArray:
+    """Takes the body out of viewers."""
+    return MarkerArray(markers=[Marker(header=header(stamp_ns), action=Marker.DELETEALL)])
+
+
+def state_message(
+    name: str, values: Mapping[str, str], state: TrackState, stamp_ns: int, *, ready: bool
+) -> DiagnosticArray:
+    """A tracker's state: OK while it tracks, WARN otherwise.
+
+    Args:
+        name: the node's name.
+        values: what `TrackerStatus.values` gives.
+        state: state after the last frame.
+        stamp_ns: time of the images of which it speaks, 0 before the first.
+        ready: whether the tracker is ready.
+    """
+    fine = ready and state is TrackState.TRACKING
+    status = DiagnosticStatus(
+        level=DiagnosticStatus.OK if fine else DiagnosticStatus.WARN,
+        name=f"{name}: tracking",
+        message=f"{state.value}: {values['activity']}" if not fine else state.value,
+        hardware_id="markerless_tracker",
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+    return DiagnosticArray(header=header(stamp_ns, ""), status=[status])
+
+
+def _point(xyz: FloatArray) -> Point:
+    x, y, z = (float(v) for v in xyz)
+    return Point(x=x, y=y, z=z)
+
+
+def _pose(T_world_x: FloatArray) -> Pose:
+    w, x, y, z = (float(v) for v in quaternion_from_rotation(T_world_x[:3, :3]))
+    return Pose(position=_point(T_world_x[:3, 3]), orientation=Quaternion(x=x, y=y, z=z, w=w))

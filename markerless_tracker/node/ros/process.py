@@ -1,0 +1,136 @@
+"""Starting and stopping an executable of this package in a ROS graph."""
+
+import signal
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from typing import Any
+
+from markerless_tracker.errors import ConfigError, TrackerError
+from markerless_tracker.node.ros.profile import apply_profile
+
+NOT_INSTALLED = (
+    "ROS 2 is not installed: pip install 'markerless_tracker[ros]' or source a ROS 2 Jazzy setup"
+)
+
+
+_NEEDED = (
+    "rclpy",
+    "diagnostic_msgs.msg",
+    "geometry_msgs.msg",
+    "sensor_msgs.msg",
+    "std_srvs.srv",
+    "visualization_msgs.msg",
+)
+
+
+class RosMissingError(TrackerError):
+    """A ROS node was asked for where ROS 2 cannot be imported."""
+
+
+def require_ros() -> None:
+    """Make sure that rclpy and the message packages can be imported.
+
+    Raises:
+        RosMissingError: they cannot; says how to install them.
+    """
+    try:
+        for module in _NEEDED:
+            import_module(module)
+    except ImportError as error:
+        missing = f" ({error.name} is missing)" if error.name else ""
+        raise RosMissingError(NOT_INSTALLED + missing) from error
+
+
+class StopSignals:
+    """Notes SIGINT and SIGTERM instead of letting them break into whatever runs; a context manager.
+
+    An exception in the midst of writing a result would cut it, and one in the midst of an import
+    can make Python report a failure at its end although it was caught.
+
+    Attributes:
+        asked: whether one has come.
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    def __enter__(self) -> "StopSignals":
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """The process is about to end: what comes now changes nothing."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
+
+    def _note(self, number: int, frame: object) -> None:
+        self.asked = True
+
+
+def run_executable(
+    name: str, body: Callable[[list[str], StopSignals], int], argv: Sequence[str] | None = None
+) -> int:
+    """Run an executable: one line on standard error and 1 for an error.
+
+    Args:
+        name: the executable's, for its messages.
+        body: called with the arguments after ROS is known to be there, and with what tells it that
+            it is time to end; returns the exit code.
+        argv: arguments without the program's name; those of this process if None.
+    """
+    with StopSignals() as stop:
+        try:
+            apply_profile()
+            require_ros()
+            return body(list(sys.argv[1:] if argv is None else argv), stop)
+        except TrackerError as error:
+            print(f"{name}: {error}", file=sys.stderr, flush=True)
+            return 1
+
+
+def print_help(name: str, summary: str, example: str, lines: Mapping[str, str]) -> None:
+    """Print what an executable does, an example, and its parameters with a line about each."""
+    width = max(map(len, lines)) + 2
+    listed = "\n".join(f"  {key:{width}}{line}" for key, line in lines.items())
+    print(
+        f"usage: {name} --ros-args [-p NAME:=VALUE ...] [--params-file FILE]\n\n{summary}\n\n"
+        f"example:\n  {example}\n\nparameters:\n{listed}"
+    )
+
+
+def init_context(arguments: Sequence[str]) -> Any:
+    """Initialise rclpy with a context of its own and ROS arguments.
+
+    Args:
+        arguments: e.g. ``["--ros-args", "-p", "seed:=1"]``.
+
+    Returns:
+        The ``rclpy.Context``; signals are left to the caller.
+
+    Raises:
+        ConfigError: an argument that ROS does not understand, or one outside ``--ros-args``.
+    """
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
+    try:
+        rest = remove_ros_args(args=["", *arguments])[1:]
+        if rest:
+            raise ConfigError(
+                f"argument {rest[0]!r} is not understood, expected "
+                "--ros-args -p NAME:=VALUE or --params-file FILE"
+            )
+        context = rclpy.Context()
+        rclpy.init(
+            args=list(arguments),
+            context=context,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+    except ConfigError:
+        raise
+    except Exception as error:  # rclpy has no common root for what it finds wrong in arguments
+        raise ConfigError(f"ROS arguments: {' '.join(str(error).split())}") from error
+    return context

@@ -1,0 +1,109 @@
+"""The tracker node's parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from markerless_tracker.datasets.background import MAX_FRAMES
+from markerless_tracker.node.ros import declared
+from markerless_tracker.tracking import TrackerConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodeSettings:
+    """What the node itself is told; everything else is the tracker's.
+
+    Attributes:
+        cameras: names of the cameras, all of `calibration_file` if empty.
+        calibration_file: `calibration.toml` of the images as they come; camera_info and TF if None.
+        background_dir: the empty scene: an image, clip, folder or learned NAME.npz per camera.
+        subject_file: sizes of the person.
+        stature: the person's stature in m, for those who have no subject file.
+        start_file: TRC or pose YAML to begin with; without one, somebody is looked for.
+        scale: factor by which images are made smaller on arrival.
+        result_file: NAME of NAME.trc and NAME.json; none are written if None.
+        wait_for_background: start without backgrounds and wait for the service learn_background.
+        learn_background_sets: sets of images that the service learn_background learns from.
+        sync_tolerance: s by which the stamps of one set may differ; 0 means equal stamps.
+        config: the tracker's settings.
+    """
+
+    cameras: tuple[str, ...] = ()
+    calibration_file: Path | None = None
+    background_dir: Path | None = None
+    subject_file: Path | None = None
+    stature: float | None = None
+    start_file: Path | None = None
+    scale: float = 1.0
+    result_file: Path | None = None
+    wait_for_background: bool = False
+    learn_background_sets: int = 20
+    sync_tolerance: float = 0.0
+    config: TrackerConfig
+
+
+_OWN = tuple(entry.name for entry in fields(NodeSettings) if entry.name != "config")
+_FILES = ("calibration_file", "background_dir", "subject_file", "start_file", "result_file")
+
+
+def parameter_names() -> tuple[str, ...]:
+    """Every parameter of the tracker node that is not ROS' own."""
+    return (*_OWN, *(setting.name for setting in TrackerConfig.settings()))
+
+
+def read_settings(given: Mapping[str, Any]) -> NodeSettings:
+    """Settings from the parameters a user gave, by name; None and empty texts mean "not given".
+
+    Raises:
+        ConfigError: an unknown name or an impossible value; names the parameter.
+    """
+    declared.check_names(given, parameter_names())
+    values = declared.present(given)
+    own: dict[str, Any] = {
+        name: Path(declared.text(name, values[name])).expanduser()
+        for name in _FILES
+        if name in values
+    }
+    if "cameras" in values:
+        own["cameras"] = declared.names("cameras", values["cameras"])
+    ranges = {"stature": (0.5, 2.5), "scale": (0.01, 1.0), "sync_tolerance": (0.0, 1.0)}
+    for name, (least, most) in ranges.items():
+        if name in values:
+            own[name] = declared.number(name, values[name], least, most)
+    if "wait_for_background" in values:
+        own["wait_for_background"] = declared.flag(
+            "wait_for_background", values["wait_for_background"]
+        )
+    if "learn_background_sets" in values:
+        own["learn_background_sets"] = declared.count(
+            "learn_background_sets", values["learn_background_sets"], 2, MAX_FRAMES
+        )
+    rest = {name: value for name, value in values.items() if name not in _OWN}
+    return NodeSettings(config=TrackerConfig.from_mapping(rest), **own)
+
+
+def effective_values(settings: NodeSettings) -> dict[str, Any]:
+    """What every parameter is now, as ROS can hold it (None where there is no value)."""
+    own = {name: getattr(settings, name) for name in _OWN}
+    chosen = {s.name: getattr(settings.config, s.name) for s in TrackerConfig.settings()}
+    return {name: _as_parameter(value) for name, value in {**chosen, **own}.items()}
+
+
+def descriptions() -> dict[str, str]:
+    """One line about every parameter."""
+    lines = {}
+    for setting in TrackerConfig.settings():
+        choices = f" ({', '.join(map(str, setting.choices))})" if setting.choices else ""
+        lines[setting.name] = f"{setting.doc}{choices}"
+    own = declared.attribute_lines(NodeSettings)
+    lines.update({name: own[name] for name in _OWN})
+    return lines
+
+
+def _as_parameter(value: Any) -> Any:
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, (tuple, list)):
+        return list(value) or None
+    return value

@@ -1,0 +1,152 @@
+"""From the node's settings to a rig and a tracker."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.camera.calibration import read_calibration
+from markerless_tracker.datasets.background import read_background, read_background_models
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.imaging import BackgroundModel, learn_background
+from markerless_tracker.node.tracker.parameters import NodeSettings
+from markerless_tracker.tracking import TrackerSetup, build_tracker
+
+
+class RigSource:
+    """Where the rig comes from: the calibration file, or camera infos and TF.
+
+    Attributes:
+        names: the cameras.
+        rig: the rig of full-size images, None while it is not known.
+
+    Raises:
+        CalibrationError: the calibration file cannot be used or lacks a camera.
+        ConfigError: there is neither a calibration file nor another way to learn the rig.
+    """
+
+    def __init__(self, settings: NodeSettings) -> None:
+        self.rig: CameraRig | None = None
+        self._tree: Any = None
+        if settings.calibration_file is not None:
+            rig = read_calibration(settings.calibration_file)
+            self.rig = rig.selected(settings.cameras or rig.names)
+            self.names = self.rig.names
+            return
+        if not settings.cameras:
+            raise ConfigError(
+                "calibration_file: not given, expected a calibration.toml, or names in `cameras` "
+                "whose extrinsics come from TF"
+            )
+        self.names = settings.cameras
+        try:
+            import tf2_msgs.msg  # noqa: F401
+        except ImportError as error:
+            raise ConfigError(
+                "calibration_file: not given, and extrinsics from TF need tf2_msgs, which is not "
+                "installed"
+            ) from error
+        from markerless_tracker.node.ros.extrinsics import TransformTree
+
+        self._tree = TransformTree()
+
+    def listen(self, node: Any) -> None:
+        """Subscribe to TF if that is needed."""
+        if self._tree is None:
+            return
+        from tf2_msgs.msg import TFMessage
+
+        from markerless_tracker.node.ros.qos import image_qos, latched_qos
+
+        def take(message: Any) -> None:
+            self._tree.update(message.transforms)
+
+        static = latched_qos()
+        static.depth = 100
+        node.create_subscription(TFMessage, "/tf_static", take, static)
+        node.create_subscription(TFMessage, "/tf", take, image_qos(depth=100))
+
+    def try_rig(self, infos: Mapping[str, Any]) -> CameraRig | None:
+        """The rig if everything for it has come.
+
+        Args:
+            infos: sensor_msgs/CameraInfo of each camera, None for those that sent none.
+
+        Raises:
+            CalibrationError: a camera info cannot be used.
+        """
+        if self.rig is not None:
+            return self.rig
+        from markerless_tracker.node.ros.camera_info import camera_of
+
+        cameras = []
+        for name in self.names:
+            T_cam_world = self._tree.T_cam_world(name)
+            if T_cam_world is None or infos[name] is None:
+                return None
+            cameras.append(camera_of(name, infos[name], T_cam_world))
+        self.rig = CameraRig(tuple(cameras))
+        return self.rig
+
+    def missing(self) -> list[str]:
+        """Transforms that are waited for."""
+        if self._tree is None or self.rig is not None:
+            return []
+        from markerless_tracker.node.ros.messages import WORLD_FRAME, optical_frame
+
+        return [
+            f"TF {WORLD_FRAME} -> {optical_frame(name)}"
+            for name in self.names
+            if self._tree.T_cam_world(name) is None
+        ]
+
+
+def build(settings: NodeSettings, rig: CameraRig, scaled: CameraRig) -> TrackerSetup:
+    """The tracker that the settings describe.
+
+    Args:
+        settings: the node's.
+        rig: cameras of the images as they come.
+        scaled: cameras of the images as the tracker gets them.
+
+    Raises:
+        TrackerError: a file cannot be read, or does not fit the rig.
+    """
+    return build_tracker(
+        scaled,
+        settings.config,
+        backgrounds=_backgrounds(settings, rig, scaled),
+        subject_file=settings.subject_file,
+        stature=settings.stature,
+        start_file=settings.start_file,
+    )
+
+
+def _backgrounds(
+    settings: NodeSettings, rig: CameraRig, scaled: CameraRig
+) -> dict[str, BackgroundModel]:
+    folder = settings.background_dir
+    if settings.wait_for_background and not (folder and folder.is_dir()):
+        return {}
+    if folder is None:
+        raise ConfigError(
+            "background_dir: not given, expected a folder with an image, clip or learned model of "
+            f"the empty scene for each of {', '.join(rig.names)}"
+        )
+    sizes_px = {camera.name: camera.size_px for camera in rig}
+    models = read_background_models(folder, scaled, stored_sizes_px=sizes_px)
+    frames = read_background(folder, scaled, stored_sizes_px=sizes_px)
+    missing = [name for name in rig.names if name not in models and name not in frames]
+    if missing and settings.wait_for_background:
+        # What some have would be replaced together with what the others lack.
+        return {}
+    if missing:
+        raise ConfigError(
+            f"background_dir: {folder} holds nothing for {', '.join(missing)}, "
+            "expected an image, clip or learned model (.npz) named after each camera"
+        )
+    learned = {
+        name: learn_background(images, settings.config, camera=name)
+        for name, images in frames.items()
+        if name not in models
+    }
+    return models | learned

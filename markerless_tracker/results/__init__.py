@@ -1,0 +1,4 @@
+"""Runs over recordings, results on disk and their score.
+
+What `track`, `evaluate` and the node need.
+"""

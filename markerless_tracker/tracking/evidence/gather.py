@@ -1,0 +1,185 @@
+"""The views of one time to the evidence of the tracked body, cameras side by side."""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.errors import ImageError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
+from markerless_tracker.imaging.edges import edge_reach
+from markerless_tracker.records import Observation
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.evidence.selection import (
+    body_region,
+    explained_in_region,
+    explained_part,
+)
+
+
+class EvidenceMaker:
+    """Turns views into observations, and keeps of their silhouettes what the prediction explains.
+
+    Args:
+        rig: the cameras.
+        config: settings of the imaging and the selection.
+        backgrounds: the empty scene per camera; cameras without one take observations only.
+        pool: threads that the cameras share.
+
+    Raises:
+        ImageError: a background does not fit its camera.
+    """
+
+    def __init__(
+        self,
+        rig: CameraRig,
+        config: TrackerConfig,
+        backgrounds: Mapping[str, BackgroundModel],
+        pool: ThreadPoolExecutor,
+    ) -> None:
+        self._rig = rig
+        self._config = config
+        self._margin_px = config.component_margin_px
+        self._clear_px = edge_reach(config) + config.component_margin_px
+        self._every = config.full_frame_every
+        self._turn = 0
+        self._pool = pool
+        self.segmenters: dict[str, Segmenter] = {}
+        self.take_backgrounds(backgrounds)
+
+    def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
+        """Tell people from other empty scenes from now on.
+
+        Raises:
+            ImageError: a background does not fit its camera; all stays as it was.
+        """
+        segmenters: dict[str, Segmenter] = {}
+        for camera in self._rig:
+            background = backgrounds.get(camera.name)
+            if background is None:
+                continue
+            if background.size_px != camera.size_px:
+                raise ImageError(
+                    f"{camera.name}: background of {background.size_px[0]}x"
+                    f"{background.size_px[1]} px, its calibration says "
+                    f"{camera.size_px[0]}x{camera.size_px[1]}"
+                )
+            segmenters[camera.name] = Segmenter(camera.name, background, self._config)
+        self.segmenters = segmenters
+
+    def observe(
+        self, views: Mapping[str, Image | Observation], stamp_ns: int
+    ) -> dict[str, Observation]:
+        """Observations of the whole views, as they are; ready-made ones pass.
+
+        Raises:
+            ImageError, CalibrationError: no view, an unknown camera, an image without a background
+                or one that does not fit; names the camera.
+        """
+        self._check(views)
+
+        def evidence(item: tuple[str, Image | Observation]) -> Observation:
+            name, view = item
+            if isinstance(view, Observation):
+                return view
+            return self._segmenter(name).observe(view, stamp_ns)
+
+        return dict(zip(views, self._pool.map(evidence, views.items()), strict=True))
+
+    def select(
+        self, observed: Mapping[str, Observation], body: BodyModel, predicted: FloatArray
+    ) -> tuple[dict[str, Observation], tuple[str, ...]]:
+        """Keep the components that a predicted pose (p,) explains; say what was left out."""
+
+        def part(item: tuple[str, Observation]) -> tuple[Observation, int]:
+            name, observation = item
+            return explained_part(observation, self._rig[name], body, predicted, self._margin_px)
+
+        return _kept(dict(zip(observed, self._pool.map(part, observed.items()), strict=True)))
+
+    def gather(
+        self,
+        views: Mapping[str, Image | Observation],
+        stamp_ns: int,
+        body: BodyModel,
+        predicted: FloatArray,
+        *,
+        margin_m: float | None,
+    ) -> tuple[dict[str, Observation], tuple[str, ...]]:
+        """As `observe` and then `select`, in less time while the body is tracked.
+
+        With a margin around the body at the predicted pose, images are looked at there alone,
+        except where that would change what stays, and each camera's whole frame every
+        `full_frame_every` calls.
+
+        Raises:
+            ImageError, CalibrationError: as `observe`.
+        """
+        self._check(views)
+        self._turn += 1
+        regions = self.regions(body, predicted, margin_m)
+
+        def evidence(item: tuple[str, Image | Observation]) -> tuple[Observation, int]:
+            name, view = item
+            camera, region = self._rig[name], regions[name]
+            if not isinstance(view, Observation):
+                segmenter = self._segmenter(name)
+                if region is not None and not self._whole_frame_is_due(name):
+                    seen = segmenter.observe(view, stamp_ns, region)
+                    found = explained_in_region(
+                        seen, camera, body, predicted, self._margin_px, self._clear_px
+                    )
+                    if found is not None:
+                        return found
+                view = segmenter.observe(view, stamp_ns)
+            return explained_part(view, camera, body, predicted, self._margin_px)
+
+        return _kept(dict(zip(views, self._pool.map(evidence, views.items()), strict=True)))
+
+    def regions(
+        self, body: BodyModel, predicted: FloatArray, margin_m: float | None
+    ) -> dict[str, Region | None]:
+        """Where each camera looks at a body at a pose (p,), and a margin around it; None = all."""
+        if margin_m is None:
+            return dict.fromkeys(self._rig.names)
+        return {
+            camera.name: body_region(camera, body, predicted, margin_m, self._clear_px)
+            for camera in self._rig
+        }
+
+    def exposure(self, views: Mapping[str, Image | Observation]) -> dict[str, tuple[float, ...]]:
+        """How bright the images just gathered are beside their backgrounds, by channel."""
+        return {
+            name: self.segmenters[name].gain
+            for name, view in views.items()
+            if not isinstance(view, Observation)
+        }
+
+    def _whole_frame_is_due(self, name: str) -> bool:
+        """Cameras take turns, so that no frame costs much more than others."""
+        shift = self._rig.names.index(name) * self._every // len(self._rig)
+        return (self._turn + shift) % self._every == 0
+
+    def _check(self, views: Mapping[str, Image | Observation]) -> None:
+        if not views:
+            raise ImageError(f"no view came, expected some of {', '.join(self._rig.names)}")
+        for name in views:
+            self._rig[name]
+
+    def _segmenter(self, name: str) -> Segmenter:
+        if name not in self.segmenters:
+            raise ImageError(f"{name}: an image came, but no background to tell the person from")
+        return self.segmenters[name]
+
+
+def _kept(
+    parts: Mapping[str, tuple[Observation, int]],
+) -> tuple[dict[str, Observation], tuple[str, ...]]:
+    """What is kept of each view, and a line for each of which something was left out."""
+    warnings = tuple(
+        f"{name}: {left_out} px of silhouette away from the body left out"
+        for name, (_, left_out) in parts.items()
+        if left_out
+    )
+    return {name: kept for name, (kept, _) in parts.items()}, warnings

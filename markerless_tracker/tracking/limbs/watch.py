@@ -1,0 +1,172 @@
+"""Limbs that are lost while the rest is tracked: which they are, and finding them again.
+
+A limb outside the silhouettes is seen to be lost. One that lies inside them and is wrong all the
+same is not, so all limbs take turns to be looked for elsewhere.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.body import BodyModel, cone_transforms
+from markerless_tracker.camera import CameraRig, project_camera
+from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import keyed_generator
+from markerless_tracker.records import LimbState, Observation, TrackState
+from markerless_tracker.tracking.limbs.search import other_limb
+from markerless_tracker.tracking.loss import LimbTrack
+from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.start.population import FramePopulation
+from markerless_tracker.tracking.start.recombination import Breeder
+
+TURN_NS = 60_000_000
+"""A limb that is not lost is looked for elsewhere this often: every fourth frame at 60 frames/s."""
+_ALONG = np.linspace(0.1, 0.9, 5)
+
+
+class LimbWatch:
+    """Tells which limbs are lost, and looks for limbs alone: for lost ones, and for all in turn.
+
+    Args:
+        rig: the cameras.
+    """
+
+    def __init__(self, rig: CameraRig) -> None:
+        self._rig = rig
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the limbs so far."""
+        self._tracks: dict[str, LimbTrack] = {}
+        self._turn = 0
+        self._turned_ns: int | None = None
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Limbs that were lost when last judged."""
+        return tuple(n for n, track in self._tracks.items() if track.state is TrackState.LOST)
+
+    def judge(
+        self,
+        body: BodyModel,
+        pose: FloatArray,
+        observations: Mapping[str, Observation],
+        scatter: FloatArray,
+    ) -> dict[str, LimbState]:
+        """By limb, its state at a pose (p,).
+
+        Args:
+            body: the body.
+            pose: the estimate.
+            observations: the silhouettes.
+            scatter: (p,) as in `FrameSearch`.
+        """
+        shares = limb_shares(body, pose, observations, self._rig)
+        states = {}
+        for name in body.limbs:
+            share = shares.get(name, float("nan"))
+            wide = float(np.sqrt(np.mean(scatter[body.subspaces[name]] ** 2)))
+            track = self._tracks.setdefault(name, LimbTrack())
+            state = track.note(share, wide) if name in shares else track.state
+            states[name] = LimbState(state, share, wide)
+        return states
+
+    def mend(
+        self,
+        searcher: Searcher,
+        contours: ContourFrame,
+        observations: Mapping[str, Observation],
+        stamp_ns: int,
+        pose: FloatArray,
+    ) -> tuple[FloatArray, tuple[str, ...]]:
+        """Look for limbs that `judge` called lost, and for the one whose turn it is.
+
+        A limb is taken from elsewhere if f_s rises as clearly as a swarm's result must
+        (`swarm_gain`).
+
+        Returns:
+            The pose (p,), and the names of the limbs that were taken from elsewhere.
+        """
+        body, config = searcher.body, searcher.config
+        due = self._due(body, stamp_ns)
+        if not due:
+            return pose, ()
+        frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
+        breeder = Breeder(body, searcher.limits)
+        cost = float(frame.costs(pose[None])[0])
+        found = []
+        for name in due:
+            rng = keyed_generator(config.seed, stamp_ns, f"{name} elsewhere")
+            other, other_cost = other_limb(frame, breeder, pose, body.subspaces[name], rng)
+            if other_cost < cost - config.swarm_gain:
+                pose, cost = other, other_cost
+                found.append(name)
+        return pose, tuple(found)
+
+    def _due(self, body: BodyModel, stamp_ns: int) -> list[str]:
+        """Limbs to look for: the lost ones, and at its turn another."""
+        if not body.limbs:
+            return []
+        lost = list(self.lost)
+        if self._turned_ns is not None and 0 <= stamp_ns - self._turned_ns < TURN_NS:
+            return lost
+        self._turned_ns = stamp_ns
+        name = body.limbs[self._turn % len(body.limbs)]
+        self._turn += 1
+        return lost if name in lost else [*lost, name]
+
+
+def limb_shares(
+    body: BodyModel,
+    pose: FloatArray,
+    observations: Mapping[str, Observation],
+    rig: CameraRig,
+) -> dict[str, float]:
+    """By limb, how much of its cones' axes lies inside the silhouettes, mean over the views.
+
+    Points outside a view's region count as outside, those outside its frame not at all.
+    """
+    placed = cone_transforms(body, pose)
+    along = (body.cone_length[:, None] * _ALONG)[:, :, None]
+    points = (placed[:, None, :, 3] + along * placed[:, None, :, 2]).reshape(-1, 3)
+    seen = [_look(points, observation, rig) for observation in observations.values()]
+    shares = {}
+    for name in body.limbs:
+        nodes = np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name]))
+        below = np.isin(body.cone_node, list(_below(body, nodes)))
+        own = np.repeat(below, _ALONG.size)
+        values = [
+            float(inside[own].sum()) / float(framed[own].sum())
+            for framed, inside in seen
+            if framed[own].any()
+        ]
+        if values:
+            shares[name] = float(np.mean(values))
+    return shares
+
+
+def _below(body: BodyModel, nodes: np.ndarray[tuple[int], np.dtype[np.int64]]) -> set[int]:
+    below = {int(node) for node in nodes}
+    for node, above in enumerate(body.node_parent):
+        if int(above) in below:
+            below.add(node)
+    return below
+
+
+def _look(
+    points: FloatArray, observation: Observation, rig: CameraRig
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which of the points (n, 3) a view has in its frame, and which in its silhouette."""
+    pixels = project_camera(points, rig[observation.camera])
+    with np.errstate(invalid="ignore"):
+        framed = (pixels >= 0.0).all(axis=1) & (pixels <= np.array(observation.size_px) - 1).all(
+            axis=1
+        )
+    inside = np.zeros(len(points), dtype=np.bool_)
+    mask = observation.mask
+    u, v = (np.round(pixels[framed]) - observation.offset_px).astype(np.int64).T
+    there = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
+    inside[np.flatnonzero(framed)[there]] = mask[v[there], u[there]]
+    return np.asarray(framed), inside

@@ -1,0 +1,138 @@
+"""The first frame: the person's shape from the silhouettes, the start pose known or nearly so.
+
+Fitting pose and shape together drifts while the fitness rises, so the pose is held while the shape
+is fitted. A start whose markers are noisy would be pressed into the shape: pose and segment lengths
+are first moved to where a nearly generic body fits silhouettes and markers, each as far as it is
+trusted.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body.sizes import Sizes
+from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour.outline_rows import outline_rows, surface
+from markerless_tracker.fitness.contour.row_kernels import normal_equations
+from markerless_tracker.fitness.shape.section_fit import CORRELATION_M, fit_shape
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import Prior, refine
+from markerless_tracker.tracking.config import TrackerConfig
+
+TRUSTED_M = 0.003
+"""Start markers at most this far off are taken as they are."""
+_TIGHT = 3.0
+_ITERATIONS = 8
+_STEP = 1e-6
+_LENGTH_SPREAD = 0.15
+_LENGTH_RANGE = (0.7, 1.4)
+
+ContourMaker = Callable[[BodyModel, FloatArray], ContourFrame]
+"""Contour evidence of the first frame for a body near a pose (p,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class StartMarkers:
+    """The markers that a start pose was taken from.
+
+    Attributes:
+        positions_m: (15, 3) world frame, in the order of `MARKER_NAMES`, NaN where missing.
+        noise_m: how far they may be off, per coordinate.
+        sizes: makes the body of other lengths.
+    """
+
+    positions_m: FloatArray
+    noise_m: float
+    sizes: Sizes
+
+
+def start_noise_m(lengths_m: Mapping[str, float]) -> float:
+    """How far the markers of a row are off, per coordinate, judged by its segment lengths, m.
+
+    Left and right segments of a person are alike, so their differences are noise: each holds four
+    markers' errors along the segment, hence twice the spread of one coordinate. 0 without pairs.
+    """
+    pairs = [
+        (value, lengths_m["r_" + name[2:]])
+        for name, value in lengths_m.items()
+        if name.startswith("l_") and "r_" + name[2:] in lengths_m
+    ]
+    if not pairs:
+        return 0.0
+    return float(np.sqrt(np.mean([(left - right) ** 2 for left, right in pairs])) / 2.0)
+
+
+def shape_of_first_frame(
+    body: BodyModel,
+    pose: FloatArray,
+    start: StartMarkers | None,
+    contours: ContourMaker,
+    config: TrackerConfig,
+    limits: FloatArray,
+) -> tuple[BodyModel, FloatArray]:
+    """The body with the person's sections, and the start pose (p,) they were fitted at.
+
+    Args:
+        body: the body with generic sections.
+        pose: (p,) start pose.
+        start: the markers it was taken from, if any.
+        contours: makes the frame's contour evidence.
+        config: settings of the refinement.
+        limits: (2, p) joint limits.
+    """
+    if start is not None and start.noise_m > TRUSTED_M:
+        nearly = fit_shape(body, [(contours(body, pose), pose)], tightness=_TIGHT)
+        lengths, pose = _settled(nearly, pose, start, contours(nearly, pose), config, limits)
+        body = start.sizes.body(lengths, body)
+    return fit_shape(body, [(contours(body, pose), pose)]), pose
+
+
+def _settled(
+    body: BodyModel,
+    pose: FloatArray,
+    start: StartMarkers,
+    contours: ContourFrame,
+    config: TrackerConfig,
+    limits: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Free lengths (k,) and pose (p,) that fit contours and markers."""
+    scale = 1.0 / (CORRELATION_M * config.refine_sigma_m**2)
+    begin = start.sizes.of(body)
+    seen = np.isfinite(start.positions_m).all(axis=1)
+    p = body.size
+
+    def equations(z: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
+        model = start.sizes.body(z[p:], body)
+        contours.collect(z[:p], reach_m, model)
+        rows = outline_rows(contours)
+        points, joints = surface(model, z[:p], rows), markers(model, z[:p])[seen]
+        slopes = np.empty((rows.value.size, z.size))
+        marks = np.empty((joints.size, z.size))
+        for i in range(z.size):
+            moved = z.copy()
+            moved[i] += _STEP
+            changed = model if i < p else start.sizes.body(moved[p:], body)
+            gap = surface(changed, moved[:p], rows) - points
+            slopes[:, i] = np.einsum("ni,ni->n", rows.gradient, gap) / _STEP
+            marks[:, i] = (markers(changed, moved[:p])[seen] - joints).ravel() / _STEP
+        gap = (joints - start.positions_m[seen]).ravel()
+        trust = 1.0 / start.noise_m**2
+        hessian, slope = normal_equations(slopes, scale * rows.weight, rows.value)
+        return hessian + trust * marks.T @ marks, slope + trust * marks.T @ gap
+
+    z = refine(
+        equations,
+        np.concatenate([pose, begin]),
+        priors=(
+            Prior(
+                np.concatenate([body.neutral, begin]),
+                np.concatenate([1.0 / body.spread**2, 1.0 / (_LENGTH_SPREAD * begin) ** 2]),
+            ),
+        ),
+        bounds=np.concatenate([limits, np.outer(_LENGTH_RANGE, begin)], axis=1),
+        iterations=_ITERATIONS,
+        reach=(config.refine_reach_m, config.refine_reach_end_m),
+    )
+    return z[p:], z[:p]

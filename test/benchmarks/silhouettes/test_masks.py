@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+
+from markerless_tracker.benchmarks.silhouettes.masks import (
+    LEAK_PX,
+    agreement,
+    draw_agreement,
+    measure,
+    radii_mm,
+)
+from markerless_tracker.benchmarks.silhouettes.scene import made_up_scene, recorded_scene
+from markerless_tracker.errors import DatasetError
+
+
+def square(left: int, right: int) -> np.ndarray:
+    mask = np.zeros((40, 60), dtype=bool)
+    mask[10:30, left:right] = True
+    return mask
+
+
+def test_shares_by_hand() -> None:
+    told = agreement(square(15, 35), square(10, 30))
+    assert told.iou == pytest.approx(15 / 25)
+    assert told.precision == told.recall == pytest.approx(15 / 20)
+    assert told.shadow_leak == 0.0
+
+
+def test_a_leak_begins_beyond_the_margin() -> None:
+    exact = square(10, 30)
+    near = exact.copy()
+    near[20, 30 : 30 + LEAK_PX] = True
+    assert agreement(near, exact).shadow_leak == 0.0
+    near[20, 30 + LEAK_PX + 1] = True
+    assert agreement(near, exact).shadow_leak == pytest.approx(1 / exact.sum())
+
+
+def test_nothing_there() -> None:
+    nothing, something = np.zeros((40, 60), dtype=bool), square(10, 30)
+    assert agreement(nothing, nothing).iou == 1.0
+    told = agreement(nothing, something)
+    assert (told.iou, told.precision, told.recall) == (0.0, 1.0, 0.0)
+    told = agreement(something, nothing)
+    assert (told.iou, told.precision, told.recall) == (0.0, 0.0, 1.0)
+
+
+def test_a_picture_shows_what_is_wrong() -> None:
+    picture = draw_agreement(np.full((40, 60), 100, np.uint8), square(15, 35), square(10, 30))
+    assert tuple(picture[20, 32]) == (0, 0, 255)
+    assert tuple(picture[20, 12]) == (255, 80, 0)
+    assert tuple(picture[20, 20]) == (50, 140, 50)
+    assert tuple(picture[2, 2]) == (50, 50, 50)
+
+
+def test_the_same_masks_every_time_and_better_than_nothing() -> None:
+    scene = made_up_scene(frames=2, size_px=(200, 152))
+    seen: list[tuple[str, int]] = []
+    first = measure(scene, picture=lambda camera, frame, image: seen.append((camera, frame)))
+    again = measure(scene)
+    assert first["iou_mean"] > 0.85
+    assert set(seen) == {(name, frame) for name in scene.rig.names for frame in (0, 6)}
+    for name in scene.rig.names:
+        row, other = first["cameras"][name], again["cameras"][name]
+        assert {"iou", "precision", "recall", "shadow_leak", "ms"} == set(row)
+        assert [row[k] for k in row if k != "ms"] == [other[k] for k in row if k != "ms"]
+    assert set(first["opencv"]) == {"mog2", "knn"}
+    assert set(first["opencv"]["knn"]) == {"iou_mean", "ms"}
+
+
+def test_without_exact_masks_the_body_stands_in(balance_real) -> None:
+    scene = recorded_scene(balance_real, scale=0.25, frames=1)
+    assert not scene.exact and scene.frame_count == 1
+    told = measure(scene)
+    assert set(told["cameras"]) == set(scene.rig.names)
+    for row in told["cameras"].values():
+        assert 0.5 < row["overlap"] <= row["overlap_selected"] + 0.05
+    assert told["body"] == {"name": "person31", "radii_mm": radii_mm(scene.body)}
+    assert told["body"]["radii_mm"]
+
+
+def test_exact_masks_are_found_scaled(render_walk) -> None:
+    scene = recorded_scene(render_walk, scale=0.25, frames=2)
+    assert scene.exact and scene.indices == (0, 200)
+    (first, *_) = scene.frames()
+    width, height = scene.rig.cameras[0].size_px
+    assert first.masks(scene.rig)["cam01"].shape == (height, width)
+
+
+def test_a_recording_without_any_truth_is_an_error(make_recording) -> None:
+    with pytest.raises(DatasetError, match="neither masks/ nor ground_truth.trc"):
+        recorded_scene(make_recording())

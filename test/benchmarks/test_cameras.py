@@ -1,0 +1,64 @@
+"""Runs with fewer cameras."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from markerless_tracker.benchmarks.cameras import judge, measure_cameras
+from markerless_tracker.benchmarks.judged import Beginning
+from markerless_tracker.cli.synthesize import synthesize
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
+
+CONFIG = TrackerConfig.from_mapping({"threads": 1})
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A made-up walk of a few small frames in three views."""
+    scene = SyntheticScene(body="person31", cameras=3, size_px=(200, 152), samples=1)
+    folder = tmp_path_factory.mktemp("made") / "walk"
+    synthesize(folder, scene, frames=4, lossless=True)
+    return folder
+
+
+def test_every_choice_is_run_beside_all(walk) -> None:
+    row = measure_cameras(walk, CONFIG, beginnings=[Beginning()], counts=(2,))
+    names = [run["cameras"] for run in row["runs"]]
+    assert names == [
+        ["cam01", "cam02", "cam03"],
+        ["cam01", "cam02"], ["cam01", "cam03"], ["cam02", "cam03"],
+    ]  # fmt: skip
+    first, *others = row["runs"]
+    assert first["ratio"] == 1.0 and first["found"] == 1.0 and first["start"] == "measured"
+    for run in others:
+        assert run["ratio"] == pytest.approx(run["mean_mm"] / first["mean_mm"])
+
+
+@pytest.mark.parametrize("counts", [(3,), (2, 4), (0,)])
+def test_as_many_cameras_as_there_are_is_no_choice(walk, counts) -> None:
+    with pytest.raises(ConfigError, match="of 3 cameras, expected fewer than 3"):
+        measure_cameras(walk, CONFIG, beginnings=[Beginning()], counts=counts)
+
+
+def test_figures_by_hand() -> None:
+    truth = np.zeros((4, 15, 3))
+    truth[3] = np.nan
+    points = truth.copy()
+    points[0, :, 0] = 0.010
+    points[1, :, 0] = 0.030
+    points[1, 4, 0] = 0.180
+    points[2] = np.nan
+    figures = judge(points, truth)
+    assert figures["max_mm"] == pytest.approx(40.0)
+    assert figures["mean_mm"] == pytest.approx(25.0)
+    assert figures["worst_joint_mm"] == pytest.approx(180.0)
+    assert figures["lost_run"] == 1 and figures["found"] == pytest.approx(2.0 / 3.0)
+
+
+def test_nobody_found_at_all() -> None:
+    truth = np.zeros((4, 15, 3))
+    figures = judge(np.full_like(truth, np.nan), truth)
+    assert figures["mean_mm"] is None and figures["found"] == 0.0

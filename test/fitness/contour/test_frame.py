@@ -1,0 +1,326 @@
+"""Edges of silhouettes, and pose refinement on them from end to end."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from markerless_tracker.body import BodyModel, load_body, markers
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.drawing import silhouette
+from markerless_tracker.fitness import Fitness
+from markerless_tracker.fitness.contour.frame import (
+    ContourFrame,
+    EdgeOfMask,
+    edge_of_mask,
+    join_edges,
+)
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import Prior, refine
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import ring_rig
+
+SIZE = (240, 200)
+
+
+def observed(mask, **region) -> Observation:
+    return Observation.from_mask("cam", 0, mask, np.zeros(mask.shape, np.uint8), **region)
+
+
+def grid(size=SIZE):
+    v, u = np.mgrid[: size[1], : size[0]]
+    return u, v
+
+
+def disc(at, radius, size=SIZE):
+    u, v = grid(size)
+    return np.hypot(u - at[0], v - at[1]) <= radius
+
+
+def window(edge: EdgeOfMask):
+    """Columns and rows (h, w) in the frame of an edge's distances."""
+    height, width = edge.distance.shape
+    v, u = np.mgrid[:height, :width]
+    return u + edge.left, v + edge.top
+
+
+# --- the edge of one silhouette ---------------------------------------------------------------
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(60.0, 160.0), st.floats(60.0, 140.0), st.floats(8.0, 55.0), st.floats(1.0, 8.0)
+)  # fmt: skip
+def test_disc(u, v, radius, spacing_px) -> None:
+    """A disc of whole pixels is half a pixel off; the distance itself is within 2 %."""
+    edge = edge_of_mask(observed(disc((u, v), radius)), spacing_px)
+    at = window(edge)
+    error = edge.distance - (np.hypot(at[0] - u, at[1] - v) - radius)
+    far = np.abs(edge.distance)
+    assert (np.abs(error) <= 0.6 + 0.02 * far).all()
+    assert abs(error[far < 3.0].mean()) < 0.2
+
+    out = edge.points - (u, v)
+    from_middle = np.linalg.norm(out, axis=1)
+    assert np.abs(from_middle - radius).max() < 0.8
+    outward = (out / from_middle[:, None] * edge.normals).sum(axis=1)
+    assert outward.min() > 0.9
+    np.testing.assert_allclose(np.linalg.norm(edge.normals, axis=1), 1.0)
+    # Chains of pixels are up to 8 % longer than the curve they follow.
+    assert edge.spacing.sum() == pytest.approx(2 * np.pi * radius, rel=0.09)
+    gaps = np.linalg.norm(np.diff(edge.points, axis=0), axis=1)
+    assert gaps.max() < 2.0 * max(spacing_px, 1.5)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(1, 60), st.integers(1, 60), st.integers(20, 120), st.integers(20, 100))
+def test_rectangle(left, top, wide, high) -> None:
+    mask = np.zeros(SIZE[::-1], bool)
+    mask[top : top + high, left : left + wide] = True
+    edge = edge_of_mask(observed(mask), 4.0)
+    u, v = window(edge)
+    # The edge runs midway between the last pixel inside and the first outside.
+    du = np.maximum(left - 0.5 - u, u - (left + wide - 0.5))
+    dv = np.maximum(top - 0.5 - v, v - (top + high - 0.5))
+    beside = np.minimum(du, dv) < 0
+    error = edge.distance - np.maximum(du, dv)
+    assert np.abs(error[beside]).max() < 1e-3
+    corner = edge.distance[~beside] - np.hypot(du, dv)[~beside]
+    assert np.abs(corner).max() <= 0.6 + 0.02 * edge.distance.max()
+
+    on_side = np.abs(edge.normals).max(axis=1) > 0.999
+    assert on_side.mean() > 0.5
+    along = np.argmax(np.abs(edge.normals), axis=1)
+    for axis, low, length in ((0, left, wide), (1, top, high)):
+        at = edge.points[on_side & (along == axis)]
+        towards = edge.normals[on_side & (along == axis), axis]
+        expected = np.where(towards > 0, low + length - 0.5, low - 0.5)
+        np.testing.assert_allclose(at[:, axis], expected, atol=1e-3)
+
+
+def test_window_is_the_bounding_box_with_a_margin() -> None:
+    mask = np.zeros((400, 300), bool)
+    mask[40:340, 100:160] = True
+    edge = edge_of_mask(observed(mask), 4.0)
+    # A sixth of the height, cut at the frame.
+    assert (edge.left, edge.top) == (100 - 49, 0)
+    assert edge.distance.shape == (340 + 49, 60 + 2 * 49)
+    small = edge_of_mask(observed(disc((120, 100), 10.0)), 4.0)
+    assert (small.left, small.top) == (110 - 24, 90 - 24)
+
+
+def test_holes_have_edges_too() -> None:
+    ring = disc((120, 100), 60.0) & ~disc((120, 100), 30.0)
+    edge = edge_of_mask(observed(ring), 3.0)
+    out = edge.points - (120, 100)
+    radius = np.linalg.norm(out, axis=1)
+    inner = radius < 45
+    assert np.abs(radius[inner] - 30).max() < 0.8 and np.abs(radius[~inner] - 60).max() < 0.8
+    outward = (out / radius[:, None] * edge.normals).sum(axis=1)
+    assert outward[inner].max() < -0.9 and outward[~inner].min() > 0.9
+    assert edge.spacing[inner].sum() == pytest.approx(2 * np.pi * 30, rel=0.1)
+
+
+@pytest.mark.parametrize("at", [(0.0, 100.0), (239.0, 100.0), (120.0, 0.0), (120.0, 199.0)])
+def test_no_points_where_the_silhouette_leaves_the_frame(at) -> None:
+    edge = edge_of_mask(observed(disc(at, 50.0)), 2.0)
+    assert np.abs(np.linalg.norm(edge.points - at, axis=1) - 50.0).max() < 0.8
+    assert (edge.points > 0).all() and (edge.points < np.array(SIZE) - 1).all()
+    # Half of it is left.
+    assert edge.spacing.sum() == pytest.approx(np.pi * 50.0, rel=0.12)
+
+
+def test_specks_have_no_points() -> None:
+    mask = disc((120, 100), 40.0)
+    speckled = mask.copy()
+    speckled[30:33, 30:33] = True
+    speckled[99:101, 119:121] = False
+    plain, edge = (edge_of_mask(observed(m), 3.0) for m in (mask, speckled))
+    np.testing.assert_array_equal(edge.points, plain.points)
+    assert edge.distance.shape != plain.distance.shape
+
+
+@pytest.mark.parametrize("mask", [np.zeros((50, 60), bool), disc((3, 3), 1.0)])
+def test_nothing_to_see(mask) -> None:
+    edge = edge_of_mask(observed(mask), 3.0)
+    assert edge.points.shape == edge.normals.shape == (0, 2) and edge.spacing.shape == (0,)
+    assert edge.distance.shape == (0, 0) or np.isfinite(edge.distance).all()
+
+
+def test_a_full_frame_is_all_inside() -> None:
+    edge = edge_of_mask(observed(np.ones((50, 60), bool)), 3.0)
+    assert edge.points.shape == (0, 2)
+    assert (edge.distance < 0).all()
+
+
+@pytest.mark.parametrize("margin", [0, 1, 7, 40])
+def test_a_region_says_the_same_as_the_full_frame(margin) -> None:
+    mask = disc((120.3, 100.2), 45.0) | disc((150, 70), 30.0)
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    v, u = int(rows[0]) - margin, int(columns[0]) - margin
+    cut = mask[v : rows[-1] + margin + 1, u : columns[-1] + margin + 1]
+    part = edge_of_mask(observed(cut, size_px=SIZE, offset_px=(u, v)), 4.0)
+    whole = edge_of_mask(observed(mask), 4.0)
+    assert (part.left, part.top) == (whole.left, whole.top)
+    for name in ("distance", "points", "normals", "spacing"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name))
+
+
+def test_joined_edges_can_be_taken_apart() -> None:
+    masks = [disc((120, 100), 40.0), np.zeros(SIZE[::-1], bool), disc((70, 60), 25.0)]
+    edges = [edge_of_mask(observed(mask), 3.0) for mask in masks]
+    joined = join_edges(edges)
+    for i, edge in enumerate(edges):
+        left, top, width, height = joined.window[i]
+        assert (left, top, height, width) == (edge.left, edge.top, *edge.distance.shape)
+        start = joined.distance_start[i]
+        flat = joined.distance[start : start + width * height]
+        np.testing.assert_array_equal(flat.reshape(height, width), edge.distance)
+        part = slice(joined.point_start[i], joined.point_start[i + 1])
+        np.testing.assert_array_equal(joined.points[part], edge.points)
+        np.testing.assert_array_equal(joined.normals[part], edge.normals)
+        np.testing.assert_array_equal(joined.spacing[part], edge.spacing)
+    assert joined.point_start[-1] == len(joined.points) and len(joined.points) > 50
+
+
+# --- refinement from end to end ---------------------------------------------------------------
+
+PRECISION = 1.0 / (0.05 * 0.010**2)
+"""Of 10 mm of noise in pieces of outline 50 mm long."""
+LENS = (-0.15, 0.06, 0.002, -0.0015, 0.01)
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """A body, its true pose, and what four cameras see of it."""
+
+    body: BodyModel
+    rig: CameraRig
+    pose: FloatArray
+    observations: dict[str, Observation]
+
+    def frame(self, *, threads=1, black=()) -> ContourFrame:
+        seen = dict(self.observations)
+        for name in black:
+            nothing = np.zeros_like(seen[name].edges)
+            seen[name] = Observation.from_mask(name, 0, nothing, nothing)
+        return ContourFrame(
+            self.body,
+            {camera.name: camera for camera in self.rig},
+            seen,
+            Fitness(self.body, self.rig.cameras).lay_out(seen),
+            pixels_per_m={camera.name: camera.matrix[0, 0] / 4.5 for camera in self.rig},
+            threads=threads,
+        )
+
+    def start(self, seed, *, offset_m=0.06, turn_rad=0.15) -> tuple[FloatArray, Prior]:
+        """A disturbed pose, the root somewhere within `offset_m`, and the belief in it."""
+        moved = np.isin(np.arange(self.body.size), self.body.root[3:])
+        most = np.where(moved, offset_m / np.sqrt(3.0), turn_rad)
+        change = np.random.default_rng(seed).uniform(-most, most)
+        pose = np.clip(self.pose + change, *self.body.limits)
+        return pose, Prior(pose, 1.0 / most**2)
+
+    def error_mm(self, pose) -> float:
+        gap = markers(self.body, pose) - markers(self.body, self.pose)
+        return float(np.linalg.norm(gap, axis=1).mean() * 1000.0)
+
+
+def person(name, seed, **angles) -> Person:
+    """Somebody with limbs apart and bent, turned any way; named angles (rad) replace drawn ones."""
+    body = load_body(name, 1.75)
+    rng = np.random.default_rng(seed)
+    pose = body.neutral.copy()
+    pose[body.joints] += rng.uniform(-0.15, 0.15, body.joints.size)
+    pose[[body.index("pelvis_rz"), body.index("pelvis_tz")]] = rng.uniform(-3.0, 3.0), 0.95
+    for side, out in (("l", 0.2), ("r", -0.2)):
+        pose[body.index(f"{side}_knee")] = rng.uniform(-0.9, -0.3)
+        pose[body.index(f"{side}_elbow")] = rng.uniform(-1.2, -0.5)
+        pose[body.index(f"{side}_shoulder_x")] += 0.7
+        pose[body.index(f"{side}_hip_x")] += out
+    for key, value in angles.items():
+        pose[body.index(key)] = value
+    rig = ring_rig(4, (656, 490), distortion=LENS)
+    seen = {}
+    for camera in rig:
+        mask = silhouette(body, pose, camera)
+        seen[camera.name] = Observation.from_mask(
+            camera.name, 0, mask, np.zeros(mask.shape, np.uint8)
+        )
+    return Person(body, rig, pose, seen)
+
+
+def refined(shown: Person, frame: ContourFrame, start: FloatArray, prior: Prior, iterations=12):
+    def equations(pose, reach_m):
+        sums = frame.equations(pose, reach_m)
+        return sums.hessian * PRECISION, sums.slope * PRECISION
+
+    return refine(
+        equations, start, priors=(prior,), bounds=shown.body.limits, iterations=iterations,
+        reach=(0.2, 0.03),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["balan31", "person31"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_disturbed_pose_is_found_again(name, seed) -> None:
+    shown = person(name, seed)
+    start, prior = shown.start(100 + seed)
+    found = refined(shown, shown.frame(), start, prior)
+    assert shown.error_mm(start) > 70.0
+    assert shown.error_mm(found) < 5.0
+
+
+def test_a_small_disturbance_needs_few_iterations() -> None:
+    shown = person("person31", 0)
+    start, prior = shown.start(5, offset_m=0.02, turn_rad=0.05)
+    found = refined(shown, shown.frame(), start, prior, iterations=4)
+    assert shown.error_mm(start) > 20.0 and shown.error_mm(found) < 3.0
+
+
+def test_threads_give_the_same_bytes() -> None:
+    shown = person("person31", 1)
+    start, prior = shown.start(1)
+    once, again, threaded = (
+        refined(shown, shown.frame(threads=threads), start, prior) for threads in (1, 1, 2)
+    )
+    assert once.tobytes() == again.tobytes() == threaded.tobytes()
+
+
+@pytest.mark.parametrize("joint", ["l_elbow", "r_elbow", "l_knee", "r_knee"])
+@pytest.mark.parametrize("beyond", [0.0, 0.3])
+def test_limits_are_kept(joint, beyond) -> None:
+    """A limb straight to its limit, or bent beyond it by what nobody can."""
+    body = load_body("person31", 1.75)
+    most = body.limits[1, body.index(joint)]
+    shown = person("person31", 2, **{joint: most + beyond})
+    start, prior = shown.start(3, offset_m=0.03, turn_rad=0.1)
+    found = refined(shown, shown.frame(), start, prior)
+    assert (found >= body.limits[0]).all() and (found <= body.limits[1]).all()
+    at = found[body.index(joint)]
+    assert at == most if beyond else at > most - 0.1
+    assert shown.error_mm(found) < (25.0 if beyond else 5.0)
+
+
+def test_a_black_camera_is_no_trouble() -> None:
+    shown = person("person31", 3)
+    start, prior = shown.start(4, offset_m=0.03, turn_rad=0.08)
+    found = refined(shown, shown.frame(black=["cam02"]), start, prior)
+    assert np.isfinite(found).all()
+    assert shown.error_mm(found) < 10.0
+
+
+def test_all_cameras_black_leaves_the_start() -> None:
+    shown = person("balan31", 4)
+    start, prior = shown.start(5)
+    found = refined(shown, shown.frame(black=shown.rig.names), start, prior)
+    np.testing.assert_allclose(found, start, atol=1e-12)
+
+
+def test_a_missing_camera() -> None:
+    shown = person("person31", 5)
+    del shown.observations["cam03"]
+    start, prior = shown.start(6, offset_m=0.03, turn_rad=0.08)
+    assert shown.error_mm(refined(shown, shown.frame(), start, prior)) < 10.0

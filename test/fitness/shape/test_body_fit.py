@@ -1,0 +1,138 @@
+"""Lengths and sections from several frames, their poses known about only."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import load_description, markers
+from markerless_tracker.body.sizes import PROPORTIONS, Sizes
+from markerless_tracker.fitness.shape.body_fit import BodyFit
+from markerless_tracker.fitness.shape.sections import RADIUS_RANGE
+from markerless_tracker.synthesis import ring_rig
+
+SIZES = Sizes(load_description("person31"))
+GENERIC = SIZES.of_stature(1.70)
+LIMITS = GENERIC.limits
+RIG = ring_rig(4, (656, 490))
+FRAMES = 4
+
+
+def person(seed):
+    """Somebody of 1.80 m with longer and shorter parts, stouter or slimmer."""
+    rng = np.random.default_rng(seed)
+    lengths = SIZES.of(SIZES.of_stature(1.80))
+    own = SIZES.body(lengths * np.exp(PROPORTIONS * rng.uniform(-1.5, 1.5, lengths.size)))
+    shape = own.cone_shape.copy()
+    shape[:, :, :2] *= rng.uniform(0.85, 1.2)
+    return replace(own, cone_shape=shape)
+
+
+def poses(seed):
+    """Poses (n, p) of somebody who moves all limbs."""
+    rng = np.random.default_rng(seed)
+    out = np.tile(GENERIC.neutral, (FRAMES, 1))
+    out[:, GENERIC.joints] += rng.uniform(-0.25, 0.25, (FRAMES, GENERIC.joints.size))
+    out[:, GENERIC.index("pelvis_tz")] = 1.0
+    out[:, GENERIC.index("pelvis_rz")] = 0.4
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        out[:, GENERIC.index(f"{side}_knee")] = rng.uniform(-1.0, -0.2, FRAMES)
+        out[:, GENERIC.index(f"{side}_elbow")] = rng.uniform(-1.2, -0.3, FRAMES)
+        out[:, GENERIC.index(f"{side}_hip_x")] += 0.2 * sign
+        out[:, GENERIC.index(f"{side}_shoulder_x")] += 0.6
+    return out
+
+
+@pytest.fixture(scope="module", params=[0, 1])
+def fit(request, contours_of):
+    """The person, the poses, and the fit after twelve iterations from poses that are a bit off."""
+    true, moves = person(request.param), poses(request.param)
+    rng = np.random.default_rng(request.param)
+    fit = BodyFit(SIZES, GENERIC, SIZES.usual(None), LIMITS)
+    for pose in moves:
+        about = pose.copy()
+        about[GENERIC.joints] += rng.normal(0.0, 0.08, GENERIC.joints.size)
+        about[GENERIC.root[3:]] += rng.normal(0.0, 0.02, 3)
+        fit.add(contours_of(true, pose, RIG, GENERIC), np.clip(about, *LIMITS))
+    for reach_m in np.geomspace(0.10, 0.035, 12):
+        fit.iterate(reach_m)
+    return true, moves, fit
+
+
+def test_lengths_come_nearer_to_the_persons(fit) -> None:
+    true, _, fitted = fit
+    before = np.abs(np.log(SIZES.of(GENERIC) / SIZES.of(true)))
+    after = np.abs(np.log(SIZES.of(fitted.body) / SIZES.of(true)))
+    assert after.mean() < 0.6 * before.mean()
+    assert after.mean() < 0.035
+
+
+def test_joints_come_nearer_to_the_persons(fit) -> None:
+    """What lengths, sections and poses trade against each other leaves the joints in place."""
+    true, moves, fitted = fit
+    gaps = [
+        np.linalg.norm(markers(fitted.body, pose) - markers(true, move), axis=1).mean()
+        for pose, move in zip(fitted.poses, moves, strict=True)
+    ]
+    assert max(gaps) < 0.025
+
+
+def test_both_sides_stay_alike_and_all_bounds_are_kept(fit) -> None:
+    _, _, fitted = fit
+    body = fitted.body
+    for name, value in body.lengths_m.items():
+        if name.startswith("l_"):
+            assert body.lengths_m["r_" + name[2:]] == value
+    left = [i for i, name in enumerate(body.cone_names) if name.startswith("l_")]
+    right = [body.cone_names.index("r_" + body.cone_names[i][2:]) for i in left]
+    mirrored = body.cone_shape[left] * [1.0, 1.0, 1.0, -1.0]
+    np.testing.assert_allclose(body.cone_shape[right], mirrored)
+    ratio = body.cone_shape[:, :, :2] / GENERIC.cone_shape[:, :, :2]
+    assert ratio.min() >= RADIUS_RANGE[0] - 1e-9 and ratio.max() <= RADIUS_RANGE[1] + 1e-9
+    assert (fitted.poses >= LIMITS[0]).all() and (fitted.poses <= LIMITS[1]).all()
+
+
+def test_without_evidence_the_belief_stays(contours_of) -> None:
+    """Nothing seen: the lengths go to what is usual, the sections stay generic."""
+    fit = BodyFit(SIZES, SIZES.of_stature(1.9), SIZES.usual(None), LIMITS)
+    fit.iterate(0.1)
+    fit.iterate(0.1)
+    np.testing.assert_allclose(SIZES.of(fit.body), SIZES.of(GENERIC), rtol=1e-3)
+    np.testing.assert_allclose(fit.body.cone_shape, SIZES.of_stature(1.9).cone_shape, rtol=1e-9)
+
+
+def test_a_frame_without_silhouettes_says_nothing(contours_of) -> None:
+    pose = poses(0)[0]
+    away = pose.copy()
+    away[GENERIC.index("pelvis_tx")] = 500.0
+    fit = BodyFit(SIZES, GENERIC, SIZES.usual(None), LIMITS)
+    fit.add(contours_of(GENERIC, away, RIG, GENERIC), pose)
+    for _ in range(3):
+        fit.iterate(0.1)
+    np.testing.assert_allclose(SIZES.of(fit.body), SIZES.of(GENERIC), rtol=1e-6)
+    np.testing.assert_allclose(fit.poses[0, GENERIC.root], pose[GENERIC.root], atol=1e-6)
+
+
+def test_equations_that_are_not_finite_change_nothing(contours_of) -> None:
+    fit = BodyFit(SIZES, GENERIC, SIZES.usual(None), LIMITS)
+    pose = poses(0)[0]
+    frame = contours_of(GENERIC, pose, RIG, GENERIC)
+    fit.add(frame, np.where(np.arange(pose.size) == 3, np.nan, pose))
+    before = SIZES.of(fit.body)
+    fit.iterate(0.1)
+    np.testing.assert_array_equal(SIZES.of(fit.body), before)
+
+
+def test_a_told_stature_holds_the_lengths_back(contours_of) -> None:
+    """Told 1.60 m of somebody of 1.80 m: the outlines win, but by less than if it was unknown."""
+    true, moves = person(0), poses(0)[:2]
+    sizes = []
+    for stature in (1.60, None):
+        fit = BodyFit(SIZES, SIZES.of_stature(1.60), SIZES.usual(stature), LIMITS)
+        for pose in moves:
+            fit.add(contours_of(true, pose, RIG, GENERIC), pose)
+        for reach_m in np.geomspace(0.10, 0.035, 6):
+            fit.iterate(reach_m)
+        sizes.append(np.log(SIZES.of(fit.body)).mean())
+    told = np.log(SIZES.of(SIZES.of_stature(1.60))).mean()
+    assert told < sizes[0] < sizes[1] - 0.01

@@ -1,0 +1,211 @@
+"""Sections and offsets of the cones from silhouettes, the pose known."""
+
+from dataclasses import dataclass, fields, replace
+
+import cv2
+import numpy as np
+import pytest
+
+from markerless_tracker.body import BodyModel, load_body
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.drawing import silhouette
+from markerless_tracker.fitness import Fitness
+from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.shape.section_fit import fit_shape
+from markerless_tracker.fitness.shape.sections import OFFSET_RANGE_M, RADIUS_RANGE
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import ring_rig
+
+GENERIC = load_body("person31", 1.75)
+RIG = ring_rig(4, (656, 490))
+NAMES = GENERIC.cone_names
+LEFT = [i for i, name in enumerate(NAMES) if name.startswith("l_")]
+RIGHT = [NAMES.index("r_" + NAMES[i][2:]) for i in LEFT]
+MIDDLE = [i for i, name in enumerate(NAMES) if name[:2] not in ("l_", "r_")]
+
+
+def open_pose(seed) -> FloatArray:
+    """Limbs apart and bent, turned any way."""
+    rng = np.random.default_rng(seed)
+    pose = GENERIC.neutral.copy()
+    pose[GENERIC.joints] += rng.uniform(-0.15, 0.15, GENERIC.joints.size)
+    at = {name: i for i, name in enumerate(GENERIC.parameter_names)}
+    pose[[at["pelvis_rz"], at["pelvis_tz"]]] = rng.uniform(-3.0, 3.0), 0.95
+    for side, out in (("l", 0.25), ("r", -0.25)):
+        pose[at[f"{side}_knee"]], pose[at[f"{side}_elbow"]] = -0.5, -0.8
+        pose[at[f"{side}_shoulder_x"]] += 0.7
+        pose[at[f"{side}_hip_x"]] += out
+    return pose
+
+
+def somebody(seed, *, alike=True) -> BodyModel:
+    """A person whose sections differ from the generic ones by up to 25 % and 15 mm."""
+    rng = np.random.default_rng(seed)
+    shape = GENERIC.cone_shape.copy()
+    shape[:, :, :2] *= rng.uniform(0.8, 1.25, shape[:, :, :2].shape)
+    shape[:, :, 2:] += rng.uniform(-0.015, 0.015, shape[:, :, 2:].shape)
+    if alike:
+        shape[MIDDLE, :, 3] = 0.0
+        shape[RIGHT] = shape[LEFT] * [1.0, 1.0, 1.0, -1.0]
+    return replace(GENERIC, cone_shape=shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What the rig sees of a body at a pose."""
+
+    pose: FloatArray
+    observations: dict[str, Observation]
+    rig: CameraRig = RIG
+
+    def frame(self, body=GENERIC) -> ContourFrame:
+        return ContourFrame(
+            body,
+            {camera.name: camera for camera in self.rig},
+            self.observations,
+            Fitness(body, self.rig.cameras).lay_out(self.observations),
+            pixels_per_m={camera.name: camera.matrix[0, 0] / 4.5 for camera in self.rig},
+        )
+
+    def f_s(self, body) -> float:
+        fitness = Fitness(body, self.rig.cameras)
+        terms = fitness.terms(fitness.lay_out(self.observations), self.pose)
+        return float(np.mean([t.silhouette for t in terms.values()]))
+
+
+def seen(body, pose, change=lambda mask: mask) -> Seen:
+    observations = {}
+    for camera in RIG:
+        mask = change(silhouette(body, pose, camera).astype(np.uint8))
+        observations[camera.name] = Observation.from_mask(
+            camera.name, 0, mask, np.zeros(mask.shape, np.uint8)
+        )
+    return Seen(pose, observations)
+
+
+@pytest.fixture(scope="module", params=[0, 1])
+def case(request) -> tuple[BodyModel, Seen, BodyModel]:
+    """A person, what is seen of that person, and the body fitted to it."""
+    true = somebody(request.param)
+    view = seen(true, open_pose(request.param))
+    return true, view, fit_shape(GENERIC, [(view.frame(), view.pose)])
+
+
+# --- the fit --------------------------------------------------------------------------------
+
+
+def test_a_known_shape_is_found_again(case) -> None:
+    true, view, fitted = case
+    assert view.f_s(GENERIC) < 0.96
+    assert view.f_s(fitted) > 0.985
+    error = np.abs(fitted.cone_shape - true.cone_shape) * 1000.0
+    before = np.abs(GENERIC.cone_shape - true.cone_shape) * 1000.0
+    # Ends inside other parts are not seen; all others are.
+    radii, offsets = error[:, :, :2], error[:, :, 2:]
+    assert radii.mean() < 4.0 < 7.0 < before[:, :, :2].mean()
+    assert np.quantile(radii, 0.75) < 4.8
+    assert offsets.mean() < 3.0 and np.quantile(offsets, 0.9) < 6.0
+
+
+def test_the_contours_cost_falls_to_the_true_shapes(case) -> None:
+    true, view, fitted = case
+    frame = view.frame()
+    costs = []
+    for body in (None, true, fitted, None):
+        frame.collect(view.pose, 0.1, body)
+        costs.append(frame.residuals.cost.sum())
+    generic, least, found, again = costs
+    assert found - least < 0.1 * (generic - least)
+    # The frame's own body is still the generic one.
+    assert again == generic
+
+
+def test_left_and_right_are_alike_and_the_trunk_symmetric(case) -> None:
+    fitted = case[2].cone_shape
+    np.testing.assert_array_equal(fitted[RIGHT], fitted[LEFT] * [1.0, 1.0, 1.0, -1.0])
+    assert not fitted[MIDDLE, :, 3].any()
+    assert (np.abs(fitted[LEFT, :, 3]) > 1e-4).any()
+
+
+def test_sides_that_differ_are_averaged() -> None:
+    """A left calf 20 % thicker, a right one 20 % thinner: both come out as they were."""
+    shape = GENERIC.cone_shape.copy()
+    for side, factor in (("l", 1.2), ("r", 0.8)):
+        for part in ("calf", "shin"):
+            shape[NAMES.index(f"{side}_{part}"), :, :2] *= factor
+    view = seen(replace(GENERIC, cone_shape=shape), open_pose(2))
+    fitted = fit_shape(GENERIC, [(view.frame(), view.pose)]).cone_shape
+    np.testing.assert_array_equal(fitted[RIGHT], fitted[LEFT] * [1.0, 1.0, 1.0, -1.0])
+    shin = NAMES.index("l_shin")
+    np.testing.assert_allclose(
+        fitted[shin, :, :2].mean(), GENERIC.cone_shape[shin, :, :2].mean(), rtol=0.05
+    )
+
+
+@pytest.mark.parametrize("grow", [True, False], ids=["swollen", "shrunken"])
+def test_bounds_are_kept(grow) -> None:
+    """Silhouettes of somebody 80 mm thicker, or of a skeleton, all around."""
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (25, 25) if grow else (9, 9))
+    view = seen(GENERIC, open_pose(3), lambda m: (cv2.dilate if grow else cv2.erode)(m, kernel))
+    fitted = fit_shape(GENERIC, [(view.frame(), view.pose)], tightness=0.01).cone_shape
+    ratio = fitted[:, :, :2] / GENERIC.cone_shape[:, :, :2]
+    least, most = RADIUS_RANGE
+    assert ratio.min() >= least * (1 - 1e-12) and ratio.max() <= most * (1 + 1e-12)
+    assert (ratio > 1.2).mean() > 0.3 if grow else (ratio < 0.8).mean() > 0.2
+    assert (ratio.max() > 0.999 * most) if grow else (ratio.min() < 1.001 * least)
+    moved = fitted[:, :, 2:] - GENERIC.cone_shape[:, :, 2:]
+    assert np.abs(moved).max() <= OFFSET_RANGE_M * (1 + 1e-12)
+
+
+def test_nothing_to_see_leaves_the_generic_shape() -> None:
+    view = seen(GENERIC, open_pose(4), np.zeros_like)
+    fitted = fit_shape(GENERIC, [(view.frame(), view.pose)])
+    np.testing.assert_allclose(fitted.cone_shape, GENERIC.cone_shape, atol=1e-12)
+
+
+def test_one_black_camera_is_no_trouble() -> None:
+    true = somebody(5)
+    view = seen(true, open_pose(5))
+    nothing = np.zeros((490, 656), np.uint8)
+    dark = view.observations | {"cam02": Observation.from_mask("cam02", 0, nothing, nothing)}
+    fitted = fit_shape(GENERIC, [(Seen(view.pose, dark).frame(), view.pose)])
+    assert np.isfinite(fitted.cone_shape).all()
+    assert view.f_s(fitted) > 0.97 > view.f_s(GENERIC)
+
+
+def test_a_tight_prior_holds_the_generic_shape() -> None:
+    view = seen(somebody(6), open_pose(6))
+    frames = [(view.frame(), view.pose)]
+    held, loose = (fit_shape(GENERIC, frames, tightness=t).cone_shape for t in (1e7, 1.0))
+    np.testing.assert_allclose(held, GENERIC.cone_shape, atol=1e-5)
+    assert np.abs(loose - GENERIC.cone_shape).max() > 0.02
+
+
+def test_frames_are_averaged() -> None:
+    """The same frame twice says what it says once; another one adds something."""
+    true = somebody(7)
+    first, second = (seen(true, open_pose(seed)) for seed in (7, 8))
+    frames = [(view.frame(), view.pose) for view in (first, second)]
+    once, twice, both = (
+        fit_shape(GENERIC, chosen).cone_shape for chosen in (frames[:1], frames[:1] * 2, frames)
+    )
+    np.testing.assert_allclose(twice, once, atol=1e-9)
+    error = [np.abs(s - true.cone_shape)[:, :, :2].mean() for s in (GENERIC.cone_shape, both)]
+    assert error[1] < 0.4 * error[0]
+    assert np.abs(both - once).max() > 1e-3
+
+
+def test_only_the_sections_change(case) -> None:
+    fitted = case[2]
+    for field in fields(BodyModel):
+        if field.name != "cone_shape":
+            assert getattr(fitted, field.name) is getattr(GENERIC, field.name)
+
+
+def test_the_published_body_can_be_fitted_too() -> None:
+    body = load_body("balan31", 1.75)
+    true = replace(body, cone_shape=body.cone_shape * [1.15, 1.15, 1.0, 1.0])
+    view = seen(true, open_pose(9))
+    fitted = fit_shape(body, [(view.frame(body), view.pose)])
+    assert view.f_s(body) < 0.95 < 0.985 < view.f_s(fitted)

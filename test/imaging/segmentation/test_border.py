@@ -1,0 +1,70 @@
+"""The silhouette's border against bodies whose coverage of each pixel is known."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.imaging import ImagingSettings, Segmenter, learn_background
+from markerless_tracker.imaging.region import Region
+from markerless_tracker.imaging.segmentation.border import trim_border
+
+SIZE_PX = (120, 90)
+
+
+def coverage(centre: tuple[float, float], radius: float) -> np.ndarray:
+    """Part of each pixel (h, w) that a disc covers, from 8 x 8 samples."""
+    fine = (np.arange(8) + 0.5) / 8.0 - 0.5
+    v, u = np.mgrid[0 : SIZE_PX[1], 0 : SIZE_PX[0]].astype(float)
+    total = np.zeros(v.shape)
+    for dv in fine:
+        for du in fine:
+            total += np.hypot(u + du - centre[0], v + dv - centre[1]) <= radius
+    return total / 64.0
+
+
+def shot(
+    covered: np.ndarray, body: tuple[float, ...], floor: tuple[float, ...], sigma: float, seed: int
+) -> np.ndarray:
+    image = covered[:, :, None] * np.array(body) + (1.0 - covered[:, :, None]) * np.array(floor)
+    image = image + np.random.default_rng(seed).normal(0.0, sigma, image.shape)
+    return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+def test_half_covered_pixels_are_where_it_ends(layers: int) -> None:
+    covered = coverage((60.3, 44.6), 25.2)
+    body, floor = (30.0, 60.0, 160.0), (120.0, 120.0, 120.0)
+    image = shot(covered, body, floor, 0.0, 0)
+    mask = ((covered > 0.02) * 255).astype(np.uint8)
+    mean = np.broadcast_to(np.array(floor, np.float32)[:, None, None], (3, 90, 120)).copy()
+    whole = Region.whole(SIZE_PX)
+    trim_border(image, mean, np.ones(3, np.float32), mask, whole, layers=layers, least=10.0)
+    clear = np.abs(covered - 0.5) > 0.05
+    assert ((mask > 0) == (covered >= 0.5))[clear].all()
+
+
+def test_a_body_like_the_background_is_left() -> None:
+    image = np.full((90, 120, 1), 100, np.uint8)
+    mask = np.zeros((90, 120), np.uint8)
+    mask[20:60, 30:70] = 255
+    before = mask.copy()
+    mean = np.full((1, 90, 120), 98.0, np.float32)
+    whole = Region.whole(SIZE_PX)
+    trim_border(image, mean, np.ones(1, np.float32), mask, whole, layers=2, least=10.0)
+    assert (mask == before).all()
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_the_segmenter_finds_the_area_without_bias(channels: int) -> None:
+    floor, body = (130.0, 120.0, 110.0)[:channels], (40.0, 50.0, 200.0)[:channels]
+    nothing, covered = np.zeros((90, 120)), coverage((61.2, 45.7), 24.0)
+    empty = [shot(nothing, body, floor, 2.0, seed) for seed in range(8)]
+    image = shot(covered, body, floor, 2.0, 99)
+    if channels == 1:
+        empty, image = [frame[:, :, 0] for frame in empty], image[:, :, 0]
+    areas = {}
+    for layers in (0, 1):
+        options = ImagingSettings(mask_trim_px=layers, texture_radius_px=0)
+        segmenter = Segmenter("cam01", learn_background(empty, options), options)
+        areas[layers] = segmenter.observe(image, 0).mask.sum() / covered.sum()
+    assert areas[1] == pytest.approx(1.0, abs=0.01)
+    assert areas[0] > 1.02

@@ -1,0 +1,45 @@
+import numpy as np
+import pytest
+
+from markerless_tracker.imaging import Segmenter, learn_background
+from markerless_tracker.imaging.segmentation.exposure import exposure_gain
+
+
+def wall(channels: int = 3) -> np.ndarray:
+    return np.random.default_rng(0).uniform(60.0, 180.0, (120, 160, channels)).astype(np.float32)
+
+
+def shot(mean: np.ndarray, gain: object, seed: int = 1) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(0.0, 3.0, mean.shape)
+    return np.clip(np.rint(mean * gain + noise), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("gain", [0.7, 0.95, 1.0, 1.05, 1.3])
+def test_the_factor_is_found_beside_a_person(gain: float) -> None:
+    image = shot(wall(), gain)
+    image[20:110, 50:110] = 15
+    image[20:60, 50:110] = 200
+    assert exposure_gain(image, wall()) == pytest.approx(gain, rel=0.01)
+
+
+def test_channels_have_their_own() -> None:
+    gain = np.array([0.8, 1.0, 1.2], np.float32)
+    assert exposure_gain(shot(wall(), gain), wall()) == pytest.approx(gain, rel=0.01)
+
+
+def test_an_image_of_something_else_tells_nothing() -> None:
+    assert (exposure_gain(np.zeros((120, 160, 1), np.uint8), wall(1)) == 1.0).all()
+    noise = np.random.default_rng(5).integers(0, 256, (120, 160, 1), dtype=np.uint8)
+    assert (exposure_gain(noise, wall(1)) == 1.0).all()
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_a_step_is_told_and_leaves_the_silhouette_empty(channels: int) -> None:
+    mean = wall(channels)
+    frames = [shot(mean, 1.0, i) for i in range(8)]
+    bright = shot(mean, 1.3, 9)
+    if channels == 1:
+        frames, bright = [frame[:, :, 0] for frame in frames], bright[:, :, 0]
+    segmenter = Segmenter("cam01", learn_background(frames))
+    assert not segmenter.observe(bright, 0).mask.any()
+    assert segmenter.gain == pytest.approx((1.3,) * channels, rel=0.01)

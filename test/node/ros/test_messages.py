@@ -1,0 +1,128 @@
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from visualization_msgs.msg import Marker
+
+from markerless_tracker.body import BodyModel, load_body, markers, root_transform
+from markerless_tracker.body.urdf import urdf
+from markerless_tracker.geometry import apply, inverse, rotation_from_quaternion
+from markerless_tracker.node.ros import messages
+from markerless_tracker.node.ros.stamps import stamp_of, time_message
+from markerless_tracker.records import Confidence, TrackState
+
+STAMP_NS = 12_345_678_901
+
+
+@pytest.fixture(scope="module")
+def body() -> BodyModel:
+    return load_body("balan31", 1.75)
+
+
+@pytest.fixture(scope="module")
+def pose(body: BodyModel) -> np.ndarray:
+    rng = np.random.default_rng(3)
+    pose = body.neutral + rng.uniform(-0.3, 0.3, body.size)
+    pose[body.root[:3]] += (1.0, -2.0, 0.5)
+    return pose
+
+
+@pytest.mark.parametrize("stamp_ns", [0, 1, 999_999_999, 10**9, STAMP_NS])
+def test_stamps_round_trip(stamp_ns: int) -> None:
+    header = messages.header(stamp_ns)
+    assert header.frame_id == "map"
+    assert header.stamp.sec * 10**9 + header.stamp.nanosec == stamp_ns
+    assert time_message(stamp_ns) == header.stamp
+
+
+def test_joint_states_and_root_pose_carry_the_whole_pose(body: BodyModel, pose: np.ndarray) -> None:
+    state = messages.joint_state(body, pose, STAMP_NS)
+    root = messages.root_pose(body, pose, STAMP_NS)
+    assert stamp_of(state) == stamp_of(root) == STAMP_NS and root.header.frame_id == "map"
+    assert len(state.name) == len(state.position) == body.size - 6
+    given = dict(zip(state.name, state.position, strict=True))
+    for index, name in enumerate(body.parameter_names):
+        assert (name in given) == (index not in body.root)
+        if name in given:
+            assert given[name] == pose[index]
+    # A body at a pose of these joints only, moved by the root pose, is the body.
+    rootless = pose.copy()
+    rootless[body.root] = 0.0
+    T = np.eye(4)
+    q, p = root.pose.pose.orientation, root.pose.pose.position
+    T[:3, :3] = rotation_from_quaternion((q.w, q.x, q.y, q.z))
+    T[:3, 3] = (p.x, p.y, p.z)
+    local = apply(inverse(root_transform(body, rootless)), markers(body, rootless))
+    np.testing.assert_allclose(apply(T, local), markers(body, pose), atol=1e-12)
+    assert set(root.pose.covariance) == {0.0}
+
+
+def test_joint_names_are_those_of_the_urdf(body: BodyModel, pose: np.ndarray) -> None:
+    moving = {
+        joint.get("name")
+        for joint in ElementTree.fromstring(urdf(body)).iter("joint")
+        if joint.get("type") != "fixed" and joint.find("mimic") is None
+    }
+    assert set(messages.joint_state(body, pose, 0).name) <= moving
+
+
+def test_marker_poses_are_the_15_in_order(body: BodyModel, pose: np.ndarray) -> None:
+    points = markers(body, pose)
+    message = messages.marker_poses(points, STAMP_NS)
+    assert message.header.frame_id == "map" and stamp_of(message) == STAMP_NS
+    got = [(p.position.x, p.position.y, p.position.z) for p in message.poses]
+    np.testing.assert_array_equal(got, points)
+
+
+def test_the_body_for_viewers(body: BodyModel, pose: np.ndarray) -> None:
+    points = markers(body, pose)
+    message = messages.body_markers(body, pose, points, STAMP_NS)
+    cylinders = [m for m in message.markers if m.type == Marker.CYLINDER]
+    assert len(cylinders) == len(body.cone_names)
+    assert len({(m.ns, m.id) for m in message.markers}) == len(message.markers)
+    for marker in message.markers:
+        assert marker.header.frame_id == "map" and stamp_of(marker) == STAMP_NS
+        q = marker.pose.orientation
+        assert np.linalg.norm((q.x, q.y, q.z, q.w)) == pytest.approx(1.0)
+        assert min(marker.scale.x, marker.scale.y, marker.scale.z) > 0.0
+    # The axis of the left thigh runs from hip to knee.
+    thigh = cylinders[body.cone_names.index("l_thigh")]
+    p, q = thigh.pose.position, thigh.pose.orientation
+    axis = rotation_from_quaternion((q.w, q.x, q.y, q.z))[:, 2]
+    hip, knee = points[9], points[10]
+    np.testing.assert_allclose((p.x, p.y, p.z), (hip + knee) / 2, atol=0.03)
+    assert abs(axis @ (knee - hip)) / np.linalg.norm(knee - hip) > 0.98
+
+
+def test_a_lost_body_disappears_from_viewers() -> None:
+    assert [m.action for m in messages.no_markers(1).markers] == [Marker.DELETEALL]
+
+
+@pytest.mark.parametrize(
+    ("state", "ready", "level"),
+    [
+        (TrackState.TRACKING, True, DiagnosticStatus.OK),
+        (TrackState.TRACKING, False, DiagnosticStatus.WARN),
+        (TrackState.LOST, True, DiagnosticStatus.WARN),
+        (TrackState.SEARCHING, True, DiagnosticStatus.WARN),
+    ],
+)
+def test_state_levels(state: TrackState, ready: bool, level: bytes) -> None:
+    values = {"activity": "tracking", "ready": str(ready)}
+    message = messages.state_message("tracker", values, state, STAMP_NS, ready=ready)
+    (status,) = message.status
+    assert status.level == level and state.value in status.message
+    assert {pair.key: pair.value for pair in status.values} == values
+    assert stamp_of(message) == STAMP_NS
+
+
+def test_deviations_and_covariance(body: BodyModel, pose: np.ndarray) -> None:
+    covariance = np.arange(36.0).reshape(6, 6)
+    sure = Confidence(np.arange(float(body.size)), np.ones((15, 3)), covariance)
+    message = messages.joint_deviations(body, sure, STAMP_NS)
+    assert message.name == messages.joint_state(body, pose, 0).name
+    assert stamp_of(message) == STAMP_NS
+    assert list(message.position) == [float(index) for index in body.joints]
+    root = messages.root_pose(body, pose, STAMP_NS, sure)
+    np.testing.assert_array_equal(np.reshape(root.pose.covariance, (6, 6)), covariance)

@@ -1,0 +1,96 @@
+import importlib
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.node.ros.process import StopSignals, run_executable
+
+WITHOUT_ROS = """
+import sys
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("rclpy", "sensor_msgs", "std_srvs", "diagnostic_msgs",
+                                  "geometry_msgs", "visualization_msgs", "std_msgs"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Missing())
+from markerless_tracker.node.NODE.executable import main
+sys.exit(main([]))
+"""
+
+
+SIGNALLED = """
+import os, sys
+from markerless_tracker.node.ros.process import run_executable
+def body(argv, stop):
+    for _ in range(3):
+        exec("os.kill(os.getpid(), int(sys.argv[1]))")
+    print("went on, asked:", stop.asked)
+    return 7
+sys.exit(run_executable("x", body, []))
+"""
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture(autouse=True)
+def _own_signals() -> Iterator[None]:
+    """An executable ignores signals once it is through; the tests must not."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    handlers = [signal.getsignal(number) for number in numbers]
+    yield
+    for number, handler in zip(numbers, handlers, strict=True):
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("node", ["tracker", "player"])
+def test_without_ros_there_is_one_clear_line(node: str, project_root: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_ROS.replace("NODE", node)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, "PYTHONPATH": str(project_root)},
+    )
+    assert done.returncode == 1 and done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert "ROS 2 is not installed" in line and "markerless_tracker[ros]" in line
+
+
+def test_errors_are_one_line_and_exit_1(capsys: pytest.CaptureFixture[str]) -> None:
+    def fail(_: list[str], __: StopSignals) -> int:
+        raise ConfigError("seed: got -1, expected at least 0")
+
+    assert run_executable("tracker", fail, []) == 1
+    assert capsys.readouterr().err == "tracker: seed: got -1, expected at least 0\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_is_noted_and_breaks_nothing(number: int) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SIGNALLED, str(int(number))],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (7, "went on, asked: True\n", "")
+
+
+@pytest.mark.parametrize(
+    ("node", "parameters"),
+    [("tracker", ("calibration_file", "edge_weight")), ("player", ("bag", "loop"))],
+)
+def test_help_lists_the_parameters(
+    node: str, parameters: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    main = importlib.import_module(f"markerless_tracker.node.{node}.executable").main
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    assert "example:" in text
+    assert all(f"\n  {name} " in text for name in parameters)

@@ -1,0 +1,321 @@
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from markerless_tracker.errors import ConfigError, ImageError
+from markerless_tracker.imaging import ImagingSettings
+from markerless_tracker.node.tracker.learning import Learning
+from markerless_tracker.node.tracker.status import TrackerStatus
+from markerless_tracker.node.tracker.synchronizer import Synchronizer
+from markerless_tracker.node.tracker.worker import (
+    FittedSet,
+    Fitting,
+    FitWorker,
+    StartGate,
+    one_line,
+)
+from markerless_tracker.records import LimbState, TrackResult, TrackState
+
+FRAME_NS = 16_666_667
+KEYS = ("tracked", "dropped_before_start")
+
+
+class FakeTracker:
+    """Steps as slowly and as badly as a test wants."""
+
+    def __init__(self) -> None:
+        self.seen: list[tuple[int, dict[str, Any]]] = []
+        self.resets = 0
+        self.threads: set[int] = set()
+        self.compiled = threading.Event()
+        self.compiled.set()
+        self.free = threading.Event()
+        self.free.set()
+        self.error: Exception | None = None
+        self.state = TrackState.TRACKING
+        self.backgrounds: dict[str, Any] = {}
+
+    def warm_up(self) -> None:
+        self.threads.add(threading.get_ident())
+        self.compiled.wait(20)
+        if self.error:
+            raise self.error
+
+    def step(self, views: Any, stamp_ns: int) -> TrackResult:
+        self.threads.add(threading.get_ident())
+        self.free.wait(20)
+        if self.error:
+            raise self.error
+        self.seen.append((stamp_ns, dict(views)))
+        lost, fine = (LimbState(s, 0.5, 0.5) for s in (TrackState.LOST, TrackState.TRACKING))
+        return TrackResult(
+            stamp_ns, self.state, np.zeros(3), np.zeros((15, 3)), 1.5, {"a": 0.5}, 7,
+            limbs={"l_arm": lost, "r_arm": fine, "l_leg": lost},
+        )  # fmt: skip
+
+    def reset(self) -> None:
+        self.resets += 1
+
+    def take_backgrounds(self, backgrounds: Any) -> None:
+        if self.error:
+            raise self.error
+        self.backgrounds = dict(backgrounds)
+
+
+class Bench:
+    """A worker on a fake tracker, with all it says."""
+
+    def __init__(self, start_ns: int | None = None) -> None:
+        self.tracker = FakeTracker()
+        self.sets: Synchronizer[int] = Synchronizer(("a", "b"))
+        self.status = TrackerStatus()
+        self.published: list[FittedSet] = []
+        self.reports: list[str] = []
+        self.prepared: Fitting | None = Fitting(
+            self.tracker, start_ns, lambda name, view: np.full((2, 2), view, np.uint8)
+        )
+        self.worker = FitWorker(
+            self.sets,
+            self.status,
+            prepare=lambda: self.prepared,
+            publish=self.published.append,
+            report=self.reports.append,
+        )
+
+    def offer(self, *stamps: int) -> None:
+        for stamp in stamps:
+            for camera in ("a", "b"):
+                self.sets.add(camera, stamp, 7, now_s=time.monotonic())
+
+    def values(self) -> dict[str, str]:
+        return self.status.values(self.sets.counts, ("a", "b"), ())
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        end = time.monotonic() + 20
+        while not condition():
+            assert time.monotonic() < end, self.values()
+            time.sleep(0.002)
+
+
+@pytest.fixture
+def bench() -> Any:
+    bench = Bench()
+    yield bench
+    bench.tracker.free.set()
+    bench.tracker.compiled.set()
+    assert bench.worker.stop(20)
+
+
+def test_sets_are_decoded_tracked_and_published_in_one_thread(bench: Bench) -> None:
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    bench.offer(5)
+    bench.until(lambda: bench.published)
+    stamp, views = bench.tracker.seen[0]
+    assert stamp == 5 and views["a"].tolist() == [[7, 7], [7, 7]]
+    assert bench.published[0].images["b"].shape == (2, 2)
+    assert len(bench.tracker.threads) == 1
+    assert threading.get_ident() not in bench.tracker.threads
+    values = bench.values()
+    assert values["state"] == "TRACKING" and values["tracked"] == "1"
+    assert values["agreement/a"] == "0.5000" and values["agreement/b"] == "nan"
+    assert values["lost_limbs"] == "l_arm, l_leg"
+    assert float(values["latency_median_ms"]) >= 0.0
+
+
+def test_images_before_it_is_ready_are_dropped_and_counted_apart(bench: Bench) -> None:
+    bench.tracker.compiled.clear()
+    bench.worker.start()
+    bench.until(lambda: bench.values()["activity"] == "compiling")
+    bench.offer(1, 2, 3)
+    assert bench.values()["ready"] == "false" and bench.values()["dropped_before_ready"] == "3"
+    bench.tracker.compiled.set()
+    bench.until(lambda: bench.status.ready)
+    bench.offer(4)
+    bench.until(lambda: bench.published)
+    values = bench.values()
+    assert [stamp for stamp, _ in bench.tracker.seen] == [4]
+    assert values["dropped_before_ready"] == "3" and values["skipped"] == "0"
+
+
+def test_a_slow_tracker_skips_to_the_newest(bench: Bench) -> None:
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    bench.tracker.free.clear()
+    bench.offer(1)
+    bench.until(lambda: bench.sets.held == 0)
+    bench.offer(2, 3, 4)
+    bench.tracker.free.set()
+    bench.until(lambda: len(bench.published) == 2)
+    assert [stamp for stamp, _ in bench.tracker.seen] == [1, 4]
+    assert bench.values()["skipped"] == "2"
+
+
+@pytest.mark.parametrize("error", [ImageError("cam01: too dark\nfor this"), ZeroDivisionError("x")])
+def test_an_error_costs_its_set_and_is_reported_once(bench: Bench, error: Exception) -> None:
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    bench.tracker.error = error
+    for count, stamp in enumerate((1, 2), 1):
+        bench.offer(stamp)
+        bench.until(lambda count=count: bench.values()["dropped_on_error"] == str(count))
+    bench.tracker.error = None
+    bench.offer(3)
+    bench.until(lambda: bench.published)
+    assert bench.reports == [f"stamp 1: {one_line(error)}"]
+    assert "\n" not in bench.reports[0]
+    assert bench.values()["last_error"] == one_line(error) and bench.worker.fatal is None
+
+
+def test_an_error_before_the_first_set_is_fatal(bench: Bench) -> None:
+    bench.tracker.error = ConfigError("threads: too many")
+    bench.worker.start()
+    bench.until(lambda: bench.worker.fatal)
+    assert bench.worker.fatal == "threads: too many" and not bench.status.ready
+
+
+def test_it_asks_again_until_it_can_begin(bench: Bench) -> None:
+    fitting, bench.prepared = bench.prepared, None
+    bench.worker.start()
+    bench.offer(1)
+    assert not bench.status.ready
+    bench.prepared = fitting
+    bench.until(lambda: bench.status.ready)
+    assert bench.values()["dropped_before_ready"] == "1"
+
+
+def test_reset_and_restart_make_the_tracker_forget(bench: Bench) -> None:
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    for stamp in (8, 9):
+        bench.offer(stamp)
+        bench.until(lambda stamp=stamp: bench.tracker.seen and bench.tracker.seen[-1][0] == stamp)
+    assert bench.tracker.resets == 0
+    bench.worker.reset()
+    bench.offer(10)
+    bench.until(lambda: len(bench.published) == 3)
+    assert bench.tracker.resets == 1
+    bench.offer(0)
+    bench.until(lambda: len(bench.published) == 4)
+    assert bench.tracker.resets == 2 and bench.values()["restarts"] == "1"
+
+
+def test_the_start_row_decides_where_it_begins_on_every_pass() -> None:
+    bench = Bench(start_ns=2 * FRAME_NS + 300_000)
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    for _ in range(2):
+        for frame in range(4):
+            before = bench.values()
+            bench.offer(frame * FRAME_NS)
+            bench.until(lambda b=before: any(bench.values()[k] != b[k] for k in KEYS))
+    bench.until(lambda: len(bench.published) == 4)
+    assert bench.worker.stop(20)
+    assert [stamp // FRAME_NS for stamp, _ in bench.tracker.seen] == [2, 3, 2, 3]
+    assert bench.values()["dropped_before_start"] == "4"
+
+
+def test_stop_does_not_wait_for_ever() -> None:
+    bench = Bench()
+    bench.tracker.compiled.clear()
+    bench.worker.start()
+    assert not bench.worker.stop(0.05)
+    bench.tracker.compiled.set()
+    assert bench.worker.stop(20)
+
+
+@pytest.mark.parametrize(
+    ("start_ns", "stamps", "admitted"),
+    [
+        (None, [5, 6], [True, True]),
+        (16_666_667, [0, FRAME_NS, 2 * FRAME_NS], [False, True, True]),
+        (17_000_000, [0, FRAME_NS], [False, True]),
+        (16_666_667, [10**18], [True]),
+        (FRAME_NS // 2, [0, 4_166_667, 8_333_333], [False, False, True]),
+    ],
+)
+def test_start_gate(start_ns: int | None, stamps: list[int], admitted: list[bool]) -> None:
+    gate = StartGate(start_ns)
+    assert [gate.admits(stamp) for stamp in stamps] == admitted
+
+
+def learn(bench: Bench, sets: int = 4) -> Learning:
+    learning = Learning(("a", "b"), sets, ImagingSettings(), None)
+    bench.worker.learn(learning)
+    return learning
+
+
+def offer_one_by_one(bench: Bench, *stamps: int) -> None:
+    for stamp in stamps:
+        before = {key: bench.values()[key] for key in ("tracked", "dropped_while_learning")}
+        bench.offer(stamp)
+        bench.until(lambda before=before: any(bench.values()[k] != v for k, v in before.items()))
+
+
+def test_sets_become_backgrounds_and_the_tracker_looks_at_the_first_and_the_last(
+    bench: Bench,
+) -> None:
+    early = learn(bench)
+    assert early.answered and early.message == "nothing learned: the tracker is not ready yet"
+    bench.tracker.state = TrackState.SEARCHING
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    learning = learn(bench)
+    second = learn(bench)
+    assert second.answered and "already" in second.message
+    offer_one_by_one(bench, 1, 2, 3, 4)
+    bench.until(lambda: learning.answered)
+    assert learning.success and learning.message == "a, b learned from 4 images each"
+    assert [stamp for stamp, _ in bench.tracker.seen] == [1, 4]
+    assert bench.values()["dropped_while_learning"] == "2"
+    assert bench.tracker.backgrounds["b"].note == "learned live from 4 images"
+    assert (bench.tracker.backgrounds["b"].mean == 7.0).all()
+    offer_one_by_one(bench, 5)
+    assert bench.tracker.seen[-1][0] == 5
+
+
+def test_a_tracked_person_is_not_learned(bench: Bench) -> None:
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    learning = learn(bench)
+    offer_one_by_one(bench, 1)
+    bench.until(lambda: learning.answered)
+    assert not learning.success and "somebody stands there" in learning.message
+    assert not bench.tracker.backgrounds
+    # The next request is a new one.
+    bench.until(lambda: "somebody" not in learn(bench).message)
+
+
+def test_trouble_answers_a_request(bench: Bench) -> None:
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    bench.tracker.error = ImageError("a: too dark")
+    learning = learn(bench)
+    bench.offer(1)
+    bench.until(lambda: learning.answered)
+    assert learning.message == "nothing learned: a: too dark"
+    bench.tracker.error = None
+    waiting = learn(bench)
+    assert bench.worker.stop(20)
+    assert waiting.message == "nothing learned: the tracker ends"
+
+
+def test_without_backgrounds_sets_are_dropped_until_they_are_learned(bench: Bench) -> None:
+    assert bench.prepared is not None
+    bench.prepared = replace(bench.prepared, waits=True)
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    offer_one_by_one(bench, 1, 2)
+    assert not bench.tracker.seen
+    assert bench.values()["activity"] == "waiting for learn_background"
+    learning = learn(bench, 2)
+    offer_one_by_one(bench, 3, 4)
+    bench.until(lambda: learning.answered)
+    assert learning.success and set(bench.tracker.backgrounds) == {"a", "b"}
+    offer_one_by_one(bench, 5)
+    assert [stamp for stamp, _ in bench.tracker.seen] == [5]
