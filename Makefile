@@ -49,3 +49,4 @@ lock: ## pin anew what requirements/direct.txt names, newest versions
 
 clean: ## remove everything that the targets made
 	rm -rf $(VENV) build install log dist demo out .hypothesis .mypy_cache .ruff_cache *.egg-info
+	find . -name __pycache__ -prune -exec rm -rf {} +

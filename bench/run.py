@@ -12,7 +12,7 @@ DATA = ROOT.parent / "shared" / "data"
 # Full size has four times the pixels and hardly a millimetre more to say.
 RECORDINGS = {"render_walk": "1", "balance_real": "0.5"}
 STATURES = {"render_walk": "1.72", "balance_real": "1.70"}
-PARTS = ("accuracy", "start", "automatic", "cameras", "recovery", "calm", "speed")
+PARTS = ("accuracy", "start", "automatic", "cameras", "recovery", "jitter", "speed")
 STAND = "--motion stand --seconds 3 --body person31 --noise 8 --seed 2".split()
 # Hours: only when named.
 LONG = ("papers",)
@@ -52,12 +52,12 @@ def bench(parts: list[str], data: Path, out: Path, seeds: int) -> None:
             run(["benchmark", "cameras", str(data / name), *told[:4]])
         if "recovery" in parts and name == "render_walk":
             run(["benchmark", "recovery", str(data / name), *told])
-    if "calm" in parts:
+    if "jitter" in parts:
         stand = out / "stand"
         if not stand.exists():
             run(["synthesize", str(stand), *STAND])
         walks = [str(data / name) for name in found if name == "render_walk"]
-        run(["benchmark", "calm", str(stand), *walks])
+        run(["benchmark", "jitter", str(stand), *walks])
     if "speed" in parts:
         run(["benchmark", "speed"])
 

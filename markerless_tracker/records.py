@@ -124,7 +124,7 @@ class Stage:
         iterations: iterations, of a swarm the initial sample being the first.
         silhouette_weight, edge_weight: weights of f_s and f_e.
         silhouette_cones, edge_cones: (c,) cones that each term uses.
-        gain: where stages compete, f must rise by more than this for the result to be taken.
+        min_improvement: where stages compete, a result is taken if f rises by more than this.
         options: the algorithm's own settings by name.
     """
 
@@ -139,7 +139,7 @@ class Stage:
     edge_weight: float
     silhouette_cones: NDArray[np.bool_]
     edge_cones: NDArray[np.bool_]
-    gain: float = 0.0
+    min_improvement: float = 0.0
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -186,15 +186,15 @@ class LimbState:
 
     Attributes:
         state: TRACKING or LOST.
-        share: of its axis, how much lies inside the silhouettes, mean over the views; NaN if it
-            lies outside all frames.
-        scatter: standard deviation of the swarm's particles in the end, as a share of the spread
-            that they began with; NaN without a swarm.
+        inside_fraction: fraction of the limb's axis inside the silhouettes, mean over the views;
+            NaN if it lies outside all frames.
+        particle_sd_ratio: standard deviation of the swarm's particles after the last iteration
+            over that of the first sample; NaN without a swarm.
     """
 
     state: TrackState
-    share: float
-    scatter: float
+    inside_fraction: float
+    particle_sd_ratio: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +227,7 @@ class TrackResult:
         pose: (p,) parameters in m and rad, or None when there is no estimate.
         markers_m: (15, 3) marker positions, world frame, or None.
         fitness: f = f_s + f_e in [0, 2] of the estimate (NaN without one).
-        agreement: per camera, overlap (IoU) of the silhouette and the projected body.
+        iou: per camera, overlap (IoU) of the silhouette and the projected body.
         evaluations: evaluations of the objective that the swarms spent on this frame.
         refinements: iterations of contour refinement spent on this frame.
         observations: the evidence each camera gave.
@@ -243,7 +243,7 @@ class TrackResult:
     pose: NDArray[np.float64] | None
     markers_m: NDArray[np.float64] | None
     fitness: float
-    agreement: Mapping[str, float]
+    iou: Mapping[str, float]
     evaluations: int
     refinements: int = 0
     observations: Mapping[str, Observation] = field(default_factory=dict, repr=False)

@@ -25,7 +25,7 @@ FILTERS = ("none", "one_euro")
 Points = NDArray[np.float64]
 
 
-def measure_calm(
+def measure_jitter(
     source: Path,
     config: TrackerConfig,
     *,

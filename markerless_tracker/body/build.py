@@ -150,11 +150,13 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
             [float(_get(v, "sigma", f"parameter {k}")) for k, v in d.parameters.items()]
         ),
         neutral=neutral,
-        usual=neutral
-        + np.array([np.deg2rad(float(v.get("usual", 0.0))) for v in d.parameters.values()]),
-        spread=np.array(
+        prior_mean=neutral
+        + np.array(
+            [np.deg2rad(float(v.get("prior_mean_deg", 0.0))) for v in d.parameters.values()]
+        ),
+        prior_sd=np.array(
             [
-                np.inf if k in d.subspaces["root"] else float(v.get("spread", _SPREAD_RAD))
+                np.inf if k in d.subspaces["root"] else float(v.get("prior_sd_rad", _SPREAD_RAD))
                 for k, v in d.parameters.items()
             ]
         ),

@@ -41,9 +41,8 @@ class BodyModel:
         root_frame: name of the frame that carries the body.
         sigma: (p,) greatest change between frames at 60 fps (SPPSO Eq 1).
         neutral: (p,) standing, arms hanging; the root at the origin.
-        usual: (p,) what people's poses scatter about; neutral, but for elbows, which nobody keeps
-            straight.
-        spread: (p,) how far they scatter about it, infinite for the root: a weak belief for
+        prior_mean: (p,) mean of people's poses: neutral, with slightly bent elbows.
+        prior_sd: (p,) how far they scatter about it, infinite for the root: a weak belief for
             refinement, where the images do not tell.
         limits: (2, p) anatomical lower and upper limits, infinite where free.
         walking_limits: (2, p) published limits, learned from one walk.
@@ -72,8 +71,8 @@ class BodyModel:
     root_frame: str
     sigma: FloatArray
     neutral: FloatArray
-    usual: FloatArray
-    spread: FloatArray
+    prior_mean: FloatArray
+    prior_sd: FloatArray
     limits: FloatArray
     walking_limits: FloatArray
     marker_node: IntArray

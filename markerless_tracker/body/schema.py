@@ -67,8 +67,8 @@ _ENTRIES: Mapping[str, tuple[Mapping[str, tuple[str, Check]], Mapping[str, tuple
         {"sigma": _POSITIVE},
         {
             "neutral": _NUMBER,
-            "usual": _NUMBER,
-            "spread": _POSITIVE,
+            "prior_mean_deg": _NUMBER,
+            "prior_sd_rad": _POSITIVE,
             "limits": _RANGE,
             "walking": _RANGE,
         },

@@ -14,7 +14,7 @@ from markerless_tracker.fitness.arrays import Views, body_arrays, lay_out_views
 from markerless_tracker.fitness.raster import kernels
 from markerless_tracker.fitness.raster.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule
 from markerless_tracker.fitness.raster.outline import make_outlines
-from markerless_tracker.fitness.raster.static_layer import Drawing, divide
+from markerless_tracker.fitness.raster.static_layer import Drawing, split_static
 from markerless_tracker.fitness.terms import OVERLAP, PROJECTED, CostRule, view_terms
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
@@ -124,12 +124,14 @@ class Fitness:
         """Counts (n, v, 4) of poses (n, p): see the columns of `terms`."""
         everything = np.arange(self.body.size)
         cost = CostRule(1.0, 1.0, self._rule.squared, False)
-        drawing = divide(
+        drawing = split_static(
             self.body, self._arrays, views.arrays, everything, self.body.neutral, silhouette_cones,
             edge_cones, self._rule, cost, self._scratch, self._outlines,
         )  # fmt: skip
-        bars = np.full(len(poses), np.inf)
-        return self._run(views, drawing, poses, everything, self.body.neutral, bars, cost)[0]
+        cutoff_costs = np.full(len(poses), np.inf)
+        return self._run(views, drawing, poses, everything, self.body.neutral, cutoff_costs, cost)[
+            0
+        ]
 
     def terms(self, views: Views, pose: FloatArray) -> dict[str, ViewTerms]:
         """f_s, f_e and overlap of one pose (p,), by the names of the cameras that see."""
@@ -149,16 +151,16 @@ class Fitness:
         points: FloatArray,
         active: NDArray[np.int64],
         centre: FloatArray,
-        bars: FloatArray,
+        cutoff_costs: FloatArray,
         cost: CostRule,
     ) -> tuple[FloatArray, FloatArray]:
         """Counts (n, v, 4) and costs (n,) of points (n, d)."""
         counts = np.empty((len(points), len(views.names), 4))
         costs = np.empty(len(points))
         args = (
-            points, active, centre, bars, drawing.body, views.arrays, drawing.silhouette_cones,
-            drawing.edge_cones, self._rule, cost, drawing.still, self._scratch, self._outlines,
-            counts, costs,
+            points, active, centre, cutoff_costs, drawing.body, views.arrays,
+            drawing.silhouette_cones, drawing.edge_cones, self._rule, cost, drawing.still,
+            self._scratch, self._outlines, counts, costs,
         )  # fmt: skip
         work_s = len(points) * len(views.names) * drawing.silhouette_cones.size * _CONE_S
         if not worth_waking(work_s, self.threads):
@@ -193,7 +195,7 @@ class Evaluator:
             fitness._rule.squared,
             fitness.cost == "one_sided",
         )
-        self._drawing = divide(
+        self._drawing = split_static(
             fitness.body, fitness._arrays, views.arrays, stage.active, stage.centre,
             # A term without weight is not looked at.
             stage.silhouette_cones, stage.edge_cones & (stage.edge_weight != 0.0),
@@ -206,17 +208,17 @@ class Evaluator:
         poses[:, self._stage.active] = points
         return poses
 
-    def __call__(self, points: FloatArray, bars: FloatArray | None = None) -> FloatArray:
+    def __call__(self, points: FloatArray, cutoff_costs: FloatArray | None = None) -> FloatArray:
         """Costs (n,) of points (n, d).
 
         Args:
             points: the points.
-            bars: (n,) costs below which they matter: a point that does not get there may cost
-                anything from its bar to what it costs in full.
+            cutoff_costs: (n,) cutoff per point: an evaluation may stop once its cost exceeds it,
+                and then returns a lower bound of the cost that is at least the cutoff.
         """
         stage = self._stage
-        bars = np.full(len(points), np.inf) if bars is None else bars
+        cutoff_costs = np.full(len(points), np.inf) if cutoff_costs is None else cutoff_costs
         return self._fitness._run(
             self._views, self._drawing, np.ascontiguousarray(points), stage.active, stage.centre,
-            bars, self._cost,
+            cutoff_costs, self._cost,
         )[1]  # fmt: skip

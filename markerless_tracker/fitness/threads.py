@@ -6,7 +6,9 @@ from functools import cache
 
 import numba
 import numpy as np
-from numba import njit, prange
+from numba import prange
+
+from markerless_tracker.compiled import compiled
 
 # The only threading layer without a library to install. It takes one caller at a time.
 numba.config.THREADING_LAYER = "workqueue"
@@ -49,7 +51,7 @@ def launch_cost_s(threads: int) -> float:
     return float(np.median(costs))
 
 
-@njit(cache=True, nogil=True, parallel=True)  # type: ignore[misc]
+@compiled(parallel=True)
 def _nothing(ticks):  # type: ignore[no-untyped-def]
     for thread in prange(ticks.size):
         ticks[thread] += 1.0

@@ -1,9 +1,9 @@
 """The edge map: where the silhouette's neighbourhood changes brightness, in [0, 1]."""
 
 import cv2
-import numba
 import numpy as np
 
+from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image, grey_of
 from markerless_tracker.imaging.segmentation.morphology import Mask
 from markerless_tracker.imaging.settings import ImagingSettings
@@ -64,7 +64,7 @@ def _gradient_strength(grey: Image, settings: ImagingSettings) -> Image:
     return strength
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _weighted(above, here, below, smooth, slope):  # type: ignore[no-untyped-def]
     """Three rows (w,) into smooth, slope (w + 2,), the last values repeated at both ends."""
     n = here.size
@@ -78,7 +78,7 @@ def _weighted(above, here, below, smooth, slope):  # type: ignore[no-untyped-def
     slope[n + 1] = slope[n]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _steep(smooth, slope, low, gain, out):  # type: ignore[no-untyped-def]
     full = np.float32(255.0)
     for j in range(out.size):
@@ -91,7 +91,7 @@ def _steep(smooth, slope, low, gain, out):  # type: ignore[no-untyped-def]
         out[j] = np.uint8(np.int32(min(value, full) + np.float32(0.5)))
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def gradient_strength(grey, low, gain, strength):  # type: ignore[no-untyped-def]
     """Fill strength (h, w) uint8 with (Sobel gradient - low) gain of grey (h, w) uint8, to 255."""
     rows, columns = grey.shape

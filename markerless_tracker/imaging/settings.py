@@ -140,7 +140,7 @@ class ImagingSettings:
     )
     mask_close_px: int = setting(
         5,
-        "side of the closing that mends cracks, in images of 640x480 or more; in smaller ones it "
+        "side of the closing that closes cracks, in images of 640x480 or more; in smaller ones it "
         "is as much smaller as they are; 0 or 1 = none",
         least=0,
         most=101,

@@ -6,7 +6,7 @@ from markerless_tracker.optim.draws import keyed_generator
 from markerless_tracker.optim.gauss_newton import Prior, refine
 from markerless_tracker.optim.mcpso import MASTER_TERMS, Mcpso, swarm_sizes
 from markerless_tracker.optim.pf import Pf
-from markerless_tracker.optim.problem import Cloud, Feasible, Problem, everything_feasible
+from markerless_tracker.optim.problem import Feasible, ParticleSet, Problem, everything_feasible
 from markerless_tracker.optim.pso import Pso
 from markerless_tracker.optim.registry import ALGORITHMS
 from markerless_tracker.optim.sppso import UPDATES, Sppso
@@ -17,7 +17,7 @@ __all__ = [
     "MASTER_TERMS",
     "UPDATES",
     "Apf",
-    "Cloud",
+    "ParticleSet",
     "Evaluate",
     "Feasible",
     "Mcpso",

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from markerless_tracker.errors import SearchError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim.base import Optimizer
-from markerless_tracker.optim.problem import Cloud, Problem
+from markerless_tracker.optim.problem import ParticleSet, Problem
 from markerless_tracker.optim.weights import (
     annealed_sharpness,
     drawn_by_weight,
@@ -82,15 +82,15 @@ class Apf(Optimizer):
         return self.best_x
 
     @property
-    def scatter(self) -> FloatArray:
+    def particle_sd_ratio(self) -> FloatArray:
         """(d,) standard deviation of the last layer's particles, weighted."""
         around = self._particles - self._weights @ self._particles
         return np.asarray(np.sqrt(self._weights @ around**2))
 
     @property
-    def memory(self) -> Cloud:
+    def memory(self) -> ParticleSet:
         """Particles and weights of the last layer, relative to the estimate."""
-        return Cloud(self._particles - self.estimate, self._weights)
+        return ParticleSet(self._particles - self.estimate, self._weights)
 
     def _sharpness(self, costs: FloatArray) -> float:
         return annealed_sharpness(costs, self._survival)

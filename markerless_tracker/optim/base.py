@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from markerless_tracker.errors import SearchError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim.problem import Cloud, Problem
+from markerless_tracker.optim.problem import ParticleSet, Problem
 
 Evaluate = Callable[..., FloatArray]
-"""Costs (n,) of a batch of points (n, d); may take bars (n,), see `Optimizer.run`."""
+"""Costs (n,) of a batch of points (n, d); may take cutoff_costs (n,), see `Optimizer.run`."""
 
 
 class Optimizer(ABC):
@@ -36,7 +36,7 @@ class Optimizer(ABC):
         self.evaluations = 0
         self.bad_costs = 0
         self._asked: FloatArray | None = None
-        self._barred: NDArray[np.bool_] | None = None
+        self._infeasible: NDArray[np.bool_] | None = None
 
     @property
     def estimate(self) -> FloatArray:
@@ -44,12 +44,12 @@ class Optimizer(ABC):
         return self.best_x
 
     @property
-    def scatter(self) -> FloatArray:
+    def particle_sd_ratio(self) -> FloatArray:
         """(d,) standard deviation of the particles, of their own bests if they keep any."""
         return np.zeros_like(self.best_x)
 
     @property
-    def memory(self) -> Cloud | None:
+    def memory(self) -> ParticleSet | None:
         """What the next frame's search may go on from; None for most."""
         return None
 
@@ -68,7 +68,7 @@ class Optimizer(ABC):
             raise SearchError(
                 "ask() was called out of turn: tell() the costs first, stop when finished"
             )
-        self._asked, self._barred = self._ask()
+        self._asked, self._infeasible = self._ask()
         return self._asked
 
     def tell(self, costs: FloatArray) -> None:
@@ -77,7 +77,7 @@ class Optimizer(ABC):
         Raises:
             SearchError: called out of turn or with another number of costs.
         """
-        if self._asked is None or self._barred is None or costs.shape != (len(self._asked),):
+        if self._asked is None or self._infeasible is None or costs.shape != (len(self._asked),):
             raise SearchError(
                 f"tell() got {costs.shape} costs for "
                 f"{'no' if self._asked is None else len(self._asked)} points asked for"
@@ -87,7 +87,7 @@ class Optimizer(ABC):
         costs = np.array(costs, dtype=np.float64)
         bad = ~np.isfinite(costs)
         self.bad_costs += int(bad.sum())
-        costs[bad | self._barred] = np.inf
+        costs[bad | self._infeasible] = np.inf
         best = int(np.argmin(costs))
         if costs[best] < self.best_cost:
             self.best_cost = float(costs[best])
@@ -95,7 +95,7 @@ class Optimizer(ABC):
         self._tell(points, costs)
 
     @property
-    def bars(self) -> FloatArray | None:
+    def cutoff_costs(self) -> FloatArray | None:
         """Costs (n,) below which the costs of the points asked for matter; None: all matter.
 
         A particle swarm only learns from a particle that beats its own best.
@@ -107,13 +107,13 @@ class Optimizer(ABC):
 
         Args:
             evaluate: costs of points.
-            early: it takes bars as well, and may return, for a point that cannot get below its
-                bar, any cost from the bar to the point's own. The run comes out the same.
+            early: pass `cutoff_costs` as well. An evaluation may then stop once its cost exceeds
+                its cutoff and return a lower bound. The result of the run is the same.
         """
         while not self.finished:
             points = self.ask()
-            bars = self.bars if early else None
-            self.tell(evaluate(points) if bars is None else evaluate(points, bars))
+            cutoff_costs = self.cutoff_costs if early else None
+            self.tell(evaluate(points) if cutoff_costs is None else evaluate(points, cutoff_costs))
         return self.estimate
 
     @abstractmethod

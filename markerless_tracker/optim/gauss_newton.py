@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt with Gaussian priors, bounds, and a reach that shrinks.
+"""Levenberg-Marquardt with Gaussian priors, bounds, and a truncation that shrinks.
 
 For robust least squares whose normal equations somebody else sums: contour refinement.
 """
@@ -12,7 +12,7 @@ from markerless_tracker.errors import SearchError
 from markerless_tracker.geometry import FloatArray
 
 Equations = Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]
-"""At a point (p,) and a reach: JᵀWJ (p, p) and JᵀWr (p,), in units of the data's precision."""
+"""At a point (p,) and a truncation: JᵀWJ (p, p) and JᵀWr (p,), in units of the data's precision."""
 
 _DAMPING = 1e-3
 _ACTIVE_SETS = 10
@@ -78,7 +78,7 @@ def refine(
     priors: tuple[Prior, ...],
     bounds: FloatArray,
     iterations: int,
-    reach: tuple[float, float],
+    truncation: tuple[float, float],
 ) -> FloatArray:
     """Refine a point (p,) by a fixed number of damped Gauss-Newton steps.
 
@@ -87,8 +87,8 @@ def refine(
         start: (p,) where to begin.
         priors: added to the data's equations.
         bounds: (2, p), kept.
-        iterations: number of steps; the reach shrinks geometrically over them.
-        reach: residuals beyond it are outliers, in the first and in the last step.
+        iterations: number of steps; the truncation shrinks geometrically over them.
+        truncation: residuals beyond it are outliers, in the first and in the last step.
 
     Returns:
         The refined point (p,). A step whose equations cannot be solved ends the refinement.
@@ -96,7 +96,7 @@ def refine(
     x = np.clip(start, bounds[0], bounds[1])
     for i in range(iterations):
         share = i / (iterations - 1) if iterations > 1 else 1.0
-        hessian, slope = equations(x, reach[0] * (reach[1] / reach[0]) ** share)
+        hessian, slope = equations(x, truncation[0] * (truncation[1] / truncation[0]) ** share)
         hessian, slope = hessian.copy(), slope.copy()
         for prior in priors:
             hessian[np.diag_indices_from(hessian)] += prior.precision

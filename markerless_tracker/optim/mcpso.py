@@ -148,16 +148,16 @@ class Mcpso(Optimizer):
         self._phi = 0.5
 
     @property
-    def scatter(self) -> FloatArray:
+    def particle_sd_ratio(self) -> FloatArray:
         """(d,) standard deviation of all particles' own best positions, the master's included."""
         return np.asarray(np.concatenate([self._subs.best, self._master.best]).std(axis=0))
 
     @property
-    def bars(self) -> FloatArray:
+    def cutoff_costs(self) -> FloatArray:
         """Own best cost of each particle that was asked for."""
         if self._iteration == 1:
-            return np.concatenate([self._subs.bars, self._master.bars])
-        return (self._subs if self._subs_next else self._master).bars
+            return np.concatenate([self._subs.cutoff_costs, self._master.cutoff_costs])
+        return (self._subs if self._subs_next else self._master).cutoff_costs
 
     def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:
         if self._iteration == 1:
@@ -169,7 +169,7 @@ class Mcpso(Optimizer):
         else:
             moving = self._master
             moving.move(self.problem, self._master_step)
-        return moving.x.copy(), moving.barred
+        return moving.x.copy(), moving.infeasible
 
     def _sub_step(self, rows: Rows) -> tuple[FloatArray, FloatArray]:
         subs = self._subs

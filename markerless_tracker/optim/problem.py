@@ -14,7 +14,7 @@ Feasible = Callable[[FloatArray], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
-class Cloud:
+class ParticleSet:
     """Weighted particles about an estimate, as particle filters keep them between frames.
 
     Attributes:
@@ -47,7 +47,7 @@ class Problem:
     iterations: int
     feasible: Feasible
     rng: np.random.Generator
-    memory: Cloud | None = None
+    memory: ParticleSet | None = None
 
     def __post_init__(self) -> None:
         d = self.centre.size

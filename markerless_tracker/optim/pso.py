@@ -105,19 +105,19 @@ class Pso(Optimizer):
         self._iteration = 1
 
     @property
-    def scatter(self) -> FloatArray:
+    def particle_sd_ratio(self) -> FloatArray:
         """(d,) standard deviation of the particles' own best positions."""
         return np.asarray(self._swarm.best.std(axis=0))
 
     @property
-    def bars(self) -> FloatArray:
+    def cutoff_costs(self) -> FloatArray:
         """Each particle's own best cost."""
-        return self._swarm.bars
+        return self._swarm.cutoff_costs
 
     def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:
         if self._iteration > 1:
             self._swarm.move(self.problem, self._step)
-        return self._swarm.x.copy(), self._swarm.barred
+        return self._swarm.x.copy(), self._swarm.infeasible
 
     def _step(self, rows: Rows) -> tuple[FloatArray, FloatArray]:
         swarm = self._swarm

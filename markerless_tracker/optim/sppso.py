@@ -8,9 +8,9 @@ partition itself, two such stages with their parameters and spreads, is made in 
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from markerless_tracker.compiled import compiled
 from markerless_tracker.errors import SearchError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim.base import Optimizer
@@ -63,7 +63,7 @@ def constricted_step(
     return _constricted_step(x, v, best, leader, r1, r2, c, constriction(c), v_max)  # type: ignore[no-any-return]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@compiled()
 def _constricted_step(x, v, best, leader, r1, r2, c, chi, v_max):  # type: ignore[no-untyped-def]
     moved, there = np.empty(x.shape), np.empty(x.shape)
     for n in range(x.shape[0]):
@@ -107,16 +107,16 @@ class Sppso(Optimizer):
         self._next = 0
 
     @property
-    def scatter(self) -> FloatArray:
+    def particle_sd_ratio(self) -> FloatArray:
         """(d,) standard deviation of the particles' own best positions."""
         return np.asarray(self._best.std(axis=0))
 
     @property
-    def bars(self) -> FloatArray:
+    def cutoff_costs(self) -> FloatArray:
         """Each particle's own best cost; one that broke a constraint cannot win at all."""
-        bars = self._best_costs[self._rows].copy()
-        bars[self._barred] = -np.inf
-        return bars
+        cutoff_costs = self._best_costs[self._rows].copy()
+        cutoff_costs[self._infeasible] = -np.inf
+        return cutoff_costs
 
     @property
     def _rows(self) -> slice:
@@ -133,18 +133,18 @@ class Sppso(Optimizer):
         x, v, best = self._x[rows], self._v[rows], self._best[rows]
         r1, r2 = problem.rng.random((2, *x.shape))
         new_x, new_v = constricted_step(x, v, best, self.best_x, r1, r2, c, self._v_max)
-        barred = ~problem.feasible(new_x)
+        infeasible = ~problem.feasible(new_x)
         for _ in range(ATTEMPTS - 1):
-            todo = np.flatnonzero(barred)
+            todo = np.flatnonzero(infeasible)
             if todo.size == 0:
                 break
             r1, r2 = problem.rng.random((2, todo.size, problem.centre.size))
             new_x[todo], new_v[todo] = constricted_step(
                 x[todo], v[todo], best[todo], self.best_x, r1, r2, c, self._v_max
             )
-            barred[todo] = ~problem.feasible(new_x[todo])
+            infeasible[todo] = ~problem.feasible(new_x[todo])
         self._x[rows], self._v[rows] = new_x, new_v
-        return new_x, barred
+        return new_x, infeasible
 
     def _tell(self, points: FloatArray, costs: FloatArray) -> None:
         rows = self._rows

@@ -26,19 +26,19 @@ class Swarm:
     Attributes:
         x, v, best: (n, d) positions, velocities, best positions so far.
         best_costs: (n,) their costs; infinite until one is known.
-        barred: (n,) particles whose last move broke a constraint.
+        infeasible: (n,) particles whose last move broke a constraint.
     """
 
     def __init__(self, x: FloatArray, v: FloatArray) -> None:
         self.x, self.v, self.best = x.copy(), v.copy(), x.copy()
         self.best_costs = np.full(len(x), np.inf)
-        self.barred = np.zeros(len(x), dtype=np.bool_)
+        self.infeasible = np.zeros(len(x), dtype=np.bool_)
 
     def move(self, problem: Problem, step: Step) -> None:
         """Move all particles, confined to the bounds.
 
         A move that breaks a constraint is tried again from where the particle was, with fresh
-        draws, at most `ATTEMPTS` times; after the last it moves all the same and is barred.
+        draws, at most `ATTEMPTS` times; after the last it moves all the same and is infeasible.
         """
         x, v = self.x.copy(), self.v.copy()
         todo = np.arange(len(x))
@@ -48,13 +48,13 @@ class Swarm:
             if todo.size == 0:
                 break
         self.x, self.v = x, v
-        self.barred = np.zeros(len(x), dtype=np.bool_)
-        self.barred[todo] = True
+        self.infeasible = np.zeros(len(x), dtype=np.bool_)
+        self.infeasible[todo] = True
 
     @property
-    def bars(self) -> FloatArray:
+    def cutoff_costs(self) -> FloatArray:
         """(n,) own best costs; one that broke a constraint cannot win at all."""
-        return np.where(self.barred, -np.inf, self.best_costs)
+        return np.where(self.infeasible, -np.inf, self.best_costs)
 
     def learn(self, costs: FloatArray) -> None:
         """Update the own bests by the costs (n,) of the positions."""

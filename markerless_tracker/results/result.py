@@ -130,7 +130,7 @@ class ResultWriter:
                     "fitness": r.fitness if math.isfinite(r.fitness) else None,
                     "evaluations": r.evaluations,
                     "refinements": r.refinements,
-                    "agreement": dict(r.agreement),
+                    "iou": dict(r.iou),
                     "exposure": {name: list(gain) for name, gain in r.exposure.items()},
                     "parameters": None if r.pose is None else r.pose.tolist(),
                     **_confidence(r),
@@ -160,8 +160,8 @@ def _limbs(result: TrackResult) -> dict[str, Any]:
     limbs = {
         name: {
             "state": limb.state.value,
-            "share": _rounded(limb.share),
-            "scatter": _rounded(limb.scatter),
+            "inside_fraction": _rounded(limb.inside_fraction),
+            "particle_sd_ratio": _rounded(limb.particle_sd_ratio),
         }
         for name, limb in result.limbs.items()
     }

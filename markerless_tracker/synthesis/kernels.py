@@ -1,10 +1,11 @@
 """Compiled loops of the renderer: triangles into a depth buffer, samples into an image."""
 
 import numpy as np
-from numba import njit
+
+from markerless_tracker.compiled import compiled
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@compiled()
 def rasterize(points, triangles, label, shade, nearness, labels, shades):  # type: ignore[no-untyped-def]
     """Draw triangles into a depth buffer; the nearest one keeps a sample.
 
@@ -40,7 +41,7 @@ def rasterize(points, triangles, label, shade, nearness, labels, shades):  # typ
                     shades[v, u] = wa * shade[i] + wb * shade[j] + wc * shade[k]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@compiled()
 def compose(background, nearness, labels, shades, palette, cast, darkness, samples, image, covered):  # type: ignore[no-untyped-def]
     """Average samples x samples samples per pixel of the body over a shadowed background.
 

@@ -27,7 +27,7 @@ LEAST_VIEWS = 3
 _FIRST_NS = 300_000_000
 _LEAST_CHECKS = 3
 _ITERATIONS = 4
-_REACH_M = (0.10, 0.035)
+_TRUNCATION_M = (0.10, 0.035)
 _WIDE_M = 0.10
 _SHIFTS = 3
 
@@ -155,17 +155,17 @@ def _refined(
     contours = searcher.frame(observations, result.stamp_ns, result.pose).contours
     scale = 1.0 / (CORRELATION_M * searcher.config.refine_sigma_m**2)
 
-    def equations(pose: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
-        sums = contours.equations(pose, reach_m)
+    def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
+        sums = contours.equations(pose, truncation_m)
         return sums.hessian * scale, sums.slope * scale
 
     return refine(
         equations,
         result.pose,
-        priors=(Prior(searcher.body.usual, 1.0 / searcher.body.spread**2),),
+        priors=(Prior(searcher.body.prior_mean, 1.0 / searcher.body.prior_sd**2),),
         bounds=searcher.limits,
         iterations=_ITERATIONS,
-        reach=_REACH_M,
+        truncation=_TRUNCATION_M,
     )
 
 

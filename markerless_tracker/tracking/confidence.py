@@ -29,7 +29,7 @@ CORRELATED = 9.0
 over the piece of outline that a refinement takes for independent."""
 _LEVER_M = 0.25
 """Errors of joints' centres turn limbs about as long as this."""
-_REACH_M = 0.06
+_TRUNCATION_M = 0.06
 _LEAST_SIGMA_M = 0.002
 _SLIDES = 3
 """Kinds of nodes from here on are translations."""
@@ -46,7 +46,7 @@ def confidence_of(
         contours: the frame's contour evidence.
         measured: whether the body's lengths are the person's own.
     """
-    sums = contours.equations(pose, _REACH_M)
+    sums = contours.equations(pose, _TRUNCATION_M)
     rows = outline_rows(contours)
     total = float(rows.weight.sum())
     if total <= 0.0:
@@ -54,7 +54,7 @@ def confidence_of(
     weight, value = rows.weight, rows.value
     variance = max(float((weight * value**2).sum()) / total, _LEAST_SIGMA_M**2)
     precision = sums.hessian / (CORRELATED * CORRELATION_M * variance)
-    precision[np.diag_indices_from(precision)] += 1.0 / body.spread**2 + 1e-9
+    precision[np.diag_indices_from(precision)] += 1.0 / body.prior_sd**2 + 1e-9
     try:
         covariance = np.linalg.inv(precision)
     except np.linalg.LinAlgError:

@@ -94,13 +94,13 @@ class TrackerConfig(ImagingSettings):
     refine_iterations: int = setting(
         4, "iterations of each of the two contour refinements", least=1, most=1000
     )
-    refine_reach_m: float = setting(
+    refine_truncation_m: float = setting(
         0.10,
         "outline farther than this from a silhouette's edge is an outlier, at first",
         least=0.001,
         most=10.0,
     )
-    refine_reach_end_m: float = setting(
+    refine_truncation_end_m: float = setting(
         0.035, "the same, in the last iteration", least=0.001, most=10.0
     )
     refine_sigma_m: float = setting(
@@ -118,7 +118,7 @@ class TrackerConfig(ImagingSettings):
         least=0.01,
         most=100.0,
     )
-    swarm_gain: float = setting(
+    min_improvement: float = setting(
         0.001,
         "with refinement: how much f must rise for a swarm's result to be taken",
         least=0.0,

@@ -17,7 +17,7 @@ LIMB_LOST_BELOW = 0.55
 LIMB_REGAINED_ABOVE = 0.75
 """Shares of a limb's axis inside the silhouettes, mean over the views."""
 DISAGREEING = 1.5
-"""A swarm whose particles scatter by this much more than usual in the end does not agree."""
+"""A swarm disagrees if its particle_sd_ratio exceeds the limb's usual one by this factor."""
 _MEMORY = 0.05
 
 
@@ -50,7 +50,10 @@ def next_state(state: TrackState, overlap: float, usual: float = 0.0) -> TrackSt
 
 
 def next_limb_state(
-    state: TrackState, share: float, scatter: float = math.nan, usual: float = math.nan
+    state: TrackState,
+    inside_fraction: float,
+    particle_sd_ratio: float = math.nan,
+    usual: float = math.nan,
 ) -> TrackState:
     """State of a limb after a frame.
 
@@ -59,15 +62,14 @@ def next_limb_state(
 
     Args:
         state: before the frame.
-        share: of the limb's axis, how much lies inside the silhouettes.
-        scatter: of the particles in the end, as a share of the spread that they began with; NaN
-            without a swarm.
-        usual: the scatter that this limb usually has, NaN if unknown.
+        inside_fraction: of the limb's axis, how much lies inside the silhouettes.
+        particle_sd_ratio: of the limb's swarm, see `LimbState`; NaN without a swarm.
+        usual: the particle_sd_ratio that this limb usually has, NaN if unknown.
     """
-    if share >= LIMB_REGAINED_ABOVE:
+    if inside_fraction >= LIMB_REGAINED_ABOVE:
         return TrackState.TRACKING
-    disagreeing = scatter > DISAGREEING * usual
-    if share < LIMB_LOST_BELOW or disagreeing or state is TrackState.LOST:
+    disagreeing = particle_sd_ratio > DISAGREEING * usual
+    if inside_fraction < LIMB_LOST_BELOW or disagreeing or state is TrackState.LOST:
         return TrackState.LOST
     return TrackState.TRACKING
 
@@ -78,18 +80,22 @@ class LimbTrack:
 
     Attributes:
         state: after the last frame.
-        usual: mean scatter of the tracked frames, recent ones counting more; NaN before the first.
+        usual: running mean of particle_sd_ratio over tracked frames; NaN before the first.
     """
 
     state: TrackState = TrackState.TRACKING
     usual: float = math.nan
 
-    def note(self, share: float, scatter: float) -> TrackState:
-        """Take a frame's share and scatter, see `next_limb_state`; returns the state after it."""
-        self.state = next_limb_state(self.state, share, scatter, self.usual)
-        if self.state is TrackState.TRACKING and math.isfinite(scatter):
+    def note(self, inside_fraction: float, particle_sd_ratio: float) -> TrackState:
+        """The state after a frame, see `next_limb_state`."""
+        self.state = next_limb_state(self.state, inside_fraction, particle_sd_ratio, self.usual)
+        if self.state is TrackState.TRACKING and math.isfinite(particle_sd_ratio):
             known = math.isfinite(self.usual)
-            self.usual = self.usual + _MEMORY * (scatter - self.usual) if known else scatter
+            self.usual = (
+                self.usual + _MEMORY * (particle_sd_ratio - self.usual)
+                if known
+                else particle_sd_ratio
+            )
         return self.state
 
 

@@ -12,7 +12,14 @@ from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.evaluator import ViewTerms
 from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim import ALGORITHMS, Cloud, Prior, Problem, keyed_generator, refine
+from markerless_tracker.optim import (
+    ALGORITHMS,
+    ParticleSet,
+    Prior,
+    Problem,
+    keyed_generator,
+    refine,
+)
 from markerless_tracker.records import CONTOUR, Observation, Stage
 from markerless_tracker.tracking.config import TrackerConfig
 
@@ -58,12 +65,12 @@ class Searcher:
             edge_step_px=config.edge_step_px,
             cost=config.cost,
         )
-        self.clouds: dict[str, Cloud] = {}
+        self.particle_sets: dict[str, ParticleSet] = {}
         """What each stage left in the last frame, where its algorithm goes on from that."""
 
     def forget(self) -> None:
         """Forget the last frame."""
-        self.clouds.clear()
+        self.particle_sets.clear()
 
     def frame(
         self, observations: Mapping[str, Observation], stamp_ns: int, predicted: FloatArray
@@ -78,8 +85,8 @@ class FrameSearch:
     Attributes:
         pose: (p,) the estimate so far.
         evaluations, refinements: what was spent.
-        scatter: (p,) standard deviation of the particles in the end, as a share of the spread
-            that they began with, in the last swarm that varied a parameter; NaN without one.
+        particle_sd_ratio: (p,) standard deviation of the particles over that of the first sample,
+            in the last swarm that varied a parameter; NaN without one.
     """
 
     def __init__(
@@ -93,7 +100,7 @@ class FrameSearch:
         self._predicted = predicted
         self.evaluations = 0
         self.refinements = 0
-        self.scatter = np.full(searcher.body.size, np.nan)
+        self.particle_sd_ratio = np.full(searcher.body.size, np.nan)
         self._searcher = searcher
         self._observations = observations
         self._stamp_ns = stamp_ns
@@ -135,7 +142,7 @@ class FrameSearch:
                 self.pose = found
                 continue
             found_cost = float(judge(found[None])[0])
-            if found_cost < cost - stage.gain:
+            if found_cost < cost - stage.min_improvement:
                 self.pose, cost = found, found_cost
         return self.pose
 
@@ -156,15 +163,15 @@ class FrameSearch:
                 stage.active, stage.centre, forgive=searcher.config.collision == "elliptic"
             ),
             rng=keyed_generator(searcher.config.seed, self._stamp_ns, stage.name),
-            memory=searcher.clouds.get(stage.name),
+            memory=searcher.particle_sets.get(stage.name),
         )
         optimizer = ALGORITHMS[stage.algorithm](problem, **stage.options)
         best = optimizer.run(evaluator, early=True)
         self.evaluations += optimizer.evaluations
         with np.errstate(invalid="ignore", divide="ignore"):
-            self.scatter[stage.active] = optimizer.scatter / problem.sigma
+            self.particle_sd_ratio[stage.active] = optimizer.particle_sd_ratio / problem.sigma
         if optimizer.memory is not None:
-            searcher.clouds[stage.name] = optimizer.memory
+            searcher.particle_sets[stage.name] = optimizer.memory
         return np.asarray(evaluator.poses(best[None])[0])
 
     def _refine(self, stage: Stage) -> FloatArray:
@@ -172,8 +179,8 @@ class FrameSearch:
         scale = 1.0 / (CORRELATION_M * config.refine_sigma_m**2)
         contours = self.contours
 
-        def equations(pose: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
-            sums = contours.equations(pose, reach_m)
+        def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
+            sums = contours.equations(pose, truncation_m)
             return sums.hessian * scale, sums.slope * scale
 
         self.refinements += stage.iterations
@@ -182,11 +189,11 @@ class FrameSearch:
             stage.centre,
             priors=(
                 Prior(self._predicted, 1.0 / stage.sigma**2),
-                Prior(searcher.body.usual, 1.0 / searcher.body.spread**2),
+                Prior(searcher.body.prior_mean, 1.0 / searcher.body.prior_sd**2),
             ),
             bounds=searcher.limits,
             iterations=stage.iterations,
-            reach=(config.refine_reach_m, config.refine_reach_end_m),
+            truncation=(config.refine_truncation_m, config.refine_truncation_end_m),
         )
 
     def _pixels_per_m(self) -> dict[str, float]:

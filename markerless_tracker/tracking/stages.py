@@ -39,7 +39,7 @@ def frame_stages(
         return swarm
     return (
         contour_stage("align", body, config, centre, sigma),
-        *(replace(stage, gain=config.swarm_gain) for stage in swarm),
+        *(replace(stage, min_improvement=config.min_improvement) for stage in swarm),
         *limb_stages(body, config, centre, sigma),
         contour_stage("polish", body, config, centre, sigma),
     )
@@ -61,7 +61,7 @@ def limb_stages(
             centre,
             config.limb_spread * sigma,
             budget,
-            gain=config.swarm_gain,
+            min_improvement=config.min_improvement,
         )  # fmt: skip
         for name in body.limbs
     )

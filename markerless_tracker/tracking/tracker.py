@@ -79,7 +79,7 @@ class Tracker:
         self._track = Track()
         self._views = ViewWatch(rig)
         self._limbs = LimbWatch(rig)
-        self._mends = config.search_again and config.refinement != "none"
+        self._recovers = config.search_again and config.refinement != "none"
         self._generic = body
         given = start_pose is not None
         self._start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
@@ -227,8 +227,8 @@ class Tracker:
         sigma = self.body.sigma * self._rate_factor(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
         elsewhere: tuple[str, ...] = ()
-        if self._mends:
-            search.pose, elsewhere = self._limbs.mend(
+        if self._recovers:
+            search.pose, elsewhere = self._limbs.recover(
                 self._searcher, search.contours, observations, stamp_ns, search.pose
             )
             notes += tuple(f"{name}: found elsewhere" for name in elsewhere)
@@ -277,7 +277,7 @@ class Tracker:
         return TrackResult(
             stamp_ns=stamp_ns, state=self.state, pose=None, markers_m=None,
             fitness=float("nan"), evaluations=0, observations=observed, warnings=notes,
-            agreement=dict.fromkeys(observed, 0.0) if self.state is TrackState.LOST else {},
+            iou=dict.fromkeys(observed, 0.0) if self.state is TrackState.LOST else {},
         )  # fmt: skip
 
     def _seek(
@@ -351,7 +351,7 @@ class Tracker:
         self._pose = search.pose
         self._stamp_ns = stamp_ns
         lost = self._limbs.lost
-        limbs = self._limbs.judge(self.body, search.pose, observations, search.scatter)
+        limbs = self._limbs.judge(self.body, search.pose, observations, search.particle_sd_ratio)
         warnings += tuple(f"{name}: lost" for name in self._limbs.lost if name not in lost)
         shown = search.pose
         if self._smooth is not None:
@@ -362,7 +362,7 @@ class Tracker:
             pose=shown,
             markers_m=markers(self.body, shown),
             fitness=float(np.mean([t.silhouette + t.edges for t in terms.values()])),
-            agreement={name: t.overlap for name, t in terms.items()},
+            iou={name: t.overlap for name, t in terms.items()},
             evaluations=search.evaluations,
             refinements=search.refinements,
             observations=observations,

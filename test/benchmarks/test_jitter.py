@@ -5,7 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from markerless_tracker.benchmarks.jitter import jitter_mm, lag_frames, longest_whole, measure_calm
+from markerless_tracker.benchmarks.jitter import (
+    jitter_mm,
+    lag_frames,
+    longest_whole,
+    measure_jitter,
+)
 from markerless_tracker.benchmarks.judged import Beginning
 from markerless_tracker.cli.synthesize import synthesize
 from markerless_tracker.errors import DatasetError
@@ -72,7 +77,7 @@ def stand(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_filter_calms_who_stands(stand) -> None:
     config = TrackerConfig.from_mapping({"threads": 1})
-    row = measure_calm(stand, config, beginning=Beginning())
+    row = measure_jitter(stand, config, beginning=Beginning())
     plain, filtered = row["none"], row["one_euro"]
     assert row["frames"] == 40 and row["fps"] == 60.0 and row["start"] == "measured"
     assert plain["lag_frames"] == pytest.approx(0.0, abs=0.01)
@@ -85,4 +90,4 @@ def test_a_recording_without_truth_is_refused(stand, tmp_path: Path) -> None:
         if file.name != "ground_truth.trc":
             (tmp_path / file.name).symlink_to(file)
     with pytest.raises(DatasetError, match=r"no ground_truth\.trc, expected one to judge by"):
-        measure_calm(tmp_path, TrackerConfig(), beginning=Beginning())
+        measure_jitter(tmp_path, TrackerConfig(), beginning=Beginning())

@@ -42,15 +42,15 @@ def test_elbows_are_usually_bent_and_all_else_is_neutral() -> None:
     for name in ("person31", "person34", "person35"):
         body = load_body(name, 1.72)
         elbows = [body.index("l_elbow"), body.index("r_elbow")]
-        bent = np.abs(body.usual - body.neutral)
+        bent = np.abs(body.prior_mean - body.neutral)
         np.testing.assert_allclose(bent[elbows], np.deg2rad(30.0))
         assert np.count_nonzero(bent) == 2
-        assert (body.limits[0] < body.usual).all() and (body.usual < body.limits[1]).all()
+        assert (body.limits[0] < body.prior_mean).all() and (body.prior_mean < body.limits[1]).all()
 
 
 def test_parameters_are_the_published_bodys() -> None:
     assert BODY.parameter_names == PUBLISHED.parameter_names and BODY.size == 31
-    for name in ("sigma", "walking_limits", "spread"):
+    for name in ("sigma", "walking_limits", "prior_sd"):
         np.testing.assert_array_equal(getattr(BODY, name), getattr(PUBLISHED, name), err_msg=name)
     # Shoulders hang lower than on the walker that the published limits were learned from.
     lower = np.zeros(31)
@@ -79,9 +79,9 @@ def test_the_spread_of_poses_about_neutral() -> None:
     """Weak beliefs of refinement: none about the root, tight ones for clavicles and thorax."""
 
     def of(name):
-        return BODY.spread[BODY.index(name)]
+        return BODY.prior_sd[BODY.index(name)]
 
-    assert np.isinf(BODY.spread[BODY.root]).all()
+    assert np.isinf(BODY.prior_sd[BODY.root]).all()
     tight = ("l_clavicle_x", "r_clavicle_y", "thorax_y", "thorax_z")
     assert [of(n) for n in tight] == [0.15] * 4
     assert [of(f"head_{a}") for a in "xyz"] == [0.3] * 3

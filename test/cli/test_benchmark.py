@@ -259,7 +259,7 @@ def test_fewer_cameras(walk, capsys) -> None:
     assert "--start: guessed, expected some of measured, automatic" in capsys.readouterr().err
 
 
-def test_calm_needs_some_frames(walk, capsys) -> None:
-    assert main(["benchmark", "calm", walk, "--threads", "1"]) == 1
+def test_jitter_needs_some_frames(walk, capsys) -> None:
+    assert main(["benchmark", "jitter", walk, "--threads", "1"]) == 1
     last = capsys.readouterr().err.strip().splitlines()[-1]
     assert "tracked for 4 frames in a row" in last and "expected 32 frames" in last

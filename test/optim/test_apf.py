@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.errors import SearchError
-from markerless_tracker.optim import Apf, Cloud, Pf, Problem, everything_feasible
+from markerless_tracker.optim import Apf, ParticleSet, Pf, Problem, everything_feasible
 from markerless_tracker.optim.apf import diffused, layer_sigma
 from markerless_tracker.optim.weights import (
     annealed_sharpness,
@@ -98,7 +98,7 @@ def test_two_layers_by_hand():
 
 
 def test_the_next_frame_goes_on_from_the_last_layer_about_its_own_centre():
-    memory = Cloud(np.array([[1.0, 0.0], [0.0, -1.0]]), np.array([0.0, 1.0]))
+    memory = ParticleSet(np.array([[1.0, 0.0], [0.0, -1.0]]), np.array([0.0, 1.0]))
     search = Pf(problem(particles=2000, iterations=1, memory=memory))
     points = search.ask()
     # All of the weight is on the particle that lay 1 below the estimate.
@@ -152,4 +152,4 @@ def test_an_unknown_estimate_is_refused():
 
 def test_a_memory_of_another_size_is_refused():
     with pytest.raises(SearchError, match="does not fit a centre of 2"):
-        problem(memory=Cloud(np.zeros((3, 5)), np.ones(3) / 3))
+        problem(memory=ParticleSet(np.zeros((3, 5)), np.ones(3) / 3))

@@ -8,18 +8,18 @@ from markerless_tracker.optim import Optimizer, Problem, everything_feasible
 
 
 class Counting(Optimizer):
-    """Asks for (i, 0), (i, 1) .. in turn i; bars the points listed."""
+    """Asks for (i, 0), (i, 1) .. in turn i; cutoff_costs the points listed."""
 
-    def __init__(self, problem: Problem, barred: frozenset[int] = frozenset()) -> None:
+    def __init__(self, problem: Problem, infeasible: frozenset[int] = frozenset()) -> None:
         super().__init__(problem)
         self.turn = 0
-        self.barred = barred
+        self.infeasible = infeasible
         self.told: list[list[float]] = []
 
     def _ask(self):
         n = self.problem.particles
         points = np.column_stack([np.full(n, float(self.turn)), np.arange(n, dtype=float)])
-        return points, np.array([i in self.barred for i in range(n)])
+        return points, np.array([i in self.infeasible for i in range(n)])
 
     def _tell(self, points, costs):
         self.turn += 1
@@ -73,7 +73,7 @@ def test_with_bad_costs_alone_the_centre_stays_best(problem):
 
 
 def test_points_that_break_a_constraint_are_counted_but_never_win(problem):
-    search = Counting(problem, barred=frozenset({0}))
+    search = Counting(problem, infeasible=frozenset({0}))
     search.ask()
     search.tell(np.array([-100.0, 5.0, 6.0]))
     assert (search.best_cost, search.evaluations, search.bad_costs) == (5.0, 3, 0)

@@ -74,8 +74,8 @@ def test_particles_scatter_less_where_costs_tell_them_where_to_be(name):
         problem(d=2, particles=60, iterations=1 if name == "pf" else 6, sigma=0.3)
     )
     search.run(lambda x: 30.0 * (x[:, 0] - 1.8) ** 2)
-    assert search.scatter.shape == (2,)
-    assert 0.0 < search.scatter[0] < 0.7 * search.scatter[1]
+    assert search.particle_sd_ratio.shape == (2,)
+    assert 0.0 < search.particle_sd_ratio[0] < 0.7 * search.particle_sd_ratio[1]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -165,15 +165,19 @@ def test_costs_that_stop_at_a_particles_bar_change_nothing(name):
     """Whatever lies between the bar and the cost, for a point that does not get below its bar."""
     spared = 0
 
-    def stopping(points, bars=None):
+    def stopping(points, cutoff_costs=None):
         nonlocal spared
         costs = sphere(points)
-        if bars is None:
+        if cutoff_costs is None:
             return costs
-        assert bars.shape == costs.shape
-        loses = costs >= bars
+        assert cutoff_costs.shape == costs.shape
+        loses = costs >= cutoff_costs
         spared += int(loses.sum())
-        return np.where(loses, np.maximum(bars, 0.3 * np.maximum(bars, 0.0) + 0.7 * costs), costs)
+        return np.where(
+            loses,
+            np.maximum(cutoff_costs, 0.3 * np.maximum(cutoff_costs, 0.0) + 0.7 * costs),
+            costs,
+        )
 
     searches = [ALGORITHMS[name](problem(particles=20, iterations=15)) for _ in range(2)]
     full, early = searches[0].run(sphere), searches[1].run(stopping, early=True)

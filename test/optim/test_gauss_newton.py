@@ -115,15 +115,15 @@ class Recorded:
         self.h, self.minimum = h, minimum
         self.points, self.reaches = [], []
 
-    def __call__(self, x, reach_m):
+    def __call__(self, x, truncation_m):
         self.points.append(x.copy())
-        self.reaches.append(reach_m)
+        self.reaches.append(truncation_m)
         return self.h, self.h @ (x - self.minimum)
 
 
-def run(equations, start, *, priors=(), bounds=FREE, iterations=6, reach=(0.1, 0.02)):
+def run(equations, start, *, priors=(), bounds=FREE, iterations=6, truncation=(0.1, 0.02)):
     return refine(
-        equations, start, priors=priors, bounds=bounds, iterations=iterations, reach=reach
+        equations, start, priors=priors, bounds=bounds, iterations=iterations, truncation=truncation
     )
 
 
@@ -135,13 +135,13 @@ def test_refinement_converges_to_the_minimum() -> None:
 
 def test_the_reach_shrinks_geometrically() -> None:
     equations = Recorded(np.eye(4), np.zeros(4))
-    run(equations, np.ones(4), iterations=4, reach=(0.16, 0.02))
+    run(equations, np.ones(4), iterations=4, truncation=(0.16, 0.02))
     np.testing.assert_allclose(equations.reaches, [0.16, 0.08, 0.04, 0.02])
 
 
 def test_a_single_iteration_takes_the_last_reach() -> None:
     equations = Recorded(np.eye(4), np.zeros(4))
-    run(equations, np.ones(4), iterations=1, reach=(0.16, 0.02))
+    run(equations, np.ones(4), iterations=1, truncation=(0.16, 0.02))
     assert equations.reaches == [pytest.approx(0.02)]
 
 
@@ -178,7 +178,7 @@ def test_refinement_within_bounds_against_scipy(seed) -> None:
     bounds = np.array([np.full(4, -0.3), np.full(4, 0.3)])
     seen = []
 
-    def equations(x, reach_m):
+    def equations(x, truncation_m):
         seen.append(x)
         return a.T @ a, a.T @ (a @ x - b)
 
@@ -201,8 +201,8 @@ def test_a_start_out_of_bounds_is_put_on_them() -> None:
 def test_equations_that_cannot_be_solved_end_it_at_the_last_point(bad, after) -> None:
     good = Recorded(np.eye(4), np.zeros(4))
 
-    def equations(x, reach_m):
-        h, slope = good(x, reach_m)
+    def equations(x, truncation_m):
+        h, slope = good(x, truncation_m)
         if len(good.points) <= after:
             return h, slope
         if bad == "singular":

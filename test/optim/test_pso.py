@@ -85,7 +85,7 @@ def test_every_point_asked_for_lies_within_bounds():
     assert search.best_x[0] == 2.1
 
 
-def test_moves_are_tried_ten_times_then_barred():
+def test_a_particle_is_infeasible_after_ten_attempts():
     swarm = Swarm(np.zeros((2, 2)), np.zeros((2, 2)))
     tried = []
 
@@ -98,7 +98,7 @@ def test_moves_are_tried_ten_times_then_barred():
 
     swarm.move(problem(feasible=feasible), step)
     assert tried == [[0, 1], *[[1]] * 9]
-    np.testing.assert_array_equal(swarm.barred, [False, True])
+    np.testing.assert_array_equal(swarm.infeasible, [False, True])
     np.testing.assert_array_equal(swarm.x, [[1.0, 1.0], [10.0, 10.0]])
 
 

@@ -204,7 +204,7 @@ def test_a_move_is_tried_at_most_ten_times_from_where_the_particle_was():
 
 
 def test_an_infeasible_particle_does_not_become_its_own_best():
-    """After a barred move with a splendid cost, the pull goes to the earlier, feasible place."""
+    """After an infeasible move of low cost, the pull goes to the earlier, feasible position."""
     allowed = [True]
 
     def feasible(points):

@@ -33,7 +33,7 @@ def result(stamp_ns: int, value: float | None = 0.0, **changes) -> TrackResult:
         "pose": None if value is None else np.full(31, value),
         "markers_m": None if value is None else np.full((15, 3), value),
         "fitness": float("nan") if value is None else 1.5,
-        "agreement": {} if value is None else {"cam01": 0.75},
+        "iou": {} if value is None else {"cam01": 0.75},
         "evaluations": 1000,
     }
     return TrackResult(**{**fields, **changes})
@@ -72,7 +72,7 @@ def test_the_summary_says_what_made_the_result(tmp_path, body, config):
     assert first["state"] == "TRACKING"
     assert first["fitness"] == 1.5
     assert first["evaluations"] == 1000
-    assert first["agreement"] == {"cam01": 0.75}
+    assert first["iou"] == {"cam01": 0.75}
     assert first["parameters"] == [0.5] * 31
     assert (second["state"], second["fitness"], second["parameters"]) == ("LOST", None, None)
 
@@ -203,7 +203,7 @@ def test_each_limb_has_its_state_where_there_is_an_estimate(tmp_path, body, conf
         writer.add(result(1, None))
     with_them, without = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["frames"]
     assert with_them["limbs"] == {
-        "l_arm": {"state": "LOST", "share": 0.412, "scatter": None},
-        "r_arm": {"state": "TRACKING", "share": 1.0, "scatter": 0.25},
+        "l_arm": {"state": "LOST", "inside_fraction": 0.412, "particle_sd_ratio": None},
+        "r_arm": {"state": "TRACKING", "inside_fraction": 1.0, "particle_sd_ratio": 0.25},
     }
     assert "limbs" not in without

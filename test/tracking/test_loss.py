@@ -86,7 +86,7 @@ NAN = float("nan")
 
 
 @pytest.mark.parametrize(
-    ("state", "share", "scatter", "expected"),
+    ("state", "inside_fraction", "particle_sd_ratio", "expected"),
     [
         (TRACKING, LIMB_LOST_BELOW - 1e-9, 0.1, LOST),
         (TRACKING, LIMB_LOST_BELOW, 0.1, TRACKING),
@@ -100,8 +100,8 @@ NAN = float("nan")
         (TRACKING, NAN, 0.1, TRACKING),
     ],
 )
-def test_a_limbs_transitions(state, share, scatter, expected):
-    assert next_limb_state(state, share, scatter, usual=0.1) is expected
+def test_a_limbs_transitions(state, inside_fraction, particle_sd_ratio, expected):
+    assert next_limb_state(state, inside_fraction, particle_sd_ratio, usual=0.1) is expected
 
 
 def test_a_swarm_does_not_count_until_its_usual_scatter_is_known():

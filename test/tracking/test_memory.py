@@ -10,14 +10,14 @@ def test_particles_outlive_a_frame_and_reset_forgets_them(
 ):
     tracker = make_tracker(swarm_settings, optimizer=optimizer, evaluations=300)
     searcher = tracker._searcher
-    assert not searcher.clouds
+    assert not searcher.particle_sets
     first = tracker.step(frames[0].observations, frames[0].stamp_ns)
-    cloud = searcher.clouds["body"]
-    assert cloud.weights.sum() == pytest.approx(1.0)
+    particle_set = searcher.particle_sets["body"]
+    assert particle_set.weights.sum() == pytest.approx(1.0)
     second = tracker.step(frames[1].observations, frames[1].stamp_ns)
-    assert searcher.clouds["body"] is not cloud
+    assert searcher.particle_sets["body"] is not particle_set
     tracker.reset()
-    assert not searcher.clouds
+    assert not searcher.particle_sets
     again = [tracker.step(f.observations, f.stamp_ns) for f in frames[:2]]
     for before, after in zip((first, second), again, strict=True):
         assert before.pose.tobytes() == after.pose.tobytes()

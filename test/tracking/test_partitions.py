@@ -172,7 +172,7 @@ def test_beside_a_refinement_every_swarm_keeps_its_share_and_must_gain(optimizer
     assert [found[0].algorithm, found[-1].algorithm] == [CONTOUR, CONTOUR]
     swarms, limbs = found[1:-5], found[-5:-1]
     assert spent(swarms) == budget * SWARM_SHARE
-    assert {s.gain for s in swarms + limbs} == {0.001}
+    assert {s.min_improvement for s in swarms + limbs} == {0.001}
     assert [s.particles for s in limbs] == [LIMB_SWARM[0] * budget // 1000] * 4
     assert len({s.name for s in found}) == len(found)
 

@@ -201,7 +201,7 @@ def test_each_stage_starts_from_the_estimate_so_far(person, monkeypatch) -> None
 
 
 def test_refinement_is_told_limits_beliefs_and_reach(person, monkeypatch) -> None:
-    config = settings(refine_reach_m=0.2, refine_reach_end_m=0.05, refine_prior=3.0)
+    config = settings(refine_truncation_m=0.2, refine_truncation_end_m=0.05, refine_prior=3.0)
     told = []
 
     def refine(equations, start, **kwargs):
@@ -213,12 +213,12 @@ def test_refinement_is_told_limits_beliefs_and_reach(person, monkeypatch) -> Non
     searched(person, config)
     assert len(told) == 2
     for kwargs in told:
-        assert kwargs["reach"] == (0.2, 0.05) and kwargs["iterations"] == 3
+        assert kwargs["truncation"] == (0.2, 0.05) and kwargs["iterations"] == 3
         np.testing.assert_array_equal(kwargs["bounds"], person.body.limits)
         predicted, usual = kwargs["priors"]
         np.testing.assert_array_equal(predicted.mean, person.predicted)
         np.testing.assert_allclose(predicted.precision, (3.0 * person.body.sigma) ** -2.0)
-        np.testing.assert_array_equal(usual.mean, person.body.usual)
+        np.testing.assert_array_equal(usual.mean, person.body.prior_mean)
         assert not usual.precision[person.body.root].any()
         assert (usual.precision[person.body.joints] > 0).all()
 
@@ -289,12 +289,12 @@ def test_scatter_is_that_of_the_last_swarm_that_varied_a_parameter(person) -> No
     config = settings()
     root, body = sppso_stages(person.body, config, person.predicted, 0.5 * person.body.sigma)
     limb = next(s for s in stages(person, config) if s.name == "l_arm")
-    alone = searched(person, config, (root,)).scatter
+    alone = searched(person, config, (root,)).particle_sd_ratio
     varied = np.zeros(person.body.size, dtype=bool)
     varied[root.active] = True
     assert np.isnan(alone[~varied]).all() and (alone[varied] > 0.0).all()
-    whole = searched(person, config, (root, body)).scatter
+    whole = searched(person, config, (root, body)).particle_sd_ratio
     assert np.isfinite(whole).all()
-    both = searched(person, config, (root, body, limb)).scatter
+    both = searched(person, config, (root, body, limb)).particle_sd_ratio
     changed = both != whole
     assert changed[limb.active].all() and not np.delete(changed, limb.active).any()

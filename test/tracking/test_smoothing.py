@@ -26,7 +26,7 @@ def points_mm(body, poses):
 
 def test_standing_still_is_calm(body) -> None:
     rng = np.random.default_rng(0)
-    noise = np.where(np.isfinite(body.spread), 0.0032, 0.0012)
+    noise = np.where(np.isfinite(body.prior_sd), 0.0032, 0.0012)
     poses = body.neutral + noise * rng.standard_normal((180, body.size))
     jitter_mm, raw_mm = (
         np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=2).mean(axis=0))

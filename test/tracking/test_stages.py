@@ -127,10 +127,14 @@ def test_each_limb_has_a_small_wide_swarm_of_its_own(body, refined_settings):
 
 
 def test_beside_a_refinement_every_swarm_must_gain(body, refined_settings, swarm_settings):
-    stages = frame_stages(body, swarm(refined_settings, swarm_gain=0.004), body.neutral, body.sigma)
-    assert [s.gain for s in stages] == [0.0, *[0.004] * 6, 0.0]
-    alone = frame_stages(body, swarm(swarm_settings, swarm_gain=0.004), body.neutral, body.sigma)
-    assert {s.gain for s in alone} == {0.0}
+    stages = frame_stages(
+        body, swarm(refined_settings, min_improvement=0.004), body.neutral, body.sigma
+    )
+    assert [s.min_improvement for s in stages] == [0.0, *[0.004] * 6, 0.0]
+    alone = frame_stages(
+        body, swarm(swarm_settings, min_improvement=0.004), body.neutral, body.sigma
+    )
+    assert {s.min_improvement for s in alone} == {0.0}
 
 
 def test_a_budget_that_cannot_be_spent_is_refused_in_the_users_terms(

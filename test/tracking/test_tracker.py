@@ -36,8 +36,8 @@ class TestFollowing:
             assert gap.max() < 60.0
             assert result.state is TrackState.TRACKING
             assert result.stamp_ns == frame.stamp_ns
-            assert set(result.agreement) == set(frame.images)
-            assert min(result.agreement.values()) > 0.8
+            assert set(result.iou) == set(frame.images)
+            assert min(result.iou.values()) > 0.8
             assert 0.0 < result.fitness <= 2.0
             assert set(result.observations) == set(frame.images)
 
@@ -150,7 +150,7 @@ class TestSameBytes:
             a = here.step(frame.images, frame.stamp_ns)
             b = there.step(sent, frame.stamp_ns)
             assert a.pose.tobytes() == b.pose.tobytes()
-            assert (a.fitness, a.agreement) == (b.fitness, b.agreement)
+            assert (a.fitness, a.iou) == (b.fitness, b.iou)
 
     def test_the_order_of_the_views_does_not_matter(self, make_tracker, frames, swarm_settings):
         frame = frames[0]
@@ -226,7 +226,7 @@ class TestViews:
             del views[missing]
             result = tracker.step(views, frame.stamp_ns)
             assert result.state is TrackState.TRACKING
-            assert set(result.agreement) == set(views)
+            assert set(result.iou) == set(views)
             assert errors_mm(result, frame).mean() < 30.0
 
     def test_who_stops_and_comes_back_is_named(self, make_tracker, frames, refined_settings):
@@ -237,14 +237,14 @@ class TestViews:
             if number in (2, 3):
                 del seen["cam02"]
             result = tracker.step(seen, frame.stamp_ns)
-            assert result.state is TrackState.TRACKING and set(result.agreement) == set(seen)
+            assert result.state is TrackState.TRACKING and set(result.iou) == set(seen)
             assert errors_mm(result, frame).mean() < 30.0
             said.append(tuple(note for note in result.warnings if "cam02" in note))
         assert said == [(), (), ("cam02: left out, no image",), (), ("cam02: taken back",)]
 
     def test_one_view_is_enough_to_go_on(self, make_tracker, frames, refined_settings):
         result = make_tracker(refined_settings).step({"cam02": frames[0].images["cam02"]}, 0)
-        assert set(result.agreement) == {"cam02"}
+        assert set(result.iou) == {"cam02"}
         assert np.isfinite(result.pose).all()
 
     def test_images_and_observations_may_be_mixed(self, make_tracker, frames, swarm_settings):
@@ -282,7 +282,7 @@ class TestViews:
             lost = tracker.step(black, stamp_ns)
             assert lost.state is TrackState.LOST
             assert lost.pose is None
-            assert set(lost.agreement.values()) == {0.0}
+            assert set(lost.iou.values()) == {0.0}
         back = [tracker.step(frames[2].images, 50_000_000 + i * 16_666_667) for i in range(3)]
         assert back[-1].state is TrackState.TRACKING
         assert errors_mm(back[-1], frames[2]).mean() < 40.0

@@ -42,7 +42,7 @@ def result(body, cameras=("cam01", "cam02"), pose=True) -> TrackResult:
         pose=standing if pose else None,
         markers_m=None,
         fitness=1.0,
-        agreement={},
+        iou={},
         evaluations=0,
         observations={name: Observation.from_mask(name, 100, mask, 200 * mask) for name in cameras},
     )

@@ -1,4 +1,4 @@
-"""`benchmark calm`: what the filter of the results takes from jitter and costs in time."""
+"""`benchmark jitter`: what the filter of the results takes from jitter and costs in time."""
 
 import argparse
 import sys
@@ -23,11 +23,11 @@ from markerless_tracker.cli.track import read_config
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
     parser = kinds.add_parser(
-        "calm",
+        "jitter",
         help="jitter of who stands and lag of who moves, without and with the filter",
         description="Jitter, lag and error, without and with smoothing: one_euro.",
         epilog="example: markerless_tracker synthesize STAND --motion stand --seconds 3 && "
-        "markerless_tracker benchmark calm STAND WALK",
+        "markerless_tracker benchmark jitter STAND WALK",
     )
     add_recordings(parser, without="start and lengths from the first row of the truth")
 
@@ -39,7 +39,9 @@ def run(args: argparse.Namespace) -> int:
 
     def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:
         beginning = Beginning(stature_m is None, stature_m)
-        return jitter.measure_calm(source, config, beginning=beginning, scale=scale, report=report)
+        return jitter.measure_jitter(
+            source, config, beginning=beginning, scale=scale, report=report
+        )
 
     rows = measure_each(args, measure)
     if args.json:

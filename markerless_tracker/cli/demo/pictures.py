@@ -53,7 +53,7 @@ def mean_overlap(frames: Sequence[Frame]) -> dict[str, float]:
     """Camera -> overlap (IoU) of the person's silhouette and the projected body, mean of frames."""
     values: dict[str, list[float]] = {}
     for frame in frames:
-        for camera, overlap in frame["agreement"].items():
+        for camera, overlap in frame["iou"].items():
             values.setdefault(camera, []).append(overlap)
     return {camera: float(np.mean(found)) for camera, found in values.items()}
 

@@ -10,9 +10,8 @@ composite-rigid-body algorithm does for inertia: Featherstone, Rigid Body Dynami
 """
 
 import numpy as np
-from numba import njit
 
-from markerless_tracker.compiled import kernel
+from markerless_tracker.compiled import compiled, kernel
 
 SUMS = 27
 """Per part: the upper triangle of the 6x6 sum of weighted outer products, then the 6 of W r."""
@@ -37,7 +36,7 @@ def add_wrench(x, y, z, gx, gy, gz, weight, value, sums, node):  # type: ignore[
         sums[node, 21 + i] += weight * value * wrench[i]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@compiled()
 def twist_of(node, body, nodes, twist):  # type: ignore[no-untyped-def]
     """Fill twist (6,) of a node's joint; returns whether it has one."""
     kind = body.kind[node]
@@ -60,7 +59,7 @@ def twist_of(node, body, nodes, twist):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@compiled()
 def sum_chain(body, nodes, sums, hessian, slope):  # type: ignore[no-untyped-def]
     """Fill hessian (p, p) and slope (p,) from the parts' sums (m, SUMS), which become the trees'.
 

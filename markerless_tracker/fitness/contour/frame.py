@@ -31,7 +31,7 @@ Mapper = Callable[..., "object"]
 
 
 @dataclass(frozen=True, eq=False)
-class EdgeOfMask:
+class SilhouetteContour:
     """The edge of one silhouette.
 
     Attributes:
@@ -49,7 +49,7 @@ class EdgeOfMask:
     spacing: FloatArray
 
 
-def edge_of_mask(observation: Observation, spacing_px: float) -> EdgeOfMask:
+def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteContour:
     """Signed distances around a silhouette, and points along its edge.
 
     The window is the silhouette's bounding box and a margin of a sixth of its height. The edge
@@ -61,7 +61,7 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> EdgeOfMask:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if rows.size == 0:
         nothing = np.empty((0, 2))
-        return EdgeOfMask(np.empty((0, 0), np.float32), 0, 0, nothing, nothing, np.empty(0))
+        return SilhouetteContour(np.empty((0, 0), np.float32), 0, 0, nothing, nothing, np.empty(0))
     margin = max(_LEAST_MARGIN_PX, (rows[-1] - rows[0]) // 6)
     top, bottom = max(0, rows[0] - margin), min(height, rows[-1] + margin + 1)
     left, right = max(0, columns[0] - margin), min(width, columns[-1] + margin + 1)
@@ -89,7 +89,7 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> EdgeOfMask:
     length = np.linalg.norm(normal, axis=1)
     inner = (at > 0).all(axis=1) & (at < (width - 1, height - 1)).all(axis=1) & (length > 0)
     normal = normal[inner] / length[inner, None]
-    return EdgeOfMask(
+    return SilhouetteContour(
         distance,
         int(left),
         int(top),
@@ -111,7 +111,7 @@ def _full_frame(observation: Observation) -> NDArray[np.uint8]:
     return frame
 
 
-def join_edges(edges: Sequence[EdgeOfMask]) -> ContourViews:
+def join_edges(edges: Sequence[SilhouetteContour]) -> ContourViews:
     """The edges of several views as the kernels read them."""
     sizes = [edge.distance.size for edge in edges]
     counts = [len(edge.points) for edge in edges]
@@ -173,7 +173,7 @@ class ContourFrame:
         self._threads = usable_threads(threads)
         self._step_px = step_px
 
-        def edge(name: str) -> EdgeOfMask:
+        def edge(name: str) -> SilhouetteContour:
             return edge_of_mask(observations[name], SPACING_M * pixels_per_m[name])
 
         self.contours = join_edges(list(mapper(edge, views.names)))  # type: ignore[call-overload]
@@ -191,18 +191,18 @@ class ContourFrame:
             int(views.arrays.words.max()),
         )
 
-    def equations(self, pose: FloatArray, reach_m: float) -> NormalEquations:
-        """Normal equations at a pose (p,); residuals beyond `reach_m` are outliers."""
-        self.collect(pose, reach_m)
+    def equations(self, pose: FloatArray, truncation_m: float) -> NormalEquations:
+        """Normal equations at a pose (p,); residuals beyond `truncation_m` are outliers."""
+        self.collect(pose, truncation_m)
         s = self._scratch
         return NormalEquations(s.hessian.copy(), s.slope.copy(), float(self.residuals.cost.sum()))
 
-    def collect(self, pose: FloatArray, reach_m: float, body: BodyModel | None = None) -> None:
+    def collect(self, pose: FloatArray, truncation_m: float, body: BodyModel | None = None) -> None:
         """Fill `samples` and `residuals` at a pose (p,), of another body's shape if given."""
         arrays = self._arrays if body is None else body_arrays(body)
         args = (
             np.ascontiguousarray(pose, dtype=np.float64), arrays, self.views.arrays, self.contours,
-            SPACING_M, self._step_px, reach_m, self.samples, self.residuals, self._scratch,
+            SPACING_M, self._step_px, truncation_m, self.samples, self.residuals, self._scratch,
             self._outlines,
         )  # fmt: skip
         if not worth_waking(len(self.views.names) * _VIEW_S, self._threads):

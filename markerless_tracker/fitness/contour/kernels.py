@@ -10,10 +10,10 @@ sliding along the surface does not move the outline to first order.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import kernel
+from markerless_tracker.compiled import compiled, kernel
 from markerless_tracker.fitness.contour.chain_kernels import SUMS, add_wrench, sum_chain
 from markerless_tracker.fitness.contour.outline_samples import MAX_SAMPLES, sample_outline
 from markerless_tracker.fitness.raster.kernels import cone_ends
@@ -221,10 +221,11 @@ def _nearest(u, v, nu, nv, bands, pixel, normal, start, order):  # type: ignore[
 
 
 @kernel
-def collect_residuals(view, views, contours, reach_m, samples, start, order, residuals):  # type: ignore[no-untyped-def]
+def collect_residuals(view, views, contours, truncation_m, samples, start, order, residuals):  # type: ignore[no-untyped-def]
     """Fill the residuals of one view, both ways.
 
-    Robust weights are Tukey's, (1 - (r / reach)²)², and cost reach² / 6 (1 - (1 - (r / reach)²)³).
+    With c the truncation, robust weights are Tukey's, (1 - (r / c)²)², and the cost is
+    c² / 6 (1 - (1 - (r / c)²)³).
     """
     r, t = views.rotation[view], views.translation[view]
     k, d = views.intrinsics[view], views.distortion[view]
@@ -237,7 +238,7 @@ def collect_residuals(view, views, contours, reach_m, samples, start, order, res
     width, height = contours.window[view, 2], contours.window[view, 3]
     n = 0
     cost = 0.0
-    limit = reach_m * reach_m / 6.0
+    limit = truncation_m * truncation_m / 6.0
     focal = 1.0 / k[0]
     for s in range(count):
         metres = depth[s] * focal
@@ -247,13 +248,13 @@ def collect_residuals(view, views, contours, reach_m, samples, start, order, res
             distance, distance_start, left, top, width, height, pixel[s, 0], pixel[s, 1]
         )
         value *= metres
-        if not inside or abs(value) >= reach_m:
+        if not inside or abs(value) >= truncation_m:
             continue
         steep = np.sqrt(along_u * along_u + along_v * along_v)
         facing = along_u * normal[s, 0] + along_v * normal[s, 1]
         if steep < 0.3 or facing < 0.5 * steep:
             continue
-        share = 1.0 - (value / reach_m) ** 2
+        share = 1.0 - (value / truncation_m) ** 2
         cost -= length * limit * share**3
         values[n] = value
         weights[n] = length * share * share
@@ -277,9 +278,9 @@ def collect_residuals(view, views, contours, reach_m, samples, start, order, res
             continue
         du, dv = pixel[nearest, 0] - u, pixel[nearest, 1] - v
         gap = (du * du + dv * dv) * metres * metres
-        if gap >= reach_m * reach_m:
+        if gap >= truncation_m * truncation_m:
             continue
-        share = 1.0 - gap / (reach_m * reach_m)
+        share = 1.0 - gap / (truncation_m * truncation_m)
         cost -= length * limit * share**3
         values[n] = (du * nu + dv * nv) * metres
         weights[n] = length * share * share
@@ -309,8 +310,18 @@ def _accumulate(view, cone_node, samples, residuals, sums):  # type: ignore[no-u
 
 @kernel
 def _one_view(  # type: ignore[no-untyped-def]
-    view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch, outlines
-):
+    view,
+    body,
+    views,
+    contours,
+    spacing_m,
+    step_px,
+    truncation_m,
+    samples,
+    residuals,
+    scratch,
+    outlines,
+):  # fmt: skip
     world = scratch.world
     r, t = views.rotation[view], views.translation[view]
     depth = r[2, 0] * world[0] + r[2, 1] * world[LANES] + r[2, 2] * world[2 * LANES] + t[2]
@@ -319,12 +330,19 @@ def _one_view(  # type: ignore[no-untyped-def]
         view, views, body.cone_node.size, spacing_px, step_px, scratch, outlines, samples
     )
     collect_residuals(
-        view, views, contours, reach_m, samples, scratch.start[view], scratch.order[view], residuals
+        view,
+        views,
+        contours,
+        truncation_m,
+        samples,
+        scratch.start[view],
+        scratch.order[view],
+        residuals,
     )
     _accumulate(view, body.cone_node, samples, residuals, scratch.sums[view])
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@compiled()
 def _total(body, views, scratch):  # type: ignore[no-untyped-def]
     """Add up the views' sums, always in the same order, and fill the normal equations."""
     sums = scratch.sums[0]
@@ -335,29 +353,49 @@ def _total(body, views, scratch):  # type: ignore[no-untyped-def]
     sum_chain(body, scratch.nodes, sums, scratch.hessian, scratch.slope)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@compiled()
 def equations_serial(  # type: ignore[no-untyped-def]
-    pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch, outlines
-):
+    pose,
+    body,
+    views,
+    contours,
+    spacing_m,
+    step_px,
+    truncation_m,
+    samples,
+    residuals,
+    scratch,
+    outlines,
+):  # fmt: skip
     """Residuals and per-view normal equations at a pose (p,), on the calling thread."""
     cone_ends(pose, body, scratch.nodes, scratch.world)
     for view in range(views.size.shape[0]):
         _one_view(
-            view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch,
-            outlines,
+            view, body, views, contours, spacing_m, step_px, truncation_m, samples, residuals,
+            scratch, outlines,
         )  # fmt: skip
     _total(body, views.size.shape[0], scratch)
 
 
-@njit(cache=True, nogil=True, parallel=True)  # type: ignore[misc]
+@compiled(parallel=True)
 def equations_parallel(  # type: ignore[no-untyped-def]
-    pose, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch, outlines
-):
+    pose,
+    body,
+    views,
+    contours,
+    spacing_m,
+    step_px,
+    truncation_m,
+    samples,
+    residuals,
+    scratch,
+    outlines,
+):  # fmt: skip
     """As `equations_serial`, a thread a view; each view sums for itself, so nothing changes."""
     cone_ends(pose, body, scratch.nodes, scratch.world)
     for view in prange(views.size.shape[0]):
         _one_view(
-            view, body, views, contours, spacing_m, step_px, reach_m, samples, residuals, scratch,
-            outlines,
+            view, body, views, contours, spacing_m, step_px, truncation_m, samples, residuals,
+            scratch, outlines,
         )  # fmt: skip
     _total(body, views.size.shape[0], scratch)

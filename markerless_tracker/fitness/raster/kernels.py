@@ -9,11 +9,11 @@ particle. A result depends on its particle alone, hence not on the number of thr
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
 from markerless_tracker.body.kinematics import node_transform
-from markerless_tracker.compiled import kernel
+from markerless_tracker.compiled import compiled, kernel
 from markerless_tracker.fitness.raster.edge_samples import (
     OUTLINE,
     VISIBLE,
@@ -59,7 +59,7 @@ def make_scratch(
     )
 
 
-class Still(NamedTuple):
+class StaticLayer(NamedTuple):
     """What all poses of a search share, drawn once: the parts that do not move.
 
     Attributes:
@@ -188,8 +188,8 @@ def compare_view(  # type: ignore[no-untyped-def]
 
 @kernel
 def evaluate(  # type: ignore[no-untyped-def]
-    points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still, scratch,
-    outlines, counts, costs, thread, threads,
+    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, still,
+    scratch, outlines, counts, costs, thread, threads,
 ):  # fmt: skip
     """Fill costs (n,) and counts (n, v, 4) of points (n, d), every `threads`-th
     point, from point `thread` on, on the calling thread.
@@ -197,9 +197,9 @@ def evaluate(  # type: ignore[no-untyped-def]
     Args:
         points: values of the active parameters.
         active: (d,) their indices; the others are at centre (p,).
-        bars: (n,) costs that matter only if they are lower: an evaluation that cannot get below
-            its bar may end early, its cost is then a lower bound that is not below the bar, and
-            counts of the views it has not come to are not filled.
+        cutoff_costs: (n,) cutoff per particle: an evaluation may stop once its cost exceeds it.
+            The cost is then a lower bound of at least the cutoff, and the counts of the views not
+            reached are not filled.
         body: the moving cones, and all nodes.
         body_cones, edge_cones: see `compare_view`.
         rule, cost: see `EdgeRule` and `CostRule`.
@@ -237,7 +237,7 @@ def evaluate(  # type: ignore[no-untyped-def]
         total = 0.0
         for view in range(seen):
             low = (total + still.least[view]) / seen - _ROUNDING
-            if low >= bars[n]:
+            if low >= cutoff_costs[n]:
                 break
             compare_view(
                 body_cones, edge_cones, views, view, rule, still, world, out, bits, used, order,
@@ -248,15 +248,15 @@ def evaluate(  # type: ignore[no-untyped-def]
         costs[n] = low
 
 
-@njit(cache=True, nogil=True, parallel=True)  # type: ignore[misc]
+@compiled(parallel=True)
 def evaluate_parallel(  # type: ignore[no-untyped-def]
-    points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still, scratch,
-    outlines, counts, costs,
+    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, still,
+    scratch, outlines, counts, costs,
 ):  # fmt: skip
     """As `evaluate`, on as many threads as the scratch memory is for."""
     threads = scratch.bits.shape[0]
     for thread in prange(threads):
         evaluate(
-            points, active, centre, bars, body, views, body_cones, edge_cones, rule, cost, still,
-            scratch, outlines, counts, costs, thread, threads,
+            points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost,
+            still, scratch, outlines, counts, costs, thread, threads,
         )  # fmt: skip

@@ -14,7 +14,7 @@ from markerless_tracker.fitness.arrays import BodyArrays, ViewArrays
 from markerless_tracker.fitness.raster.bits import popcount
 from markerless_tracker.fitness.raster.edge_samples import OUTLINE, VISIBLE, EdgeRule, sample_cone
 from markerless_tracker.fitness.raster.fill import clear_used, fill_outline
-from markerless_tracker.fitness.raster.kernels import Scratch, Still, cone_ends
+from markerless_tracker.fitness.raster.kernels import Scratch, StaticLayer, cone_ends
 from markerless_tracker.fitness.raster.outline import (
     HIDDEN,
     Outlines,
@@ -49,10 +49,10 @@ class Drawing:
     body: BodyArrays
     silhouette_cones: NDArray[np.bool_]
     edge_cones: NDArray[np.bool_]
-    still: Still
+    still: StaticLayer
 
 
-def divide(
+def split_static(
     body: BodyModel,
     arrays: BodyArrays,
     views: ViewArrays,
@@ -105,7 +105,7 @@ def divide(
             centre, _some(arrays, rest), views, silhouette_cones[rest], sampled[rest], rule, cost,
             scratch.used[0], nodes, scratch.world[0], outlines, bits, counts, start, listed, least,
         )  # fmt: skip
-    still = Still(
+    still = StaticLayer(
         np.flatnonzero(moves), nodes, bits, counts, start, listed[: start[-1]], least,
     )  # fmt: skip
     return Drawing(_some(arrays, drawn), silhouette_cones[drawn], sampled[drawn], still)
@@ -126,7 +126,7 @@ def _draw_still(  # type: ignore[no-untyped-def]
     centre, body, views, silhouette_cones, edge_cones, rule, cost, used, nodes, world, outlines,
     bits, counts, start, listed, least,
 ):  # fmt: skip
-    """Fill the fields of `Still` from the cones of `body`."""
+    """Fill the fields of `StaticLayer` from the cones of `body`."""
     cone_ends(centre, body, nodes, world)
     out = outlines_of(outlines, 0)
     nothing = bits[:0]

@@ -71,21 +71,21 @@ class BodyFit:
         """Take a frame's contours and about its pose (p,)."""
         self._frames.append(_Frame(contours, pose))
 
-    def iterate(self, reach_m: float) -> None:
+    def iterate(self, truncation_m: float) -> None:
         """One damped Gauss-Newton step of lengths, sections and all poses.
 
         The poses are eliminated first (Schur complement): each meets the others only by the body.
         Equations that cannot be solved change nothing.
 
         Args:
-            reach_m: outline further than this from a silhouette's edge is an outlier.
+            truncation_m: outline further than this from a silhouette's edge is an outlier.
         """
         body = self.body
         longer = [self._made(self._lengths + step) for step in _STEP * np.eye(len(self._lengths))]
         hessian, slope = self._believed()
         parts = []
         for frame in self._frames:
-            own, pull = self._equations(frame, body, longer, reach_m)
+            own, pull = self._equations(frame, body, longer, truncation_m)
             parts.append(eliminated(own, pull, body.size, hessian, slope))
         hessian[np.diag_indices_from(hessian)] *= 1.0 + _DAMPING
         step = solved(hessian, slope)
@@ -117,10 +117,10 @@ class BodyFit:
         return hessian, slope
 
     def _equations(
-        self, frame: _Frame, body: BodyModel, longer: list[BodyModel], reach_m: float
+        self, frame: _Frame, body: BodyModel, longer: list[BodyModel], truncation_m: float
     ) -> tuple[FloatArray, FloatArray]:
         """One frame's normal equations (p + k, p + k) and (p + k,): of its pose, of the body."""
-        frame.contours.collect(frame.pose, reach_m, body)
+        frame.contours.collect(frame.pose, truncation_m, body)
         rows = outline_rows(frame.contours)
         points = surface(body, frame.pose, rows)
         by_length = [
@@ -132,8 +132,8 @@ class BodyFit:
         slopes = np.column_stack([by_pose, *by_length, by_section])
         weight = rows.weight / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG * AMONG)
         hessian, slope = normal_equations(slopes, weight, rows.value)
-        usual = 1.0 / (AMONG * body.spread**2)
+        usual = 1.0 / (AMONG * body.prior_sd**2)
         pose = np.arange(body.size)
         hessian[pose, pose] = (hessian[pose, pose] + usual + 1e-9) * (1.0 + _DAMPING)
-        slope[pose] += usual * (frame.pose - body.usual)
+        slope[pose] += usual * (frame.pose - body.prior_mean)
         return hessian, slope

@@ -11,7 +11,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 
 ITERATIONS = 12
-REACH_M = (0.10, 0.04)
+TRUNCATION_M = (0.10, 0.04)
 """Outline further than this from the silhouette's edge is an outlier, at first and at last."""
 RESIDUAL_SIGMA_M = 0.010
 """Noise believed of an outline's position, for pieces of outline `CORRELATION_M` long."""
@@ -37,11 +37,11 @@ def fit_shape(
     sections = Sections(body)
     scale = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * len(frames))
 
-    def equations(shape: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
+    def equations(shape: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
         hessian, slope = np.zeros((sections.size, sections.size)), np.zeros(sections.size)
         shaped = sections.put(body, shape)
         for frame, pose in frames:
-            frame.collect(pose, reach_m, shaped)
+            frame.collect(pose, truncation_m, shaped)
             rows = outline_rows(frame)
             slopes = sections.slopes(shaped, pose, rows)
             one = normal_equations(slopes, rows.weight, rows.value)
@@ -56,6 +56,6 @@ def fit_shape(
         priors=(prior,),
         bounds=sections.bounds,
         iterations=ITERATIONS,
-        reach=REACH_M,
+        truncation=TRUNCATION_M,
     )
     return sections.put(body, fitted)

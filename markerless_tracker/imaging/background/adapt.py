@@ -3,9 +3,9 @@
 import math
 
 import cv2
-import numba
 import numpy as np
 
+from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.segmentation.morphology import Mask, disc
 
 # A longer gap, or time going backwards, is a new beginning: nothing is learned across it.
@@ -14,7 +14,7 @@ GAP_NS = 1_000_000_000
 STRIDE = 4
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def adapt_means(image, gain, keep_out, mean, scale, share, first, stride):  # type: ignore[no-untyped-def]
     """Move the Gaussian that explains a pixel towards it: mean += share (image / gain - mean).
 

@@ -3,10 +3,10 @@
 from collections.abc import Iterable, Iterator
 from itertools import chain
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 
 FloatImage = NDArray[np.float32]
@@ -20,7 +20,7 @@ _LEAST_SHARE = 0.05
 _LEAST_FRAMES = 2
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def add_frame(image, reach, count, mean, moment):  # type: ignore[no-untyped-def]
     """Give every pixel (h, w, c) to the nearest of its modes within ``reach`` in each channel.
 

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable, Iterator
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-def]
     """Per pixel, the mean of the frames in the shortest brightness interval that holds ``share``.
 
@@ -100,7 +100,7 @@ def steady_image(
     return steady, variance
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def match_kernel(stack, target, reach, matches, total):  # type: ignore[no-untyped-def]
     """Count and add up the frames that lie within ``reach`` of ``target`` in every channel."""
     count, height, width, channels = stack.shape
@@ -134,7 +134,7 @@ def matching_frames(
     return matches, np.where(matches[:, :, None] > 0, mean, target).astype(np.float32)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def motion_kernel(stack, steady, reach, share, jump):  # type: ignore[no-untyped-def]
     """Share of the frames that differ from the steady value, and the largest change at once."""
     count, height, width, channels = stack.shape

@@ -4,10 +4,10 @@ Patches are found from the runs of each row, which a silhouette has few of.
 """
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.region import Region
 
 LEFT, TOP, RIGHT, BOTTOM = 1, 2, 4, 8
@@ -15,7 +15,7 @@ LEFT, TOP, RIGHT, BOTTOM = 1, 2, 4, 8
 EVERY = LEFT | TOP | RIGHT | BOTTOM
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _root(parent, i):  # type: ignore[no-untyped-def]
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -23,7 +23,7 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
     return i
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _count_runs(mask, part, target):  # type: ignore[no-untyped-def]
     """Runs of ``target`` in a part (left, top, right, bottom) of a mask."""
     count = 0
@@ -37,7 +37,7 @@ def _count_runs(mask, part, target):  # type: ignore[no-untyped-def]
     return count
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _same_until(values, words, u, value):  # type: ignore[no-untyped-def]
     """First place from u on whose value differs; eight at a time, ``value`` is 0 or 255."""
     n = values.size
@@ -52,7 +52,7 @@ def _same_until(values, words, u, value):  # type: ignore[no-untyped-def]
     return n
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def flip_small(mask, part, need, target, least, reach, spared, unknown):  # type: ignore[no-untyped-def]
     """Turn patches of ``target`` with fewer than ``least`` pixels into 255 - target, in place.
 

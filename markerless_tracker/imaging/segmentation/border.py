@@ -7,10 +7,10 @@ beside it; a is the part that is covered.
 """
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.region import Region
 
@@ -18,7 +18,7 @@ from markerless_tracker.imaging.region import Region
 _NEAR_PX = 3
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, gone):  # type: ignore[no-untyped-def]
     """Mark pixels of the mask's border that are covered by less than half.
 

@@ -7,10 +7,10 @@ so many pixels share. It is found anew in every image and remembers nothing.
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 
 # Pixels looked at; a grid over the image.
@@ -27,7 +27,7 @@ _LEAST_SHARE = 0.2
 _LEAST_SAMPLES = 200
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def crowded_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-untyped-def]
     """Fill gain (c,) from the pixels where (n, 2) = (v, u) of an image (h, w, c).
 

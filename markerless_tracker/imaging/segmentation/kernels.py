@@ -5,9 +5,10 @@ caller. Not `parallel=True`: numba's own threads must not be entered by two call
 All in one file: numba's cache does not notice changes in functions inlined from another.
 """
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from markerless_tracker.compiled import compiled
 
 FOREGROUND = 255
 SHADOW = 127
@@ -28,7 +29,7 @@ def coarse(
     return np.rint(steps).astype(np.uint16), unit
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@compiled(inline="always")
 def hue_deg(blue, green, red, value, chroma):  # type: ignore[no-untyped-def]
     """Hue in degrees, [0, 360), as OpenCV defines it; ``chroma`` = max - min > 0."""
     if value == red:
@@ -42,7 +43,7 @@ def hue_deg(blue, green, red, value, chroma):  # type: ignore[no-untyped-def]
     return hue
 
 
-@numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@compiled(inline="always")
 def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped-def]
     """Eq 12 for a colour pixel (float32 BGR) and its background; ``rule``: `shadow.shadow_rule`."""
     value = max(b, g, r)
@@ -68,7 +69,7 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
 
 
 # Loops over one row with few arrays each: what the compiler turns into vector instructions.
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _split_row(pixel, blue, green, red):  # type: ignore[no-untyped-def]
     for j in range(blue.size):
         blue[j] = pixel[3 * j]
@@ -78,7 +79,7 @@ def _split_row(pixel, blue, green, red):  # type: ignore[no-untyped-def]
         red[j] = pixel[3 * j + 2]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _add_square(value, mean, scale, gain, distance):  # type: ignore[no-untyped-def]
     """Add ((value - gain mean) scale)^2 of one row; mean and scale in whole numbers."""
     white = np.float32(255.0)
@@ -87,7 +88,7 @@ def _add_square(value, mean, scale, gain, distance):  # type: ignore[no-untyped-
         distance[j] += x * x
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _beyond(distance, limit, row, marks):  # type: ignore[no-untyped-def]
     for j in range(distance.size):
         marks[j] = np.uint8(255) if distance[j] > limit else np.uint8(0)
@@ -95,7 +96,7 @@ def _beyond(distance, limit, row, marks):  # type: ignore[no-untyped-def]
         row[j] = marks[j]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def label_colour(image, first, unit, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
     """Label a part of a colour image: 0 background, 127 shadow, 255 foreground.
 
@@ -159,7 +160,7 @@ def label_colour(image, first, unit, mean, scale, gain, rule, left, top, labels)
                 row[j] = label
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def label_grey(image, first, unit, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
     """As `label_colour` with one channel: image (a, b), mean and scale (k, 1, h, w), gain (1,).
 

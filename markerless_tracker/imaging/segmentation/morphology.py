@@ -77,7 +77,7 @@ def repair_reach(settings: ImagingSettings, frame_px: int) -> int:
 
 
 def open_and_close(mask: Mask, settings: ImagingSettings, frame_px: int) -> None:
-    """Remove specks and mend cracks of a mask (h, w) of a frame of that many pixels, in place."""
+    """Remove specks and close cracks of a mask (h, w) of a frame of that many pixels, in place."""
     if settings.mask_open_px > 1:
         cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc(settings.mask_open_px), dst=mask)
     side = closing_px(settings, frame_px)

@@ -8,10 +8,10 @@ something only where p^2 var(B), the pattern, stands out from the noise.
 """
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.region import Region
 
@@ -33,19 +33,19 @@ _AGREE = 3.5
 
 
 # Loops over one row with few arrays each: what the compiler turns into vector instructions.
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _slide(total, came, gone):  # type: ignore[no-untyped-def]
     for j in range(came.size):
         total[j] += came[j] - gone[j]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _slide_product(total, came_x, came_y, gone_x, gone_y):  # type: ignore[no-untyped-def]
     for j in range(came_x.size):
         total[j] += came_x[j] * came_y[j] - gone_x[j] * gone_y[j]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _sum_across(part, side, total):  # type: ignore[no-untyped-def]
     """total[j] = part[j] + ... + part[j + side - 1], side odd."""
     n = total.size
@@ -64,7 +64,7 @@ def _sum_across(part, side, total):  # type: ignore[no-untyped-def]
 
 
 # Division as in NumPy: a test for zero would be a branch in the loop.
-@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@compiled(error_model="numpy")
 def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[no-untyped-def]
     for j in range(out.size):
         n = down * across[j]
@@ -84,7 +84,7 @@ def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[
         out[j] = found if (a[j] > 0) & (b[j] > 0) else np.float32(0.0)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _whole_levels(image, mean, gain, a, b):  # type: ignore[no-untyped-def]
     for j in range(a.size):
         a[j] = np.int32(image[j])
@@ -92,7 +92,7 @@ def _whole_levels(image, mean, gain, a, b):  # type: ignore[no-untyped-def]
         b[j] = np.int32(mean[j] * gain + np.float32(0.5))
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def window_light(image, mean, gain, noise, radius, left, top, light):  # type: ignore[no-untyped-def]
     """Light of the windows on a part of an image: p > 0 where they show the background in light p.
 
@@ -139,7 +139,7 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
         )
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _spread_run(row, start, stop, step, out):  # type: ignore[no-untyped-def]
     """Along a row of light from a window on, windows without a pattern take over its light."""
     near = row[start]
@@ -155,7 +155,7 @@ def _spread_run(row, start, stop, step, out):  # type: ignore[no-untyped-def]
         j += step
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def spread_light(light, spread):  # type: ignore[no-untyped-def]
     """Let plain windows take part in the light next to them if theirs is the same.
 
@@ -188,7 +188,7 @@ def spread_light(light, spread):  # type: ignore[no-untyped-def]
             _spread_row(light[i], nears, steps_of, spread[i])
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
     """One row of light takes over what comes from the row before; as `_spread_run`, branchless."""
     for j in range(row.size):
@@ -203,7 +203,7 @@ def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
         steps[j] = steps[j] + np.int32(1) if taken else np.int32(0)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def lit(light, least, most, valid):  # type: ignore[no-untyped-def]
     """Drop light that is not between least and most; valid (a, b) uint8 is 1 where any is left."""
     for i in range(light.shape[0]):
@@ -216,7 +216,7 @@ def lit(light, least, most, valid):  # type: ignore[no-untyped-def]
             row[j] = p if good else min(p, np.float32(0.0))
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled()
 def apply_light(  # type: ignore[no-untyped-def]
     image, mean, gain, agree, radius, protect, reveal, left, top, light, near_valid, part, corner,
     looked_at, labels,

@@ -1,4 +1,4 @@
 """The node `player`: the images of a bag as topics.
 
-Reads ahead and keeps the pace of the recording.
+Reads prefetch and keeps the pace of the recording.
 """

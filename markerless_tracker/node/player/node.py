@@ -18,7 +18,7 @@ from markerless_tracker.node.player.parameters import (
     player_values,
     read_player_settings,
 )
-from markerless_tracker.node.player.prefetch import read_ahead
+from markerless_tracker.node.player.prefetch import prefetch
 from markerless_tracker.node.ros.camera_info import info_of
 from markerless_tracker.node.ros.declared import declare_effective, given_parameters
 from markerless_tracker.node.ros.images import fill_image
@@ -126,7 +126,7 @@ class PlayerNode(Node):
         """Play once; returns whether to go on."""
         pace = Pace(self.settings.rate, clock=time.monotonic)
         began_s, first_ns, last_ns = time.monotonic(), None, 0
-        with read_ahead(self._sets, _AHEAD) as sets:
+        with prefetch(self._sets, _AHEAD) as sets:
             for frame_set in sets:
                 first_ns = frame_set.stamp_ns if first_ns is None else first_ns
                 last_ns = frame_set.stamp_ns

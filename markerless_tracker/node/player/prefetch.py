@@ -1,4 +1,4 @@
-"""Reading ahead in a thread, so that decoding and publishing overlap."""
+"""Reading prefetch in a thread, so that decoding and publishing overlap."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,8 +12,8 @@ _POLL_S = 0.1
 
 
 @contextmanager
-def read_ahead(source: Callable[[], Iterator[Item]], depth: int) -> Iterator[Iterator[Item]]:
-    """The items of an iterator that a thread makes and reads, at most `depth` of them ahead.
+def prefetch(source: Callable[[], Iterator[Item]], depth: int) -> Iterator[Iterator[Item]]:
+    """The items of an iterator that a thread makes and reads, at most `depth` of them prefetch.
 
     What the iterator raises is raised to whoever reads the items. Leaving the context ends the
     thread.
@@ -54,7 +54,7 @@ def read_ahead(source: Callable[[], Iterator[Item]], depth: int) -> Iterator[Ite
                 return
             yield item  # type: ignore[misc]
 
-    thread = Thread(target=read, name="read-ahead", daemon=True)
+    thread = Thread(target=read, name="read-prefetch", daemon=True)
     thread.start()
     try:
         yield items()

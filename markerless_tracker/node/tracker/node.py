@@ -31,7 +31,7 @@ from markerless_tracker.node.tracker.outputs import Pictures, ResultFile
 from markerless_tracker.node.tracker.setup import RigSource, build
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
-from markerless_tracker.node.tracker.worker import FittedSet, Fitting, FitWorker
+from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, TrackWorker
 
 STATE_PERIOD_S = 0.5
 _TURN_S = 0.002
@@ -53,7 +53,7 @@ _NOTED = (
 class TrackerNode(Node):
     """Subscribes, stores, and publishes what its worker thread finds.
 
-    Callbacks only store; `FitWorker` does the work. Call `close` before `destroy_node`.
+    Callbacks only store; `TrackWorker` does the work. Call `close` before `destroy_node`.
 
     Args:
         node_arguments: passed on to ``rclpy.node.Node`` (context, parameter_overrides, ...).
@@ -77,7 +77,7 @@ class TrackerNode(Node):
         self._status = TrackerStatus()
         self._sets: Synchronizer[Image] = Synchronizer(names, tolerance_ns=tolerance_ns)
         self._inputs = [self._input(name) for name in names]
-        self._fitting: Fitting | None = None
+        self._fitting: TrackerHandle | None = None
         self._described: BodyModel | None = None
         self._no_pose_shown = False
         self._missing: Sequence[str] = ()
@@ -88,7 +88,7 @@ class TrackerNode(Node):
         if self._source.rig is not None:
             self._build(self._source.rig)
         self._listen()
-        self._worker = FitWorker(
+        self._worker = TrackWorker(
             self._sets,
             self._status,
             prepare=self._prepare,
@@ -187,7 +187,7 @@ class TrackerNode(Node):
 
     # work, in the worker's thread unless there is a calibration file
 
-    def _prepare(self) -> Fitting | None:
+    def _prepare(self) -> TrackerHandle | None:
         if self._fitting is None:
             rig = self._source.try_rig({source.name: source.info for source in self._inputs})
             if rig is None:
@@ -206,7 +206,7 @@ class TrackerNode(Node):
         self._result_file.open(setup.tracker)
         self._pictures = Pictures(self, scaled)
         self._describe(setup.tracker.body)
-        self._fitting = Fitting(
+        self._fitting = TrackerHandle(
             setup.tracker,
             setup.start_stamp_ns,
             partial(_decode, sizes_px),
@@ -228,7 +228,7 @@ class TrackerNode(Node):
         self._marker_poses = self.create_publisher(PoseArray, "marker_poses", output_qos())
         self._markers = self.create_publisher(MarkerArray, "markers", output_qos())
 
-    def _publish(self, fitted: FittedSet) -> None:
+    def _publish(self, fitted: TrackedSet) -> None:
         result, stamp_ns = fitted.result, fitted.result.stamp_ns
         self._result_file.add(result)
         if not self.context.ok():  # a signal came while this set was fitted

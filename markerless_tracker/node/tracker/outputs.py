@@ -17,7 +17,7 @@ from markerless_tracker.imaging import Image as Picture
 from markerless_tracker.node.ros.images import fill_image
 from markerless_tracker.node.ros.messages import header, optical_frame
 from markerless_tracker.node.ros.qos import output_qos
-from markerless_tracker.node.tracker.worker import FittedSet
+from markerless_tracker.node.tracker.worker import TrackedSet
 from markerless_tracker.records import TrackResult
 from markerless_tracker.results.result import ResultWriter
 from markerless_tracker.tracking import Tracker
@@ -98,7 +98,7 @@ class Pictures:
             for kind in ("overlay", "evidence")
         }
 
-    def publish(self, fitted: FittedSet, tracker: Tracker) -> None:
+    def publish(self, fitted: TrackedSet, tracker: Tracker) -> None:
         """Draw and publish those that somebody wants to see."""
         for (name, kind), publisher in self._publishers.items():
             if not publisher.get_subscription_count() or name not in fitted.images:
@@ -109,13 +109,13 @@ class Pictures:
                 message = Image(header=header(fitted.result.stamp_ns, optical_frame(name)))
                 publisher.publish(fill_image(message, picture, f"debug/{name}/{kind}"))
 
-    def _overlay(self, name: str, fitted: FittedSet, tracker: Tracker) -> Picture:
+    def _overlay(self, name: str, fitted: TrackedSet, tracker: Tracker) -> Picture:
         image = fitted.images[name]
         if fitted.result.pose is None:
             return image
         return draw_overlay(image, self._rig[name], tracker.body, fitted.result.pose)
 
-    def _evidence(self, name: str, fitted: FittedSet, tracker: Tracker) -> Picture | None:
+    def _evidence(self, name: str, fitted: TrackedSet, tracker: Tracker) -> Picture | None:
         """None where nothing was made of the image."""
         observation = fitted.result.observations.get(name)
         if observation is None:

@@ -131,9 +131,9 @@ class TrackerStatus:
                 "fitness": _number(None if result is None else result.fitness, 4),
                 "evaluations": "0" if result is None else str(result.evaluations),
             }
-            agreement: Mapping[str, float] = {} if result is None else result.agreement
+            iou: Mapping[str, float] = {} if result is None else result.iou
             for name in cameras:
-                values[f"agreement/{name}"] = _number(agreement.get(name), 4)
+                values[f"iou/{name}"] = _number(iou.get(name), 4)
             exposure: Mapping[str, tuple[float, ...]] = {} if result is None else result.exposure
             for name in cameras:
                 gain = float(np.mean(exposure[name])) if name in exposure else None

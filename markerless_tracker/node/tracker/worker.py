@@ -67,7 +67,7 @@ class StartGate:
 
 
 @dataclass(frozen=True)
-class FittedSet:
+class TrackedSet:
     """A result and the images it came from (scaled, as the tracker saw them)."""
 
     result: TrackResult
@@ -75,7 +75,7 @@ class FittedSet:
 
 
 @dataclass(frozen=True)
-class Fitting:
+class TrackerHandle:
     """What the worker works with, once it can be made.
 
     Attributes:
@@ -91,7 +91,7 @@ class Fitting:
     waits: bool = False
 
 
-class FitWorker:
+class TrackWorker:
     """A thread that compiles, then tracks whatever set is newest.
 
     No exception leaves the thread: what goes wrong with one set is reported and costs that set;
@@ -100,8 +100,7 @@ class FitWorker:
     Args:
         sets: where the complete sets come from.
         status: told of everything.
-        prepare: makes the `Fitting`; returns None while something it needs has not come, and is
-            then asked again.
+        prepare: makes the `TrackerHandle`; None while an input is missing, then called again.
         publish: called in the worker's thread with each result.
         report: called with each new error, one line.
         clock: seconds that only go forward, the clock of the sets' arrival.
@@ -112,8 +111,8 @@ class FitWorker:
         sets: Synchronizer[Any],
         status: TrackerStatus,
         *,
-        prepare: Callable[[], Fitting | None],
-        publish: Callable[[FittedSet], None],
+        prepare: Callable[[], TrackerHandle | None],
+        publish: Callable[[TrackedSet], None],
         report: Callable[[str], None],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -189,7 +188,7 @@ class FitWorker:
             if self._learning.answered:
                 self._learning = None
 
-    def _make(self) -> Fitting | None:
+    def _make(self) -> TrackerHandle | None:
         while not self._stop.is_set():
             fitting = self._prepare()
             if fitting is not None:
@@ -197,7 +196,7 @@ class FitWorker:
             self._stop.wait(_POLL_S)
         return None
 
-    def _handle(self, fitting: Fitting, gate: StartGate, matched: MatchedSet[Any]) -> None:
+    def _handle(self, fitting: TrackerHandle, gate: StartGate, matched: MatchedSet[Any]) -> None:
         try:
             if matched.restarted:
                 gate.close()
@@ -235,14 +234,14 @@ class FitWorker:
             return
         self._status.tracked(result, arrived_s=matched.arrived_s, finished_s=finished_s)
         try:
-            self._publish(FittedSet(result, images))
+            self._publish(TrackedSet(result, images))
         except Exception as error:
             self._trouble(matched.stamp_ns, error)
         if learning is not None:
             learning.saw(result.state)
             self._learn(fitting, learning, matched.stamp_ns)
 
-    def _learn(self, fitting: Fitting, learning: Learning, stamp_ns: int) -> None:
+    def _learn(self, fitting: TrackerHandle, learning: Learning, stamp_ns: int) -> None:
         try:
             if learning.finish_if_complete(fitting.tracker):
                 self._waits = False

@@ -5,7 +5,7 @@ import numpy as np
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.start.population import FramePopulation
-from markerless_tracker.tracking.start.recombination import Breeder
+from markerless_tracker.tracking.start.recombination import Recombiner
 
 DRAWS = 120
 """Limbs drawn at first: half of them as people hold them, half anywhere."""
@@ -13,12 +13,12 @@ LAYERS = (0.4, 0.2)
 """Then the best are scattered, twice, by these shares of how far people's joints scatter."""
 _PARENTS, _CHILDREN = 6, 10
 _REFINE = (3, (0.12, 0.035))
-"""Iterations of the refinement of the best, and reach (m) of the first and the last."""
+"""Iterations of the refinement of the best, and truncation (m) of the first and the last."""
 
 
 def other_limb(
     frame: FramePopulation,
-    breeder: Breeder,
+    recombiner: Recombiner,
     pose: FloatArray,
     limb: IntArray,
     rng: np.random.Generator,
@@ -30,7 +30,7 @@ def other_limb(
 
     Args:
         frame: the evidence.
-        breeder: draws limbs of the body.
+        recombiner: draws limbs of the body.
         pose: (p,) where the rest of the body is.
         limb: the limb's parameters.
         rng: draws.
@@ -38,14 +38,16 @@ def other_limb(
     half = DRAWS // 2
     poses = np.concatenate(
         [
-            breeder.with_usual_limb(pose, limb, half, rng),
-            breeder.with_limb(pose, limb, DRAWS - half, rng),
+            recombiner.with_usual_limb(pose, limb, half, rng),
+            recombiner.with_limb(pose, limb, DRAWS - half, rng),
         ]
     )
     costs = frame.costs(poses)
     for share in LAYERS:
         best = np.argsort(costs, kind="stable")[:_PARENTS]
-        near = breeder.with_limb_near(np.repeat(poses[best], _CHILDREN, axis=0), limb, share, rng)
+        near = recombiner.with_limb_near(
+            np.repeat(poses[best], _CHILDREN, axis=0), limb, share, rng
+        )
         poses = np.concatenate([poses[best], near])
         costs = np.concatenate([costs[best], frame.costs(near)])
     refined = frame.refined(poses[[int(costs.argmin())]], *_REFINE)

@@ -19,7 +19,7 @@ from markerless_tracker.tracking.limbs.search import other_limb
 from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.population import FramePopulation
-from markerless_tracker.tracking.start.recombination import Breeder
+from markerless_tracker.tracking.start.recombination import Recombiner
 
 TURN_NS = 60_000_000
 """A limb that is not lost is looked for elsewhere this often: every fourth frame at 60 frames/s."""
@@ -53,7 +53,7 @@ class LimbWatch:
         body: BodyModel,
         pose: FloatArray,
         observations: Mapping[str, Observation],
-        scatter: FloatArray,
+        particle_sd_ratio: FloatArray,
     ) -> dict[str, LimbState]:
         """By limb, its state at a pose (p,).
 
@@ -61,19 +61,19 @@ class LimbWatch:
             body: the body.
             pose: the estimate.
             observations: the silhouettes.
-            scatter: (p,) as in `FrameSearch`.
+            particle_sd_ratio: (p,) as in `FrameSearch`.
         """
-        shares = limb_shares(body, pose, observations, self._rig)
+        fractions = inside_fractions(body, pose, observations, self._rig)
         states = {}
         for name in body.limbs:
-            share = shares.get(name, float("nan"))
-            wide = float(np.sqrt(np.mean(scatter[body.subspaces[name]] ** 2)))
+            inside_fraction = fractions.get(name, float("nan"))
+            wide = float(np.sqrt(np.mean(particle_sd_ratio[body.subspaces[name]] ** 2)))
             track = self._tracks.setdefault(name, LimbTrack())
-            state = track.note(share, wide) if name in shares else track.state
-            states[name] = LimbState(state, share, wide)
+            state = track.note(inside_fraction, wide) if name in fractions else track.state
+            states[name] = LimbState(state, inside_fraction, wide)
         return states
 
-    def mend(
+    def recover(
         self,
         searcher: Searcher,
         contours: ContourFrame,
@@ -84,7 +84,7 @@ class LimbWatch:
         """Look for limbs that `judge` called lost, and for the one whose turn it is.
 
         A limb is taken from elsewhere if f_s rises as clearly as a swarm's result must
-        (`swarm_gain`).
+        (`min_improvement`).
 
         Returns:
             The pose (p,), and the names of the limbs that were taken from elsewhere.
@@ -94,13 +94,13 @@ class LimbWatch:
         if not due:
             return pose, ()
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
-        breeder = Breeder(body, searcher.limits)
+        recombiner = Recombiner(body, searcher.limits)
         cost = float(frame.costs(pose[None])[0])
         found = []
         for name in due:
             rng = keyed_generator(config.seed, stamp_ns, f"{name} elsewhere")
-            other, other_cost = other_limb(frame, breeder, pose, body.subspaces[name], rng)
-            if other_cost < cost - config.swarm_gain:
+            other, other_cost = other_limb(frame, recombiner, pose, body.subspaces[name], rng)
+            if other_cost < cost - config.min_improvement:
                 pose, cost = other, other_cost
                 found.append(name)
         return pose, tuple(found)
@@ -118,7 +118,7 @@ class LimbWatch:
         return lost if name in lost else [*lost, name]
 
 
-def limb_shares(
+def inside_fractions(
     body: BodyModel,
     pose: FloatArray,
     observations: Mapping[str, Observation],
@@ -132,7 +132,7 @@ def limb_shares(
     along = (body.cone_length[:, None] * _ALONG)[:, :, None]
     points = (placed[:, None, :, 3] + along * placed[:, None, :, 2]).reshape(-1, 3)
     seen = [_look(points, observation, rig) for observation in observations.values()]
-    shares = {}
+    fractions = {}
     for name in body.limbs:
         nodes = np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name]))
         below = np.isin(body.cone_node, list(_below(body, nodes)))
@@ -143,8 +143,8 @@ def limb_shares(
             if framed[own].any()
         ]
         if values:
-            shares[name] = float(np.mean(values))
-    return shares
+            fractions[name] = float(np.mean(values))
+    return fractions
 
 
 def _below(body: BodyModel, nodes: np.ndarray[tuple[int], np.dtype[np.int64]]) -> set[int]:

@@ -17,7 +17,7 @@ EVERY = 2
 """Of the tracked frames every so many-th is taken."""
 POLISH = 5
 """Iterations after the last frame was taken; there is one with each frame before."""
-REACH_M = (0.10, 0.05)
+TRUNCATION_M = (0.10, 0.05)
 """Outline further than this from the silhouette's edge is an outlier, at first and at last."""
 
 
@@ -86,7 +86,7 @@ class BodyFitting:
             self._fit.add(contours, pose)
             self._last = pose
         share = self._rounds / (FRAMES + POLISH - 1)
-        self._fit.iterate(REACH_M[0] * (REACH_M[1] / REACH_M[0]) ** share)
+        self._fit.iterate(TRUNCATION_M[0] * (TRUNCATION_M[1] / TRUNCATION_M[0]) ** share)
         self._rounds += 1
         if self._rounds < FRAMES + POLISH:
             return None

@@ -103,9 +103,9 @@ def _settled(
     seen = np.isfinite(start.positions_m).all(axis=1)
     p = body.size
 
-    def equations(z: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
+    def equations(z: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
         model = start.sizes.body(z[p:], body)
-        contours.collect(z[:p], reach_m, model)
+        contours.collect(z[:p], truncation_m, model)
         rows = outline_rows(contours)
         points, joints = surface(model, z[:p], rows), markers(model, z[:p])[seen]
         slopes = np.empty((rows.value.size, z.size))
@@ -128,11 +128,11 @@ def _settled(
         priors=(
             Prior(
                 np.concatenate([body.neutral, begin]),
-                np.concatenate([1.0 / body.spread**2, 1.0 / (_LENGTH_SPREAD * begin) ** 2]),
+                np.concatenate([1.0 / body.prior_sd**2, 1.0 / (_LENGTH_SPREAD * begin) ** 2]),
             ),
         ),
         bounds=np.concatenate([limits, np.outer(_LENGTH_RANGE, begin)], axis=1),
         iterations=_ITERATIONS,
-        reach=(config.refine_reach_m, config.refine_reach_end_m),
+        truncation=(config.refine_truncation_m, config.refine_truncation_end_m),
     )
     return z[p:], z[:p]

@@ -30,7 +30,7 @@ LEAST_VOLUME_M3 = 0.015
 MOST_VOLUME_M3 = 1.5
 """A person of two metres with the slack of two views; more is a room, not a person."""
 MOST_COARSE_M3 = 6.0
-_REACH_M = 5.0
+_RADIUS_M = 5.0
 _UP_M = 2.5
 _FAR_M = 4.0
 _TRUNK_SHARE = 0.5
@@ -90,8 +90,8 @@ def find_hulls(
         return
     middle = _middle([cameras[name] for name in observations])
     views = [_View.of(camera, observation, middle) for camera, observation in seen]
-    low = middle - (_REACH_M, _REACH_M, _UP_M)
-    size = np.ceil(2.0 * np.array([_REACH_M, _REACH_M, _UP_M]) / COARSE_M).astype(np.int64)
+    low = middle - (_RADIUS_M, _RADIUS_M, _UP_M)
+    size = np.ceil(2.0 * np.array([_RADIUS_M, _RADIUS_M, _UP_M]) / COARSE_M).astype(np.int64)
     inside, looking = _occupied(low, size, COARSE_M, views)
     labels, count = ndimage.label(inside, structure=np.ones((3, 3, 3)))
     support = np.bincount(labels[inside], weights=looking[inside], minlength=count + 1)

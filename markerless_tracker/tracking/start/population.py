@@ -1,4 +1,4 @@
-"""Several poses that explain one frame, better and better: bred, refined, selected."""
+"""Several poses that explain one frame, better and better: recombined, refined, selected."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ from markerless_tracker.records import CONTOUR, Observation, Stage
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.postures import first_guesses
-from markerless_tracker.tracking.start.recombination import Breeder
+from markerless_tracker.tracking.start.recombination import Recombiner
 
 PER_QUARTER = 4
 """Poses that are kept of each quarter of the headings, seen from the best."""
-_SOWN = 24
+_INITIALISED_COUNT = 24
 _PER_HEADING = 2
 _CHILDREN = 480
 _REFINED = 10
@@ -27,11 +27,11 @@ _ALIKE_M = 0.07
 """Poses whose markers lie nearer to each other than this, on average, are the same."""
 _PRIOR = 4.0
 """Weight of the belief in usual poses: a generic body's outline fits by some centimetres only."""
-_SOW = (6, (0.25, 0.08))
-_BREED = (5, (0.15, 0.05))
-_FOLLOW = (3, (0.12, 0.05))
-"""Iterations of refinement, and reach (m) of the first and last: from nothing, in a search, from
-the frame before."""
+_INITIALISE = (6, (0.25, 0.08))
+_RECOMBINE = (5, (0.15, 0.05))
+_PROPAGATE = (3, (0.12, 0.05))
+"""Iterations of refinement, and first and last truncation in m: of an initialised population, of a
+recombined one, and of one propagated from the frame before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,20 +87,24 @@ class FramePopulation:
             edge_weight=0.0, silhouette_cones=every, edge_cones=every,
         )  # fmt: skip
         self._costs = searcher.fitness.prepare(self.contours.views, stage)
-        self._breeder = Breeder(searcher.body, searcher.limits)
+        self._recombiner = Recombiner(searcher.body, searcher.limits)
 
-    def sown(self, hull: Hull, hints: FloatArray | None = None) -> Population:
+    def initialised(self, hull: Hull, hints: FloatArray | None = None) -> Population:
         """The best first guesses of every heading, and hints (n, p), refined."""
         rng = keyed_generator(self._searcher.config.seed, self._stamp_ns, "sow")
         guesses = first_guesses(self._searcher.body, self._searcher.limits, hull, rng)
         costs = self.costs(guesses.reshape(-1, guesses.shape[2])).reshape(guesses.shape[:2])
         best = np.argsort(costs, axis=1, kind="stable")[:, :_PER_HEADING]
-        order = np.argsort(np.take_along_axis(costs, best, axis=1).ravel(), kind="stable")[:_SOWN]
+        order = np.argsort(np.take_along_axis(costs, best, axis=1).ravel(), kind="stable")[
+            :_INITIALISED_COUNT
+        ]
         chosen = np.take_along_axis(guesses, best[:, :, None], axis=1).reshape(-1, guesses.shape[2])
-        sown = chosen[order] if hints is None else np.concatenate([hints, chosen[order]])
-        return self.selected(self.refined(sown, *_SOW))
+        initialised = chosen[order] if hints is None else np.concatenate([hints, chosen[order]])
+        return self.selected(self.refined(initialised, *_INITIALISE))
 
-    def bred(self, population: Population, generation: int, *, share: float = 1.0) -> Population:
+    def recombined(
+        self, population: Population, generation: int, *, share: float = 1.0
+    ) -> Population:
         """One more generation.
 
         Args:
@@ -111,36 +115,38 @@ class FramePopulation:
         rng = keyed_generator(
             self._searcher.config.seed, self._stamp_ns, f"generation {generation}"
         )
-        children = self._breeder.children(population.poses, round(share * _CHILDREN), rng)
+        children = self._recombiner.children(population.poses, round(share * _CHILDREN), rng)
         best = np.argsort(self.costs(children), kind="stable")[: max(1, round(share * _REFINED))]
         return self.selected(
-            np.concatenate([population.poses, self.refined(children[best], *_BREED)])
+            np.concatenate([population.poses, self.refined(children[best], *_RECOMBINE)])
         )
 
-    def followed(self, population: Population) -> Population:
+    def propagated(self, population: Population) -> Population:
         """The population of the frame before, refined in this one."""
-        return self.selected(self.refined(population.poses, *_FOLLOW))
+        return self.selected(self.refined(population.poses, *_PROPAGATE))
 
     def costs(self, poses: FloatArray) -> FloatArray:
         """1 - f_s (n,) of poses (n, p); infinite where there is none."""
         costs = self._costs(poses)
         return np.where(np.isfinite(costs), costs, np.inf)
 
-    def refined(self, poses: FloatArray, iterations: int, reach: tuple[float, float]) -> FloatArray:
+    def refined(
+        self, poses: FloatArray, iterations: int, truncation: tuple[float, float]
+    ) -> FloatArray:
         """Poses (n, p), each refined on the contours."""
         searcher = self._searcher
         scale = 1.0 / (CORRELATION_M * searcher.config.refine_sigma_m**2)
-        usual = Prior(searcher.body.usual, _PRIOR / searcher.body.spread**2)
+        usual = Prior(searcher.body.prior_mean, _PRIOR / searcher.body.prior_sd**2)
 
-        def equations(pose: FloatArray, reach_m: float) -> tuple[FloatArray, FloatArray]:
-            sums = self.contours.equations(pose, reach_m)
+        def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
+            sums = self.contours.equations(pose, truncation_m)
             return sums.hessian * scale, sums.slope * scale
 
         return np.array(
             [
                 refine(
                     equations, pose, priors=(usual,), bounds=searcher.limits,
-                    iterations=iterations, reach=reach,
+                    iterations=iterations, truncation=truncation,
                 )
                 for pose in poses
             ]

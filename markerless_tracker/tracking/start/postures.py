@@ -58,7 +58,7 @@ def postures(body: BodyModel) -> FloatArray:
 
 def joint_spread(body: BodyModel) -> FloatArray:
     """(p,) how far people's joints scatter about neutral, rad; 0 for the root."""
-    return np.where(np.isfinite(body.spread), body.spread, 0.0)
+    return np.where(np.isfinite(body.prior_sd), body.prior_sd, 0.0)
 
 
 def first_guesses(

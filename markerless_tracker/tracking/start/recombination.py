@@ -25,7 +25,7 @@ _RANK = 0.15
 """Parents are drawn by rank; each is this much likelier to be taken than passed over."""
 
 
-class Breeder:
+class Recombiner:
     """Makes children of poses of one body.
 
     Args:

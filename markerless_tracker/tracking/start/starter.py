@@ -15,9 +15,9 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull, find_hulls, hulls_part
-from markerless_tracker.tracking.start.in_view import Patience
 from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
 from markerless_tracker.tracking.start.postures import put_at
+from markerless_tracker.tracking.start.start_gate import StartGate
 
 SETTLING_FRAMES = 8
 """Frames from the first pose to the one from which on it is tracked like any other."""
@@ -82,9 +82,10 @@ class Starter:
     """Finds somebody in the views, without any start pose.
 
     From a body of the right stature (tried, if unknown) in many postures and headings the best are
-    refined, bred and refined again. Facing one way or the opposite looks alike: both are followed
-    for some frames, and what explains them better wins; who walks faces where he goes. Then the
-    body's sections are fitted with the poses held.
+    refined, recombined and refined again. A person facing the opposite way gives nearly the same
+    silhouettes, so both headings are propagated over some frames; the one that explains them
+    better is kept, and a walking person faces the walking direction. Then the body's sections
+    are fitted with the poses held.
 
     Args:
         rig: the cameras.
@@ -114,12 +115,12 @@ class Starter:
         self._sized = sized
         self._fit_shape = fit_shape
         self._last_pose = last_pose
-        self._patience = Patience()
+        self._start_gate = StartGate()
         self.reset()
 
     def reset(self) -> None:
         """Forget whom it was about to find."""
-        self._patience.reset()
+        self._start_gate.reset()
         self._population: Population | None = None
         self._searcher: Searcher | None = None
         self._way = 0.0
@@ -138,10 +139,10 @@ class Starter:
             observed, self._searcher.body, self._best(population).poses[0]
         )
         frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
-        population = frame.followed(population)
+        population = frame.propagated(population)
         if len(self._seen[0]) == 1:
             population = self._second_look(frame, population, observations)
-        population = frame.bred(population, 0, share=_GENERATION_SHARE)
+        population = frame.recombined(population, 0, share=_GENERATION_SHARE)
         if 1.0 - population.costs[0] < LEAST_FIT:
             self.reset()
             return None
@@ -159,7 +160,7 @@ class Starter:
         for hull in find_hulls(self._cameras, observed):
             # A search takes long: not for somebody who is hardly in view yet.
             stands = put_at(self._body, hull, self._body.neutral)
-            if not self._patience.enough(self._body, stands, looking, stamp_ns):
+            if not self._start_gate.enough(self._body, stands, looking, stamp_ns):
                 continue
             observations = {
                 name: hulls_part(observation, self._cameras[name], hull)
@@ -171,7 +172,7 @@ class Starter:
             frame, population = found
             assert self._searcher is not None
             best = population.poses[0]
-            if not self._patience.enough(self._searcher.body, best, looking, stamp_ns):
+            if not self._start_gate.enough(self._searcher.body, best, looking, stamp_ns):
                 continue
             self._population = population
             self._way = float(population.headings[0])
@@ -191,9 +192,9 @@ class Starter:
         hull = next(find_hulls(self._cameras, observations), None)
         if hull is None:
             return population
-        fresh = frame.sown(hull)
+        fresh = frame.initialised(hull)
         for generation in range(1, 1 + SECOND_GENERATIONS):
-            fresh = frame.bred(fresh, generation)
+            fresh = frame.recombined(fresh, generation)
         return frame.selected(np.concatenate([population.poses, fresh.poses]))
 
     def _search(
@@ -208,9 +209,9 @@ class Starter:
         hints = None
         if self._last_pose is not None:
             hints = np.array([self._last_pose, put_at(body, hull, self._last_pose)])
-        population = frame.sown(hull, hints)
+        population = frame.initialised(hull, hints)
         for generation in range(GENERATIONS):
-            population = frame.bred(population, generation)
+            population = frame.recombined(population, generation)
             if self._sized is not None and generation == _RESIZED_AFTER:
                 frame, population = self._resize(
                     frame, population, height_m, observations, stamp_ns
@@ -241,7 +242,7 @@ class Starter:
                 best = (cost, other, Population(moved, population.costs, population.headings),
                         searcher)  # fmt: skip
         _, found, chosen, self._searcher = best
-        return found, chosen if found is frame else found.followed(chosen)
+        return found, chosen if found is frame else found.propagated(chosen)
 
     def _note(self, frame: FramePopulation, population: Population) -> None:
         for side, seen in enumerate(self._seen):

@@ -15,10 +15,10 @@ def write(path: Path, frames: list[dict[str, object]]) -> None:
 
 def test_only_tracked_frames_count(tmp_path: Path) -> None:
     frames = [
-        {"stamp_ns": 0, "state": "SEARCHING", "agreement": {}},
-        {"stamp_ns": 1, "state": "TRACKING", "agreement": {"cam01": 0.5, "cam02": 0.25}},
-        {"stamp_ns": 2, "state": "TRACKING", "agreement": {"cam01": 1.0}},
-        {"stamp_ns": 3, "state": "LOST", "agreement": {"cam01": 0.0}},
+        {"stamp_ns": 0, "state": "SEARCHING", "iou": {}},
+        {"stamp_ns": 1, "state": "TRACKING", "iou": {"cam01": 0.5, "cam02": 0.25}},
+        {"stamp_ns": 2, "state": "TRACKING", "iou": {"cam01": 1.0}},
+        {"stamp_ns": 3, "state": "LOST", "iou": {"cam01": 0.0}},
     ]
     write(tmp_path / "run.v1.json", frames)
     outcome = read_outcome(tmp_path / "run.v1")
@@ -38,6 +38,6 @@ def test_no_result_is_one_line(tmp_path: Path, text: str | None) -> None:
 
 
 def test_nobody_tracked_is_one_line(tmp_path: Path) -> None:
-    write(tmp_path / "run.json", [{"stamp_ns": 0, "state": "LOST", "agreement": {}}])
+    write(tmp_path / "run.json", [{"stamp_ns": 0, "state": "LOST", "iou": {}}])
     with pytest.raises(DatasetError, match=r"run.json: .* in none of 1 frames"):
         read_outcome(tmp_path / "run")

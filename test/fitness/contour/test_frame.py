@@ -13,7 +13,7 @@ from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contour.frame import (
     ContourFrame,
-    EdgeOfMask,
+    SilhouetteContour,
     edge_of_mask,
     join_edges,
 )
@@ -39,7 +39,7 @@ def disc(at, radius, size=SIZE):
     return np.hypot(u - at[0], v - at[1]) <= radius
 
 
-def window(edge: EdgeOfMask):
+def window(edge: SilhouetteContour):
     """Columns and rows (h, w) in the frame of an edge's distances."""
     height, width = edge.distance.shape
     v, u = np.mgrid[:height, :width]
@@ -253,13 +253,13 @@ def person(name, seed, **angles) -> Person:
 
 
 def refined(shown: Person, frame: ContourFrame, start: FloatArray, prior: Prior, iterations=12):
-    def equations(pose, reach_m):
-        sums = frame.equations(pose, reach_m)
+    def equations(pose, truncation_m):
+        sums = frame.equations(pose, truncation_m)
         return sums.hessian * PRECISION, sums.slope * PRECISION
 
     return refine(
         equations, start, priors=(prior,), bounds=shown.body.limits, iterations=iterations,
-        reach=(0.2, 0.03),
+        truncation=(0.2, 0.03),
     )  # fmt: skip
 
 

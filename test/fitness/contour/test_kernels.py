@@ -23,7 +23,7 @@ from markerless_tracker.fitness.contour.chain_kernels import SUMS, add_wrench, s
 from markerless_tracker.fitness.contour.frame import (
     SPACING_M,
     ContourFrame,
-    EdgeOfMask,
+    SilhouetteContour,
     edge_of_mask,
 )
 from markerless_tracker.fitness.contour.outline_samples import MAX_SAMPLES
@@ -52,7 +52,7 @@ class Scene:
     def spacing_px(self) -> float:
         return SPACING_M * self.rig.cameras[0].matrix[0, 0] / DISTANCE_M
 
-    def edges(self, camera: CameraModel) -> EdgeOfMask:
+    def edges(self, camera: CameraModel) -> SilhouetteContour:
         return edge_of_mask(self.observations[camera.name], self.spacing_px)
 
 
@@ -147,9 +147,9 @@ def test_samples_lie_on_the_outline_and_cover_it(posed) -> None:
         gap = cKDTree(pixels).query(outline)[0]
         assert (gap <= 2.0 * posed.spacing_px).mean() >= 0.98
         # Between legs that nearly touch, the free step ends in the other leg.
-        reach = np.ones((2 * int(STEP_PX) + 3,) * 2, np.uint8)
-        filled = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, reach)
-        near_gap = cv2.dilate(filled - mask.view(np.uint8), reach)
+        truncation = np.ones((2 * int(STEP_PX) + 3,) * 2, np.uint8)
+        filled = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, truncation)
+        near_gap = cv2.dilate(filled - mask.view(np.uint8), truncation)
         column, row = np.round(outline).astype(int).T
         assert gap[near_gap[row, column] == 0].max() <= 4.0 * posed.spacing_px
 
@@ -317,11 +317,11 @@ class Twin:
     cost: float
 
 
-def tukey(r, reach):
-    return reach**2 / 6.0 * (1.0 - max(0.0, 1.0 - (r / reach) ** 2) ** 3)
+def tukey(r, truncation):
+    return truncation**2 / 6.0 * (1.0 - max(0.0, 1.0 - (r / truncation) ** 2) ** 3)
 
 
-def bilinear(edge: EdgeOfMask, point):
+def bilinear(edge: SilhouetteContour, point):
     """Distance at a point (2,) and its gradient (2,); None outside the window."""
     x, y = point - (edge.left, edge.top)
     height, width = edge.distance.shape
@@ -333,7 +333,7 @@ def bilinear(edge: EdgeOfMask, point):
     return b @ d @ a, np.array([b @ d @ [-1.0, 1.0], np.array([-1.0, 1.0]) @ d @ a])
 
 
-def slow_residuals(made: Scene, view: int, reach: float) -> Twin:
+def slow_residuals(made: Scene, view: int, truncation: float) -> Twin:
     """Both ways, one at a time, as the documentation of the kernels says."""
     camera, samples = made.rig.cameras[view], made.frame.samples
     focal, n = camera.matrix[0, 0], samples.count[view]
@@ -349,10 +349,10 @@ def slow_residuals(made: Scene, view: int, reach: float) -> Twin:
             value, slope = found[0] * depth[s] / focal, found[1]
             steep = np.linalg.norm(slope)
             # Neither on ridges of the distance nor where the edge faces another way.
-            kept = steep >= 0.3 and slope @ normal[s] >= 0.5 * steep and abs(value) < reach
-        cost += length[s] * (tukey(value, reach) if kept else reach**2 / 6.0)
+            kept = steep >= 0.3 and slope @ normal[s] >= 0.5 * steep and abs(value) < truncation
+        cost += length[s] * (tukey(value, truncation) if kept else truncation**2 / 6.0)
         if kept:
-            weight = length[s] * (1.0 - (value / reach) ** 2) ** 2
+            weight = length[s] * (1.0 - (value / truncation) ** 2) ** 2
             rows.append((value, weight, s, slope * depth[s] / focal))
     for at, out, px in zip(edge.points, edge.normals, edge.spacing, strict=True):
         facing = np.flatnonzero(normal @ out > 0.5)
@@ -360,10 +360,10 @@ def slow_residuals(made: Scene, view: int, reach: float) -> Twin:
         near = int(facing[away.argmin()]) if facing.size else 0
         metres = depth[near] / focal
         far = away.min() * metres if facing.size else np.inf
-        cost += px * metres * tukey(min(far, reach), reach)
-        if far < reach:
+        cost += px * metres * tukey(min(far, truncation), truncation)
+        if far < truncation:
             value = (pixel[near] - at) @ out * metres
-            weight = px * metres * (1.0 - (far / reach) ** 2) ** 2
+            weight = px * metres * (1.0 - (far / truncation) ** 2) ** 2
             rows.append((value, weight, near, out * metres))
     value, weight, sample, along = map(np.array, zip(*rows, strict=True))
     return Twin(value, weight, sample, along, cost)
@@ -374,12 +374,12 @@ def disturbed(made: Scene, seed=0, size=0.06) -> FloatArray:
     return np.asarray(pose)
 
 
-@pytest.mark.parametrize("reach", [0.03, 0.1])
-def test_residuals_weights_and_cost(posed, reach) -> None:
-    posed.frame.collect(disturbed(posed), reach)
+@pytest.mark.parametrize("truncation", [0.03, 0.1])
+def test_residuals_weights_and_cost(posed, truncation) -> None:
+    posed.frame.collect(disturbed(posed), truncation)
     kept = outliers = 0
     for v in range(len(posed.rig)):
-        slow = slow_residuals(posed, v, reach)
+        slow = slow_residuals(posed, v, truncation)
         fast = posed.frame.residuals
         n = fast.count[v]
         assert n == len(slow.value) > 30
@@ -389,7 +389,7 @@ def test_residuals_weights_and_cost(posed, reach) -> None:
         assert fast.cost[v] == pytest.approx(slow.cost, rel=1e-7)
         both = posed.frame.samples.count[v] + len(posed.edges(posed.rig.cameras[v]).points)
         kept, outliers = kept + n, outliers + both - n
-    # The reach leaves some out, and not all.
+    # The truncation leaves some out, and not all.
     assert kept > 300 and outliers > 0.01 * kept
 
 
@@ -414,10 +414,10 @@ def test_gradients_by_the_world_point(posed) -> None:
 def test_one_residual_by_hand() -> None:
     """A body 20 mm beside its silhouette: sideways residuals are 20 mm, weighted by Tukey."""
     made = scene("balan31", 0, lambda body, *_, **__: standing(body), cameras=1)
-    camera, reach = made.rig.cameras[0], 0.05
+    camera, truncation = made.rig.cameras[0], 0.05
     pose = made.pose.copy()
     pose[[made.body.index(f"pelvis_t{a}") for a in "xyz"]] += 0.020 * camera.T_cam_world[0, :3]
-    made.frame.collect(pose, reach)
+    made.frame.collect(pose, truncation)
     residuals, samples = made.frame.residuals, made.frame.samples
     s = residuals.sample[0, : residuals.count[0]]
     value, weight = residuals.value[0, : s.size], residuals.weight[0, : s.size]
@@ -503,11 +503,11 @@ def test_slopes_along_the_chain(posed) -> None:
 
 def test_normal_equations(posed) -> None:
     """JᵀWJ and JᵀWr of the slow residuals, J by finite differences through the lens."""
-    pose, reach = disturbed(posed, seed=1), 0.08
-    found = posed.frame.equations(pose, reach)
+    pose, truncation = disturbed(posed, seed=1), 0.08
+    found = posed.frame.equations(pose, truncation)
     hessian, slope, cost = np.zeros((31, 31)), np.zeros(31), 0.0
     for v, camera in enumerate(posed.rig):
-        slow = slow_residuals(posed, v, reach)
+        slow = slow_residuals(posed, v, truncation)
         samples = posed.frame.samples
         points = attached(
             posed.body, pose, samples.cone[v, slow.sample], samples.world[v, slow.sample]

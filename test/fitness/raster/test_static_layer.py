@@ -78,11 +78,11 @@ def test_a_cost_that_matters_is_exact_and_one_that_does_not_is_a_bound(
     rng = np.random.default_rng(seed)
     points = pose[active] + 2.0 * body.sigma[active] * rng.standard_normal((15, active.size))
     full = evaluate(points)
-    bars = rng.permutation(full) + rng.choice([0.0, -np.inf, np.inf, 1e-12, -1e-12], 15)
-    found = evaluate(points, bars)
-    wins = full < bars
+    cutoff_costs = rng.permutation(full) + rng.choice([0.0, -np.inf, np.inf, 1e-12, -1e-12], 15)
+    found = evaluate(points, cutoff_costs)
+    wins = full < cutoff_costs
     np.testing.assert_array_equal(found[wins], full[wins])
-    assert (found[~wins] >= bars[~wins]).all()
+    assert (found[~wins] >= cutoff_costs[~wins]).all()
     assert (found[~wins] <= full[~wins]).all()
 
 

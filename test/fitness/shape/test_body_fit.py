@@ -54,8 +54,8 @@ def fit(request, contours_of):
         about[GENERIC.joints] += rng.normal(0.0, 0.08, GENERIC.joints.size)
         about[GENERIC.root[3:]] += rng.normal(0.0, 0.02, 3)
         fit.add(contours_of(true, pose, RIG, GENERIC), np.clip(about, *LIMITS))
-    for reach_m in np.geomspace(0.10, 0.035, 12):
-        fit.iterate(reach_m)
+    for truncation_m in np.geomspace(0.10, 0.035, 12):
+        fit.iterate(truncation_m)
     return true, moves, fit
 
 
@@ -131,8 +131,8 @@ def test_a_told_stature_holds_the_lengths_back(contours_of) -> None:
         fit = BodyFit(SIZES, SIZES.of_stature(1.60), SIZES.usual(stature), LIMITS)
         for pose in moves:
             fit.add(contours_of(true, pose, RIG, GENERIC), pose)
-        for reach_m in np.geomspace(0.10, 0.035, 6):
-            fit.iterate(reach_m)
+        for truncation_m in np.geomspace(0.10, 0.035, 6):
+            fit.iterate(truncation_m)
         sizes.append(np.log(SIZES.of(fit.body)).mean())
     told = np.log(SIZES.of(SIZES.of_stature(1.60))).mean()
     assert told < sizes[0] < sizes[1] - 0.01

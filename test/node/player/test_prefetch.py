@@ -5,15 +5,15 @@ from collections.abc import Iterator
 import pytest
 
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.node.player.prefetch import read_ahead
+from markerless_tracker.node.player.prefetch import prefetch
 
 
 def threads() -> list[str]:
-    return [thread.name for thread in threading.enumerate() if thread.name == "read-ahead"]
+    return [thread.name for thread in threading.enumerate() if thread.name == "read-prefetch"]
 
 
 def test_all_items_come_in_order() -> None:
-    with read_ahead(lambda: iter(range(50)), 3) as items:
+    with prefetch(lambda: iter(range(50)), 3) as items:
         assert list(items) == list(range(50))
     assert not threads()
 
@@ -26,7 +26,7 @@ def test_no_more_than_the_depth_is_read_ahead_and_leaving_ends_the_thread() -> N
             made.append(i)
             yield i
 
-    with read_ahead(source, 4) as items:
+    with prefetch(source, 4) as items:
         assert next(items) == 0
         end = time.monotonic() + 20
         while len(made) < 6 and time.monotonic() < end:
@@ -42,7 +42,7 @@ def test_an_error_of_the_source_reaches_the_reader_after_what_came_before() -> N
         raise DatasetError("bag: cut off")
 
     got = []
-    with read_ahead(source, 4) as items, pytest.raises(DatasetError, match="cut off"):
+    with prefetch(source, 4) as items, pytest.raises(DatasetError, match="cut off"):
         for item in items:
             got.append(item)
     assert got == [1]

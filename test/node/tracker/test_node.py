@@ -244,7 +244,7 @@ def test_joint_states_and_root_pose_give_the_known_joints(live: Live) -> None:
     assert np.mean(means) < TOLERANCE_MEAN_M and worst < TOLERANCE_MAX_M, (means, worst)
     values = live.values
     assert values["state"] == "TRACKING" and float(values["fitness"]) > 1.5
-    assert all(float(values[f"agreement/{name}"]) > 0.8 for name in live.camera.names)
+    assert all(float(values[f"iou/{name}"]) > 0.8 for name in live.camera.names)
     assert values["skipped"] == "0" and float(values["latency_median_ms"]) > 0.0
     live.until(lambda: live.markers, "markers for viewers")
 
@@ -442,7 +442,7 @@ def test_the_background_is_learned_when_nobody_is_there(
     for _ in range(3):
         live.track()
     assert live.value("state") == "TRACKING" and live.value("warnings") == ""
-    assert all(float(live.value(f"agreement/{name}")) > 0.8 for name in live.camera.names)
+    assert all(float(live.value(f"iou/{name}")) > 0.8 for name in live.camera.names)
 
 
 def test_a_node_without_background_waits_for_one(

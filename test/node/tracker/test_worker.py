@@ -13,10 +13,10 @@ from markerless_tracker.node.tracker.learning import Learning
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.node.tracker.worker import (
-    FittedSet,
-    Fitting,
-    FitWorker,
     StartGate,
+    TrackedSet,
+    TrackerHandle,
+    TrackWorker,
     one_line,
 )
 from markerless_tracker.records import LimbState, TrackResult, TrackState
@@ -74,12 +74,12 @@ class Bench:
         self.tracker = FakeTracker()
         self.sets: Synchronizer[int] = Synchronizer(("a", "b"))
         self.status = TrackerStatus()
-        self.published: list[FittedSet] = []
+        self.published: list[TrackedSet] = []
         self.reports: list[str] = []
-        self.prepared: Fitting | None = Fitting(
+        self.prepared: TrackerHandle | None = TrackerHandle(
             self.tracker, start_ns, lambda name, view: np.full((2, 2), view, np.uint8)
         )
-        self.worker = FitWorker(
+        self.worker = TrackWorker(
             self.sets,
             self.status,
             prepare=lambda: self.prepared,
@@ -123,7 +123,7 @@ def test_sets_are_decoded_tracked_and_published_in_one_thread(bench: Bench) -> N
     assert threading.get_ident() not in bench.tracker.threads
     values = bench.values()
     assert values["state"] == "TRACKING" and values["tracked"] == "1"
-    assert values["agreement/a"] == "0.5000" and values["agreement/b"] == "nan"
+    assert values["iou/a"] == "0.5000" and values["iou/b"] == "nan"
     assert values["lost_limbs"] == "l_arm, l_leg"
     assert float(values["latency_median_ms"]) >= 0.0
 

@@ -9,7 +9,7 @@ from markerless_tracker.body import MARKER_NAMES, markers
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
-from markerless_tracker.tracking.limbs.watch import TURN_NS, LimbWatch, limb_shares
+from markerless_tracker.tracking.limbs.watch import TURN_NS, LimbWatch, inside_fractions
 from markerless_tracker.tracking.loss import LIMB_LOST_BELOW, LIMB_REGAINED_ABOVE
 from markerless_tracker.tracking.search import Searcher
 
@@ -62,10 +62,10 @@ def balancing():
 
 def test_shares_tell_the_limb_that_is_off(standing) -> None:
     scene, seen, pose, raised = standing
-    true = limb_shares(scene.body, pose, seen, scene.rig)
+    true = inside_fractions(scene.body, pose, seen, scene.rig)
     assert set(true) == {"l_arm", "r_arm", "l_leg", "r_leg"}
     assert min(true.values()) > 0.9
-    wrong = limb_shares(scene.body, raised, seen, scene.rig)
+    wrong = inside_fractions(scene.body, raised, seen, scene.rig)
     assert wrong["l_arm"] < LIMB_LOST_BELOW
     assert wrong["r_arm"] == true["r_arm"] > LIMB_REGAINED_ABOVE
 
@@ -73,13 +73,13 @@ def test_shares_tell_the_limb_that_is_off(standing) -> None:
 def test_states_name_the_limb_that_is_off(standing) -> None:
     scene, seen, pose, raised = standing
     watch = LimbWatch(scene.rig)
-    scatter = np.full(scene.body.size, 0.25)
+    particle_sd_ratio = np.full(scene.body.size, 0.25)
     for at, expected in ((pose, TRACKING), (raised, LOST), (pose, TRACKING)):
-        states = watch.judge(scene.body, at, seen, scatter)
+        states = watch.judge(scene.body, at, seen, particle_sd_ratio)
         assert states.pop("l_arm").state is expected
         assert {limb.state for limb in states.values()} == {TRACKING}
         assert watch.lost == (("l_arm",) if expected is LOST else ())
-        assert {limb.scatter for limb in states.values()} == {0.25}
+        assert {limb.particle_sd_ratio for limb in states.values()} == {0.25}
 
 
 def test_a_lost_arm_is_found_alone(standing) -> None:
@@ -87,7 +87,7 @@ def test_a_lost_arm_is_found_alone(standing) -> None:
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
     watch.judge(scene.body, raised, seen, np.full(scene.body.size, np.nan))
-    found, names = watch.mend(searcher, contours_of(searcher, seen, raised), seen, 0, raised)
+    found, names = watch.recover(searcher, contours_of(searcher, seen, raised), seen, 0, raised)
     assert names == ("l_arm",)
     assert gaps(scene.body, raised, pose)[ARM].min() > 0.3
     assert gaps(scene.body, found, pose)[ARM].max() < 0.10
@@ -103,7 +103,7 @@ def test_an_arm_that_is_wrong_inside_the_silhouettes_is_found_at_its_turn(balanc
     assert states["l_arm"].state is TRACKING
     at, taken = hidden, []
     for stamp_ns in range(0, 8 * TURN_NS, TURN_NS):
-        at, names = watch.mend(searcher, contours_of(searcher, seen, at), seen, stamp_ns, at)
+        at, names = watch.recover(searcher, contours_of(searcher, seen, at), seen, stamp_ns, at)
         taken += names
     assert taken[0] == "l_arm"
     assert gaps(body, at, pose)[ARM].max() < 0.08
@@ -115,7 +115,7 @@ def test_limbs_in_their_place_are_left_alone(balancing) -> None:
     watch = LimbWatch(scene.rig)
     for stamp_ns in range(0, 4 * TURN_NS, TURN_NS):
         contours = contours_of(searcher, seen, pose)
-        assert watch.mend(searcher, contours, seen, stamp_ns, pose) == (pose, ())
+        assert watch.recover(searcher, contours, seen, stamp_ns, pose) == (pose, ())
 
 
 def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
@@ -125,7 +125,7 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
     watch = LimbWatch(scene.rig)
     assert watch.judge(body, pose, seen, np.zeros(body.size)) == {}
     contours = contours_of(searcher, seen, pose)
-    assert watch.mend(searcher, contours, seen, 0, pose) == (pose, ())
+    assert watch.recover(searcher, contours, seen, 0, pose) == (pose, ())
 
 
 def test_turns_come_by_time_and_depend_on_nothing_else(balancing) -> None:
@@ -135,7 +135,7 @@ def test_turns_come_by_time_and_depend_on_nothing_else(balancing) -> None:
         searcher = searcher_of(scene, threads)
         watch = LimbWatch(scene.rig)
         contours = contours_of(searcher, seen, hidden)
-        return [watch.mend(searcher, contours, seen, stamp, hidden)[1] for stamp in stamps]
+        return [watch.recover(searcher, contours, seen, stamp, hidden)[1] for stamp in stamps]
 
     # The arm is first in the order of turns, and nobody's turn comes again so soon.
     assert found([0, 1, TURN_NS - 1]) == [("l_arm",), (), ()]
@@ -149,7 +149,7 @@ def test_the_same_search_gives_the_same_bytes_with_any_number_of_threads(standin
     for threads in (1, 2):
         searcher = searcher_of(scene, threads)
         contours = contours_of(searcher, seen, raised)
-        poses.append(LimbWatch(scene.rig).mend(searcher, contours, seen, 0, raised)[0].tobytes())
+        poses.append(LimbWatch(scene.rig).recover(searcher, contours, seen, 0, raised)[0].tobytes())
     assert poses[0] == poses[1]
 
 
@@ -179,5 +179,5 @@ def test_a_limb_that_gets_lost_is_told_once_also_without_refinement(standing) ->
     tracker = Tracker(scene.rig, scene.body, config, start_pose=raised, shape_known=True)
     first, second = (tracker.step(seen, round(k * 1e9 / 60)) for k in range(2))
     assert first.limbs["l_arm"].state is second.limbs["l_arm"].state is LOST
-    assert first.limbs["l_arm"].scatter > 0.0
+    assert first.limbs["l_arm"].particle_sd_ratio > 0.0
     assert "l_arm: lost" in first.warnings and "l_arm: lost" not in second.warnings

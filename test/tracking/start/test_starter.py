@@ -68,7 +68,7 @@ def test_nobody_is_a_state_and_no_error(walk) -> None:
     }
     result = tracker.step(nobody, stamp - 1)
     assert result.state is TrackState.SEARCHING
-    assert result.pose is None and result.markers_m is None and not result.agreement
+    assert result.pose is None and result.markers_m is None and not result.iou
     assert tracker.step(seen, stamp).state is TrackState.TRACKING
 
 
@@ -146,7 +146,7 @@ def test_some_blind_cameras_are_left_out_and_said(walk) -> None:
         tracker.step(seen, stamp)
     stamp, seen, points = taken[-1]
     result = tracker.step({**seen, "cam01": blind(seen)["cam01"]}, stamp)
-    assert "cam01" not in result.agreement and error_mm(result, points) < 60.0
+    assert "cam01" not in result.iou and error_mm(result, points) < 60.0
     assert any(w.startswith("cam01: left out") for w in result.warnings)
 
 

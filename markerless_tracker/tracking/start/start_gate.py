@@ -20,7 +20,7 @@ PATIENCE_NS = 2_000_000_000
 """How long somebody whom two cameras see is waited for to come into a third one's view."""
 
 
-class Patience:
+class StartGate:
     """Tells when to start from somebody: at once if three cameras see him, else after a while."""
 
     def __init__(self) -> None:

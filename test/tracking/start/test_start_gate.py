@@ -9,7 +9,7 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.synthesis.rig import ring_rig
 from markerless_tracker.tracking import TrackerConfig, build_tracker
-from markerless_tracker.tracking.start.in_view import PATIENCE_NS, Patience, share_in_view
+from markerless_tracker.tracking.start.start_gate import PATIENCE_NS, StartGate, share_in_view
 
 
 @pytest.fixture(scope="module")
@@ -45,16 +45,16 @@ def test_a_third_camera_is_waited_for_a_while(body) -> None:
     rig, pose = ring_rig(4), standing(body, 0.0)
     aside = standing(body, 2.6)
     assert share_in_view(body, aside, rig, 2) == 1.0 > 0.5 > share_in_view(body, aside, rig, 3)
-    assert Patience().enough(body, pose, rig, 0)
+    assert StartGate().enough(body, pose, rig, 0)
     # Others do not look: two are all there are.
-    assert Patience().enough(body, pose, rig.cameras[:2], 0)
-    patience = Patience()
-    assert not patience.enough(body, aside, rig, 5)
-    assert not patience.enough(body, aside, rig, PATIENCE_NS)
-    assert patience.enough(body, aside, rig, 5 + PATIENCE_NS)
-    patience.reset()
-    assert not patience.enough(body, aside, rig, 6 + PATIENCE_NS)
-    assert not patience.enough(body, standing(body, 9.0), rig, 9 * PATIENCE_NS)
+    assert StartGate().enough(body, pose, rig.cameras[:2], 0)
+    start_gate = StartGate()
+    assert not start_gate.enough(body, aside, rig, 5)
+    assert not start_gate.enough(body, aside, rig, PATIENCE_NS)
+    assert start_gate.enough(body, aside, rig, 5 + PATIENCE_NS)
+    start_gate.reset()
+    assert not start_gate.enough(body, aside, rig, 6 + PATIENCE_NS)
+    assert not start_gate.enough(body, standing(body, 9.0), rig, 9 * PATIENCE_NS)
 
 
 def test_nobody_is_started_from_an_outline_and_a_hand() -> None:

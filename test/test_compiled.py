@@ -1,0 +1,61 @@
+"""Stored kernels: named after all sources that they are compiled from."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from markerless_tracker.compiled import PACKAGE, kernel_sources, source_digest
+
+PROGRAM = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from small import upper
+print(upper.twice_and_one(3.0), upper.twice_and_one.stats.cache_hits)
+"""
+
+
+def run(folder: Path) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(folder)], capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip()
+
+
+def test_an_edit_in_a_kernel_that_another_file_calls_is_noticed(tmp_path: Path) -> None:
+    """Our `compiled.py` in a package of two files, one calling the other."""
+    package = tmp_path / "small"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "compiled.py").write_text((PACKAGE / "compiled.py").read_text())
+    lower, upper = package / "lower.py", package / "upper.py"
+    head = "from small.compiled import compiled\n"
+    function = "\n@compiled()\ndef twice(x):\n    return {} * x\n"
+    lower.write_text(head + function.format("2.0"))
+    upper.write_text(
+        head + "from small.lower import twice\n"
+        "\n@compiled()\ndef twice_and_one(x):\n    return twice(x) + 1.0\n"
+    )
+    assert run(tmp_path) == "7.0 Counter()"
+    assert run(tmp_path).startswith("7.0 Counter({") and "1" in run(tmp_path)
+    lower.write_text(head + function.format("5.0"))
+    assert run(tmp_path) == "16.0 Counter()"
+    assert run(tmp_path).startswith("16.0 Counter({")
+
+
+def test_every_file_with_kernels_counts_and_what_these_import() -> None:
+    names = {file.relative_to(PACKAGE).as_posix() for file in kernel_sources(PACKAGE)}
+    assert {
+        "compiled.py",
+        "body/collision.py",
+        "fitness/raster/fill.py",
+        "imaging/segmentation/kernels.py",
+        "records.py",
+    } <= names
+    assert "cli/main.py" not in names
+    assert len(source_digest()) == 12
+
+
+def test_no_kernel_is_compiled_past_the_digest() -> None:
+    for file in PACKAGE.rglob("*.py"):
+        text = file.read_text(encoding="utf-8")
+        assert file.name == "compiled.py" or "njit" not in text, file
