@@ -2,12 +2,13 @@
 
 numba looks at the date of a kernel's own file only. A kernel that calls one in another file would
 keep the old one compiled into it after an edit there. So the names of the stored files hold a
-digest of all sources that kernels are compiled from. `make clean` removes old ones.
+digest of all sources that they are compiled from. `make clean` removes old ones.
 """
 
 import hashlib
+import inspect
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -47,42 +48,61 @@ inlined: Decorator = compiled(error_model="numpy", inline="always")
 """For small functions that become part of the kernel that calls them; may return arrays."""
 
 
-def kernel_sources(package: Path) -> list[Path]:
-    """Files that hold kernels, and the files of the package that these import; sorted.
-
-    Args:
-        package: its folder, named as the package.
-    """
-    texts = {file: file.read_text(encoding="utf-8") for file in package.rglob("*.py")}
-    found = {file for file, text in texts.items() if f"from {package.name}.compiled import" in text}
-    todo = list(found)
-    while todo:
-        for file in _imported(package, texts[todo.pop()]):
-            if file in texts and file not in found:
-                found.add(file)
-                todo.append(file)
-    return sorted(found)
-
-
 @cache
-def source_digest(package: Path = PACKAGE) -> str:
-    """Digest of all kernel sources, part of the names of the files that numba stores."""
-    sources = b"\0".join(file.read_bytes() for file in kernel_sources(package))
+def source_digest(file: Path, package: Path = PACKAGE) -> str:
+    """Digest of what the kernels of a file are compiled from, part of the names of stored files."""
+    sources = b"\0".join(source.read_bytes() for source in kernel_sources(file, package))
     return hashlib.sha256(sources).hexdigest()[:12]
 
 
-def _imported(package: Path, text: str) -> Iterable[Path]:
-    """Modules of the package that a text imports from; not packages, which only hand on names."""
+def kernel_sources(file: Path, package: Path = PACKAGE) -> list[Path]:
+    """What the kernels of a file are compiled from: that file and others of the package; sorted.
+
+    Others are those that it imports kernels, constants (upper case) or named tuples from, and what
+    these import in the same way.
+
+    Args:
+        file: a module of the package.
+        package: the package's folder, named as the package.
+    """
+    found = {file}
+    todo = [file]
+    while todo:
+        for source, names in _imported(package, todo.pop()):
+            if source not in found and _compiles(source, names):
+                found.add(source)
+                todo.append(source)
+    return sorted(found)
+
+
+def _imported(package: Path, file: Path) -> Iterator[tuple[Path, list[str]]]:
+    """Modules of the package that a module imports from, and the names it takes."""
+    text = file.read_text(encoding="utf-8")
     for module, one, several in re.findall(_IMPORT.format(package.name), text, re.MULTILINE):
-        above = package.joinpath(*module.split("."))
-        yield above.with_suffix(".py")
-        yield from (above / f"{name}.py" for name in re.findall(r"\w+", one or several))
+        above, names = package.joinpath(*module.split(".")), re.findall(r"\w+", one or several)
+        if above.with_suffix(".py").is_file():
+            yield above.with_suffix(".py"), names
+        for name in names:
+            if (above / f"{name}.py").is_file():
+                yield above / f"{name}.py", []
+
+
+def _compiles(source: Path, names: list[str]) -> bool:
+    """Whether kernels that import these names from a module depend on its text."""
+    text = source.read_text(encoding="utf-8")
+    return "compiled import" in text or any(
+        name.isupper() or f"class {name}(NamedTuple)" in text for name in names
+    )
 
 
 class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._digest = source_digest(Path(inspect.getfile(function)))
+        super().__init__(function)
+
     def get_filename_base(self, fullname: str, abiflags: str) -> str:
         base: str = super().get_filename_base(fullname, abiflags)
-        return f"{base}-{source_digest()}"
+        return f"{base}-{self._digest}"
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
