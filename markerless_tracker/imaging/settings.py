@@ -68,6 +68,11 @@ class ImagingSettings:
         12, "distance from the silhouette that does not follow", least=0, most=500
     )
     shadow_removal: bool = setting(True, "take pixels that look like a shadow for background")
+    shadow_undecided: bool = setting(
+        True,
+        "pixels that look like a shadow are undecided: person near the predicted body, elsewhere "
+        "not counted; false: they are background",
+    )
     shadow_value_min: float = setting(
         0.5, "darkest shadow, as a ratio of its brightness to the background's", least=0.0, most=1.0
     )

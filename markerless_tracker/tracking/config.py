@@ -23,6 +23,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         "prediction": 0.0,
         "refinement": "none",
         "search_again": False,
+        "shadow_undecided": False,
         "sigma_scale": 1.0,
     },
 }

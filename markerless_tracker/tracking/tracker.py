@@ -17,6 +17,7 @@ from markerless_tracker.records import Confidence, Observation, TrackResult, Tra
 from markerless_tracker.tracking.confidence import confidence_of
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
+from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
 from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.limits import joint_limits
@@ -220,6 +221,8 @@ class Tracker:
         observations, notes = self._views.sort(observed, self.body, expected)
         if not anybody(observations):
             return self._unseen(observed, stamp_ns, notes)
+        if self.state is not TrackState.LOST:
+            observations = decide(observations, self.rig, self.body, predicted)
         if not self._shape_fitted:
             self._shape_fitted = True
             predicted = self._take_shape(observations, stamp_ns)

@@ -24,6 +24,10 @@ SPACING_M = 0.02
 """Distance of outline points along the body's outline."""
 _VIEW_S = 0.07e-3
 """About how long the equations of one view take one thread."""
+UNDECIDED_PX = 2.0
+"""No residual is taken so near to undecided pixels."""
+_SAME_PX = 0.5
+_FAR_PX = np.float32(1e4)
 _SMALLEST_EDGE_PX = 12
 _LEAST_MARGIN_PX = 24
 
@@ -54,9 +58,12 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
 
     The window is the silhouette's bounding box and a margin of a sixth of its height. The edge
     runs midway between pixels inside and outside; where the silhouette leaves the frame, and
-    around specks, there are no points.
+    around specks, there are no points. Where the silhouette borders on undecided pixels is no edge:
+    there are no points within `UNDECIDED_PX` of them, and distances are very large where
+    that border would be the nearest edge.
     """
-    mask = _full_frame(observation)
+    mask = observation.full_frame(observation.mask.view(np.uint8))
+    undecided = observation.undecided
     height, width = mask.shape
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if rows.size == 0:
@@ -72,6 +79,10 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
     distance -= inside
     distance += window
     distance -= 0.5
+    plain, free = distance, None
+    if undecided is not None:
+        open_ = observation.full_frame(undecided.view(np.uint8))[top:bottom, left:right]
+        distance, free = _without_undecided(plain, window, np.ascontiguousarray(open_))
     contours, _ = cv2.findContours(window, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     chains: list[NDArray[Any]] = [np.empty((0, 2), dtype=np.int32)]
     spacing = [np.empty(0)]
@@ -85,9 +96,11 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
     chain = np.concatenate(chains)
     at = chain + (left, top)
     normal = np.empty(at.shape)
-    kernels.steepest(distance, chain, normal)
+    kernels.steepest(plain, chain, normal)
     length = np.linalg.norm(normal, axis=1)
     inner = (at > 0).all(axis=1) & (at < (width - 1, height - 1)).all(axis=1) & (length > 0)
+    if free is not None:
+        inner &= free[chain[:, 1], chain[:, 0]]
     normal = normal[inner] / length[inner, None]
     return SilhouetteContour(
         distance,
@@ -99,16 +112,26 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
     )
 
 
-def _full_frame(observation: Observation) -> NDArray[np.uint8]:
-    """The mask (h, w) of the whole frame: outside the observation's region there is no body."""
-    mask = observation.mask.view(np.uint8)
-    width, height = observation.size_px
-    if mask.shape == (height, width):
-        return mask
-    u, v = observation.offset_px
-    frame = np.zeros((height, width), dtype=np.uint8)
-    frame[v : v + observation.height, u : u + observation.width] = mask
-    return frame
+def _without_undecided(
+    distance: NDArray[np.float32], person: NDArray[np.uint8], undecided: NDArray[np.uint8]
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Distances (h, w), very large where the nearest edge borders on undecided pixels.
+
+    Also the pixels farther than `UNDECIDED_PX` from undecided ones. The nearest edge is one of
+    person and background where it does not matter which of both undecided pixels are.
+
+    Args:
+        distance: (h, w) to the edge of the person alone.
+        person, undecided: (h, w), 0 or 1.
+    """
+    either = person | undecided
+    wider = np.asarray(cv2.distanceTransform(1 - either, cv2.DIST_L2, 5), np.float32)
+    wider -= cv2.distanceTransform(either, cv2.DIST_L2, 5)
+    wider += either
+    wider -= 0.5
+    same = np.abs(wider - distance) < _SAME_PX
+    free = cv2.distanceTransform(1 - undecided, cv2.DIST_L2, 3) > UNDECIDED_PX
+    return np.where(same & free, distance, _FAR_PX), free
 
 
 def join_edges(edges: Sequence[SilhouetteContour]) -> ContourViews:

@@ -29,10 +29,11 @@ from markerless_tracker.imaging.segmentation.exposure import ExposureMeter
 from markerless_tracker.imaging.segmentation.level_set import level_set_reach, refine_contour
 from markerless_tracker.imaging.segmentation.morphology import (
     Mask,
-    foreground_mask,
     open_and_close,
     patch_reach,
     repair_reach,
+    shadow_patches,
+    split_undecided,
 )
 from markerless_tracker.imaging.segmentation.shadow import shadow_rule
 from markerless_tracker.imaging.segmentation.texture import correct_labels, texture_reach
@@ -110,7 +111,7 @@ class Segmenter:
         self._rule = shadow_rule(self.settings, grey=self._grey)
         self._size_px = (width, height)
         self._whole = Region.whole(self._size_px)
-        self._memory = np.empty((2, height * width), dtype=np.uint8)
+        self._memory = np.empty((3, height * width), dtype=np.uint8)
         share = options.shadow_grey_blob_share if self._grey else options.shadow_blob_share
         self._least_shadow_px = share * height * width
 
@@ -169,8 +170,20 @@ class Segmenter:
         """
         self._check(image)
         region = region or self._whole
-        mask, zone = self._silhouette(image, region, 0)
+        mask, _, zone = self._silhouette(image, region, 0)
         return mask[region.within(zone).slices]
+
+    def classes(self, image: Image, region: Region | None = None) -> tuple[Mask, Mask | None]:
+        """As `mask`, and the undecided pixels likewise; None with two classes.
+
+        Raises:
+            ImageError: as `mask`.
+        """
+        self._check(image)
+        region = region or self._whole
+        mask, undecided, zone = self._silhouette(image, region, 0)
+        inside = region.within(zone).slices
+        return mask[inside], None if undecided is None else undecided[inside]
 
     def labels(self, image: Image) -> Mask:
         """(h, w) uint8: 0 background, 127 shadow, 255 foreground, before any repair; to look at.
@@ -208,15 +221,21 @@ class Segmenter:
                 f"{self.camera}: got a region of {tuple(region)}, expected one inside the image of "
                 f"{self._size_px[0]}x{self._size_px[1]} px"
             )
-        mask, zone = self._silhouette(image, region, edge_reach(self.settings))
+        mask, undecided, zone = self._silhouette(image, region, edge_reach(self.settings))
         inside = region.within(zone).slices
-        edges = edge_map(image[zone.slices], mask, self.settings)[inside]
+        either = mask if undecided is None else cv2.bitwise_or(mask, undecided)
+        edges = edge_map(image[zone.slices], np.asarray(either, np.uint8), self.settings)[inside]
         if self._adaptation is not None and region != self._whole:
             self._adaptation.pass_over(stamp_ns)
         elif self._adaptation is not None:
             values = (grey_of(image) if self._grey else image).reshape(*mask.shape, -1)
             self._adaptation.follow(
-                values, mask, stamp_ns, self._gain, self._means_by_channel, self._scales_by_channel
+                values,
+                either,
+                stamp_ns,
+                self._gain,
+                self._means_by_channel,
+                self._scales_by_channel,
             )
             self._first = kernels.coarse(self._mean[0], self._scale[0])
         return Observation.from_mask(
@@ -224,6 +243,7 @@ class Segmenter:
             stamp_ns,
             mask[inside],
             edges,
+            undecided=None if undecided is None else undecided[inside],
             size_px=self._size_px,
             offset_px=(region.left, region.top),
         )
@@ -238,8 +258,10 @@ class Segmenter:
                 f"{kind[self.background.channels]}; expected the same"
             )
 
-    def _silhouette(self, image: Image, region: Region, reach: int) -> tuple[Mask, Region]:
-        """Mask of a zone that holds the region and `reach` px around it, and that zone.
+    def _silhouette(
+        self, image: Image, region: Region, reach: int
+    ) -> tuple[Mask, Mask | None, Region]:
+        """Person and undecided of a zone that holds the region and `reach` px around, and the zone.
 
         What is decided by the size of a patch needs all of the patch: more is looked at until none
         that is too small to tell goes on outside.
@@ -254,7 +276,9 @@ class Segmenter:
                 return found
             slack *= 4
 
-    def _try_silhouette(self, image: Image, need: Region, slack: int) -> tuple[Mask, Region] | None:
+    def _try_silhouette(
+        self, image: Image, need: Region, slack: int
+    ) -> tuple[Mask, Mask | None, Region] | None:
         """`_silhouette` with so much more around what is needed; None if that is too little."""
         size_px, options = self._size_px, self.settings
         if options.level_set_iterations:
@@ -270,12 +294,17 @@ class Segmenter:
         labels = self._labels(image, window)
         self._look_at_texture(image, labels, window, patches)
         mask = self._scratch(1, window)
-        asked = foreground_mask(
-            labels, mask, self._least_shadow_px, grey=self._grey, zone=patches.within(window),
-            need=whole.grown(repair, size_px).within(window), unknown=unknown,
+        shadow = self._scratch(2, window)
+        asked = shadow_patches(
+            labels, shadow, self._least_shadow_px, opened=self._grey or options.shadow_undecided,
+            zone=patches.within(window), need=whole.grown(repair, size_px).within(window),
+            unknown=unknown,
         )  # fmt: skip
         if asked:
             return None
+        cv2.threshold(labels, 0, 255, cv2.THRESH_BINARY, dst=mask)
+        if not options.shadow_undecided:
+            cv2.subtract(mask, shadow, dst=mask)
         # Outside of `patches` the mask is wrong, but opening and closing reach no further.
         open_and_close(mask, options, frame_px)
         inner = zone.within(window)
@@ -287,7 +316,10 @@ class Segmenter:
             return None
         self._trim(image, mask, inner, window)
         self._refine(image, mask, inner, window)
-        return mask[inner.slices], zone
+        if not options.shadow_undecided:
+            return mask[inner.slices], None, zone
+        split_undecided(mask, shadow)
+        return mask[inner.slices], shadow[inner.slices], zone
 
     def _trim(self, image: Image, mask: Mask, inner: Region, window: Region) -> None:
         """Take what the body covers by less than half from the mask's border, in place."""

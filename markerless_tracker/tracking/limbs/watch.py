@@ -126,7 +126,8 @@ def inside_fractions(
 ) -> dict[str, float]:
     """By limb, how much of its cones' axes lies inside the silhouettes, mean over the views.
 
-    Points outside a view's region count as outside, those outside its frame not at all.
+    Points outside a view's region count as outside; those outside its frame, and those on
+    undecided pixels, do not count.
     """
     placed = cone_transforms(body, pose)
     along = (body.cone_length[:, None] * _ALONG)[:, :, None]
@@ -165,8 +166,11 @@ def _look(
             axis=1
         )
     inside = np.zeros(len(points), dtype=np.bool_)
-    mask = observation.mask
+    mask, undecided = observation.mask, observation.undecided
     u, v = (np.round(pixels[framed]) - observation.offset_px).astype(np.int64).T
     there = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
-    inside[np.flatnonzero(framed)[there]] = mask[v[there], u[there]]
+    seen = np.flatnonzero(framed)[there]
+    inside[seen] = mask[v[there], u[there]]
+    if undecided is not None:
+        framed[seen] &= ~undecided[v[there], u[there]]
     return np.asarray(framed), inside

@@ -104,7 +104,7 @@ def find_hulls(
 
 def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
     """The silhouette's components that a hull's points fall on, the very same if that is all."""
-    mask = observation.mask.view(np.uint8)
+    mask = observation.not_background.view(np.uint8)
     count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
     if count <= 2:
         return observation
@@ -117,13 +117,9 @@ def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Obs
     kept[0] = False
     if not kept.any() or kept[1:].all():
         return observation
-    return Observation.from_mask(
-        observation.camera,
-        observation.stamp_ns,
-        kept[labels],
-        observation.edges,
-        size_px=observation.size_px,
-        offset_px=observation.offset_px,
+    selected, undecided = kept[labels], observation.undecided
+    return observation.with_masks(
+        observation.mask & selected, None if undecided is None else undecided & selected
     )
 
 
