@@ -16,6 +16,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import LimbState, Observation, TrackState
 from markerless_tracker.tracking.limbs.search import other_limb
+from markerless_tracker.tracking.limbs.unexplained import limbs_unexplained
 from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.population import FramePopulation
@@ -90,7 +91,8 @@ class LimbWatch:
             The pose (p,), and the names of the limbs that were taken from elsewhere.
         """
         body, config = searcher.body, searcher.config
-        due = self._due(body, stamp_ns)
+        unexplained = limbs_unexplained(body, pose, observations, self._rig)
+        due = self._due(body, stamp_ns, unexplained)
         if not due:
             return pose, ()
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
@@ -105,11 +107,11 @@ class LimbWatch:
                 found.append(name)
         return pose, tuple(found)
 
-    def _due(self, body: BodyModel, stamp_ns: int) -> list[str]:
-        """Limbs to look for: the lost ones, and at its turn another."""
+    def _due(self, body: BodyModel, stamp_ns: int, unexplained: tuple[str, ...]) -> list[str]:
+        """Limbs to search: lost ones, those near unexplained silhouette, and one more by turns."""
         if not body.limbs:
             return []
-        lost = list(self.lost)
+        lost = [*self.lost, *(name for name in unexplained[:2] if name not in self.lost)]
         if self._turned_ns is not None and 0 <= stamp_ns - self._turned_ns < TURN_NS:
             return lost
         self._turned_ns = stamp_ns
