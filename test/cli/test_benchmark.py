@@ -43,7 +43,7 @@ def test_the_same_figures_as_track_and_evaluate(walk, tmp_path: Path, capsys) ->
 
 def test_tables_for_people_and_on_disk(walk, tmp_path: Path, capsys) -> None:
     config = tmp_path / "settings.yaml"
-    config.write_text("fit_shape: false\nrefine_iterations: 2\n")
+    config.write_text("fit_shape: false\nrefine:\n  iterations: 2\n")
     words = [
         "tables", walk, "--config", str(config), "--body", "balan31,person31", "--refinement",
         "contour,none", "--seeds", "1", "--frames", "1", "--evaluations", "1000", "--fps", "60",

@@ -3,6 +3,8 @@
 import dataclasses
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import ImagingSettings
@@ -83,6 +85,27 @@ def test_groups_are_nested_or_dotted():
     assert TrackerConfig.from_mapping({"edges": {"step_px": 3}}, preset="paper").edges == (
         dataclasses.replace(TrackerConfig.from_mapping({}, preset="paper").edges, step_px=3.0)
     )
+
+
+@given(
+    st.dictionaries(
+        st.one_of(st.sampled_from(["apf", "refine", "apf.layers", "seed"]), st.text(), st.none()),
+        st.recursive(
+            st.one_of(st.none(), st.integers(), st.floats(), st.text()),
+            lambda inner: st.dictionaries(
+                st.one_of(st.sampled_from(["layers", "iterations"]), st.text(), st.integers()),
+                inner,
+            ),
+        ),
+    )
+)
+def test_any_mapping_is_a_configuration_or_refused_in_one_line(values):
+    try:
+        config = TrackerConfig.from_mapping(values)
+    except ConfigError as error:
+        assert "\n" not in str(error)
+    else:
+        assert TrackerConfig.from_mapping(config.as_mapping()) == config
 
 
 def test_messages_name_the_group():
