@@ -11,10 +11,10 @@ from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.arrays import body_arrays, camera_arrays
 from markerless_tracker.fitness.raster.fill import clear_used, fill_outline
 from markerless_tracker.fitness.raster.kernels import cone_ends
-from markerless_tracker.fitness.raster.outline import (
+from markerless_tracker.fitness.raster.outline import find_outlines
+from markerless_tracker.fitness.raster.outline_arrays import (
     HIDDEN,
     LANES,
-    find_outlines,
     make_outlines,
     outlines_of,
 )

@@ -164,9 +164,8 @@ def _look(
     """Which of the points (n, 3) a view has in its frame, and which in its silhouette."""
     pixels = project_camera(points, rig[observation.camera])
     with np.errstate(invalid="ignore"):
-        framed = (pixels >= 0.0).all(axis=1) & (pixels <= np.array(observation.size_px) - 1).all(
-            axis=1
-        )
+        last = np.array(observation.size_px) - 1
+        framed = np.asarray((pixels >= 0.0).all(axis=1) & (pixels <= last).all(axis=1))
     inside = np.zeros(len(points), dtype=np.bool_)
     mask, undecided = observation.mask, observation.undecided
     u, v = (np.round(pixels[framed]) - observation.offset_px).astype(np.int64).T
@@ -175,4 +174,4 @@ def _look(
     inside[seen] = mask[v[there], u[there]]
     if undecided is not None:
         framed[seen] &= ~undecided[v[there], u[there]]
-    return np.asarray(framed), inside
+    return framed, inside
