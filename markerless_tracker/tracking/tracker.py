@@ -74,6 +74,7 @@ class Tracker:
         person: Unmeasured | None = None,
     ) -> None:
         self.rig = rig
+        self._cameras = {camera.name: camera for camera in rig}
         self.config = config
         self._person = person
         self._smooth = OneEuro(body) if config.smoothing == "one_euro" else None
@@ -222,7 +223,7 @@ class Tracker:
         if not anybody(observations):
             return self._unseen(observed, stamp_ns, notes)
         if self.state is not TrackState.LOST:
-            observations = decide(observations, self.rig, self.body, predicted)
+            observations = decide(observations, self._cameras, self.body, predicted)
         if not self._shape_fitted:
             self._shape_fitted = True
             predicted = self._take_shape(observations, stamp_ns)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from markerless_tracker.body import BodyModel
-from markerless_tracker.camera import CameraRig
+from markerless_tracker.camera import CameraModel
 from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
@@ -16,7 +16,10 @@ NEAR_PX = 2
 
 
 def decide(
-    observed: Mapping[str, Observation], rig: CameraRig, body: BodyModel, pose: FloatArray
+    observed: Mapping[str, Observation],
+    cameras: Mapping[str, CameraModel],
+    body: BodyModel,
+    pose: FloatArray,
 ) -> dict[str, Observation]:
     """Observations whose undecided pixels near a body at a pose (p,) are person.
 
@@ -25,7 +28,7 @@ def decide(
     open_ = [name for name, seen in observed.items() if seen.undecided_words is not None]
     if not open_:
         return dict(observed)
-    bodies = body_masks(body, pose, [rig[name] for name in open_])
+    bodies = body_masks(body, pose, [cameras[name] for name in open_])
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEAR_PX + 1, 2 * NEAR_PX + 1))
     decided = dict(observed)
     for name in open_:

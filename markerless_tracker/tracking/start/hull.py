@@ -109,7 +109,11 @@ def find_hulls(
 
 
 def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
-    """The silhouette's components that a hull's points fall on, the very same if that is all."""
+    """The silhouette's components that a hull's points fall on, the very same if that is all.
+
+    Undecided pixels that the hull covers are person: what all views allow is no shadow.
+    """
+    observation = decided_by_hull(observation, camera, hull)
     mask = observation.not_background.view(np.uint8)
     count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
     if count <= 2:
@@ -127,6 +131,26 @@ def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Obs
     return observation.with_masks(
         observation.mask & selected, None if undecided is None else undecided & selected
     )
+
+
+def decided_by_hull(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
+    """The observation with undecided pixels as person where the hull's points fall."""
+    undecided = observation.undecided
+    if undecided is None:
+        return observation
+    pixels = project_camera(hull.points_m, camera) - observation.offset_px
+    with np.errstate(invalid="ignore"):
+        u, v = np.round(pixels).T
+        framed = (u >= 0) & (v >= 0) & (u < observation.width) & (v < observation.height)
+    covered = np.zeros(undecided.shape, dtype=np.uint8)
+    covered[v[framed].astype(np.int64), u[framed].astype(np.int64)] = 1
+    middle = hull.points_m.mean(axis=0)
+    depth = float(camera.T_cam_world[2, :3] @ middle + camera.T_cam_world[2, 3])
+    side = 2 * int(0.75 * FINE_M * float(camera.matrix[0, 0]) / max(depth, 1.0)) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    covered = np.asarray(cv2.morphologyEx(covered, cv2.MORPH_CLOSE, kernel), dtype=np.uint8)
+    person = undecided & (covered > 0)
+    return observation.with_masks(observation.mask | person, undecided & ~person)
 
 
 def _fine(
