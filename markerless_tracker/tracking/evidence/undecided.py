@@ -11,7 +11,7 @@ from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
-NEAR_PX = 2
+NEAR_PX = 1
 """Undecided pixels so near to the body belong to the person."""
 
 
