@@ -76,6 +76,22 @@ class ShadowSettings(SettingsGroup):
         "pixels that look like a shadow are undecided: person near the predicted body, elsewhere "
         "not counted; false: they are background",
     )
+    weak_sigmas: float = setting(
+        6.0,
+        "patches whose mean differs from the background by so many standard errors are undecided; "
+        "0 = none",
+        least=0.0,
+        most=1000.0,
+    )
+    weak_least: float = setting(
+        4.0, "least difference of such a patch, grey levels", least=0.0, most=255.0
+    )
+    undecided_value_min: float = setting(
+        0.35,
+        "value_min where shadows are undecided, of colour and grey cameras alike",
+        least=0.0,
+        most=1.0,
+    )
     value_min: float = setting(
         0.5, "darkest shadow, as a ratio of its brightness to the background's", least=0.0, most=1.0
     )

@@ -17,6 +17,9 @@ from markerless_tracker.imaging.segmentation.shadow import shadow_rule
 from markerless_tracker.imaging.segmentation.texture import correct_labels, texture_reach
 from markerless_tracker.imaging.settings import ImagingSettings
 
+WEAK_RADIUS_PX = 3
+"""Radius of the patches whose mean is compared with the background."""
+_LEAST_SHARE = 0.5
 LOOK_PX = 3
 """Radius within which the choice of pixels whose texture is examined depends on their labels."""
 _SOLID = np.ones((3, 3), dtype=np.uint8)
@@ -92,7 +95,33 @@ class PixelLabeller:
         )  # fmt: skip
         if self._uses_texture:
             self._correct_by_texture(image, labels, window, corrected)
+        if self._settings.shadow.undecided and self._settings.shadow.weak_sigmas > 0.0:
+            self._mark_weak(image, labels, window)
         return labels
+
+    def _mark_weak(self, image: Image, labels: Mask, window: Region) -> None:
+        """Label background as shadow where a patch differs from it, though no single pixel does.
+
+        The mean of a patch has less noise than a pixel: clothes nearly of the background's colour
+        are found this way, and faint shadows.
+        """
+        background = self.background
+        part = background.pixels(image, window).astype(np.float32)
+        mean = background.mean[0][:, window.top : window.bottom, window.left : window.right]
+        plain = labels == 0
+        side = 2 * WEAK_RADIUS_PX + 1
+        limit = max(
+            self._settings.shadow.weak_least,
+            self._settings.shadow.weak_sigmas * background.sigma / side,
+        )
+        # Pixels that differ by themselves would smear over those beside them.
+        share = cv2.boxFilter(plain.astype(np.float32), cv2.CV_32F, (side, side))
+        weak = np.zeros(part.shape[:2], dtype=np.bool_)
+        for c in range(part.shape[2]):
+            plane = part[:, :, c] - np.minimum(self.gain[c] * mean[c], np.float32(255.0))
+            smooth = cv2.boxFilter(plane * plain, cv2.CV_32F, (side, side))
+            weak |= np.abs(smooth) > limit * np.maximum(share, _LEAST_SHARE)
+        labels[weak & plain] = kernels.SHADOW
 
     def _correct_by_texture(
         self, image: Image, labels: Mask, window: Region, corrected: Region

@@ -21,9 +21,13 @@ def shadow_rule(settings: ImagingSettings, *, grey: bool = False) -> tuple[np.fl
     """
     if not settings.shadow.removal:
         return tuple(np.float32(x) for x in (2.0, -1.0, 0.0, 0.0, 0.0))
+    darkest = settings.shadow.grey_value_min if grey else settings.shadow.value_min
+    faintest = settings.shadow.grey_value_max if grey else settings.shadow.value_max
+    if settings.shadow.undecided:
+        darkest, faintest = settings.shadow.undecided_value_min, settings.shadow.value_max
     return (
-        np.float32(settings.shadow.grey_value_min if grey else settings.shadow.value_min),
-        np.float32(settings.shadow.grey_value_max if grey else settings.shadow.value_max),
+        np.float32(darkest),
+        np.float32(faintest),
         np.float32(settings.shadow.saturation_max),
         np.float32(settings.shadow.hue_max_deg),
         np.float32(settings.shadow.chroma_min),
