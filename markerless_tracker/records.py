@@ -93,6 +93,16 @@ class Observation:
         """The silhouette of the region, unpacked: (h, w)."""
         return unpack_mask(self.mask_words, self.width)
 
+    def full_frame(self, region: NDArray[Any]) -> NDArray[Any]:
+        """An array (h, w) of the region in the full frame (height, width), 0 outside."""
+        width, height = self.size_px
+        if region.shape == (height, width):
+            return region
+        frame = np.zeros((height, width), dtype=region.dtype)
+        u, v = self.offset_px
+        frame[v : v + self.height, u : u + self.width] = region
+        return frame
+
     @classmethod
     def from_mask(
         cls,

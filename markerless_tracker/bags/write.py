@@ -29,7 +29,7 @@ from markerless_tracker.datasets.target import new_folder
 from markerless_tracker.datasets.writer import write_background
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.imaging import Image, write_background_model
-from markerless_tracker.imaging.background.model_file import SUFFIX as MODEL_SUFFIX
+from markerless_tracker.imaging.background import MODEL_SUFFIX
 
 COMPRESSIONS = ("none", "zstd", "jpeg")
 # Stamps of ROS are int32 seconds; earlier or later ones cannot be written.

@@ -19,7 +19,7 @@ from markerless_tracker.imaging import (
     scale_background_model,
     scale_image,
 )
-from markerless_tracker.imaging.background.model_file import SUFFIX as MODEL_SUFFIX
+from markerless_tracker.imaging.background import MODEL_SUFFIX
 
 # More empty images than this teach nothing new and would not fit memory at full size.
 MAX_FRAMES = 120

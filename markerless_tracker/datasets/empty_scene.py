@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from markerless_tracker.datasets.recording import Recording
-from markerless_tracker.imaging import Image
-from markerless_tracker.imaging.background.plate import background_plate
+from markerless_tracker.imaging import Image, background_plate
 
 # Frames that learning looks at, spread over the recording.
 FRAMES = 36

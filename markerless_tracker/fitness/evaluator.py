@@ -11,9 +11,16 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.fitness.arrays import Views, body_arrays, lay_out_views
-from markerless_tracker.fitness.raster import kernels
-from markerless_tracker.fitness.raster.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule
-from markerless_tracker.fitness.raster.outline_arrays import make_outlines
+from markerless_tracker.fitness.raster import (
+    OUTLINE,
+    SIDES,
+    VISIBLE,
+    EdgeRule,
+    evaluate,
+    evaluate_parallel,
+    make_outlines,
+    make_scratch,
+)
 from markerless_tracker.fitness.raster.static_layer import Drawing, split_static
 from markerless_tracker.fitness.terms import OVERLAP, PROJECTED, CostRule, view_terms
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
@@ -97,7 +104,7 @@ class Fitness:
         )
         height = max(camera.size_px[1] for camera in cameras)
         self._outlines = make_outlines(self.threads, height)
-        self._scratch = kernels.make_scratch(
+        self._scratch = make_scratch(
             self.threads,
             body.size,
             body.node_parent.size,
@@ -159,16 +166,16 @@ class Fitness:
         costs = np.empty(len(points))
         args = (
             points, active, centre, cutoff_costs, drawing.body, views.arrays,
-            drawing.silhouette_cones, drawing.edge_cones, self._rule, cost, drawing.still,
+            drawing.silhouette_cones, drawing.edge_cones, self._rule, cost, drawing.static,
             self._scratch, self._outlines, counts, costs,
         )  # fmt: skip
         work_s = len(points) * len(views.names) * drawing.silhouette_cones.size * _CONE_S
         if not worth_waking(work_s, self.threads):
-            kernels.evaluate(*args, 0, 1)
+            evaluate(*args, 0, 1)
         else:
             with ONE_CALLER:
                 numba.set_num_threads(self.threads)
-                kernels.evaluate_parallel(*args)
+                evaluate_parallel(*args)
         return counts, costs
 
 

@@ -5,11 +5,11 @@ import numpy as np
 
 from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image, grey_of
-from markerless_tracker.imaging.segmentation.morphology import Mask
+from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.settings import ImagingSettings
 
 
-def edge_reach(settings: ImagingSettings) -> int:
+def edge_radius_px(settings: ImagingSettings) -> int:
     """How far from a pixel its edge strength looks at the mask and the image, px."""
     return settings.edge_margin_px + settings.edge_blur_px // 2 + 1
 
@@ -33,9 +33,9 @@ def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
     if w == 0 or h == 0:
         return edges
     margin = settings.edge_margin_px
-    reach = margin + settings.edge_blur_px + 1
-    u0, v0 = max(left - reach, 0), max(top - reach, 0)
-    u1, v1 = min(left + w + reach, width), min(top + h + reach, height)
+    border_px = margin + settings.edge_blur_px + 1
+    u0, v0 = max(left - border_px, 0), max(top - border_px, 0)
+    u1, v1 = min(left + w + border_px, width), min(top + h + border_px, height)
     strength = _gradient_strength(grey_of(image[v0:v1, u0:u1]), settings)
     near = mask[v0:v1, u0:u1]
     if margin > 0:

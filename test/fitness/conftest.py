@@ -12,7 +12,7 @@ from markerless_tracker.body import BodyModel, cone_transforms, load_body
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
-from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, Stage
 from markerless_tracker.synthesis import ring_rig

@@ -36,8 +36,8 @@ def test_only_active_parameters_leave_the_centre(body, rig, pose, observations, 
     points = np.array([[0.1, 0.9, -0.2], [-0.1, 1.0, 0.0]])
     poses = evaluate.poses(points)
     np.testing.assert_array_equal(poses[:, active], points)
-    still = np.setdiff1d(np.arange(body.size), active)
-    np.testing.assert_array_equal(poses[:, still], np.tile(pose[still], (2, 1)))
+    held = np.setdiff1d(np.arange(body.size), active)
+    np.testing.assert_array_equal(poses[:, held], np.tile(pose[held], (2, 1)))
     whole = fitness.prepare(fitness.lay_out(observations), make_stage(body, pose))
     np.testing.assert_array_equal(evaluate(points), whole(poses))
 

@@ -21,7 +21,7 @@ from markerless_tracker.fitness.contour.silhouette_contour import (
     edge_of_mask,
     join_edges,
 )
-from markerless_tracker.fitness.raster.outline_arrays import Outlines, make_outlines
+from markerless_tracker.fitness.raster import Outlines, make_outlines
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation

@@ -44,8 +44,8 @@ def nearest_facing(u, v, nu, nv, bands, pixel, normal, start, order):  # type: i
             rows = min(v - (home - away + 1) * BAND_PX, (home + away) * BAND_PX - v)
             if rows > 0 and rows * rows >= best:
                 break
-        for turn in range(2 if away > 0 else 1):
-            band = home - away if turn == 0 else home + away
+        for side in range(2 if away > 0 else 1):
+            band = home - away if side == 0 else home + away
             if band < 0 or band >= bands:
                 continue
             for i in range(start[band], start[band + 1]):

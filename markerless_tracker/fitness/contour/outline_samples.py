@@ -92,10 +92,10 @@ def _sample_arc(  # type: ignore[no-untyped-def]
     bu, bv = flat[at + 4 * LANES], flat[at + 5 * LANES]
     radius = np.sqrt(max(au * au + av * av, bu * bu + bv * bv))
     n = np.int64(min(max(3.0, np.ceil(radius * k[0] * abs(sweep) / spacing_px)), 200.0))
-    turn = sweep / n
-    turn_cos, turn_sin = np.cos(turn), np.sin(turn)
+    step = sweep / n
+    step_cos, step_sin = np.cos(step), np.sin(step)
     # The arc begins half a step before its first point.
-    half_cos, half_sin = np.cos(0.5 * turn), np.sin(0.5 * turn)
+    half_cos, half_sin = np.cos(0.5 * step), np.sin(0.5 * step)
     cos, sin = arcs[4 * e * LANES + c], arcs[(4 * e + 1) * LANES + c]
     cos, sin = cos * half_cos - sin * half_sin, sin * half_cos + cos * half_sin
     p = 9 * e * LANES + c
@@ -123,13 +123,13 @@ def _sample_arc(  # type: ignore[no-untyped-def]
                         world[row] + cos * world[row + 3 * LANES] + sin * world[row + 6 * LANES]
                     )
                 depth[kept] = z
-                length[kept] = norm * abs(turn) * z / k[0]
+                length[kept] = norm * abs(step) * z / k[0]
                 cone[kept] = c
                 shape[kept, 0], shape[kept, 1] = cos, sin
                 shape[kept, 2], shape[kept, 3] = cos, sin
                 shape[kept, 4] = e
                 kept += 1
-        cos, sin = cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin
+        cos, sin = cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin
     return kept
 
 

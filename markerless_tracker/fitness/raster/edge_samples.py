@@ -24,7 +24,7 @@ class EdgeRule(NamedTuple):
 
 @kernel
 def sample_side(  # type: ignore[no-untyped-def]
-    pu, pv, qu, qv, outward, bits, still, start, edges, edge_start, width, height, rule,
+    pu, pv, qu, qv, outward, bits, static, start, edges, edge_start, width, height, rule,
     listed, listed_count,
 ):  # fmt: skip
     """Add up the edge map along the segment (pu, pv) to (qu, qv).
@@ -32,7 +32,7 @@ def sample_side(  # type: ignore[no-untyped-def]
     Args:
         outward: +1 or -1, the side of the segment that faces away from its cone.
         bits: what hides a sample: nearer cones (VISIBLE) or the moving parts (OUTLINE).
-        still: the still parts, flat from `start` on, which hide it too (OUTLINE); may be empty.
+        static: the static parts, flat from `start` on, which hide it too (OUTLINE); may be empty.
         edges: uint8 edge map, flat from `edge_start` on.
         listed: (s, 2): samples that other parts may hide (OUTLINE) are not added but listed there,
             from row `listed_count` on: word * 64 + bit that hides it, what it adds. With no rows
@@ -53,7 +53,7 @@ def sample_side(  # type: ignore[no-untyped-def]
     du, dv = du * share, dv * share
     pu, pv = pu + 0.5 * du, pv + 0.5 * dv
     u_end, v_end = width - 0.5, height - 0.5
-    beside, squared, which = still.size > 0, rule.squared, rule.rule
+    beside, squared, which = static.size > 0, rule.squared, rule.rule
     listing = listed.shape[0] > 0
     qu, qv = pu + (samples - 1) * du, pv + (samples - 1) * dv
     border = abs(rule.step_px) + 1.0
@@ -74,7 +74,7 @@ def sample_side(  # type: ignore[no-untyped-def]
             there = (far_u >> np.uint64(6)) * np.uint64(height) + far_v
             hiding = bits[there]
             if beside:
-                hiding |= still[np.uint64(start) + there]
+                hiding |= static[np.uint64(start) + there]
             free = int(~(hiding >> (far_u & np.uint64(63))) & np.uint64(1))
             pixel = np.int64(v + 0.5) * width + np.int64(u + 0.5)
             total += free * _worth(edges[np.uint64(edge_start + pixel)], squared)
@@ -94,7 +94,7 @@ def sample_side(  # type: ignore[no-untyped-def]
                 at = np.uint64((x >> 6) * height + y)
                 word = bits[at]
                 if beside:
-                    word |= still[np.uint64(start) + at]
+                    word |= static[np.uint64(start) + at]
                 if (word >> np.uint64(x & 63)) & np.uint64(1) != np.uint64(0):
                     continue
                 if listing:
@@ -116,7 +116,7 @@ def _worth(strength, squared):  # type: ignore[no-untyped-def]
 
 @kernel
 def sample_cone(  # type: ignore[no-untyped-def]
-    c, count, wanted, out, bits, still, start, edges, edge_start, width, height, rule,
+    c, count, wanted, out, bits, static, start, edges, edge_start, width, height, rule,
     listed, listed_count,
 ):  # fmt: skip
     """Sample the sides of one cone, and its far end's edge, where wanted (c, 2).
@@ -138,7 +138,7 @@ def sample_cone(  # type: ignore[no-untyped-def]
             a, b, outward, asked = far, near, 1.0, wanted[c, 1]
         if asked:
             more, found, listed_count = sample_side(
-                u[a], v[a], u[b], v[b], outward, bits, still, start, edges, edge_start, width,
+                u[a], v[a], u[b], v[b], outward, bits, static, start, edges, edge_start, width,
                 height, rule, listed, listed_count,
             )  # fmt: skip
             total, number = total + more, number + found
@@ -146,12 +146,12 @@ def sample_cone(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def recount_still(view, still, bits):  # type: ignore[no-untyped-def]
-    """EDGE_SUM and EDGE_COUNT of a view's still samples that the moving parts do not hide."""
+def recount_static(view, static, bits):  # type: ignore[no-untyped-def]
+    """EDGE_SUM and EDGE_COUNT of a view's static samples that the moving parts do not hide."""
     total, number = 0, 0
-    for s in range(still.sample_start[view], still.sample_start[view + 1]):
-        at = np.uint64(still.samples[s, 0])
+    for s in range(static.sample_start[view], static.sample_start[view + 1]):
+        at = np.uint64(static.samples[s, 0])
         if (bits[at >> np.uint64(6)] >> (at & np.uint64(63))) & np.uint64(1) == np.uint64(0):
-            total += still.samples[s, 1]
+            total += static.samples[s, 1]
             number += 1
     return total, number

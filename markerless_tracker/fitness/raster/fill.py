@@ -95,14 +95,14 @@ def count_and_wipe(words, height, bits, mask, start, used):  # type: ignore[no-u
 
 
 @kernel
-def count_beside_and_wipe(words, height, bits, mask, still, start, used):  # type: ignore[no-untyped-def]
-    """As `count_and_wipe`, of the set bits that are not among those of `still`, flat likewise."""
+def count_beside_and_wipe(words, height, bits, mask, static, start, used):  # type: ignore[no-untyped-def]
+    """As `count_and_wipe`, of the set bits that are not among those of `static`, flat likewise."""
     overlap = np.uint64(0)
     projected = np.uint64(0)
     for w in range(words):
         base, there = np.uint64(w * height), np.uint64(start + w * height)
         for v in range(np.uint64(used[w, 0]), np.uint64(used[w, 1] + 1)):
-            word = bits[base + v] & ~still[there + v]
+            word = bits[base + v] & ~static[there + v]
             overlap += popcount(word & mask[there + v])
             projected += popcount(word)
             bits[base + v] = np.uint64(0)

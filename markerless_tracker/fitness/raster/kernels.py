@@ -17,7 +17,7 @@ from markerless_tracker.compiled import compiled, kernel
 from markerless_tracker.fitness.raster.edge_samples import (
     OUTLINE,
     VISIBLE,
-    recount_still,
+    recount_static,
     sample_cone,
 )
 from markerless_tracker.fitness.raster.fill import (
@@ -66,8 +66,8 @@ class StaticLayer(NamedTuple):
     Attributes:
         moving: nodes that are worked out for every pose, parents first.
         nodes: (m, 3, 4) transforms of all nodes at the search's centre.
-        bits: the still parts' silhouette, as `ViewArrays.mask`; empty if everything moves.
-        counts: (v, 4) the still parts' own, without edge samples that something may hide.
+        bits: the static parts' silhouette, as `ViewArrays.mask`; empty if everything moves.
+        counts: (v, 4) the static parts' own, without edge samples that something may hide.
         sample_start: (v + 1,) view i's edge samples that something may hide begin at
             sample_start[i].
         samples: (s, 2) word * 64 + bit that hides each, and what it adds.
@@ -129,7 +129,7 @@ def _nearest_first(cones, ends, order):  # type: ignore[no-untyped-def]
 
 @kernel
 def compare_view(  # type: ignore[no-untyped-def]
-    body_cones, edge_cones, views, view, rule, still, world, out, bits, used, order, counts
+    body_cones, edge_cones, views, view, rule, static, world, out, bits, used, order, counts
 ):
     """Draw the moving cones into one view and count.
 
@@ -142,7 +142,7 @@ def compare_view(  # type: ignore[no-untyped-def]
     cones = body_cones.size
     width, height, words = views.size[view, 0], views.size[view, 1], views.words[view]
     start, edge_start = views.mask_start[view], views.edge_start[view]
-    beside = still.bits.size > 0
+    beside = static.bits.size > 0
     count = find_outlines(cones, views, view, world, out)
     clear_used(words, height, used)
     for c in range(cones):
@@ -158,8 +158,8 @@ def compare_view(  # type: ignore[no-untyped-def]
             sampled = True
             if rule.rule != OUTLINE:
                 more, number, _ = sample_cone(
-                    c, count, edge_cones, out, bits, still.bits, start, views.edges, edge_start,
-                    width, height, rule, still.samples[:0], 0,
+                    c, count, edge_cones, out, bits, static.bits, start, views.edges, edge_start,
+                    width, height, rule, static.samples[:0], 0,
                 )  # fmt: skip
                 edge_sum, edge_count = edge_sum + more, edge_count + number
         if body_cones[c]:
@@ -168,8 +168,8 @@ def compare_view(  # type: ignore[no-untyped-def]
         for c in range(cones):
             if out.form[c] != HIDDEN and (edge_cones[c, 0] or edge_cones[c, 1]):
                 more, number, _ = sample_cone(
-                    c, count, edge_cones, out, bits, still.bits, start, views.edges, edge_start,
-                    width, height, rule, still.samples[:0], 0,
+                    c, count, edge_cones, out, bits, static.bits, start, views.edges, edge_start,
+                    width, height, rule, static.samples[:0], 0,
                 )  # fmt: skip
                 edge_sum, edge_count = edge_sum + more, edge_count + number
     if not beside:
@@ -177,19 +177,19 @@ def compare_view(  # type: ignore[no-untyped-def]
         counts[OVERLAP], counts[PROJECTED] = overlap, projected
         counts[EDGE_SUM], counts[EDGE_COUNT] = edge_sum, edge_count
         return
-    more, number = recount_still(view, still, bits)
+    more, number = recount_static(view, static, bits)
     overlap, projected = count_beside_and_wipe(
-        words, height, bits, views.mask, still.bits, start, used
+        words, height, bits, views.mask, static.bits, start, used
     )
-    counts[OVERLAP] = still.counts[view, OVERLAP] + overlap
-    counts[PROJECTED] = still.counts[view, PROJECTED] + projected
-    counts[EDGE_SUM] = still.counts[view, EDGE_SUM] + edge_sum + more
-    counts[EDGE_COUNT] = still.counts[view, EDGE_COUNT] + edge_count + number
+    counts[OVERLAP] = static.counts[view, OVERLAP] + overlap
+    counts[PROJECTED] = static.counts[view, PROJECTED] + projected
+    counts[EDGE_SUM] = static.counts[view, EDGE_SUM] + edge_sum + more
+    counts[EDGE_COUNT] = static.counts[view, EDGE_COUNT] + edge_count + number
 
 
 @kernel
 def evaluate(  # type: ignore[no-untyped-def]
-    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, still,
+    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, static,
     scratch, outlines, counts, costs, thread, threads,
 ):  # fmt: skip
     """Fill costs (n,) and counts (n, v, 4) of points (n, d), every `threads`-th
@@ -217,7 +217,7 @@ def evaluate(  # type: ignore[no-untyped-def]
     for m in range(nodes.shape[0]):
         for i in range(3):
             for j in range(4):
-                nodes[m, i, j] = still.nodes[m, i, j]
+                nodes[m, i, j] = static.nodes[m, i, j]
     for n in range(thread, points.shape[0], threads):
         finite = True
         for i in range(active.size):
@@ -229,19 +229,19 @@ def evaluate(  # type: ignore[no-untyped-def]
                     counts[n, view, i] = np.nan
             costs[n] = np.nan
             continue
-        for i in range(still.moving.size):
+        for i in range(static.moving.size):
             node_transform(
-                still.moving[i], pose, body.parent, body.fixed, body.kind, body.sign,
+                static.moving[i], pose, body.parent, body.fixed, body.kind, body.sign,
                 body.parameter, nodes,
             )  # fmt: skip
         place_cones(body, nodes, world)
         total = 0.0
         for view in range(seen):
-            low = (total + still.least[view]) / seen - _ROUNDING
+            low = (total + static.least[view]) / seen - _ROUNDING
             if low >= cutoff_costs[n]:
                 break
             compare_view(
-                body_cones, edge_cones, views, view, rule, still, world, out, bits, used, order,
+                body_cones, edge_cones, views, view, rule, static, world, out, bits, used, order,
                 counts[n, view],
             )  # fmt: skip
             total += view_cost(counts[n, view], views.observed[view], cost)
@@ -251,7 +251,7 @@ def evaluate(  # type: ignore[no-untyped-def]
 
 @compiled(parallel=True)
 def evaluate_parallel(  # type: ignore[no-untyped-def]
-    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, still,
+    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, static,
     scratch, outlines, counts, costs,
 ):  # fmt: skip
     """As `evaluate`, on as many threads as the scratch memory is for."""
@@ -259,5 +259,5 @@ def evaluate_parallel(  # type: ignore[no-untyped-def]
     for thread in prange(threads):
         evaluate(
             points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost,
-            still, scratch, outlines, counts, costs, thread, threads,
+            static, scratch, outlines, counts, costs, thread, threads,
         )  # fmt: skip

@@ -26,7 +26,7 @@ from markerless_tracker.fitness.raster.outline_points import (
 from markerless_tracker.fitness.raster.tangents import find_forms, find_tangents, to_camera
 
 # cos and sin around a full turn, for polygons without and with points inside the sides.
-_TURNS = tuple(
+_CIRCLES = tuple(
     np.array([np.cos(angle), np.sin(angle)])
     for angle in (
         2.0 * np.pi * np.arange(2 * ARC_POINTS) / (2 * ARC_POINTS),
@@ -85,10 +85,10 @@ def find_outlines(cones, views, view, world, out):  # type: ignore[no-untyped-de
         place_side(cones, 0, near + ARC_POINTS, out.ends, out.arcs, out.u, out.v)
     for c in range(cones):
         if out.form[c] >= ONLY_END:
-            turn = _TURNS[1] if distorted else _TURNS[0]
+            circle = _CIRCLES[1] if distorted else _CIRCLES[0]
             at = 9 * (out.form[c] - ONLY_END) * LANES + c
             for i in range(count):
-                place_point(turn[0, i], turn[1, i], at, i * LANES + c, out.ends, out.u, out.v)
+                place_point(circle[0, i], circle[1, i], at, i * LANES + c, out.ends, out.u, out.v)
     to_pixels(cones, count, views.intrinsics[view], distortion, distorted, out.u, out.v)
     scan_edges(cones, count, views.size[view, 1], out.u, out.v, out.first, out.slope, out.box)
     return count

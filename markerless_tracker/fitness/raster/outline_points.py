@@ -33,10 +33,10 @@ def place_arc(cones, e, row, ends, flat, arcs, u, v):  # type: ignore[no-untyped
     a, b as the directions of w a + b and a + w b, without any angle.
     """
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
-    at, way, to = 9 * e * LANES, 4 * e * LANES, row * LANES
+    at, row_of_arc, to = 9 * e * LANES, 4 * e * LANES, row * LANES
     for c in range(n):
-        ca, sa = arcs[way + c], arcs[way + LANES + c]
-        cb, sb = arcs[way + 2 * LANES + c], arcs[way + 3 * LANES + c]
+        ca, sa = arcs[row_of_arc + c], arcs[row_of_arc + LANES + c]
+        cb, sb = arcs[row_of_arc + 2 * LANES + c], arcs[row_of_arc + 3 * LANES + c]
         sense = -1.0 if clockwise(6 * e * LANES + c, flat) else 1.0
         # The middle lies across the chord and along the sum; the longer of the two is sure.
         hc, hs = cb - ca, sb - sa

@@ -39,13 +39,13 @@ class Drawing:
         body: all nodes, and the cones that are drawn for every pose.
         silhouette_cones: (c,) which of them make the silhouette.
         edge_cones: (c, 2) whether their sides, and their far edges, are sampled.
-        still: what is drawn once.
+        static: what is drawn once.
     """
 
     body: BodyArrays
     silhouette_cones: NDArray[np.bool_]
     edge_cones: NDArray[np.bool_]
-    still: StaticLayer
+    static: StaticLayer
 
 
 def split_static(
@@ -64,7 +64,7 @@ def split_static(
     """Draw the cones that do not depend on the active parameters (d,), at a centre (p,).
 
     Which edges are visible depends on the order of all cones in depth: where such edges are
-    sampled, nothing counts as still.
+    sampled, nothing counts as static.
 
     Args:
         body: the body.
@@ -97,14 +97,14 @@ def split_static(
         longest = ceil(int(views.size.sum(axis=1).max()) / rule.spacing_px) + _SPARE
         sides = int(sampled[rest].sum()) * _SIDES if rule.rule == OUTLINE else 0
         listed = np.empty((count * sides * longest, 2), dtype=np.int64)
-        _draw_still(
+        _draw_static(
             centre, _some(arrays, rest), views, silhouette_cones[rest], sampled[rest], rule, cost,
             scratch.used[0], nodes, scratch.world[0], outlines, bits, counts, start, listed, least,
         )  # fmt: skip
-    still = StaticLayer(
+    static = StaticLayer(
         np.flatnonzero(moves), nodes, bits, counts, start, listed[: start[-1]], least,
     )  # fmt: skip
-    return Drawing(_some(arrays, drawn), silhouette_cones[drawn], sampled[drawn], still)
+    return Drawing(_some(arrays, drawn), silhouette_cones[drawn], sampled[drawn], static)
 
 
 def _some(arrays: BodyArrays, cones: NDArray[np.int64]) -> BodyArrays:
@@ -118,7 +118,7 @@ def _some(arrays: BodyArrays, cones: NDArray[np.int64]) -> BodyArrays:
 
 
 @kernel
-def _draw_still(  # type: ignore[no-untyped-def]
+def _draw_static(  # type: ignore[no-untyped-def]
     centre, body, views, silhouette_cones, edge_cones, rule, cost, used, nodes, world, outlines,
     bits, counts, start, listed, least,
 ):  # fmt: skip

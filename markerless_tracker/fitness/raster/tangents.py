@@ -54,14 +54,14 @@ def find_forms(cones, ends, flat, form):  # type: ignore[no-untyped-def]
         gu, gv = flat[6 * LANES + c] - flat[c], flat[7 * LANES + c] - flat[LANES + c]
         apart = gu * gu + gv * gv > 1e-18
         du, dv = (gu if apart else 1.0), (gv if apart else 0.0)
-        # How far each end reaches from its centre along the way between them, times its length.
+        # Extent of each end from its centre along the line of centres, times that line's length.
         pa = flat[2 * LANES + c] * du + flat[3 * LANES + c] * dv
         pb = flat[4 * LANES + c] * du + flat[5 * LANES + c] * dv
         qa = flat[8 * LANES + c] * du + flat[9 * LANES + c] * dv
         qb = flat[10 * LANES + c] * du + flat[11 * LANES + c] * dv
-        reach = np.sqrt(qa * qa + qb * qb) - np.sqrt(pa * pa + pb * pb)
+        wider = np.sqrt(qa * qa + qb * qb) - np.sqrt(pa * pa + pb * pb)
         gap = gu * du + gv * dv
-        only = ONLY_END if gap + reach <= 0.0 else (ONLY_END + 1 if gap - reach <= 0.0 else TAPERED)
+        only = ONLY_END if gap + wider <= 0.0 else (ONLY_END + 1 if gap - wider <= 0.0 else TAPERED)
         near_0 = ends[2 * LANES + c] - abs(ends[5 * LANES + c]) - abs(ends[8 * LANES + c])
         near_1 = ends[11 * LANES + c] - abs(ends[14 * LANES + c]) - abs(ends[17 * LANES + c])
         near = near_0 if near_0 < near_1 else near_1
@@ -72,7 +72,7 @@ def find_forms(cones, ends, flat, form):  # type: ignore[no-untyped-def]
 def find_tangents(cones, flat, form, arcs):  # type: ignore[no-untyped-def]
     """Fill arcs: where the common tangents touch the ends.
 
-    The line through the two points that reach farthest along its normal gives a better normal.
+    The line through the two points farthest along its normal gives a better normal.
     """
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
     for side in range(2):
@@ -109,7 +109,7 @@ def find_tangents(cones, flat, form, arcs):  # type: ignore[no-untyped-def]
 
 @kernel
 def arc_sweep(e, c, flat, form, arcs):  # type: ignore[no-untyped-def]
-    """The angle (rad) that end e's arc of cone c sweeps, by the way that leads over the outside."""
+    """The angle (rad) that end e's arc of cone c sweeps, in the direction over the outside."""
     if form[c] == ONLY_END + e:
         return 2.0 * np.pi
     at = 4 * e * LANES + c

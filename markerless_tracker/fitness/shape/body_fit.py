@@ -12,9 +12,15 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.sizes import LengthBelief, Sizes
-from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.contour.outline_rows import outline_rows, pose_slopes, surface
-from markerless_tracker.fitness.contour.row_kernels import eliminated, normal_equations, solved
+from markerless_tracker.fitness.contour import (
+    ContourFrame,
+    eliminated,
+    normal_equations,
+    outline_rows,
+    pose_slopes,
+    solved,
+    surface,
+)
 from markerless_tracker.fitness.shape.section_fit import CORRELATION_M, RESIDUAL_SIGMA_M
 from markerless_tracker.fitness.shape.sections import Sections
 from markerless_tracker.geometry import FloatArray
@@ -132,8 +138,8 @@ class BodyFit:
         slopes = np.column_stack([by_pose, *by_length, by_section])
         weight = rows.weight / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG * AMONG)
         hessian, slope = normal_equations(slopes, weight, rows.value)
-        usual = 1.0 / (AMONG * body.prior_sd**2)
+        prior_precision = 1.0 / (AMONG * body.prior_sd**2)
         pose = np.arange(body.size)
-        hessian[pose, pose] = (hessian[pose, pose] + usual + 1e-9) * (1.0 + _DAMPING)
-        slope[pose] += usual * (frame.pose - body.prior_mean)
+        hessian[pose, pose] = (hessian[pose, pose] + prior_precision + 1e-9) * (1.0 + _DAMPING)
+        slope[pose] += prior_precision * (frame.pose - body.prior_mean)
         return hessian, slope

@@ -3,9 +3,7 @@
 import numpy as np
 
 from markerless_tracker.body import BodyModel
-from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.contour.outline_rows import outline_rows
-from markerless_tracker.fitness.contour.row_kernels import normal_equations
+from markerless_tracker.fitness.contour import ContourFrame, normal_equations, outline_rows
 from markerless_tracker.fitness.shape.sections import Sections
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
-from markerless_tracker.fitness.contour.outline_rows import OutlineRows
+from markerless_tracker.fitness.contour import OutlineRows
 from markerless_tracker.geometry import FloatArray
 
 RADIUS_SPREAD = 0.20

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from markerless_tracker.compiled import compiled
-from markerless_tracker.imaging.segmentation.morphology import Mask, disc
+from markerless_tracker.imaging.masks import Mask, disc
 
 # A longer gap, or time going backwards, is a new beginning: nothing is learned across it.
 GAP_NS = 1_000_000_000
@@ -57,14 +57,14 @@ class Adaptation:
         """Forget the times seen."""
         self._seen_ns: int | None = None
         self._followed_ns: int | None = None
-        self._turn = 0
+        self._first_row = 0
 
     def pass_over(self, stamp_ns: int) -> None:
         """An image came that is not followed: time goes on."""
         before, self._seen_ns = self._seen_ns, stamp_ns
         if before is None or not 0 < stamp_ns - before <= GAP_NS:
             self._followed_ns = None
-            self._turn = 0
+            self._first_row = 0
 
     def follow(
         self,
@@ -82,5 +82,5 @@ class Adaptation:
             return
         share = 1.0 - math.exp(-STRIDE * (stamp_ns - before) / self._tau_ns)
         keep_out = np.asarray(cv2.dilate(mask, self._brush), dtype=np.uint8)
-        adapt_means(image, gain, keep_out, mean, scale, np.float32(share), self._turn, STRIDE)
-        self._turn = (self._turn + 1) % STRIDE
+        adapt_means(image, gain, keep_out, mean, scale, np.float32(share), self._first_row, STRIDE)
+        self._first_row = (self._first_row + 1) % STRIDE

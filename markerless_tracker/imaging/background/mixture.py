@@ -13,16 +13,16 @@ FloatImage = NDArray[np.float32]
 
 # Values within this many deviations of the sensor's noise, and at least so many grey levels, are
 # of one mode.
-_REACH_SIGMAS = 4.0
-_REACH_LEAST = 12.0
+_TOLERANCE_SIGMAS = 4.0
+_LEAST_TOLERANCE = 12.0
 # A mode that fewer of the frames show is none: something passed.
 _LEAST_SHARE = 0.05
 _LEAST_FRAMES = 2
 
 
 @compiled()
-def add_frame(image, reach, count, mean, moment):  # type: ignore[no-untyped-def]
-    """Give every pixel (h, w, c) to the nearest of its modes within ``reach`` in each channel.
+def add_frame(image, tolerance, count, mean, moment):  # type: ignore[no-untyped-def]
+    """Give every pixel (h, w, c) to the nearest of its modes within ``tolerance`` in each channel.
 
     One that fits none begins a new mode, in a free place or that of a mode seen only once.
     count (k, h, w), mean and moment (k, h, w, c) float32 are updated: Welford's sums.
@@ -31,7 +31,7 @@ def add_frame(image, reach, count, mean, moment):  # type: ignore[no-untyped-def
     for v in range(height):
         for u in range(width):
             best = -1
-            nearest = reach
+            nearest = tolerance
             for k in range(modes):
                 if count[k, v, u] == 0.0:
                     continue
@@ -75,16 +75,18 @@ def learn_modes(
         (k, h, w, c), the most frequent mode first; modes that hardly any frame shows are 0.
     """
     first, second, rest = _two_and_rest(frames)
-    reach = _REACH_LEAST
+    tolerance = _LEAST_TOLERANCE
     if second is not None:
         change = np.abs(second.astype(np.int16) - first.astype(np.int16))
-        reach = max(reach, _REACH_SIGMAS * 1.4826 / np.sqrt(2.0) * float(np.median(change)))
+        tolerance = max(
+            tolerance, _TOLERANCE_SIGMAS * 1.4826 / np.sqrt(2.0) * float(np.median(change))
+        )
     count = np.zeros((modes, *first.shape[:2]), dtype=np.float32)
     mean = np.zeros((modes, *first.shape), dtype=np.float32)
     moment = np.zeros_like(mean)
     total = 0
     for frame in rest:
-        add_frame(frame, np.float32(reach), count, mean, moment)
+        add_frame(frame, np.float32(tolerance), count, mean, moment)
         total += 1
     least = max(float(_LEAST_FRAMES), _LEAST_SHARE * total)
     order = np.argsort(-count, axis=0, kind="stable")

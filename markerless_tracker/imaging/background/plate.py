@@ -25,7 +25,7 @@ BoolImage = NDArray[np.bool_]
 # Frames kept of all clips together: enough for a mode, little enough for memory.
 _FRAMES = 36
 # Grey levels within which two pictures show the same thing.
-_REACH = 14.0
+_TOLERANCE = 14.0
 # A change from frame to frame beyond this is a body's, not the light's.
 _ABRUPT = 28.0
 # Where things are covered for this share of the time, someone is burnt into the steady image.
@@ -163,7 +163,7 @@ def _covered(
     outline only, and an arm that sweeps over a person of the still for a moment is outvoted.
     """
     apart = np.abs(picture - steady).max(axis=2)
-    differ = (apart > _REACH).astype(np.uint8)
+    differ = (apart > _TOLERANCE).astype(np.uint8)
     differ = np.asarray(cv2.morphologyEx(differ, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)))
     weight = differ.astype(np.float32)
     sigma = _WINDOW * max(differ.shape)
@@ -172,23 +172,25 @@ def _covered(
     mass = cv2.GaussianBlur(weight, (0, 0), sigma)
     covered = ((differ > 0) & (blurred > _RESTLESS * mass)).astype(np.uint8)
     # The soft fringe of a person differs less than the person.
-    return np.asarray((cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0) & (apart > 0.5 * _REACH))
+    return np.asarray(
+        (cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0) & (apart > 0.5 * _TOLERANCE)
+    )
 
 
 def _fill(
     stack: Image, steady: FloatImage, pictures: list[FloatImage]
 ) -> tuple[FloatImage, BoolImage]:
     """Replace who moves by what the stills show; returns the plate and where only a still knew."""
-    share, jump = motion(stack, steady, _REACH)
+    share, jump = motion(stack, steady, _TOLERANCE)
     least = max(2.0, _SEEN_SHARE * len(stack))
     filled = steady.copy()
     best = np.zeros(steady.shape[:2])
     covered = np.zeros(steady.shape[:2], dtype=bool)
     doubtful = covered.copy()
     for index, picture in enumerate(pictures):
-        matches, mean = matching_frames(stack, picture, _REACH)
+        matches, mean = matching_frames(stack, picture, _TOLERANCE)
         others = sum(
-            (np.abs(picture - other).max(axis=2) <= _REACH).astype(float)
+            (np.abs(picture - other).max(axis=2) <= _TOLERANCE).astype(float)
             for place, other in enumerate(pictures)
             if place != index
         )
@@ -199,7 +201,7 @@ def _fill(
         filled[better] = np.where(seen[:, :, None], mean, picture)[better]
         best[better] = score[better]
         covered |= here
-        doubtful |= (np.abs(picture - steady).max(axis=2) > 2.0 * _REACH) & ~here
+        doubtful |= (np.abs(picture - steady).max(axis=2) > 2.0 * _TOLERANCE) & ~here
     if not covered.any():
         return filled, covered
     return _grow(stack, filled, steady, covered, doubtful)
@@ -229,9 +231,9 @@ def _grow(
     plate, unknown = filled[box].copy(), closed[box] > 0
     frames, doubt = stack[:, box[0], box[1]], doubtful[box].copy()
     person = steady[box]
-    far = np.stack([np.abs(frame - plate).max(axis=2) > _REACH for frame in frames])
+    far = np.stack([np.abs(frame - plate).max(axis=2) > _TOLERANCE for frame in frames])
     wide = 2 * side + 1
-    reach = np.ones((side, side), dtype=np.uint8)
+    square = np.ones((side, side), dtype=np.uint8)
     for _ in range(4 * max(unknown.shape) // side):
         known = (~unknown).astype(np.float32)
         front = np.nonzero(unknown & (cv2.boxFilter(known, -1, (side, side)) > 0.3))
@@ -247,8 +249,8 @@ def _grow(
         shown, same = _mean(values, calm), _mean(values, agreeing)
         # What the clips show most of the time may be a person: only if it is shown often around
         # nothing but scene, or is something else, does it overrule a still.
-        apart = np.abs(shown - person[front]).max(axis=1) > 2.0 * _REACH
-        suspect = cv2.dilate(doubt.astype(np.uint8), reach)[front] > 0
+        apart = np.abs(shown - person[front]).max(axis=1) > 2.0 * _TOLERANCE
+        suspect = cv2.dilate(doubt.astype(np.uint8), square)[front] > 0
         agreed = (agreed_count >= 2) & (agreed_count >= 0.5 * count)
         overruled = ~agreed & suspect & (count >= 2) & (apart | (count > _OFTEN * len(stack)))
         settled = agreed | overruled
@@ -256,7 +258,9 @@ def _grow(
             break
         where = (front[0][settled], front[1][settled])
         plate[where] = np.where(agreed[:, None], same, shown)[settled]
-        far[:, where[0], where[1]] = np.abs(values[:, settled] - plate[where]).max(axis=2) > _REACH
+        far[:, where[0], where[1]] = (
+            np.abs(values[:, settled] - plate[where]).max(axis=2) > _TOLERANCE
+        )
         doubt[front[0][overruled], front[1][overruled]] = True
         unknown[where] = False
     filled = filled.copy()
@@ -281,7 +285,9 @@ def _from_stills(stills: Sequence[Image]) -> Plate:
     aligned = [base] + [
         align_exposure(_float(align_geometry(still, reference)), base) for still in stills[1:]
     ]
-    apart = np.abs(np.stack([picture - base for picture in aligned[1:]])).max(axis=(0, 3)) > _REACH
+    apart = (
+        np.abs(np.stack([picture - base for picture in aligned[1:]])).max(axis=(0, 3)) > _TOLERANCE
+    )
     if len(stills) == 2:
         note = (
             "two stills, the first taken as it is: where they differ nothing tells which is empty"

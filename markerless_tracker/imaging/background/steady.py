@@ -42,7 +42,7 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
                 if length < least:
                     least = length
                     best = first
-            reach = max(np.float32(6.0), np.float32(3.0) * least / channels)
+            tolerance = max(np.float32(6.0), np.float32(3.0) * least / channels)
             for c in range(channels):
                 total = 0
                 for i in range(best, best + need):
@@ -55,7 +55,7 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
                 t = keys[i] & 4095
                 near = True
                 for c in range(channels):
-                    near = near and abs(np.float32(stack[t, v, u, c]) - rough[c]) <= 2.0 * reach
+                    near = near and abs(np.float32(stack[t, v, u, c]) - rough[c]) <= 2.0 * tolerance
                 if near:
                     kept += 1
                     for c in range(channels):
@@ -67,7 +67,7 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
                 inside = 0
                 for t in range(count):
                     deviation = np.float32(stack[t, v, u, c]) - value
-                    if abs(deviation) <= reach:
+                    if abs(deviation) <= tolerance:
                         square += deviation * deviation
                         inside += 1
                 variance[v, u, c] = square / np.float32(max(inside, 1))
@@ -101,8 +101,8 @@ def steady_image(
 
 
 @compiled()
-def match_kernel(stack, target, reach, matches, total):  # type: ignore[no-untyped-def]
-    """Count and add up the frames that lie within ``reach`` of ``target`` in every channel."""
+def match_kernel(stack, target, tolerance, matches, total):  # type: ignore[no-untyped-def]
+    """Count and add up the frames that lie within ``tolerance`` of ``target`` in every channel."""
     count, height, width, channels = stack.shape
     for v in range(height):
         for u in range(width):
@@ -110,7 +110,7 @@ def match_kernel(stack, target, reach, matches, total):  # type: ignore[no-untyp
             for t in range(count):
                 near = True
                 for c in range(channels):
-                    if abs(np.float32(stack[t, v, u, c]) - target[v, u, c]) > reach:
+                    if abs(np.float32(stack[t, v, u, c]) - target[v, u, c]) > tolerance:
                         near = False
                 if near:
                     found += 1
@@ -120,7 +120,7 @@ def match_kernel(stack, target, reach, matches, total):  # type: ignore[no-untyp
 
 
 def matching_frames(
-    stack: Image, target: NDArray[np.float32], reach: float
+    stack: Image, target: NDArray[np.float32], tolerance: float
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """How many frames show ``target`` (h, w, c) at each pixel, and the mean of those that do.
 
@@ -129,13 +129,13 @@ def matching_frames(
     """
     matches = np.empty(target.shape[:2], dtype=np.int32)
     total = np.zeros_like(target)
-    match_kernel(stack, target, np.float32(reach), matches, total)
+    match_kernel(stack, target, np.float32(tolerance), matches, total)
     mean = total / np.maximum(matches, 1)[:, :, None].astype(np.float32)
     return matches, np.where(matches[:, :, None] > 0, mean, target).astype(np.float32)
 
 
 @compiled()
-def motion_kernel(stack, steady, reach, share, jump):  # type: ignore[no-untyped-def]
+def motion_kernel(stack, steady, tolerance, share, jump):  # type: ignore[no-untyped-def]
     """Share of the frames that differ from the steady value, and the largest change at once."""
     count, height, width, channels = stack.shape
     for v in range(height):
@@ -146,7 +146,7 @@ def motion_kernel(stack, steady, reach, share, jump):  # type: ignore[no-untyped
                 far = False
                 for c in range(channels):
                     value = np.float32(stack[t, v, u, c])
-                    far = far or abs(value - steady[v, u, c]) > reach
+                    far = far or abs(value - steady[v, u, c]) > tolerance
                     if t > 0:
                         largest = max(largest, abs(value - np.float32(stack[t - 1, v, u, c])))
                 away += far
@@ -155,7 +155,7 @@ def motion_kernel(stack, steady, reach, share, jump):  # type: ignore[no-untyped
 
 
 def motion(
-    stack: Image, steady: NDArray[np.float32], reach: float
+    stack: Image, steady: NDArray[np.float32], tolerance: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """How often something covers each pixel, and how abruptly it comes.
 
@@ -164,7 +164,7 @@ def motion(
     Args:
         stack: (n, h, w, c) uint8 frames in the order of time.
         steady: (h, w, c) float32, of `steady_image`.
-        reach: grey levels within which two values are the same.
+        tolerance: grey levels within which two values are the same.
 
     Returns:
         Share of the frames that differ from the steady value, (h, w) float32 in 0..1, and the
@@ -172,7 +172,7 @@ def motion(
     """
     share = np.empty(steady.shape[:2], dtype=np.float32)
     jump = np.empty_like(share)
-    motion_kernel(stack, steady, np.float32(reach), share, jump)
+    motion_kernel(stack, steady, np.float32(tolerance), share, jump)
     return share, jump
 
 

@@ -53,7 +53,7 @@ def _same_until(values, words, u, value):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def flip_small(mask, part, need, target, least, reach, spared, unknown):  # type: ignore[no-untyped-def]
+def flip_small(mask, part, need, target, least, connectivity, spared, unknown):  # type: ignore[no-untyped-def]
     """Turn patches of ``target`` with fewer than ``least`` pixels into 255 - target, in place.
 
     Args:
@@ -62,7 +62,7 @@ def flip_small(mask, part, need, target, least, reach, spared, unknown):  # type
         need: the same, where the result is needed.
         target: 0 or 255.
         least: pixels.
-        reach: 0: patches are 4-connected, 1: 8-connected.
+        connectivity: 4 or 8.
         spared: sides of the part; patches that touch them stay.
         unknown: sides of the part beyond which patches may go on.
 
@@ -70,6 +70,8 @@ def flip_small(mask, part, need, target, least, reach, spared, unknown):  # type
         Whether a patch in ``need`` may be larger than what is seen of it, so that its size is not
         known; it is left as it is.
     """
+    # Runs of neighbouring rows touch at a corner too if 8-connected.
+    touch = 1 if connectivity == 8 else 0
     count = _count_runs(mask, part, target)
     begin = np.empty(count, dtype=np.int32)
     end = np.empty(count, dtype=np.int32)
@@ -97,7 +99,7 @@ def flip_small(mask, part, need, target, least, reach, spared, unknown):  # type
         a = first[i - 1]
         b = first[i]
         while a < first[i] and b < n:
-            if begin[a] < end[b] + reach and begin[b] < end[a] + reach:
+            if begin[a] < end[b] + touch and begin[b] < end[a] + touch:
                 x = _root(parent, a)
                 y = _root(parent, b)
                 parent[max(x, y)] = min(x, y)
@@ -170,7 +172,7 @@ def clear_small(
         return False
     return bool(
         flip_small(
-            mask, part, need or zone, np.uint8(255), float(least_px), int(connectivity == 8), 0,
+            mask, part, need or zone, np.uint8(255), float(least_px), connectivity, 0,
             unknown & _shared_sides(zone, part),
         )
     )  # fmt: skip
@@ -195,7 +197,7 @@ def fill_small(
     unknown &= _shared_sides(zone, part)
     return bool(
         flip_small(
-            mask, part, need or zone, np.uint8(0), float(largest_px), 0, EVERY & ~unknown, unknown
+            mask, part, need or zone, np.uint8(0), float(largest_px), 4, EVERY & ~unknown, unknown
         )
     )
 

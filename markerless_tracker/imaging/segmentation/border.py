@@ -56,14 +56,14 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, go
             length = np.float32(0.0)
             for c in range(channels):
                 base = min(gain[c] * mean[c, top + i, left + j], np.float32(255.0))
-                way = body[c] / np.float32(count) - base
-                along += (np.float32(image[i, j, c]) - base) * way
-                length += way * way
+                contrast = body[c] / np.float32(count) - base
+                along += (np.float32(image[i, j, c]) - base) * contrast
+                length += contrast * contrast
             if length >= least and along < np.float32(0.5) * length:
                 gone[i, j] = 255
 
 
-def border_reach(layers: int) -> int:
+def border_radius_px(layers: int) -> int:
     """How far from a pixel `trim_border` looks, px."""
     return layers * (_NEAR_PX + 2)
 

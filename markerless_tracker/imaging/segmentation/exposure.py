@@ -16,7 +16,7 @@ from markerless_tracker.imaging.images import Image
 # Pixels looked at; a grid over the image.
 _SAMPLES = 6_000
 # Ratios are counted in bins of their logarithm, from 1/4 to 4.
-_REACH = math.log(4.0)
+_LOG_RANGE = math.log(4.0)
 _BINS = 1024
 # Width of the crowd in bins: about +-5 %.
 _CROWD = 37
@@ -34,7 +34,7 @@ def crowded_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no
     base_logs: (n, c) log of the background there, NaN where it says nothing; value_logs: (256,) log
     of each grey level, NaN where it says nothing.
     """
-    per_log = _BINS / (2.0 * _REACH)
+    per_log = _BINS / (2.0 * _LOG_RANGE)
     counts = np.empty(_BINS, dtype=np.int64)
     sums = np.empty(_BINS, dtype=np.float64)
     for c in range(gain.size):
@@ -43,8 +43,8 @@ def crowded_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no
         total = 0
         for i in range(where.shape[0]):
             ratio = value_logs[image[where[i, 0], where[i, 1], c]] - base_logs[i, c]
-            if abs(ratio) < _REACH:  # not for NaN either
-                place = min(int((ratio + _REACH) * per_log), _BINS - 1)
+            if abs(ratio) < _LOG_RANGE:  # not for NaN either
+                place = min(int((ratio + _LOG_RANGE) * per_log), _BINS - 1)
                 counts[place] += 1
                 sums[place] += ratio
                 total += 1

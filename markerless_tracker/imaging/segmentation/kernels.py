@@ -62,10 +62,10 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
         return True
     if chroma <= np.float32(0.0) or mean_chroma <= np.float32(0.0):
         return chroma == mean_chroma
-    turn = abs(
+    difference = abs(
         hue_deg(b, g, r, value, chroma) - hue_deg(mean_b, mean_g, mean_r, mean_value, mean_chroma)
     )
-    return min(turn, np.float32(360.0) - turn) <= rule[3]
+    return min(difference, np.float32(360.0) - difference) <= rule[3]
 
 
 # Loops over one row with few arrays each: what the compiler turns into vector instructions.

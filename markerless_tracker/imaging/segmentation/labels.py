@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 from markerless_tracker.imaging.background.adapt import Adaptation
 from markerless_tracker.imaging.background.model import BackgroundModel
 from markerless_tracker.imaging.images import Image, grey_of
+from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation import kernels
 from markerless_tracker.imaging.segmentation.blobs import occupied
 from markerless_tracker.imaging.segmentation.exposure import ExposureMeter
 from markerless_tracker.imaging.segmentation.gaussians import BackgroundGaussians
-from markerless_tracker.imaging.segmentation.morphology import Mask
 from markerless_tracker.imaging.segmentation.shadow import shadow_rule
-from markerless_tracker.imaging.segmentation.texture import correct_labels, texture_reach
+from markerless_tracker.imaging.segmentation.texture import correct_labels, correction_radius_px
 from markerless_tracker.imaging.settings import ImagingSettings
 
 LOOK_PX = 3
@@ -107,7 +107,7 @@ class PixelLabeller:
             part = occupied(looked_at, corrected.within(window)).moved(window.left, window.top)
         if part.width <= 0:
             return
-        seen = part.grown(texture_reach(options.texture_radius_px), self.background.size_px)
+        seen = part.grown(correction_radius_px(options.texture_radius_px), self.background.size_px)
         correct_labels(
             grey_of(self.background.pixels(image, seen)),
             self.background.grey_mean,

@@ -5,7 +5,7 @@ import numpy as np
 
 from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.images import Image
-from markerless_tracker.imaging.segmentation.morphology import Mask
+from markerless_tracker.imaging.masks import Mask
 
 # Window in which the contour is kept smooth, px.
 _SMOOTH_PX = 5
@@ -62,7 +62,7 @@ def move_contour(image, total, inside, size, count, smooth, mask, band, least, o
                 out[i, j] = 1
 
 
-def level_set_reach(iterations: int, radius_px: int) -> int:
+def refinement_radius_px(iterations: int, radius_px: int) -> int:
     """How far from a pixel `refine_contour` looks, px."""
     return iterations * (radius_px + 1)
 

@@ -4,26 +4,18 @@ import math
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from markerless_tracker.imaging.masks import Mask, disc
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_small
 from markerless_tracker.imaging.segmentation.kernels import SHADOW
 from markerless_tracker.imaging.settings import ImagingSettings
 
-Mask = NDArray[np.uint8]
-
 # From this size of the images on, lengths set in pixels are meant as they are.
 _FULL_FRAME_PX = 640 * 480
 
 
-def disc(side_px: int) -> Mask:
-    """A round structuring element of that side."""
-    shape = cv2.MORPH_ELLIPSE if side_px > 3 else cv2.MORPH_CROSS
-    return np.asarray(cv2.getStructuringElement(shape, (side_px, side_px)), dtype=np.uint8)
-
-
-def patch_reach(settings: ImagingSettings, *, grey: bool) -> int:
+def opening_radius_px(settings: ImagingSettings, *, grey: bool) -> int:
     """How far from a pixel `foreground_mask` looks, px, but for the size of its patch."""
     share = settings.shadow_grey_blob_share if grey else settings.shadow_blob_share
     return 2 if grey and share > 0.0 else 0
@@ -71,7 +63,7 @@ def closing_px(settings: ImagingSettings, frame_px: int) -> int:
     return 2 * round((side - 1.0) / 2.0) + 1 if side > 1.0 else 1
 
 
-def repair_reach(settings: ImagingSettings, frame_px: int) -> int:
+def repair_radius_px(settings: ImagingSettings, frame_px: int) -> int:
     """How far from a pixel opening and closing look, px."""
     return 2 * (settings.mask_open_px // 2) + 2 * (closing_px(settings, frame_px) // 2)
 

@@ -3,16 +3,13 @@
 import numpy as np
 
 from markerless_tracker.imaging.images import Image
+from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_small, occupied
 from markerless_tracker.imaging.segmentation.border import trim_border
 from markerless_tracker.imaging.segmentation.labels import PixelLabeller
 from markerless_tracker.imaging.segmentation.level_set import refine_contour
-from markerless_tracker.imaging.segmentation.morphology import (
-    Mask,
-    foreground_mask,
-    open_and_close,
-)
+from markerless_tracker.imaging.segmentation.morphology import foreground_mask, open_and_close
 from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
 

@@ -4,11 +4,11 @@ import numpy as np
 
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging.background.model import BackgroundModel
-from markerless_tracker.imaging.edges import edge_map, edge_reach
+from markerless_tracker.imaging.edges import edge_map, edge_radius_px
 from markerless_tracker.imaging.images import Image, check_image
+from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.labels import PixelLabeller
-from markerless_tracker.imaging.segmentation.morphology import Mask
 from markerless_tracker.imaging.segmentation.repair import fit_border, repair_mask
 from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
@@ -108,7 +108,7 @@ class Segmenter:
                 f"{self.camera}: got a region of {tuple(region)}, expected one inside the image of "
                 f"{self._size_px[0]}x{self._size_px[1]} px"
             )
-        mask, zone = self._silhouette(image, region, edge_reach(self.settings))
+        mask, zone = self._silhouette(image, region, edge_radius_px(self.settings))
         inside = region.within(zone).slices
         edges = edge_map(image[zone.slices], mask, self.settings)[inside]
         self._labeller.follow(image, mask if region == self._whole else None, stamp_ns)
@@ -131,14 +131,14 @@ class Segmenter:
                 f"{kind[self.background.channels]}; expected the same"
             )
 
-    def _silhouette(self, image: Image, region: Region, reach: int) -> tuple[Mask, Region]:
-        """Mask of a zone that holds the region and `reach` px around it, and that zone.
+    def _silhouette(self, image: Image, region: Region, radius_px: int) -> tuple[Mask, Region]:
+        """Mask of a zone that holds the region and `radius_px` px around it, and that zone.
 
         What is decided by the size of a patch needs all of the patch: more is labelled until no
         patch that is needed and may be too small goes on outside.
         """
         self._labeller.measure_exposure(image)
-        need = region.grown(reach, self._size_px)
+        need = region.grown(radius_px, self._size_px)
         slack = _SLACK_PX
         while True:
             found = self._try_silhouette(image, need, slack)

@@ -181,10 +181,10 @@ def spread_light(light, spread):  # type: ignore[no-untyped-def]
     light[:] = spread
     nears = np.zeros(columns, dtype=np.float32)
     steps_of = np.zeros(columns, dtype=np.int32)
-    for turn in range(2):
+    for upward in range(2):
         nears[:] = 0.0
         for k in range(rows):
-            i = k if turn == 0 else rows - 1 - k
+            i = k if upward == 0 else rows - 1 - k
             _spread_row(light[i], nears, steps_of, spread[i])
 
 
@@ -267,7 +267,7 @@ def apply_light(  # type: ignore[no-untyped-def]
                 labels[y, x] = 255
 
 
-def texture_reach(radius: int) -> int:
+def correction_radius_px(radius: int) -> int:
     """How far from a pixel its correction looks, px."""
     return SPREAD_PX + 2 * radius
 
@@ -298,7 +298,8 @@ def correct_labels(
         labels: (a, b) of a window: 0 background, 127 shadow, 255 foreground.
         window: the window's place in the image.
         part: what is corrected, inside the window.
-        seen: place of ``grey``: the part and `texture_reach` around it, as far as the image goes.
+        seen: place of ``grey``: the part and `correction_radius_px` around it, cut at the image's
+            border.
         looked_at: (a, b), 0 where shadow and foreground are left as they are.
         radius: of the windows, px.
         light: least and largest light of a shadow.

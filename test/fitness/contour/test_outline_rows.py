@@ -7,7 +7,7 @@ import pytest
 
 from markerless_tracker.body import cone_transforms, load_body
 from markerless_tracker.fitness.contour.outline_rows import outline_rows, pose_slopes, surface
-from markerless_tracker.fitness.shape.sections import Sections
+from markerless_tracker.fitness.shape import Sections
 from markerless_tracker.synthesis import ring_rig
 
 BODY = load_body("person31", 1.75)

@@ -136,7 +136,7 @@ def test_an_early_end_spares_views(scene, body, rig):
     evaluate_some(
         point[None].copy(), body.root, pose, np.array([-np.inf]), evaluate._drawing.body,
         views.arrays, evaluate._drawing.silhouette_cones, evaluate._drawing.edge_cones,
-        fitness._rule, evaluate._cost, evaluate._drawing.still, fitness._scratch,
+        fitness._rule, evaluate._cost, evaluate._drawing.static, fitness._scratch,
         fitness._outlines, untouched, costs, 0, 1,
     )  # fmt: skip
     assert (untouched == -7.0).all()

@@ -10,7 +10,7 @@ from markerless_tracker.body import BodyModel, load_body
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
-from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.fitness.shape.section_fit import fit_shape
 from markerless_tracker.fitness.shape.sections import OFFSET_RANGE_M, RADIUS_RANGE
 from markerless_tracker.geometry import FloatArray

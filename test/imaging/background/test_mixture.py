@@ -4,7 +4,7 @@ import pytest
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging import BackgroundModel, ImagingSettings, Mode, learn_background
 from markerless_tracker.imaging.background.model import foreground_limit, risk_of
-from markerless_tracker.imaging.segmentation.segmenter import Segmenter
+from markerless_tracker.imaging.segmentation import Segmenter
 
 TWO = ImagingSettings(background_modes=3)
 
