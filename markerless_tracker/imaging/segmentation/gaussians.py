@@ -49,7 +49,7 @@ class BackgroundGaussians:
         spread = background.mean.max(axis=2) - background.mean.min(axis=2)
         self.is_grey = background.channels == 1 or bool(spread.max() <= _GREY_TOLERANCE)
         sigma = float(np.sqrt(np.median(background.variance)))
-        self._smooth = sigma > settings.denoise_sigma
+        self._smooth = sigma > settings.background.denoise_sigma
         self.mean, self.scale = self._learned()
         mean, variance = self._smoothed(background.mean, background.variance)
         if self.is_grey:
@@ -83,7 +83,7 @@ class BackgroundGaussians:
         smooth = np.asarray(cv2.GaussianBlur(mean, _SMOOTH_PX, 0.0), dtype=np.float32)
         row = cv2.getGaussianKernel(_SMOOTH_PX[0], 0.0, cv2.CV_64F)
         less = np.maximum(
-            variance * float((row**2).sum() ** 2), self._settings.background_sigma_min**2
+            variance * float((row**2).sum() ** 2), self._settings.background.sigma_min**2
         )
         return smooth.reshape(mean.shape), less.astype(np.float32)
 

@@ -33,7 +33,7 @@ class PixelLabeller:
         settings: of the foreground, shadow and texture tests.
 
     Attributes:
-        background: `mean` of it follows slow changes if `background_follow_s` says so.
+        background: `mean` of it follows slow changes if `background.follow_s` says so.
         gain: (c,) float32, brightness of the last image relative to the background's.
     """
 
@@ -48,14 +48,14 @@ class PixelLabeller:
         self.gain: NDArray[np.float32] = np.ones(gaussians.mean.shape[1], dtype=np.float32)
         self._meter = ExposureMeter(self._means_by_channel[0])
         self._adaptation = (
-            Adaptation(settings.background_follow_s, settings.background_follow_margin_px)
-            if settings.background_follow_s > 0.0
+            Adaptation(settings.background.follow_s, settings.background.follow_margin_px)
+            if settings.background.follow_s > 0.0
             else None
         )
         self._rule = shadow_rule(settings, grey=gaussians.is_grey)
         # A pixel that alternates between several appearances has no one pattern.
         self._uses_texture = (
-            settings.texture_radius_px > 0 and settings.shadow_removal and not background.modes
+            settings.texture.radius_px > 0 and settings.shadow.removal and not background.modes
         )
         width, height = gaussians.size_px
         self._memory = np.empty(height * width, dtype=np.uint8)
@@ -70,7 +70,7 @@ class PixelLabeller:
 
     def measure_exposure(self, image: Image) -> None:
         """Set `gain` from a whole image (h, w) or (h, w, 3), if the settings ask for it."""
-        if self._settings.exposure_compensation:
+        if self._settings.background.exposure_compensation:
             self.gain[:] = self._meter.gain(image.reshape(image.shape[0], image.shape[1], -1))
 
     def label(self, image: Image, window: Region, corrected: Region) -> Mask:
@@ -107,7 +107,7 @@ class PixelLabeller:
             part = occupied(looked_at, corrected.within(window)).moved(window.left, window.top)
         if part.width <= 0:
             return
-        seen = part.grown(correction_radius_px(options.texture_radius_px), self.background.size_px)
+        seen = part.grown(correction_radius_px(options.texture.radius_px), self.background.size_px)
         correct_labels(
             grey_of(self.background.pixels(image, seen)),
             self.background.grey_mean,
@@ -118,10 +118,10 @@ class PixelLabeller:
             part,
             seen,
             looked_at=looked_at,
-            radius=options.texture_radius_px,
-            light=(options.texture_light_min, options.shadow_value_max + 0.03),
+            radius=options.texture.radius_px,
+            light=(options.texture.light_min, options.shadow.value_max + 0.03),
             protect=is_grey,
-            reveal=is_grey and options.texture_reveal,
+            reveal=is_grey and options.texture.reveal,
         )
 
     def follow(self, image: Image, mask: Mask | None, stamp_ns: int) -> None:

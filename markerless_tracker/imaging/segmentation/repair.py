@@ -32,7 +32,7 @@ def repair_mask(
         labels: (h, w) uint8 of `zones.window`: 0 background, 127 shadow, 255 foreground.
         mask: (h, w) uint8, written: 0 or 255; right within `zones.zone` alone.
         zones: where the labels lie in the image, and where the mask is needed.
-        settings: those beginning with ``mask_``.
+        settings: the group `mask`.
         grey: whether the camera is a grey one.
         least_shadow_px: smaller patches of shadow become foreground.
 
@@ -48,7 +48,7 @@ def repair_mask(
     # Outside of `zone_before_repair` the mask is wrong, but opening and closing look no further.
     open_and_close(mask, settings, frame_px)
     zone, need, unknown = zones.zone.within(window), zones.patches.within(window), zones.open_sides
-    least, largest = settings.mask_blob_share * frame_px, settings.mask_hole_share * frame_px
+    least, largest = settings.mask.blob_share * frame_px, settings.mask.hole_share * frame_px
     if clear_small(mask, least, connectivity=8, zone=zone, need=need, unknown=unknown):
         return False
     return not fill_small(mask, largest, zone=zone, need=need, unknown=unknown)
@@ -64,10 +64,10 @@ def fit_border(
         mask: (h, w) uint8 of `zones.window`, 0 or 255; right within `zones.zone`.
         zones: as in `repair_mask`.
         labeller: what labelled this image.
-        settings: `mask_trim_px` and those beginning with ``level_set_``.
+        settings: `mask.trim_px` and the group `level_set`.
     """
     zone = zones.zone.within(zones.window)
-    _trim(image, mask, zone, zones.window, labeller, settings.mask_trim_px)
+    _trim(image, mask, zone, zones.window, labeller, settings.mask.trim_px)
     _refine(image, mask, zone, zones.window, labeller, settings)
 
 
@@ -100,16 +100,16 @@ def _refine(
 ) -> None:
     """Move the mask's contour to the local contrast, in place; outside the zone it stays."""
     body = occupied(mask, zone)
-    if settings.level_set_iterations == 0 or body.width <= 0:
+    if settings.level_set.iterations == 0 or body.width <= 0:
         return
-    margin = settings.level_set_iterations + settings.level_set_radius_px
+    margin = settings.level_set.iterations + settings.level_set.radius_px
     box = body.grown(margin, (mask.shape[1], mask.shape[0]))
     part = np.ascontiguousarray(mask[box.slices])
     refine_contour(
         labeller.background.pixels(image, box.moved(window.left, window.top)),
         part,
-        iterations=settings.level_set_iterations,
-        radius_px=settings.level_set_radius_px,
+        iterations=settings.level_set.iterations,
+        radius_px=settings.level_set.radius_px,
         least=_LEAST_CONTRAST * labeller.background.sigma,
     )
     mask[box.slices] = part

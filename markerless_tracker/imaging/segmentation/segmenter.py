@@ -50,7 +50,7 @@ class Segmenter:
         self._whole = Region.whole(self._size_px)
         self._memory = np.empty(height * width, dtype=np.uint8)
         options = self.settings
-        share = options.shadow_grey_blob_share if self._grey else options.shadow_blob_share
+        share = options.shadow.grey_blob_share if self._grey else options.shadow.blob_share
         self._least_shadow_px = share * height * width
 
     @property
@@ -88,7 +88,7 @@ class Segmenter:
     def observe(self, image: Image, stamp_ns: int, region: Region | None = None) -> Observation:
         """Silhouette and edge map of a region, or of the whole frame.
 
-        They depend on this image alone, unless `background_follow_s` lets the background follow
+        They depend on this image alone, unless `background.follow_s` lets the background follow
         slow changes: then on the images before as well, in the order of the calls. Inside a region
         they are what they would be in the whole frame.
 

@@ -46,12 +46,12 @@ class Zones:
         grey: bool,
     ) -> "Zones":
         """The zones from which the silhouette in `need` follows, with slack for its patches."""
-        if settings.level_set_iterations:
+        if settings.level_set.iterations:
             radius_px = refinement_radius_px(
-                settings.level_set_iterations, settings.level_set_radius_px
+                settings.level_set.iterations, settings.level_set.radius_px
             )
             need = need.grown(radius_px, size_px)
-        patches = need.grown(border_radius_px(settings.mask_trim_px), size_px)
+        patches = need.grown(border_radius_px(settings.mask.trim_px), size_px)
         zone = patches.grown(slack_px, size_px)
         frame_px = size_px[0] * size_px[1]
         repair = repair_radius_px(settings, frame_px)
