@@ -1,4 +1,4 @@
-"""From camera images to evidence: background, shadows, silhouette, edges."""
+"""From camera images to evidence: background, silhouette, edge map."""
 
 from markerless_tracker.imaging.background import (
     BackgroundModel,

@@ -1,8 +1,8 @@
-"""Outlines of all cones that one view sees: convex hulls of their two projected end ellipses.
+"""Outlines of all cones in one view: convex hulls of their two projected end ellipses.
 
-An outline is a closed polygon: around the far end, down one side, around the near end, up the
-other side. Sides touch the end ellipses at their common tangents; ends are sampled. All cones are
-worked on side by side (`outline_arrays`).
+An outline is a closed polygon: around end 1, down one side, around end 0, up the other side. The
+sides are the common tangents of the end ellipses; the ends are sampled. All cones are computed
+side by side (`outline_arrays`). Derivation: docs/outlines-of-cones.md.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ from markerless_tracker.fitness.raster.outline_points import (
 )
 from markerless_tracker.fitness.raster.tangents import find_forms, find_tangents, to_camera
 
-# cos and sin around a full turn, for polygons without and with points inside the sides.
+# cos and sin around a full circle, for polygons without and with points inside the sides.
 _CIRCLES = tuple(
     np.array([np.cos(angle), np.sin(angle)])
     for angle in (
@@ -43,15 +43,14 @@ def scan_edges(cones, count, height, u, v, first, slope, box):  # type: ignore[n
     for c in range(n):
         box[c], box[LANES + c] = np.inf, -np.inf
         box[2 * LANES + c], box[3 * LANES + c] = np.inf, -np.inf
-    # Several short loops: the compiler gives up on one that touches many arrays, since any two of
-    # them might overlap.
+    # Several short loops: a loop over many arrays is not vectorised, as any two might overlap.
     for i in range(count):
         at, before = i * LANES, (i - 1 if i > 0 else count - 1) * LANES
         for c in range(n):
             slope[at + c] = (u[at + c] - u[before + c]) / (v[at + c] - v[before + c])
         for c in range(n):
             y = v[at + c]
-            # Comparisons with NaN are false: it comes out as the frame's border.
+            # Comparisons with NaN are false: NaN gives row 0.
             row = np.ceil(y) if y > 0.0 else 0.0
             row = row if row < limit else limit
             first[at + c] = np.int32(row)

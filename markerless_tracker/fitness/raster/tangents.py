@@ -1,4 +1,7 @@
-"""Common tangents of the two projected end ellipses of each cone."""
+"""Common tangents of the two projected end ellipses of each cone.
+
+Derivation: docs/outlines-of-cones.md.
+"""
 
 import numpy as np
 
@@ -16,7 +19,7 @@ from markerless_tracker.fitness.raster.outline_arrays import (
 
 @kernel
 def to_camera(cones, world, rotation, translation, ends):  # type: ignore[no-untyped-def]
-    """Cone ends (18 rows) of the world in a camera's frame."""
+    """Transform cone ends (18 rows) from the world into a camera's frame."""
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
     for e in range(2):
         for i in range(3):
@@ -37,7 +40,7 @@ def to_camera(cones, world, rotation, translation, ends):  # type: ignore[no-unt
 
 @kernel
 def find_forms(cones, ends, flat, form):  # type: ignore[no-untyped-def]
-    """Fill flat and form from ends."""
+    """Fill flat (first-order images of the ends) and form from ends."""
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
     for e in range(2):
         p, q = 9 * e * LANES, 6 * e * LANES
@@ -70,10 +73,7 @@ def find_forms(cones, ends, flat, form):  # type: ignore[no-untyped-def]
 
 @kernel
 def find_tangents(cones, flat, form, arcs):  # type: ignore[no-untyped-def]
-    """Fill arcs: where the common tangents touch the ends.
-
-    The line through the two points farthest along its normal gives a better normal.
-    """
+    """Fill arcs: the angles at which the common tangents touch the ends, by iterated normals."""
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
     for side in range(2):
         sense = 1.0 if side == 0 else -1.0
@@ -109,7 +109,7 @@ def find_tangents(cones, flat, form, arcs):  # type: ignore[no-untyped-def]
 
 @kernel
 def arc_sweep(e, c, flat, form, arcs):  # type: ignore[no-untyped-def]
-    """The angle (rad) that end e's arc of cone c sweeps, in the direction over the outside."""
+    """Signed angle (rad) of end e's arc of cone c."""
     if form[c] == ONLY_END + e:
         return 2.0 * np.pi
     at = 4 * e * LANES + c

@@ -1,4 +1,4 @@
-"""What a pixel shows most steadily over time, and how often it shows something else."""
+"""Steadiest value of each pixel over time, and how often the pixel differs from it."""
 
 from collections.abc import Iterable, Iterator
 
@@ -13,10 +13,10 @@ from markerless_tracker.imaging.images import Image
 def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-def]
     """Per pixel, the mean of the frames in the shortest brightness interval that holds ``share``.
 
-    Choosing whole frames by their brightness (and not each channel for itself) keeps colours that
-    the pixel really had; frames of the interval far from its mean colour are left out again.
-    ``variance`` gets the mean square, per channel, of the deviations from
-    that value of all frames within three times the interval (at least 6 grey levels).
+    Frames are chosen by brightness, not channel by channel, so that only colours occur that the
+    pixel had. Frames of the interval whose colour is far from its mean are left out. ``variance``
+    is, per channel, the mean square deviation from the result over all frames within three times
+    the interval (at least 6 grey levels).
     """
     count, height, width, channels = stack.shape
     need = max(1, int(np.ceil(share * count)))
@@ -49,7 +49,7 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
                     total += int(stack[keys[i] & 4095, v, u, c])
                 rough[c] = np.float32(total) / np.float32(need)
                 sums[c] = 0
-            # As bright but of another colour: something else that passed.
+            # The same brightness but another colour: a passing object.
             kept = 0
             for i in range(best, best + need):
                 t = keys[i] & 4095
@@ -73,22 +73,26 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
                 variance[v, u, c] = square / np.float32(max(inside, 1))
 
 
-# Where clips are all there is: a fifth of the frames is enough to prefer a floor seen now and then,
-# which stands perfectly still, to a body that is there more often but never quite the same.
 ALONE_SHARE = 0.2
+"""Fraction of the frames that must agree if there are only clips.
+
+Small enough to prefer a motionless floor that is seldom visible to a body that is often there, but
+never quite the same.
+"""
 
 
 def steady_image(
     stack: Image, *, share: float = 0.4
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """What each pixel shows most steadily, and how much that varies.
+    """Steadiest value of each pixel, and its variance.
 
-    A pixel covered by something moving for up to 1 - ``share`` of the time still shows what is
-    behind; a median gives way at one half. What stands still longer than that is burnt in.
+    A pixel that moving objects cover for up to 1 - ``share`` of the time keeps the value of the
+    scene behind them; a median does so up to one half. Objects that stay longer without moving
+    become part of the image.
 
     Args:
         stack: (n, h, w, c) uint8 frames, n at most 4096.
-        share: part of the frames that must agree.
+        share: fraction of the frames that must agree.
 
     Returns:
         Steady value and variance, (h, w, c) float32 each, grey levels and their square.
@@ -102,7 +106,7 @@ def steady_image(
 
 @compiled()
 def match_kernel(stack, target, tolerance, matches, total):  # type: ignore[no-untyped-def]
-    """Count and add up the frames that lie within ``tolerance`` of ``target`` in every channel."""
+    """Count and sum the frames within ``tolerance`` of ``target`` in every channel."""
     count, height, width, channels = stack.shape
     for v in range(height):
         for u in range(width):
@@ -122,7 +126,7 @@ def match_kernel(stack, target, tolerance, matches, total):  # type: ignore[no-u
 def matching_frames(
     stack: Image, target: NDArray[np.float32], tolerance: float
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """How many frames show ``target`` (h, w, c) at each pixel, and the mean of those that do.
+    """Number of frames that agree with ``target`` (h, w, c) at each pixel, and their mean.
 
     Returns:
         Counts (h, w) int32, and the mean (h, w, c) float32, ``target`` where no frame agrees.
@@ -136,7 +140,7 @@ def matching_frames(
 
 @compiled()
 def motion_kernel(stack, steady, tolerance, share, jump):  # type: ignore[no-untyped-def]
-    """Share of the frames that differ from the steady value, and the largest change at once."""
+    """Fraction of the frames that differ from the steady value, and the largest single change."""
     count, height, width, channels = stack.shape
     for v in range(height):
         for u in range(width):
@@ -157,17 +161,17 @@ def motion_kernel(stack, steady, tolerance, share, jump):  # type: ignore[no-unt
 def motion(
     stack: Image, steady: NDArray[np.float32], tolerance: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """How often something covers each pixel, and how abruptly it comes.
+    """How often each pixel is covered, and how abruptly.
 
-    Light (reflections, soft shadows) changes gradually, a body arrives at once.
+    Light (reflections, soft shadows) changes gradually, a body arrives from one frame to the next.
 
     Args:
-        stack: (n, h, w, c) uint8 frames in the order of time.
+        stack: (n, h, w, c) uint8 frames in temporal order.
         steady: (h, w, c) float32, of `steady_image`.
-        tolerance: grey levels within which two values are the same.
+        tolerance: largest difference of two values that count as equal, grey levels.
 
     Returns:
-        Share of the frames that differ from the steady value, (h, w) float32 in 0..1, and the
+        Fraction of the frames that differ from the steady value, (h, w) float32 in 0..1, and the
         largest change from one frame to the next, (h, w) float32, grey levels.
     """
     share = np.empty(steady.shape[:2], dtype=np.float32)
@@ -177,7 +181,7 @@ def motion(
 
 
 def thinned(frames: Iterable[Image], most: int) -> Iterator[tuple[int, Image]]:
-    """At most ``most`` frames, evenly spread, of a sequence whose length need not be known.
+    """At most ``most`` frames, evenly spread, of a sequence of unknown length.
 
     Yields (index, frame). Holds up to ``most`` frames at a time.
     """
