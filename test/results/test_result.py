@@ -100,7 +100,7 @@ def test_the_body_may_be_fitted_on_the_way(tmp_path, body, config):
 
 def test_the_content_does_not_depend_on_where_it_is_written(tmp_path, body, config):
     texts = []
-    for name in (tmp_path / "a", tmp_path / "deep" / "folder" / "with.dots.b"):
+    for name in (tmp_path / "with.dots.b", tmp_path / "deep" / "folder" / "with.dots.b"):
         with ResultWriter(name, body, config, fps=59.94) as writer:
             writer.add(result(0, 0.1))
         texts += [name.parent / f"{name.name}{suffix}" for suffix in (".trc", ".json")]
