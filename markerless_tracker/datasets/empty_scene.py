@@ -1,5 +1,6 @@
 """Backgrounds of a recording: its own, or learned from its images where it brings none."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from markerless_tracker.datasets.recording import Recording
@@ -28,14 +29,27 @@ def backgrounds_of(recording: Recording, folder: Path | None = None) -> dict[str
     missing = [name for name in recording.rig.names if name not in found]
     if not missing:
         return found
-    every = max(1, (recording.frame_count or FRAMES) // FRAMES)
-    clips: dict[str, list[Image]] = {name: [] for name in missing}
-    for frame in recording.frames(every=every):
-        for name in missing:
-            clips[name].append(frame.images[name])
+    clips = _clips(recording, missing)
     stills = recording.room_stills()
     for name in missing:
         plate = background_plate([clips[name]], stills.get(name, []), camera=name)
         recording.warn(f"{name}: no empty-scene image, background learned from {plate.note}")
         found[name] = [plate.image]
     return {name: found[name] for name in recording.rig.names}
+
+
+def _clips(recording: Recording, names: Sequence[str]) -> dict[str, list[Image]]:
+    """Camera name -> images of a recording, evenly spread over it, fewer than `2 * FRAMES`."""
+    every = max(1, (recording.frame_count or 1) // FRAMES)
+    clips: dict[str, list[Image]] = {name: [] for name in names}
+    kept, step = 0, 1  # step doubles while a recording of unknown length goes on
+    for number, frame in enumerate(recording.frames(every=every)):
+        if recording.frame_count is None and number % step:
+            continue
+        for name in names:
+            clips[name].append(frame.images[name])
+        kept += 1
+        if recording.frame_count is None and kept == 2 * FRAMES:
+            clips = {name: images[::2] for name, images in clips.items()}
+            kept, step = FRAMES, 2 * step
+    return clips

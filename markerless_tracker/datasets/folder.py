@@ -1,6 +1,6 @@
 """Recordings as files: one video or folder of numbered images per camera, beside a calibration."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -66,20 +66,23 @@ class VideoRecording(Recording):
                     f"{camera.name}: {stream.path} has images of {stream.size_px[0]}x"
                     f"{stream.size_px[1]} px, expected {expected[0]}x{expected[1]} px as calibrated"
                 )
-        counts = {name: stream.frame_count for name, stream in streams.items()}
         rates = {name: stream.fps for name, stream in streams.items()}
+        # The stated counts; a camera without one can only be read to its end.
+        counts = {name: stream.frame_count for name, stream in streams.items()}
+        stated = [count for count in counts.values() if count is not None]
+        self._most_frames = min(stated) if stated else None
         super().__init__(
             path,
             rig,
             scale=scale,
             fps=_common_rate(path, rates),
-            frame_count=min(counts.values()),
+            frame_count=self._most_frames if len(stated) == len(counts) else None,
         )
-        if len(set(counts.values())) > 1:
+        if len(set(stated)) > 1:
             self.warn(
                 f"{self.name}: cameras differ in length ("
-                + ", ".join(f"{name} {count}" for name, count in counts.items())
-                + f" frames), the recording ends after {self.frame_count}"
+                + ", ".join(f"{name} {count or 'unknown'}" for name, count in counts.items())
+                + f" frames), the recording ends after {self._most_frames}"
             )
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
@@ -89,15 +92,16 @@ class VideoRecording(Recording):
         }
         sizes = {camera.name: camera.size_px for camera in self.rig}
         for index, images in read_together(streams, sizes, start=start, every=every):
+            if self._most_frames is not None and index >= self._most_frames:
+                return
             ended = [name for name, image in images.items() if image is None]
             if ended:
-                if index < (self.frame_count or 0):
-                    self.warn(
-                        f"{self.name}: {', '.join(ended)} cannot be read beyond frame "
-                        f"{max(index - every, 0)} of {self.frame_count}, the recording ends there"
+                if index == start:
+                    raise DatasetError(
+                        f"{self.name}: {', '.join(ended)} has no frame {start}, expected to start "
+                        "there"
                     )
-                return
-            if self.frame_count is not None and index >= self.frame_count:
+                self._warn_of_end(ended, max(index - every, 0))
                 return
             yield FrameSet(
                 index,
@@ -105,9 +109,23 @@ class VideoRecording(Recording):
                 {name: image for name, image in images.items() if image is not None},
             )
 
+    def _warn_of_end(self, ended: Sequence[str], last: int) -> None:
+        """Warn unless the frames ended where they should: all cameras at once, or as stated."""
+        if self._most_frames is not None:
+            self.warn(
+                f"{self.name}: {', '.join(ended)} cannot be read beyond frame {last} of "
+                f"{self._most_frames}, the recording ends there"
+            )
+        elif len(ended) < len(self.rig):
+            self.warn(
+                f"{self.name}: {', '.join(ended)} ends after frame {last}, before the other "
+                "cameras; the recording ends there"
+            )
+
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
-        last = (self.frame_count or 1) - 1
-        index = min(max(round(stamp_ns * self.fps / 1e9), 0), last)
+        index = max(round(stamp_ns * self.fps / 1e9), 0)
+        if self._most_frames is not None:
+            index = min(index, self._most_frames - 1)
         return index, stamp_of(index, self.fps)
 
 

@@ -91,7 +91,12 @@ def format_header(names: Sequence[str], rows: int, fps: float, name: str) -> lis
         DatasetError: a marker's name cannot stand in the file (tab, line break or empty).
     """
     for marker in names:
-        if not marker or marker != marker.strip() or len(marker.splitlines()) != 1 or "\t" in marker:
+        if (
+            not marker
+            or marker != marker.strip()
+            or len(marker.splitlines()) != 1
+            or "\t" in marker
+        ):
             raise DatasetError(f"marker name {marker!r} cannot stand in a marker file")
     count, rate = len(names), f"{fps:.10g}"
     # File names may hold what a header line in UTF-8 cannot: tabs, line breaks, undecoded bytes.
