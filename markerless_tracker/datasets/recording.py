@@ -62,17 +62,22 @@ class Recording(ABC):
         self.scale = scale
         self.fps = fps
         self.frame_count = frame_count
-        self._warnings: list[str] = []
+        self._warnings: dict[str, str] = {}
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know, one line each; reading the images may add some."""
-        return tuple(self._warnings)
+        return tuple(self._warnings.values())
 
-    def warn(self, message: str) -> None:
-        """Add a warning, once."""
-        if message not in self._warnings:
-            self._warnings.append(message)
+    def warn(self, message: str, *, replaces: str | None = None) -> None:
+        """Add a warning, once.
+
+        Args:
+            message: one line.
+            replaces: a key; the warning takes the place of the last one with that key, such as
+                the counts of an earlier reading.
+        """
+        self._warnings[replaces or message] = message
 
     def frames(self, *, start: int = 0, every: int = 1) -> Iterator[FrameSet]:
         """Every `every`-th set from index `start` on, in order.

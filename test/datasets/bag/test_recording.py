@@ -288,8 +288,10 @@ def test_damaged_bytes_never_escape_as_another_error(whole_bag, edits) -> None:
         damaged[int(place * (len(damaged) - 1))] = value
     file.write_bytes(damaged)
     try:
-        for frame in open_recording(whole_bag).frames():
-            assert set(frame.images) == {"cam01", "cam02"}
+        recording = open_recording(whole_bag)
+        for start in (0, recording.start_index(STEP_NS)):
+            for frame in recording.frames(start=start):
+                assert set(frame.images) == {"cam01", "cam02"}
     except TrackerError as error:
         assert "\n" not in str(error)
     finally:
