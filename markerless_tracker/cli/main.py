@@ -14,6 +14,7 @@ import argparse
 import importlib
 import os
 import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NoReturn
@@ -22,6 +23,9 @@ from markerless_tracker import __version__
 from markerless_tracker.errors import TrackerError
 
 PROGRAM = "markerless_tracker"
+
+HELP_WIDTH = 88
+"""Columns of a verb's description."""
 
 VERBS: Mapping[str, str] = MappingProxyType(
     {
@@ -50,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit status: 0 done, 1 failed with one line on standard error, 2 wrong arguments,
-        130 interrupted, 141 nobody reads standard output any more.
+        3 nobody found (`track`), 130 interrupted, 141 standard output was closed by its reader.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if not words:
@@ -85,7 +89,7 @@ def _run(verb: str, words: Sequence[str]) -> int:
     module = importlib.import_module(f"markerless_tracker.cli.{verb}")
     parser = _Parser(
         prog=f"{PROGRAM} {verb}",
-        description=module.HELP,
+        description=textwrap.fill(module.HELP, HELP_WIDTH),
         epilog=f"example:\n  {module.EXAMPLE}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -74,7 +74,7 @@ def refusal(outcome: tuple[int, str, str]) -> str:
 def test_a_recording_becomes_markers_and_a_summary(track, walk, tmp_path):
     status, out, _ = track("--start", walk / "ground_truth.trc")
     assert status == 0
-    assert f"{tmp_path / 'out.trc'}: 4 frames, 0 of them lost" in out
+    assert f"{tmp_path / 'out.trc'}: 4 frames, 4 tracked, 0 lost, " in out
     found = score(read_trc(tmp_path / "out.trc"), read_trc(walk / "ground_truth.trc"))
     assert found.frames == FRAMES
     assert found.mean_mm < 40.0
@@ -91,10 +91,10 @@ def test_json_alone_on_standard_output(track, walk, tmp_path):
     summary = json.loads(out)
     assert summary["result"] == str(tmp_path / "out.trc")
     assert summary["source"] == str(walk)
-    assert summary["frames"] == FRAMES
+    assert summary["frames"] == summary["tracked"] == FRAMES
     assert summary["states"] == {"TRACKING": FRAMES}
     assert summary["frames_per_s"] > 0
-    assert summary["warnings"] == []
+    assert summary["warnings"] == summary["frame_warnings"] == []
     assert "tracking walk" in err
 
 
