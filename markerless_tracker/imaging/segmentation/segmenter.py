@@ -85,7 +85,7 @@ class Segmenter:
         spread = background.mean.max(axis=2) - background.mean.min(axis=2)
         self._grey = background.channels == 1 or bool(spread.max() <= _GREY_TOLERANCE)
         sigma = float(np.sqrt(np.median(background.variance)))
-        self._smooth = sigma > self.settings.denoise_sigma
+        self._smooth = sigma > self.settings.background.denoise_sigma
         self._mean, self._scale = self._gaussians()
         self._first = kernels.coarse(self._mean[0], self._scale[0])
         mean, variance = self._steady(background.mean, background.variance)
@@ -103,15 +103,15 @@ class Segmenter:
         self._meter = ExposureMeter(self._means_by_channel[0])
         options = self.settings
         self._adaptation = (
-            Adaptation(options.background_follow_s, options.background_follow_margin_px)
-            if options.background_follow_s > 0.0
+            Adaptation(options.background.follow_s, options.background.follow_margin_px)
+            if options.background.follow_s > 0.0
             else None
         )
         self._rule = shadow_rule(self.settings, grey=self._grey)
         self._size_px = (width, height)
         self._whole = Region.whole(self._size_px)
         self._memory = np.empty((2, height * width), dtype=np.uint8)
-        share = options.shadow_grey_blob_share if self._grey else options.shadow_blob_share
+        share = options.shadow.grey_blob_share if self._grey else options.shadow.blob_share
         self._least_shadow_px = share * height * width
 
     @property
@@ -134,7 +134,7 @@ class Segmenter:
         smooth = np.asarray(cv2.GaussianBlur(mean, _SMOOTH_PX, 0.0), dtype=np.float32)
         row = cv2.getGaussianKernel(_SMOOTH_PX[0], 0.0, cv2.CV_64F)
         less = np.maximum(
-            variance * float((row**2).sum() ** 2), self.settings.background_sigma_min**2
+            variance * float((row**2).sum() ** 2), self.settings.background.sigma_min**2
         )
         return smooth.reshape(mean.shape), less.astype(np.float32)
 
@@ -179,7 +179,7 @@ class Segmenter:
             ImageError: not an image of the background's size and channels; names the camera.
         """
         self._check(image)
-        if self.settings.exposure_compensation:
+        if self.settings.background.exposure_compensation:
             self._gain[:] = self._meter.gain(image.reshape(image.shape[0], image.shape[1], -1))
         labels = self._labels(image, self._whole)
         self._look_at_texture(image, labels, self._whole, self._whole)
@@ -188,7 +188,7 @@ class Segmenter:
     def observe(self, image: Image, stamp_ns: int, region: Region | None = None) -> Observation:
         """Silhouette and edge map of a region, or of the whole frame.
 
-        They depend on this image alone, unless `background_follow_s` lets the background follow
+        They depend on this image alone, unless `background.follow_s` lets the background follow
         slow changes: then on the images before as well, in the order of the calls. Inside a region
         they are what they would be in the whole frame.
 
@@ -244,7 +244,7 @@ class Segmenter:
         What is decided by the size of a patch needs all of the patch: more is looked at until none
         that is too small to tell goes on outside.
         """
-        if self.settings.exposure_compensation:
+        if self.settings.background.exposure_compensation:
             by_channel = image.reshape(image.shape[0], image.shape[1], -1)
             self._gain[:] = self._meter.gain(by_channel)
         slack = _SLACK_PX
@@ -257,10 +257,10 @@ class Segmenter:
     def _try_silhouette(self, image: Image, need: Region, slack: int) -> tuple[Mask, Region] | None:
         """`_silhouette` with so much more around what is needed; None if that is too little."""
         size_px, options = self._size_px, self.settings
-        if options.level_set_iterations:
-            reach = level_set_reach(options.level_set_iterations, options.level_set_radius_px)
+        if options.level_set.iterations:
+            reach = level_set_reach(options.level_set.iterations, options.level_set.radius_px)
             need = need.grown(reach, size_px)
-        whole = need.grown(border_reach(options.mask_trim_px), size_px)
+        whole = need.grown(border_reach(options.mask.trim_px), size_px)
         zone = whole.grown(slack, size_px)
         unknown = _open_sides(zone, size_px)
         frame_px = size_px[0] * size_px[1]
@@ -280,7 +280,7 @@ class Segmenter:
         open_and_close(mask, options, frame_px)
         inner = zone.within(window)
         wanted = whole.within(window)
-        least, largest = options.mask_blob_share * frame_px, options.mask_hole_share * frame_px
+        least, largest = options.mask.blob_share * frame_px, options.mask.hole_share * frame_px
         if clear_small(mask, least, connectivity=8, zone=inner, need=wanted, unknown=unknown):
             return None
         if fill_small(mask, largest, zone=inner, need=wanted, unknown=unknown):
@@ -291,7 +291,7 @@ class Segmenter:
 
     def _trim(self, image: Image, mask: Mask, inner: Region, window: Region) -> None:
         """Take what the body covers by less than half from the mask's border, in place."""
-        layers = self.settings.mask_trim_px
+        layers = self.settings.mask.trim_px
         body = occupied(mask, inner)
         if layers == 0 or body.width <= 0:
             return
@@ -309,16 +309,16 @@ class Segmenter:
         """Move the mask's contour to the local contrast, in place; outside `inner` it is not."""
         options = self.settings
         body = occupied(mask, inner)
-        if options.level_set_iterations == 0 or body.width <= 0:
+        if options.level_set.iterations == 0 or body.width <= 0:
             return
-        margin = options.level_set_iterations + options.level_set_radius_px
+        margin = options.level_set.iterations + options.level_set.radius_px
         box = body.grown(margin, (mask.shape[1], mask.shape[0]))
         part = np.ascontiguousarray(mask[box.slices])
         refine_contour(
             self._pixels(image, box.moved(window.left, window.top)),
             part,
-            iterations=options.level_set_iterations,
-            radius_px=options.level_set_radius_px,
+            iterations=options.level_set.iterations,
+            radius_px=options.level_set.radius_px,
             least=_LEAST_CONTRAST * self._sigma,
         )
         mask[box.slices] = part
@@ -349,7 +349,7 @@ class Segmenter:
     def _look_at_texture(self, image: Image, labels: Mask, window: Region, patches: Region) -> None:
         options = self.settings
         # A pixel that shows things by turns has no one pattern.
-        if options.texture_radius_px == 0 or not options.shadow_removal or self.background.modes:
+        if options.texture.radius_px == 0 or not options.shadow.removal or self.background.modes:
             return
         part, looked_at = window, labels
         if not self._grey:
@@ -360,7 +360,7 @@ class Segmenter:
             part = occupied(looked_at, patches.within(window)).moved(window.left, window.top)
         if part.width <= 0:
             return
-        seen = part.grown(texture_reach(options.texture_radius_px), self._size_px)
+        seen = part.grown(texture_reach(options.texture.radius_px), self._size_px)
         correct_labels(
             grey_of(self._pixels(image, seen)),
             self._grey_mean,
@@ -371,10 +371,10 @@ class Segmenter:
             part,
             seen,
             looked_at=looked_at,
-            radius=options.texture_radius_px,
-            light=(options.texture_light_min, options.shadow_value_max + 0.03),
+            radius=options.texture.radius_px,
+            light=(options.texture.light_min, options.shadow.value_max + 0.03),
             protect=self._grey,
-            reveal=self._grey and options.texture_reveal,
+            reveal=self._grey and options.texture.reveal,
         )
 
     def _scratch(self, which: int, window: Region) -> Mask:

@@ -3,8 +3,12 @@ import pytest
 
 from markerless_tracker.imaging import ImagingSettings, Region, Segmenter, learn_background
 
-FOLLOW = ImagingSettings(background_follow_s=2.0, exposure_compensation=False, texture_radius_px=0)
-STILL = ImagingSettings(exposure_compensation=False, texture_radius_px=0)
+FOLLOW = ImagingSettings.from_mapping(
+    {"background.follow_s": 2.0, "background.exposure_compensation": False, "texture.radius_px": 0}
+)
+STILL = ImagingSettings.from_mapping(
+    {"background.exposure_compensation": False, "texture.radius_px": 0}
+)
 
 
 def shot(lamp: float, person: bool, seed: int, channels: int) -> np.ndarray:
