@@ -7,12 +7,17 @@ import cv2
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.camera import (
+    WORLD_FRAME,
+    CameraModel,
+    CameraRig,
+    info_fields,
+    optical_frame,
+    quaternion_xyzw,
+)
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.geometry import quaternion_from_rotation
 from markerless_tracker.imaging import Image
 
-WORLD_FRAME = "map"
 JPEG_QUALITY = 90
 
 
@@ -24,11 +29,6 @@ def typestore() -> Any:
 
 def _type(name: str) -> Any:
     return typestore().types[name]
-
-
-def optical_frame(camera_name: str) -> str:
-    """The frame a camera's messages carry (REP-103: x right, y down, z forward)."""
-    return f"{camera_name}_optical_frame"
 
 
 def stamp_message(stamp_ns: int) -> Any:
@@ -72,16 +72,9 @@ def jpeg_message(image: Image, stamp_ns: int, camera: CameraModel) -> Any:
 
 def camera_info_message(camera: CameraModel, stamp_ns: int) -> Any:
     """sensor_msgs/CameraInfo of an unrectified camera: R = 1, P = [K 0], plumb_bob."""
-    k = camera.matrix
     return _type("sensor_msgs/msg/CameraInfo")(
         header=header(stamp_ns, optical_frame(camera.name)),
-        height=camera.size_px[1],
-        width=camera.size_px[0],
-        distortion_model="plumb_bob",
-        d=camera.distortion.copy(),
-        k=k.reshape(-1).copy(),
-        r=np.eye(3).reshape(-1),
-        p=np.hstack([k, np.zeros((3, 1))]).reshape(-1),
+        **info_fields(camera),
         binning_x=0,
         binning_y=0,
         roi=_type("sensor_msgs/msg/RegionOfInterest")(
@@ -100,7 +93,7 @@ def static_transforms_message(rig: CameraRig, stamp_ns: int) -> Any:
     transforms = []
     for camera in rig:
         pose = camera.T_world_cam
-        w, x, y, z = (float(value) for value in quaternion_from_rotation(pose[:3, :3]))
+        x, y, z, w = quaternion_xyzw(pose[:3, :3])
         tx, ty, tz = (float(value) for value in pose[:3, 3])
         transforms.append(
             stamped(

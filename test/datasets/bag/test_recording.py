@@ -218,7 +218,7 @@ def test_topics_that_tell_too_little_are_named(make_recording, tmp_path: Path) -
         (
             [*infos, frames_message(one, two, static("cam02_optical_frame", "map", (0.0,) * 3))],
             CalibrationError,
-            "circle",
+            "cycle",
         ),
         (
             [
@@ -230,9 +230,14 @@ def test_topics_that_tell_too_little_are_named(make_recording, tmp_path: Path) -
             "cam02.*equidistant",
         ),
         (
+            [infos[0], info("cam02", rig, binning_x=2), frames_message(one, two)],
+            CalibrationError,
+            "cam02.*binning",
+        ),
+        (
             [infos[0], info("cam02", rig, k=np.zeros(9)), frames_message(one, two)],
             CalibrationError,
-            "cam02.*focal",
+            "cam02.*uncalibrated",
         ),
     ]
     for number, (messages, error, said) in enumerate(cases):
