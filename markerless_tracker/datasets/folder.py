@@ -9,6 +9,7 @@ from markerless_tracker.camera import CameraRig, read_calibration
 from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.datasets.markers.trc import read_trc
 from markerless_tracker.datasets.recording import FrameSet, Recording
+from markerless_tracker.datasets.truth import truth_path
 from markerless_tracker.datasets.video.decode import read_together
 from markerless_tracker.datasets.video.images import (
     find_stream,
@@ -146,7 +147,7 @@ class FolderRecording(VideoRecording):
 
     def ground_truth(self) -> MarkerTrack | None:
         """The markers of `ground_truth.trc`, None if there is no such file."""
-        path = self.path / "ground_truth.trc"
+        path = truth_path(self.path)
         return read_trc(path) if path.is_file() else None
 
     def masks(self, camera: str) -> dict[int, Image]:

@@ -14,6 +14,7 @@ from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.datasets.markers.trc import write_trc
 from markerless_tracker.datasets.recording import BACKGROUND
 from markerless_tracker.datasets.target import new_folder
+from markerless_tracker.datasets.truth import truth_path
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image, check_image
 
@@ -83,7 +84,7 @@ class RecordingWriter:
 
     def write_truth(self, track: MarkerTrack) -> None:
         """Write `ground_truth.trc`."""
-        write_trc(self.folder / "ground_truth.trc", track, self.fps)
+        write_trc(truth_path(self.folder), track, self.fps)
 
     def close(self) -> None:
         """Finish the videos."""
