@@ -1,4 +1,4 @@
-"""ROS messages of a bag, made from cameras and images (rosbags' types, no ROS needed)."""
+"""ROS messages of a bag, from cameras and images (message types of rosbags, without ROS)."""
 
 from functools import cache
 from typing import Any

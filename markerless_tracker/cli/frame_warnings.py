@@ -25,7 +25,7 @@ class WarningKind:
 
 @dataclass
 class FrameWarnings:
-    """The kinds of warning in a run, in the order in which they came first.
+    """The kinds of warning in a run, in the order of their first frames.
 
     Attributes:
         kinds: text without its numbers -> kind.
@@ -36,7 +36,7 @@ class FrameWarnings:
     frames: int = 0
 
     def add(self, frame: int, texts: Iterable[str]) -> list[WarningKind]:
-        """Count the warnings of one frame; returns the kinds that came for the first time.
+        """Count the warnings of one frame; returns the new kinds.
 
         Args:
             frame: number of the frame in the recording.

@@ -1,4 +1,4 @@
-"""Verb `track`: a recording or bag to a result, without a ROS graph."""
+"""Verb `track`: tracks the person in a recording or bag and writes a result, without ROS."""
 
 import argparse
 import json
@@ -195,7 +195,7 @@ def _warn(console: Console, text: str) -> None:
 
 
 def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
-    """Settings of a YAML file, overruled by flags that were given, by dotted name.
+    """Settings of a YAML file; flags that were given take precedence, by dotted name.
 
     Raises:
         ConfigError: the file cannot be read, or a setting is unknown or impossible.
@@ -216,7 +216,7 @@ def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
 
 
 def _cameras(shifts: Mapping[str, Shift]) -> dict[str, Any]:
-    """How far each camera's silhouettes lie from the body, for JSON."""
+    """Offset of each camera's silhouettes from the body, for JSON."""
     return {
         name: {
             "shift_px": [round(value, 2) for value in shift.px],

@@ -1,4 +1,4 @@
-"""Recordings, markers and calibrations from disk, whatever their format."""
+"""Recordings and marker files: reading every supported format, writing ours."""
 
 from markerless_tracker.datasets.background import read_background, read_background_models
 from markerless_tracker.datasets.folder import FolderRecording

@@ -1,4 +1,4 @@
-"""Recordings as files: one video or folder of numbered images per camera, beside a calibration."""
+"""Recordings as files: a calibration, and one video or folder of numbered images per camera."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -25,7 +25,7 @@ CALIBRATION = "calibration.toml"
 
 
 class VideoRecording(Recording):
-    """Images from one source per camera; frame i of each belongs together.
+    """Images from one source per camera; frames of one index form a set.
 
     The recording ends with its shortest camera.
 
@@ -111,7 +111,7 @@ class VideoRecording(Recording):
             )
 
     def _warn_of_end(self, ended: Sequence[str], last: int) -> None:
-        """Warn unless the frames ended where they should: all cameras at once, or as stated."""
+        """Warn unless the frames ended as stated, or without a statement at once in all cameras."""
         if self._most_frames is not None:
             self.warn(
                 f"{self.name}: {', '.join(ended)} cannot be read beyond frame {last} of "
@@ -131,7 +131,7 @@ class VideoRecording(Recording):
 
 
 class FolderRecording(VideoRecording):
-    """The neutral layout: `calibration.toml` and one video or image folder per camera."""
+    """A recording folder: `calibration.toml` and one video or image folder per camera."""
 
     def __init__(self, path: Path, *, scale: float = 1.0, input_fps: float | None = None) -> None:
         rig = read_calibration(path / CALIBRATION)
@@ -173,7 +173,7 @@ class FolderRecording(VideoRecording):
 def _common_rate(path: Path, rates: Mapping[str, float | None]) -> float:
     for name, rate in rates.items():
         if rate is None:
-            raise DatasetError(f"{path}: {name} does not say its rate, expected --input-fps")
+            raise DatasetError(f"{path}: {name} states no rate, expected --input-fps")
     if len(set(rates.values())) > 1:
         listed = ", ".join(f"{name} {rate:g}" for name, rate in rates.items())
         raise DatasetError(f"{path}: cameras differ in rate ({listed} fps), expected one rate")

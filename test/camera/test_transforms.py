@@ -66,7 +66,7 @@ def test_a_cycle_ends() -> None:
         ((np.inf, 0.0, 0.0, 1.0), "to cam is not finite"),
     ],
 )
-def test_a_transform_that_is_none_is_refused(quaternion, reported: str) -> None:
+def test_invalid_transforms_are_refused(quaternion, reported: str) -> None:
     tree = TransformTree()
     with pytest.raises(CalibrationError, match=reported):
         tree.add([stamped("map", "cam", np.eye(4), quaternion)])
@@ -74,7 +74,7 @@ def test_a_transform_that_is_none_is_refused(quaternion, reported: str) -> None:
 
 
 @given(st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3))
-def test_quaternions_are_those_of_the_geometry(vector: list[float]) -> None:
+def test_quaternions_agree_with_the_geometry(vector: list[float]) -> None:
     rotation = rotation_from_rodrigues(vector)
     w, x, y, z = quaternion_from_rotation(rotation)
     found = np.array(quaternion_xyzw(rotation))

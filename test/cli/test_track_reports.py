@@ -66,7 +66,7 @@ def test_json_has_the_warnings_of_frames(run: Run, warned, walk) -> None:
 
 @pytest.fixture
 def empty_room(tmp_path: Path) -> Path:
-    """Five frames of the made-up room without a person."""
+    """Five frames of the synthetic room without a person."""
     scene = SyntheticScene(
         body="balan31", motion="walk", size_px=(192, 144), fps=30.0, seed=4, noise=2.0
     )

@@ -33,7 +33,7 @@ def test_sets_carry_index_stamp_and_every_camera(make_recording) -> None:
     assert sets[0].images["cam01"].shape == (48, 64, 3) and recording.warnings == ()
 
 
-def test_start_and_every_pick_the_same_images(make_recording) -> None:
+def test_start_and_every_select_the_same_images(make_recording) -> None:
     recording = open_recording(make_recording(frames=8))
     whole = list(recording.frames())
     picked = list(recording.frames(start=1, every=3))
@@ -62,7 +62,7 @@ def test_impossible_scales_are_refused(make_recording, scale: float) -> None:
 
 
 @pytest.mark.parametrize(("start", "every"), [(-1, 1), (0, 0)])
-def test_impossible_picks_are_refused(make_recording, start: int, every: int) -> None:
+def test_impossible_starts_and_steps_are_refused(make_recording, start: int, every: int) -> None:
     with pytest.raises(ConfigError, match="start"):
         open_recording(make_recording()).frames(start=start, every=every)
 
@@ -80,7 +80,7 @@ def test_the_frame_of_a_stamp(make_recording) -> None:
         recording.start_index(5 * 10**9)
 
 
-def test_leaving_early_ends_the_threads(make_recording) -> None:
+def test_closing_the_iterator_ends_the_threads(make_recording) -> None:
     frames = open_recording(make_recording()).frames()
     next(frames)
     frames.close()

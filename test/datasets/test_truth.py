@@ -1,4 +1,4 @@
-"""Where the reference markers of a recording lie."""
+"""The path of the reference markers of a recording."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from markerless_tracker.datasets import existing_truth, truth_path
 from markerless_tracker.errors import DatasetError
 
 
-def test_the_truth_lies_in_the_folder_of_a_recording_or_of_a_bag_file(tmp_path: Path) -> None:
+def test_the_truth_is_in_the_folder_of_a_recording_or_of_a_bag_file(tmp_path: Path) -> None:
     (tmp_path / "walk.mcap").touch()
     for source in (tmp_path, tmp_path / "walk.mcap"):
         assert truth_path(source) == tmp_path / "ground_truth.trc"

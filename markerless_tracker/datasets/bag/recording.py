@@ -1,4 +1,4 @@
-"""Bags (rosbag2, MCAP): a rig's images as topics, `calibration.toml` and `background/` beside."""
+"""Bags (rosbag2, MCAP): images as topics, `calibration.toml` and `background/` in the folder."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ RAW_TYPE = "sensor_msgs/msg/Image"
 COMPRESSED_TYPE = "sensor_msgs/msg/CompressedImage"
 INFO_TYPE = "sensor_msgs/msg/CameraInfo"
 TF_TYPE = "tf2_msgs/msg/TFMessage"
-# Sets looked at to learn the rate.
+# Number of sets from which the rate is measured.
 RATE_SETS = 30
 LONE_SET_FPS = 60.0
 
@@ -33,9 +33,9 @@ LONE_SET_FPS = 60.0
 class BagRecording(Recording):
     """A bag with the images of a rig on `NAME/image_raw` or `NAME/image_raw/compressed`.
 
-    Images of one stamp (of their headers) make a set; incomplete sets are skipped and counted in
-    `warnings`. Of a cut or damaged file everything before the damage is read. `frame_count` is an
-    upper bound unless the file is damaged. Without a `calibration.toml` beside it, the rig comes
+    Images whose headers have the same stamp form a set; incomplete sets are skipped and counted in
+    `warnings`. A cut or damaged file is read up to the damage. `frame_count` is an upper bound
+    unless the file is damaged. Without a `calibration.toml` in the bag's folder, the rig is read
     from `NAME/camera_info` and `/tf_static`.
 
     Args:
@@ -43,7 +43,7 @@ class BagRecording(Recording):
         scale: factor for all images.
 
     Raises:
-        DatasetError: not a bag of this kind, topics are missing, or no set is complete.
+        DatasetError: not an MCAP bag, topics are missing, or no set is complete.
         CalibrationError: the calibration is missing or malformed.
     """
 
@@ -63,7 +63,7 @@ class BagRecording(Recording):
             rig = self._rig_from_topics(path, names)
         self._topics = {self._image_topic(path, name): name for name in names}
         self._where = path
-        self._set_places: dict[int, tuple[int, Place]] = {}  # index -> stamp (ns), where it lies
+        self._set_places: dict[int, tuple[int, Place]] = {}  # index -> stamp (ns), place
         stamps = [found.stamp_ns for found in islice(self._stamped(), RATE_SETS)]
         if not stamps:
             raise DatasetError(
@@ -97,7 +97,7 @@ class BagRecording(Recording):
             )
         if grouping.late:
             self.warn(
-                f"{self.name}: images that came after later ones were skipped "
+                f"{self.name}: images recorded after later ones were skipped "
                 f"({_counts(grouping.late)})",
                 replaces="late",
             )
@@ -116,7 +116,7 @@ class BagRecording(Recording):
         return best
 
     def _place_of(self, index: int) -> tuple[int | None, Place]:
-        """Stamp (ns) of a set and the place from which to read it; None and the begin for 0.
+        """Stamp (ns) of a set and the place to read from; None and the first place for set 0.
 
         Raises:
             DatasetError: the bag ends before.
@@ -131,7 +131,7 @@ class BagRecording(Recording):
         return self._set_places[index]
 
     def _stamped(self) -> Iterator[StampedSet]:
-        """The complete sets, of whose messages only the stamps are read where there is an index."""
+        """The complete sets, reading only their stamps where the bag has an index."""
         count = 0
         try:
             for found in SetGrouping(self._topics, self._where).sets(
@@ -169,7 +169,7 @@ class BagRecording(Recording):
     def _decoded(self, message: RawMessage) -> Any:
         try:
             return self._store.deserialize_cdr(message.data, message.type)
-        except Exception as error:  # hostile bytes raise whatever they like
+        except Exception as error:  # damaged bytes raise any exception
             raise DatasetError(
                 f"{self._files.paths[0]}: {message.topic}: a message cannot be decoded as "
                 f"{message.type}"

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 from markerless_tracker.datasets.bag.stream import HEAD_BYTES, Place, RawMessage
 from markerless_tracker.errors import DatasetError
 
-# Stamps that may wait for their other cameras, so that a silent camera cannot fill the memory.
+# Limit of incomplete sets held at a time; it bounds the memory if a camera records nothing.
 MAX_PENDING = 32
 
 
 class StampedSet(NamedTuple):
-    """A complete set: its stamp (ns), camera -> message, and where reading it anew must begin."""
+    """A complete set: stamp (ns), camera -> message, and the place to read it from."""
 
     stamp_ns: int
     messages: Mapping[str, RawMessage]
@@ -23,7 +23,7 @@ class StampedSet(NamedTuple):
 class SetGrouping:
     """Groups one pass over a bag into complete sets by increasing stamp.
 
-    Each pass counts for itself, so that passes beside each other do not change each other's counts.
+    Each pass has its own counts: concurrent passes do not change them.
 
     Args:
         topics: topic -> camera, in the order of the rig.
@@ -31,8 +31,8 @@ class SetGrouping:
         first_ns: images with an earlier stamp are ignored and not counted; None takes all.
 
     Attributes:
-        incomplete: camera -> images that were missing from sets that others' images announced.
-        late: camera -> images that came after a later set was complete.
+        incomplete: camera -> number of its images missing from sets.
+        late: camera -> number of its images recorded after a later set was complete.
     """
 
     def __init__(self, topics: Mapping[str, str], path: Path, first_ns: int | None = None) -> None:
@@ -60,7 +60,7 @@ class SetGrouping:
                 continue
             pending.setdefault(stamp, {})[name] = message
             if len(pending[stamp]) == len(self._topics):
-                # Images of later stamps may already have come: reading must begin before them.
+                # Images of later sets may have been read already: the place is before them.
                 place = min(m.place for parts in pending.values() for m in parts.values())
                 complete = pending.pop(stamp)
                 for earlier in [other for other in pending if other < stamp]:

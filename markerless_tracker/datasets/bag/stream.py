@@ -40,11 +40,11 @@ class RawMessage(NamedTuple):
 
 
 class IndexDamaged(Exception):
-    """The index of a file contradicts its content; reading forward still works."""
+    """The index of a file contradicts its content; the file can be read forward."""
 
 
 class McapFiles:
-    """The messages of one or more MCAP files, one after the other.
+    """The messages of one or more MCAP files, in the order of the files.
 
     Attributes:
         paths: the files.
@@ -62,7 +62,7 @@ class McapFiles:
         self.damage: str | None = None
         self.counts: dict[str, int] | None = {}
         self._summaries: list[Summary | None] = []
-        # Per file, what has been read so far; files repeat neither in each chunk.
+        # Definitions read so far, per file: a file need not repeat them in later chunks.
         self._schemas: list[dict[int, Schema]] = [{} for _ in self.paths]
         self._channels: list[dict[int, Channel]] = [{} for _ in self.paths]
         for path in self.paths:
@@ -124,7 +124,7 @@ class McapFiles:
                         continue
                     try:
                         heads = _heads(file, chunk, wanted, path.stat().st_size)
-                    except Exception as error:  # hostile bytes raise any exception
+                    except Exception as error:  # damaged bytes raise any exception
                         raise IndexDamaged from error
                     place = Place(number, chunk.chunk_start_offset)
                     for channel_id, data in heads:
@@ -149,7 +149,7 @@ class McapFiles:
                 try:
                     record = next(records, None)
                     parts = breakup_chunk(record) if isinstance(record, Chunk) else [record]
-                except Exception as error:  # hostile bytes raise any exception
+                except Exception as error:  # damaged bytes raise any exception
                     self.damage = (
                         f"{path}: cut or damaged, read up to there ({type(error).__name__})"
                     )
@@ -178,7 +178,7 @@ def _summary(path: Path) -> Summary | None:
     try:
         with path.open("rb") as file:
             return make_reader(file).get_summary()
-    except Exception:  # hostile bytes raise any exception; reading forward still works
+    except Exception:  # damaged bytes raise any exception; the file can be read forward
         return None
 
 

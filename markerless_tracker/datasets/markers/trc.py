@@ -41,7 +41,7 @@ def read_trc(path: str | Path) -> MarkerTrack:
             stamp, row = _row(path, number, line, len(names))
             if stamps and stamp <= stamps[-1]:
                 raise DatasetError(
-                    f"{path}: line {number}: Time {stamp / 1e9} s does not come after "
+                    f"{path}: line {number}: Time {stamp / 1e9} s is not later than "
                     f"{stamps[-1] / 1e9} s"
                 )
             stamps.append(stamp)
@@ -74,7 +74,7 @@ def format_trc(track: MarkerTrack, fps: float, name: str) -> str:
         name: file name without folder; line 1 states it.
 
     Raises:
-        DatasetError: a marker's name cannot stand in the file (tab, line break or empty).
+        DatasetError: a marker's name cannot be written (tab, line break or empty).
     """
     lines = format_header(track.names, len(track), fps, name)
     for index, (stamp, row) in enumerate(
@@ -88,7 +88,7 @@ def format_header(names: Sequence[str], rows: int, fps: float, name: str) -> lis
     """The five header lines of a `.trc`, without line breaks; arguments as in `format_trc`.
 
     Raises:
-        DatasetError: a marker's name cannot stand in the file (tab, line break or empty).
+        DatasetError: a marker's name cannot be written (tab, line break or empty).
     """
     for marker in names:
         if (
@@ -97,7 +97,7 @@ def format_header(names: Sequence[str], rows: int, fps: float, name: str) -> lis
             or len(marker.splitlines()) != 1
             or "\t" in marker
         ):
-            raise DatasetError(f"marker name {marker!r} cannot stand in a marker file")
+            raise DatasetError(f"marker name {marker!r} cannot be written to a marker file")
     count, rate = len(names), f"{fps:.10g}"
     # File names may hold what a header line in UTF-8 cannot: tabs, line breaks, undecoded bytes.
     title = " ".join(name.encode("utf-8", "replace").decode("utf-8").split())

@@ -20,7 +20,7 @@ class ImageStream(ABC):
     Attributes:
         path: the file or folder.
         size_px: (width, height) of its images.
-        fps: rate in 1/s, None if the source does not say.
+        fps: rate in 1/s, None if the source states none.
         frame_count: number of images as stated by the source, None if it states none (streamed
             files).
     """
@@ -156,7 +156,7 @@ def open_stream(path: Path, *, input_fps: float | None = None) -> ImageStream:
 
     Args:
         path: file or folder.
-        input_fps: rate of numbered images, 1/s; a video's own rate gives way to it.
+        input_fps: rate of numbered images, 1/s; overrides the rate of a video.
     """
     if path.is_dir():
         return NumberedImages(path, input_fps)
