@@ -6,18 +6,14 @@ from typing import Any
 import cv2
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
 
-from markerless_tracker.camera import (
-    WORLD_FRAME,
-    CameraModel,
-    CameraRig,
-    info_fields,
-    optical_frame,
-    quaternion_xyzw,
-)
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.camera.ros_fields import camera_info_fields
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image
 
+WORLD_FRAME = "map"
 JPEG_QUALITY = 90
 
 
@@ -29,6 +25,11 @@ def typestore() -> Any:
 
 def _type(name: str) -> Any:
     return typestore().types[name]
+
+
+def optical_frame(camera_name: str) -> str:
+    """The frame a camera's messages carry (REP-103: x right, y down, z forward)."""
+    return f"{camera_name}_optical_frame"
 
 
 def stamp_message(stamp_ns: int) -> Any:
@@ -72,9 +73,12 @@ def jpeg_message(image: Image, stamp_ns: int, camera: CameraModel) -> Any:
 
 def camera_info_message(camera: CameraModel, stamp_ns: int) -> Any:
     """sensor_msgs/CameraInfo of an unrectified camera: R = 1, P = [K 0], plumb_bob."""
+    lists = camera_info_fields(camera)
+    arrays = {name: np.array(lists.pop(name)) for name in ("d", "k", "r", "p")}
     return _type("sensor_msgs/msg/CameraInfo")(
         header=header(stamp_ns, optical_frame(camera.name)),
-        **info_fields(camera),
+        **lists,
+        **arrays,
         binning_x=0,
         binning_y=0,
         roi=_type("sensor_msgs/msg/RegionOfInterest")(
@@ -93,7 +97,7 @@ def static_transforms_message(rig: CameraRig, stamp_ns: int) -> Any:
     transforms = []
     for camera in rig:
         pose = camera.T_world_cam
-        x, y, z, w = quaternion_xyzw(pose[:3, :3])
+        x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True).tolist()
         tx, ty, tz = (float(value) for value in pose[:3, 3])
         transforms.append(
             stamped(

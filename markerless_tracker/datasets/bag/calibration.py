@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from markerless_tracker.camera import CameraRig, TransformTree, camera_from_info
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.camera.ros_fields import FrameTree, lens_of
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import inverse
 
@@ -19,25 +20,32 @@ def rig_from_messages(
         where: the bag, for messages.
 
     Raises:
-        CalibrationError: a camera is uncalibrated, its lens model is not supported, its frame is
-            not among the transforms, or two cameras have different roots.
+        CalibrationError: a camera is uncalibrated, its lens model is another, its frame is not
+            among the transforms, or two cameras hang from different roots.
     """
-    tree = TransformTree()
+    frames = FrameTree()
     cameras, roots = [], {}
     try:
-        tree.add(transforms)
+        for stamped in transforms:
+            q, t = stamped.transform.rotation, stamped.transform.translation
+            parent, child = stamped.header.frame_id, stamped.child_frame_id
+            frames.put(parent, child, (q.w, q.x, q.y, q.z), (t.x, t.y, t.z))
         for name, info in infos.items():
-            frame = info.header.frame_id.lstrip("/")
-            if frame not in tree:
+            frame = info.header.frame_id
+            if frame not in frames:
                 raise CalibrationError(
                     f"{name}: its frame {frame!r} is in no static transform, expected a "
                     "calibration.toml or /tf_static"
                 )
-            roots[name], T_world_cam = tree.root(frame)
-            cameras.append(camera_from_info(name, info, inverse(T_world_cam), where=name))
-        if len(set(roots.values())) > 1:
-            listed = ", ".join(f"{name} in {root}" for name, root in roots.items())
-            raise CalibrationError(f"cameras have different root frames ({listed}), expected one")
-        return CameraRig(tuple(cameras))
+            roots[name], T_root_cam = frames.up(frame)
+            matrix, distortion = lens_of(info, name)
+            size_px = (int(info.width), int(info.height))
+            cameras.append(CameraModel(name, size_px, matrix, distortion, inverse(T_root_cam)))
     except CalibrationError as error:
         raise CalibrationError(f"{where}: {error}") from error
+    if len(set(roots.values())) > 1:
+        listed = ", ".join(f"{name} in {root}" for name, root in roots.items())
+        raise CalibrationError(
+            f"{where}: cameras hang from different frames ({listed}), expected one"
+        )
+    return CameraRig(tuple(cameras))
