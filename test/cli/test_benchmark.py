@@ -31,12 +31,12 @@ def test_the_same_figures_as_track_and_evaluate(walk, tmp_path: Path, capsys) ->
     )
     capsys.readouterr()
     assert main(["evaluate", f"{result}.trc", truth, "--json"]) == 0
-    summary = json.loads(capsys.readouterr().out)
+    told = json.loads(capsys.readouterr().out)
     # Marker files hold µm.
     for key in ("mean_mm", "max_mm", "worst_joint_mm", "limbs_mm"):
-        assert row[key] == pytest.approx(summary[key], abs=2e-3)
-    assert row["joints"] == pytest.approx(summary["joints"], abs=2e-3)
-    assert row["frames"] == summary["frames"] == 2
+        assert row[key] == pytest.approx(told[key], abs=2e-3)
+    assert row["joints"] == pytest.approx(told["joints"], abs=2e-3)
+    assert row["frames"] == told["frames"] == 2
     frames = json.loads(Path(f"{result}.json").read_text())["frames"]
     assert row["evaluations"] == sum(frame["evaluations"] for frame in frames) / 2
 
@@ -189,7 +189,7 @@ def test_the_table_of_speed(capsys) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "reported", "status"),
+    ("words", "said", "status"),
     [
         ([], "required: KIND", 2),
         (["tables"], "required: SOURCE", 2),
@@ -211,7 +211,7 @@ def test_the_table_of_speed(capsys) -> None:
         (["speed", "--threads", "-1", "--frames", "1"], "threads: got -1", 1),
     ],
 )
-def test_what_cannot_be_done_says_so_in_one_line(words, reported, status, capsys) -> None:
+def test_what_cannot_be_done_says_so_in_one_line(words, said, status, capsys) -> None:
     try:
         code = main(["benchmark", *words])
     except SystemExit as stop:
@@ -219,7 +219,7 @@ def test_what_cannot_be_done_says_so_in_one_line(words, reported, status, capsys
     captured = capsys.readouterr()
     assert code == status and not captured.out
     last = captured.err.strip().splitlines()[-1]
-    assert reported in last and "Traceback" not in captured.err
+    assert said in last and "Traceback" not in captured.err
 
 
 def test_silhouettes_of_a_recording(walk, tmp_path: Path, capsys) -> None:
