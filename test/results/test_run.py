@@ -64,7 +64,7 @@ def test_the_same_bytes_with_any_threads_from_folder_and_from_bag(walk, bag, sea
         for seed in (1, 2)
     ]
     assert swarms[0] != swarms[1]
-    found = score(read_trc(tmp_path / "one.trc"), read_trc(truth))
+    found = score(read_trc(tmp_path / "one" / "walk.trc"), read_trc(truth))
     assert (found.frames, found.reference_frames) == (6, 6)
     assert found.mean_mm < 30.0
 
