@@ -24,8 +24,10 @@ EXAMPLE = "markerless_tracker convert recordings/walk walk_bag --scale 0.5"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("source", type=Path, help="recording folder, Pose2Sim project or bag")
-    parser.add_argument("bag", type=Path, help="folder to write (new or empty)")
+    parser.add_argument(
+        "source", metavar="SOURCE", type=Path, help="recording folder, Pose2Sim project or bag"
+    )
+    parser.add_argument("bag", metavar="BAG", type=Path, help="folder to write (new or empty)")
     parser.add_argument("--format", choices=FORMATS, help="format of SOURCE (default: detected)")
     parser.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images, 1/s")
     parser.add_argument(

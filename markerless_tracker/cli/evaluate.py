@@ -22,8 +22,10 @@ EXAMPLE = "markerless_tracker evaluate out/walk.trc recordings/walk/ground_truth
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("result", type=Path, help="marker file to evaluate (.trc)")
-    parser.add_argument("reference", type=Path, help="marker file with the reference (.trc)")
+    parser.add_argument("result", metavar="RESULT.trc", type=Path, help="marker file to evaluate")
+    parser.add_argument(
+        "reference", metavar="REFERENCE.trc", type=Path, help="marker file with the reference"
+    )
     parser.add_argument("--json", action="store_true", help="print the errors as JSON")
 
 

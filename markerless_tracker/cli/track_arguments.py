@@ -8,7 +8,9 @@ from markerless_tracker.tracking import OPTIMIZERS, PRESETS
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments, in groups."""
-    parser.add_argument("source", type=Path, help="recording folder, Pose2Sim project or bag")
+    parser.add_argument(
+        "source", metavar="SOURCE", type=Path, help="recording folder, Pose2Sim project or bag"
+    )
     parser.add_argument(
         "-o",
         dest="name",

@@ -220,7 +220,7 @@ class TestRefusals:
         with pytest.raises(SystemExit) as caught:
             main(["track"])
         assert caught.value.code == 2
-        assert "the following arguments are required: source, -o" in capsys.readouterr().err
+        assert "the following arguments are required: SOURCE, -o" in capsys.readouterr().err
 
 
 def test_help_has_an_example(capsys):
