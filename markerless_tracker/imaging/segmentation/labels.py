@@ -1,4 +1,4 @@
-"""What each pixel of an image shows: background, the background in shadow, or foreground."""
+"""Label of each pixel of an image: background, background in shadow, or foreground."""
 
 import cv2
 import numpy as np
@@ -25,7 +25,7 @@ _SOLID = np.ones((3, 3), dtype=np.uint8)
 class PixelLabeller:
     """Labels pixels of one camera's images: 0 background, 127 shadow, 255 foreground.
 
-    A pixel's label depends on the colours near it, never on the shape of what it belongs to.
+    A pixel's label depends on colours near it, not on the size or shape of patches.
 
     Args:
         camera: the camera's name.
@@ -61,7 +61,7 @@ class PixelLabeller:
         self._memory = np.empty(height * width, dtype=np.uint8)
 
     def reset(self) -> None:
-        """Back to the background that was given; what was learned since is forgotten."""
+        """Return to the initial background."""
         if self._adaptation is not None:
             self._adaptation.reset()
             self.background.reset()
@@ -78,7 +78,7 @@ class PixelLabeller:
 
         Args:
             image: the whole image.
-            window: what is labelled.
+            window: the labelled region.
             corrected: inside the window; texture corrects labels here alone.
         """
         part = self.background.pixels(image, window)
@@ -100,7 +100,7 @@ class PixelLabeller:
         options, is_grey = self._settings, self.background.is_grey
         part, looked_at = window, labels
         if not is_grey:
-            # Specks are not worth the look.
+            # Specks are removed later: their texture is not tested.
             solid = cv2.threshold(labels, kernels.SHADOW, 255, cv2.THRESH_BINARY)[1]
             cv2.morphologyEx(solid, cv2.MORPH_OPEN, _SOLID, dst=solid)
             looked_at = np.asarray(cv2.dilate(solid, _SOLID), dtype=np.uint8)
@@ -129,7 +129,7 @@ class PixelLabeller:
 
         Args:
             image: the whole image.
-            mask: (h, w) its silhouette; None: of a part alone, from which nothing is learned.
+            mask: (h, w) its silhouette; None if only a part was segmented: nothing is learned.
             stamp_ns: capture time.
         """
         if self._adaptation is None:

@@ -1,4 +1,4 @@
-"""Small repairs of a silhouette: specks, cracks, holes and blobs."""
+"""Morphology of silhouettes: specks, cracks, holes and blobs."""
 
 import math
 
@@ -11,12 +11,12 @@ from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_smal
 from markerless_tracker.imaging.segmentation.kernels import SHADOW
 from markerless_tracker.imaging.settings import ImagingSettings
 
-# From this size of the images on, lengths set in pixels are meant as they are.
+# In images of at least this size, lengths in pixels are used unscaled.
 _FULL_FRAME_PX = 640 * 480
 
 
 def opening_radius_px(settings: ImagingSettings, *, grey: bool) -> int:
-    """How far from a pixel `foreground_mask` looks, px, but for the size of its patch."""
+    """Radius on which `foreground_mask` depends, px, apart from the size of patches."""
     share = settings.shadow.grey_blob_share if grey else settings.shadow.blob_share
     return 2 if grey and share > 0.0 else 0
 
@@ -31,17 +31,17 @@ def foreground_mask(
     need: Region | None = None,
     unknown: int = 0,
 ) -> bool:
-    """The foreground with the shadow patches too small to be shadows.
+    """Fill a mask with the foreground and those shadow patches that are too small to be shadows.
 
     Args:
         labels: (h, w) uint8: 0 background, 127 shadow, 255 foreground.
         mask: (h, w) uint8, written: 0 or 255.
         least_shadow_px: smaller patches of shadow (4-connected) become foreground.
-        grey: the patches are opened first; the value ratio alone leaves them ragged.
+        grey: whether to open the patches first; the brightness ratio alone leaves them ragged.
         zone, need, unknown: as `blobs.clear_small` takes them.
 
     Returns:
-        Whether a needed patch's size is not known.
+        Whether the size of a needed patch is unknown.
     """
     if least_shadow_px <= 1.0:
         cv2.threshold(labels, SHADOW, 255, cv2.THRESH_BINARY, dst=mask)
@@ -64,7 +64,7 @@ def closing_px(settings: ImagingSettings, frame_px: int) -> int:
 
 
 def repair_radius_px(settings: ImagingSettings, frame_px: int) -> int:
-    """How far from a pixel opening and closing look, px."""
+    """Radius on which a pixel depends through opening and closing, px."""
     return 2 * (settings.mask.open_px // 2) + 2 * (closing_px(settings, frame_px) // 2)
 
 

@@ -26,18 +26,18 @@ def repair_mask(
     grey: bool,
     least_shadow_px: float,
 ) -> bool:
-    """Fill a mask from labels, without what is too small to be a shadow, a person or a hole.
+    """Fill a mask from labels; small shadow patches, blobs and holes are removed.
 
     Args:
         labels: (h, w) uint8 of `zones.window`: 0 background, 127 shadow, 255 foreground.
-        mask: (h, w) uint8, written: 0 or 255; right within `zones.zone` alone.
+        mask: (h, w) uint8, written: 0 or 255; correct within `zones.zone` alone.
         zones: where the labels lie in the image, and where the mask is needed.
         settings: the group `mask`.
         grey: whether the camera is a grey one.
         least_shadow_px: smaller patches of shadow become foreground.
 
     Returns:
-        False if a patch that matters goes on outside the zone and may be larger than is seen.
+        False if the size of a needed patch is unknown, as it may continue outside the zone.
     """
     frame_px, window = zones.frame_px, zones.window
     if foreground_mask(
@@ -45,7 +45,7 @@ def repair_mask(
         need=zones.patches_before_repair.within(window), unknown=zones.open_sides,
     ):  # fmt: skip
         return False
-    # Outside of `zone_before_repair` the mask is wrong, but opening and closing look no further.
+    # Outside of `zone_before_repair` the mask is wrong; opening and closing do not depend on that.
     open_and_close(mask, settings, frame_px)
     zone, need, unknown = zones.zone.within(window), zones.patches.within(window), zones.open_sides
     least, largest = settings.mask.blob_share * frame_px, settings.mask.hole_share * frame_px
@@ -61,7 +61,7 @@ def fit_border(
 
     Args:
         image: the whole image.
-        mask: (h, w) uint8 of `zones.window`, 0 or 255; right within `zones.zone`.
+        mask: (h, w) uint8 of `zones.window`, 0 or 255; correct within `zones.zone`.
         zones: as in `repair_mask`.
         labeller: what labelled this image.
         settings: `mask.trim_px` and the group `level_set`.
@@ -78,7 +78,7 @@ def _trim(
     body = occupied(mask, zone)
     if layers == 0 or body.width <= 0:
         return
-    # One pixel more, so that the body ends inside; but it goes on beyond the image.
+    # One pixel more, so that the body ends inside the box, except at the image's border.
     box = body.grown(1, (mask.shape[1], mask.shape[0]))
     part = np.ascontiguousarray(mask[box.slices])
     place = box.moved(window.left, window.top)

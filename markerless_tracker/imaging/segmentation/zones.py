@@ -22,8 +22,8 @@ class Zones:
         patches: where patches must have the right size, before border and contour are moved.
         zone: `patches` and some slack, in which patches are measured.
         patches_before_repair, zone_before_repair: the same before opening and closing.
-        window: what is labelled.
-        open_sides: sides of `zone` beyond which the image goes on, and with it its patches.
+        window: the labelled region.
+        open_sides: sides of `zone` beyond which the image continues.
         frame_px: pixels of the whole image.
     """
 

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from markerless_tracker.imaging import Region
 from markerless_tracker.imaging.segmentation import texture
 from markerless_tracker.imaging.segmentation.texture import (
+    HIDDEN_LEAST,
     MOST_RADIUS,
     OTHER,
     SAME,
+    SHOWN_LEAST,
     SPREAD_PX,
     STEP,
-    SURE,
-    TOLD,
     UNKNOWN,
     apply_light,
     correct_labels,
@@ -102,13 +102,13 @@ def slow_light(image: NDArray[np.int64], base: NDArray[np.int64]) -> tuple[float
     pattern = p * p * base.var()
     rest = (image - p * base).var() - noise
     tests = [
-        (pattern, SURE * noise), (pattern, TOLD * noise), (rest, SAME * pattern),
+        (pattern, SHOWN_LEAST * noise), (pattern, HIDDEN_LEAST * noise), (rest, SAME * pattern),
         (rest, OTHER * pattern), (rest, noise),
     ]  # fmt: skip
     near = min(abs(x - limit) / (1.0 + abs(limit)) for x, limit in tests)
-    if pattern >= SURE * noise and rest < SAME * pattern:
+    if pattern >= SHOWN_LEAST * noise and rest < SAME * pattern:
         return p, near
-    if pattern >= TOLD * noise and rest > OTHER * pattern:
+    if pattern >= HIDDEN_LEAST * noise and rest > OTHER * pattern:
         return -1.0, near
     return (UNKNOWN + p if rest < noise else 0.0), near
 
@@ -129,13 +129,13 @@ def test_light_of_windows(seed: int, radius: int, rows: int, columns: int) -> No
         for j in range(columns):
             window = np.s_[max(i - radius, 0) : i + radius + 1, max(j - radius, 0) : j + radius + 1]
             expected, near = slow_light(part[window].astype(np.int64), base[window])
-            # In single precision a test can come out otherwise at its limit alone.
+            # Single precision may change the outcome of a test only next to its limit.
             if near > 1e-3:
                 assert light[i, j] == pytest.approx(expected, rel=1e-4, abs=1e-4)
 
 
 def test_windows_of_every_kind() -> None:
-    """Shown pattern, covered pattern, no pattern, nothing to say: as the definition says."""
+    """Pattern shown, pattern covered, no pattern, undecided."""
     rng = np.random.default_rng(1)
     pattern = np.rint(100.0 + 30.0 * rng.standard_normal((9, 60))).clip(20, 180)
     mean = pattern.astype(np.float32)
@@ -203,7 +203,7 @@ def test_light_spreads_over_plain_windows(seed: int, rows: int, columns: int) ->
 
 
 @pytest.mark.parametrize("step", [1, -1])
-def test_light_spreads_so_far_along_a_run(step: int) -> None:
+def test_light_spreads_by_a_limited_distance(step: int) -> None:
     row = np.full(3 * SPREAD_PX, UNKNOWN + 0.5, dtype=np.float32)
     start, stop = (0, row.size) if step == 1 else (row.size - 1, -1)
     row[start] = 0.5
