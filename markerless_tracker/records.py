@@ -1,7 +1,7 @@
 """Frozen values that cross rooms: evidence of one image, one stage of a search, one result."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
@@ -47,13 +47,18 @@ def unpack_mask(words: MaskWords, width: int) -> NDArray[np.bool_]:
 class Observation:
     """What one camera's image says about the body, in that camera's own (distorted) pixels.
 
+    A pixel is person, background or undecided: it differs from the background as a shadow on it
+    would. Undecided pixels count neither way.
+
     Attributes:
         camera: the camera's name.
         stamp_ns: capture time.
         size_px: (width, height) of the full frame.
         offset_px: (u, v) of the region's top left pixel in the full frame.
-        mask_words: (h, ceil(w / 64)) uint64, the silhouette packed as `pack_mask` does.
+        mask_words: (h, ceil(w / 64)) uint64, the silhouette (person) packed as `pack_mask` does.
         edges: (h, w) uint8, edge strength M = value / 255, in the same region.
+        undecided_words: the undecided pixels, packed likewise; none if left out. No pixel is
+            person and undecided.
     """
 
     camera: str
@@ -62,9 +67,19 @@ class Observation:
     offset_px: tuple[int, int]
     mask_words: MaskWords
     edges: NDArray[np.uint8]
+    undecided_words: MaskWords | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mask_words", locked(self.mask_words, np.uint64))
+        if self.undecided_words is not None:
+            words = locked(self.undecided_words, np.uint64)
+            # None stands for none, so that equal evidence is equal and costs nothing.
+            object.__setattr__(self, "undecided_words", words if words.any() else None)
+            if words.shape != self.mask_words.shape or (words & self.mask_words).any():
+                raise ImageError(
+                    f"{self.camera}: undecided words {words.shape} beside mask words "
+                    f"{self.mask_words.shape}, expected the same shape and no pixel in both"
+                )
         object.__setattr__(self, "edges", locked(self.edges, np.uint8))
         if self.edges.ndim != 2 or self.mask_words.shape != (self.height, (self.width + 63) // 64):
             raise ImageError(
@@ -93,6 +108,21 @@ class Observation:
         """The silhouette of the region, unpacked: (h, w)."""
         return unpack_mask(self.mask_words, self.width)
 
+    @property
+    def undecided(self) -> NDArray[np.bool_] | None:
+        """The undecided pixels of the region, unpacked: (h, w); None if there are none."""
+        if self.undecided_words is None:
+            return None
+        return unpack_mask(self.undecided_words, self.width)
+
+    @property
+    def not_background(self) -> NDArray[np.bool_]:
+        """The pixels of the region that are person or undecided, unpacked: (h, w)."""
+        words = self.mask_words
+        if self.undecided_words is not None:
+            words = words | self.undecided_words
+        return unpack_mask(words, self.width)
+
     def full_frame(self, region: NDArray[Any]) -> NDArray[Any]:
         """An array (h, w) of the region in the full frame (height, width), 0 outside."""
         width, height = self.size_px
@@ -111,12 +141,23 @@ class Observation:
         mask: NDArray[Any],
         edges: NDArray[np.uint8],
         *,
+        undecided: NDArray[Any] | None = None,
         size_px: tuple[int, int] | None = None,
         offset_px: tuple[int, int] = (0, 0),
     ) -> "Observation":
-        """Build from a mask (h, w), non-zero = body; the region is the full frame unless given."""
+        """Build from a mask (h, w), non-zero = person; the region is the full frame unless given.
+
+        Args:
+            undecided: (h, w), non-zero = undecided; none if left out.
+        """
         size = size_px or (int(mask.shape[1]), int(mask.shape[0]))
-        return cls(camera, stamp_ns, size, offset_px, pack_mask(mask), edges)
+        words = None if undecided is None else pack_mask(undecided)
+        return cls(camera, stamp_ns, size, offset_px, pack_mask(mask), edges, words)
+
+    def with_masks(self, mask: NDArray[Any], undecided: NDArray[Any] | None) -> "Observation":
+        """The same view with other silhouette and undecided pixels, (h, w) of the region."""
+        words = None if undecided is None else pack_mask(undecided)
+        return replace(self, mask_words=pack_mask(mask), undecided_words=words)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import BodyModelError, ImageError
-from markerless_tracker.fitness.raster.bits import count_bits
+from markerless_tracker.fitness.raster.bits import ALL, count_bits
 from markerless_tracker.fitness.raster.outline_arrays import LANES
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import MaskWords, Observation, pack_mask, unpack_mask
@@ -43,6 +43,7 @@ class ViewArrays(NamedTuple):
             starts at mask_start[i].
         edges: edge maps, flat; view i starts at edge_start[i].
         observed: (v,) silhouette pixels.
+        known: pixels that are not undecided, flat as `mask`.
     """
 
     rotation: FloatArray
@@ -56,6 +57,7 @@ class ViewArrays(NamedTuple):
     edges: NDArray[np.uint8]
     edge_start: NDArray[np.int64]
     observed: NDArray[np.int64]
+    known: NDArray[np.uint64]
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,7 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
             f"no view to compare with: observations of {', '.join(observations) or 'no camera'}, "
             f"expected some of {', '.join(camera.name for camera in cameras)}"
         )
-    masks, edges = [], []
+    masks, edges, known = [], [], []
     for camera in seen:
         observation = observations[camera.name]
         if observation.size_px != camera.size_px:
@@ -111,21 +113,40 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
             )
         masks.append(_words(observation, observation.mask_words))
         edges.append(observation.full_frame(observation.edges))
-    k = np.array([camera.matrix for camera in seen])
-    arrays = ViewArrays(
-        rotation=np.ascontiguousarray([camera.T_cam_world[:3, :3] for camera in seen]),
-        translation=np.ascontiguousarray([camera.T_cam_world[:3, 3] for camera in seen]),
-        intrinsics=np.stack([k[:, 0, 0], k[:, 0, 1], k[:, 0, 2], k[:, 1, 1], k[:, 1, 2]], axis=1),
-        distortion=np.array([camera.distortion for camera in seen]),
-        size=np.array([camera.size_px for camera in seen], dtype=np.int64),
-        words=np.array([mask.shape[1] for mask in masks], dtype=np.int64),
+        if observation.undecided_words is None:
+            known.append(np.full(masks[-1].shape, ALL))
+        else:
+            known.append(~_words(observation, observation.undecided_words))
+    arrays = camera_arrays(seen)._replace(
         mask=np.concatenate([mask.T.ravel() for mask in masks]),
         mask_start=_starts(masks),
         edges=np.concatenate([edge.ravel() for edge in edges]),
         edge_start=_starts(edges),
         observed=np.array([count_bits(mask) for mask in masks], dtype=np.int64),
+        known=np.concatenate([words.T.ravel() for words in known]),
     )
     return Views(tuple(camera.name for camera in seen), arrays)
+
+
+def camera_arrays(cameras: Sequence[CameraModel]) -> ViewArrays:
+    """The arrays of cameras without any evidence."""
+    k = np.array([camera.matrix for camera in cameras])
+    words, levels = np.empty(0, dtype=np.uint64), np.empty(0, dtype=np.uint8)
+    none = np.zeros(len(cameras), dtype=np.int64)
+    return ViewArrays(
+        rotation=np.ascontiguousarray([camera.T_cam_world[:3, :3] for camera in cameras]),
+        translation=np.ascontiguousarray([camera.T_cam_world[:3, 3] for camera in cameras]),
+        intrinsics=np.stack([k[:, 0, 0], k[:, 0, 1], k[:, 0, 2], k[:, 1, 1], k[:, 1, 2]], axis=1),
+        distortion=np.array([camera.distortion for camera in cameras]),
+        size=np.array([camera.size_px for camera in cameras], dtype=np.int64),
+        words=np.array([(camera.size_px[0] + 63) // 64 for camera in cameras], dtype=np.int64),
+        mask=words,
+        mask_start=none,
+        edges=levels,
+        edge_start=none,
+        observed=none,
+        known=words,
+    )
 
 
 def _words(observation: Observation, words: MaskWords) -> MaskWords:

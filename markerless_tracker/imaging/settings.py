@@ -70,7 +70,12 @@ class ShadowSettings(SettingsGroup):
 
     NAME = "shadow"
 
-    removal: bool = setting(True, "take pixels that look like a shadow for background")
+    removal: bool = setting(True, "take pixels that look like a shadow out of the silhouette")
+    undecided: bool = setting(
+        True,
+        "pixels that look like a shadow are undecided: person near the predicted body, elsewhere "
+        "not counted; false: they are background",
+    )
     value_min: float = setting(
         0.5, "darkest shadow, as a ratio of its brightness to the background's", least=0.0, most=1.0
     )

@@ -33,6 +33,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         "prediction": 0.0,
         "refinement": "none",
         "search_again": False,
+        "shadow.undecided": False,
         "sigma.scale": 1.0,
     },
 }

@@ -17,6 +17,7 @@ from markerless_tracker.records import Confidence, Observation, TrackResult, Tra
 from markerless_tracker.tracking.confidence import confidence_of
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
+from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
 from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.limits import joint_limits
@@ -73,6 +74,7 @@ class Tracker:
         person: Unmeasured | None = None,
     ) -> None:
         self.rig = rig
+        self._cameras = {camera.name: camera for camera in rig}
         self.config = config
         self._person = person
         self._smooth = OneEuro(body) if config.smoothing == "one_euro" else None
@@ -220,6 +222,8 @@ class Tracker:
         observations, notes = self._views.sort(observed, self.body, expected)
         if not anybody(observations):
             return self._unseen(observed, stamp_ns, notes)
+        if self.state is not TrackState.LOST:
+            observations = decide(observations, self._cameras, self.body, predicted)
         if not self._shape_fitted:
             self._shape_fitted = True
             predicted = self._take_shape(observations, stamp_ns)

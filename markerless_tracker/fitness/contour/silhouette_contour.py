@@ -12,6 +12,10 @@ from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
+UNDECIDED_PX = 2.0
+"""No residual is taken so near to undecided pixels."""
+_SAME_PX = 0.5
+_FAR_PX = np.float32(1e4)
 _SMALLEST_EDGE_PX = 12
 _LEAST_MARGIN_PX = 24
 # Sobel's 5x5 kernel is the outer product of these two.
@@ -66,9 +70,12 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
 
     The window is the silhouette's bounding box and a margin of a sixth of its height. The edge
     runs midway between pixels inside and outside; where the silhouette leaves the frame, and
-    around specks, there are no points.
+    around specks, there are no points. The border of person and undecided pixels is no edge: there
+    are no points within `UNDECIDED_PX` of undecided pixels, and distances are very large where
+    that border is the nearest.
     """
     mask = observation.full_frame(observation.mask.view(np.uint8))
+    undecided = observation.undecided
     height, width = mask.shape
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if rows.size == 0:
@@ -84,6 +91,12 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
     distance -= inside
     distance += window
     distance -= 0.5
+    known, free = distance, None
+    if undecided is not None:
+        frame = observation.full_frame(undecided.view(np.uint8))
+        known, free = _without_undecided(
+            distance, window, np.ascontiguousarray(frame[top:bottom, left:right])
+        )
     contours, _ = cv2.findContours(window, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     chains: list[NDArray[Any]] = [np.empty((0, 2), dtype=np.int32)]
     spacing = [np.empty(0)]
@@ -100,15 +113,39 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
     steepest(distance, chain, normal)
     length = np.linalg.norm(normal, axis=1)
     inner = (at > 0).all(axis=1) & (at < (width - 1, height - 1)).all(axis=1) & (length > 0)
+    if free is not None:
+        inner &= free[chain[:, 1], chain[:, 0]]
     normal = normal[inner] / length[inner, None]
     return SilhouetteContour(
-        distance,
+        known,
         int(left),
         int(top),
         at[inner] + 0.5 * normal,
         normal,
         np.concatenate(spacing)[inner],
     )
+
+
+def _without_undecided(
+    distance: NDArray[np.float32], person: NDArray[np.uint8], undecided: NDArray[np.uint8]
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Distances (h, w), very large where the nearest edge borders on undecided pixels.
+
+    Also the pixels farther than `UNDECIDED_PX` from undecided ones. The nearest edge is one of
+    person and background if it does not matter which of the two undecided pixels are.
+
+    Args:
+        distance: (h, w) to the edge of the person alone.
+        person, undecided: (h, w), 0 or 1.
+    """
+    either = person | undecided
+    wider = np.asarray(cv2.distanceTransform(1 - either, cv2.DIST_L2, 5), np.float32)
+    wider -= cv2.distanceTransform(either, cv2.DIST_L2, 5)
+    wider += either
+    wider -= 0.5
+    same = np.abs(wider - distance) < _SAME_PX
+    free = np.asarray(cv2.distanceTransform(1 - undecided, cv2.DIST_L2, 3) > UNDECIDED_PX)
+    return np.where(same & free, distance, _FAR_PX), free
 
 
 @kernel

@@ -79,8 +79,11 @@ def wipe(words, height, bits, used):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def count_and_wipe(words, height, bits, mask, start, used):  # type: ignore[no-untyped-def]
-    """Set bits that the mask, flat from `start` on, holds too, and all set bits; clears them."""
+def count_and_wipe(words, height, bits, mask, known, start, used):  # type: ignore[no-untyped-def]
+    """Set bits that the mask holds too, and set bits that are known; clears them.
+
+    mask, known: flat, from `start` on.
+    """
     overlap = np.uint64(0)
     projected = np.uint64(0)
     for w in range(words):
@@ -88,13 +91,15 @@ def count_and_wipe(words, height, bits, mask, start, used):  # type: ignore[no-u
         for v in range(np.uint64(used[w, 0]), np.uint64(used[w, 1] + 1)):
             word = bits[base + v]
             overlap += popcount(word & mask[there + v])
-            projected += popcount(word)
+            projected += popcount(word & known[there + v])
             bits[base + v] = np.uint64(0)
     return overlap, projected
 
 
 @kernel
-def count_beside_and_wipe(words, height, bits, mask, static, start, used):  # type: ignore[no-untyped-def]
+def count_beside_and_wipe(  # type: ignore[no-untyped-def]
+    words, height, bits, mask, known, static, start, used
+):
     """As `count_and_wipe`, of the set bits that are not among those of `static`, flat likewise."""
     overlap = np.uint64(0)
     projected = np.uint64(0)
@@ -103,6 +108,6 @@ def count_beside_and_wipe(words, height, bits, mask, static, start, used):  # ty
         for v in range(np.uint64(used[w, 0]), np.uint64(used[w, 1] + 1)):
             word = bits[base + v] & ~static[there + v]
             overlap += popcount(word & mask[there + v])
-            projected += popcount(word)
+            projected += popcount(word & known[there + v])
             bits[base + v] = np.uint64(0)
     return overlap, projected

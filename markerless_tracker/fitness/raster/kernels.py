@@ -172,13 +172,15 @@ def compare_view(  # type: ignore[no-untyped-def]
                 )  # fmt: skip
                 edge_sum, edge_count = edge_sum + more, edge_count + number
     if not beside:
-        overlap, projected = count_and_wipe(words, height, bits, views.mask, start, used)
+        overlap, projected = count_and_wipe(
+            words, height, bits, views.mask, views.known, start, used
+        )
         counts[OVERLAP], counts[PROJECTED] = overlap, projected
         counts[EDGE_SUM], counts[EDGE_COUNT] = edge_sum, edge_count
         return
     more, number = recount_static(view, static, bits)
     overlap, projected = count_beside_and_wipe(
-        words, height, bits, views.mask, static.bits, start, used
+        words, height, bits, views.mask, views.known, static.bits, start, used
     )
     counts[OVERLAP] = static.counts[view, OVERLAP] + overlap
     counts[PROJECTED] = static.counts[view, PROJECTED] + projected

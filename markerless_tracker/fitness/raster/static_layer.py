@@ -149,6 +149,6 @@ def _draw_static(  # type: ignore[no-untyped-def]
         start[view + 1] = kept
         for i in range(own.size):
             counts[view, OVERLAP] += popcount(own[i] & views.mask[at + i])
-            counts[view, PROJECTED] += popcount(own[i])
+            counts[view, PROJECTED] += popcount(own[i] & views.known[at + i])
     for view in range(views.size.shape[0] - 1, -1, -1):
         least[view] = least[view + 1] + least_cost(counts[view], views.observed[view], cost)

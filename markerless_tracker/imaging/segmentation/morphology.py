@@ -16,45 +16,61 @@ _FULL_FRAME_PX = 640 * 480
 
 
 def opening_radius_px(settings: ImagingSettings, *, grey: bool) -> int:
-    """Radius on which `foreground_mask` depends, px, apart from the size of patches."""
-    share = settings.shadow.grey_blob_share if grey else settings.shadow.blob_share
-    return 2 if grey and share > 0.0 else 0
+    """Radius on which `shadow_patches` depends, px, apart from the size of patches."""
+    return 2 if grey or settings.shadow.undecided else 0
 
 
-def foreground_mask(
+def shadow_patches(
     labels: Mask,
-    mask: Mask,
-    least_shadow_px: float,
+    shadow: Mask,
+    least_px: float,
     *,
-    grey: bool,
+    opened: bool,
     zone: Region | None = None,
     need: Region | None = None,
     unknown: int = 0,
 ) -> bool:
-    """Fill a mask with the foreground and those shadow patches that are too small to be shadows.
+    """Find the patches of pixels labelled shadow that are large enough to be shadows.
 
     Args:
         labels: (h, w) uint8: 0 background, 127 shadow, 255 foreground.
-        mask: (h, w) uint8, written: 0 or 255.
-        least_shadow_px: smaller patches of shadow (4-connected) become foreground.
-        grey: whether to open the patches first; the brightness ratio alone leaves them ragged.
+        shadow: (h, w) uint8, written: 0 or 255.
+        least_px: smaller patches (4-connected) are cleared; none are if it is 1 or less.
+        opened: whether to open the patches first, by 3 px: pixels that the person covers in part
+            are darker than a bright background as well.
         zone, need, unknown: as `blobs.clear_small` takes them.
 
     Returns:
         Whether the size of a needed patch is unknown.
     """
-    if least_shadow_px <= 1.0:
-        cv2.threshold(labels, SHADOW, 255, cv2.THRESH_BINARY, dst=mask)
-        return False
-    cv2.threshold(labels, 0, 255, cv2.THRESH_BINARY, dst=mask)
-    shadow = np.asarray(cv2.inRange(labels, (SHADOW,), (SHADOW,)), dtype=np.uint8)
-    if grey:
+    cv2.inRange(labels, (SHADOW,), (SHADOW,), dst=shadow)
+    if opened:
         cv2.morphologyEx(shadow, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8), dst=shadow)
-    asked = clear_small(
-        shadow, least_shadow_px, connectivity=4, zone=zone, need=need, unknown=unknown
-    )
+    if least_px <= 1.0:
+        return False
+    return clear_small(shadow, least_px, connectivity=4, zone=zone, need=need, unknown=unknown)
+
+
+SPLIT_RADIUS_PX = 3
+"""How far from a pixel `split_undecided` looks."""
+
+
+def split_undecided(mask: Mask, shadow: Mask) -> None:
+    """Split what is not background (0 or 255) into person and undecided, in place.
+
+    Args:
+        mask: (h, w) all that is not background; becomes the person.
+        shadow: (h, w) pixels that may be shadow; becomes the undecided ones: those, and specks
+            and threads of the person among them.
+    """
+    cv2.bitwise_and(shadow, mask, dst=shadow)
     cv2.subtract(mask, shadow, dst=mask)
-    return asked
+    solid = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8))
+    thin = cv2.subtract(mask, solid)
+    beside = cv2.dilate(shadow, np.ones((3, 3), dtype=np.uint8))
+    cv2.bitwise_and(thin, beside, dst=thin)
+    cv2.subtract(mask, thin, dst=mask)
+    cv2.bitwise_or(shadow, thin, dst=shadow)
 
 
 def closing_px(settings: ImagingSettings, frame_px: int) -> int:

@@ -1,5 +1,6 @@
 """From labels to a silhouette: shadow patches, cracks, blobs, holes, border and contour."""
 
+import cv2
 import numpy as np
 
 from markerless_tracker.imaging.images import Image
@@ -9,7 +10,7 @@ from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_smal
 from markerless_tracker.imaging.segmentation.border import trim_border
 from markerless_tracker.imaging.segmentation.labels import PixelLabeller
 from markerless_tracker.imaging.segmentation.level_set import refine_contour
-from markerless_tracker.imaging.segmentation.morphology import foreground_mask, open_and_close
+from markerless_tracker.imaging.segmentation.morphology import open_and_close, shadow_patches
 from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
 
@@ -20,6 +21,7 @@ _LEAST_CONTRAST = 5.0
 def repair_mask(
     labels: Mask,
     mask: Mask,
+    shadow: Mask,
     zones: Zones,
     settings: ImagingSettings,
     *,
@@ -28,9 +30,12 @@ def repair_mask(
 ) -> bool:
     """Fill a mask from labels; small shadow patches, blobs and holes are removed.
 
+    With three classes the mask holds shadows, too.
+
     Args:
         labels: (h, w) uint8 of `zones.window`: 0 background, 127 shadow, 255 foreground.
         mask: (h, w) uint8, written: 0 or 255; correct within `zones.zone` alone.
+        shadow: (h, w) uint8, written: 0 or 255, patches of shadow.
         zones: where the labels lie in the image, and where the mask is needed.
         settings: the group `mask`.
         grey: whether the camera is a grey one.
@@ -40,11 +45,16 @@ def repair_mask(
         False if the size of a needed patch is unknown, as it may continue outside the zone.
     """
     frame_px, window = zones.frame_px, zones.window
-    if foreground_mask(
-        labels, mask, least_shadow_px, grey=grey, zone=zones.zone_before_repair.within(window),
+    opened = settings.shadow.undecided or (grey and least_shadow_px > 1.0)
+    if shadow_patches(
+        labels, shadow, least_shadow_px, opened=opened,
+        zone=zones.zone_before_repair.within(window),
         need=zones.patches_before_repair.within(window), unknown=zones.open_sides,
     ):  # fmt: skip
         return False
+    cv2.threshold(labels, 0, 255, cv2.THRESH_BINARY, dst=mask)
+    if not settings.shadow.undecided:
+        cv2.subtract(mask, shadow, dst=mask)
     # Outside of `zone_before_repair` the mask is wrong; opening and closing do not depend on that.
     open_and_close(mask, settings, frame_px)
     zone, need, unknown = zones.zone.within(window), zones.patches.within(window), zones.open_sides

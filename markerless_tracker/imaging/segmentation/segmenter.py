@@ -9,6 +9,7 @@ from markerless_tracker.imaging.images import Image, check_image
 from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.labels import PixelLabeller
+from markerless_tracker.imaging.segmentation.morphology import split_undecided
 from markerless_tracker.imaging.segmentation.repair import fit_border, repair_mask
 from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
@@ -48,7 +49,7 @@ class Segmenter:
         self._grey = self._labeller.background.is_grey
         self._size_px = width, height = background.size_px
         self._whole = Region.whole(self._size_px)
-        self._memory = np.empty(height * width, dtype=np.uint8)
+        self._memory = np.empty((2, height * width), dtype=np.uint8)
         options = self.settings
         share = options.shadow.grey_blob_share if self._grey else options.shadow.blob_share
         self._least_shadow_px = share * height * width
@@ -70,10 +71,19 @@ class Segmenter:
         Raises:
             ImageError: not an image of the background's size and channels; names the camera.
         """
+        return self.classes(image, region)[0]
+
+    def classes(self, image: Image, region: Region | None = None) -> tuple[Mask, Mask | None]:
+        """As `mask`, and the undecided pixels likewise; None with two classes.
+
+        Raises:
+            ImageError: as `mask`.
+        """
         self._check(image)
         region = region or self._whole
-        mask, zone = self._silhouette(image, region, 0)
-        return mask[region.within(zone).slices]
+        mask, undecided, zone = self._silhouette(image, region, 0)
+        inside = region.within(zone).slices
+        return mask[inside], None if undecided is None else undecided[inside]
 
     def labels(self, image: Image) -> Mask:
         """(h, w) uint8: 0 background, 127 shadow, 255 foreground, before any repair; for display.
@@ -108,15 +118,17 @@ class Segmenter:
                 f"{self.camera}: got a region of {tuple(region)}, expected one inside the image of "
                 f"{self._size_px[0]}x{self._size_px[1]} px"
             )
-        mask, zone = self._silhouette(image, region, edge_radius_px(self.settings))
+        mask, undecided, zone = self._silhouette(image, region, edge_radius_px(self.settings))
         inside = region.within(zone).slices
-        edges = edge_map(image[zone.slices], mask, self.settings)[inside]
-        self._labeller.follow(image, mask if region == self._whole else None, stamp_ns)
+        either = mask if undecided is None else mask | undecided
+        edges = edge_map(image[zone.slices], either, self.settings)[inside]
+        self._labeller.follow(image, either if region == self._whole else None, stamp_ns)
         return Observation.from_mask(
             self.camera,
             stamp_ns,
             mask[inside],
             edges,
+            undecided=None if undecided is None else undecided[inside],
             size_px=self._size_px,
             offset_px=(region.left, region.top),
         )
@@ -131,8 +143,10 @@ class Segmenter:
                 f"{kind[self.background.channels]}; expected the same"
             )
 
-    def _silhouette(self, image: Image, region: Region, radius_px: int) -> tuple[Mask, Region]:
-        """Mask of a zone that contains the region and `radius_px` px around it, and that zone.
+    def _silhouette(
+        self, image: Image, region: Region, radius_px: int
+    ) -> tuple[Mask, Mask | None, Region]:
+        """Person and undecided of a zone that contains the region and `radius_px` px around it.
 
         Decisions by the size of a patch need the whole patch: the margin grows until no needed
         patch of unknown size continues outside.
@@ -146,16 +160,23 @@ class Segmenter:
                 return found
             slack *= 4
 
-    def _try_silhouette(self, image: Image, need: Region, slack: int) -> tuple[Mask, Region] | None:
+    def _try_silhouette(
+        self, image: Image, need: Region, slack: int
+    ) -> tuple[Mask, Mask | None, Region] | None:
         """As `_silhouette`, with a margin of `slack` px; None if that is too small."""
         zones = Zones.around(need, slack, self._size_px, self.settings, grey=self._grey)
         window = zones.window
         labels = self._labeller.label(image, window, zones.zone_before_repair)
-        mask = self._memory[: window.width * window.height].reshape(window.height, window.width)
+        size = window.height * window.width
+        mask, shadow = self._memory[:, :size].reshape(2, window.height, window.width)
         if not repair_mask(
-            labels, mask, zones, self.settings, grey=self._grey,
+            labels, mask, shadow, zones, self.settings, grey=self._grey,
             least_shadow_px=self._least_shadow_px,
         ):  # fmt: skip
             return None
         fit_border(image, mask, zones, self._labeller, self.settings)
-        return mask[zones.zone.within(window).slices], zones.zone
+        inside = zones.zone.within(window).slices
+        if not self.settings.shadow.undecided:
+            return mask[inside], None, zones.zone
+        split_undecided(mask, shadow)
+        return mask[inside], shadow[inside], zones.zone

@@ -8,6 +8,7 @@ from markerless_tracker.imaging.segmentation.border import border_radius_px
 from markerless_tracker.imaging.segmentation.labels import LOOK_PX
 from markerless_tracker.imaging.segmentation.level_set import refinement_radius_px
 from markerless_tracker.imaging.segmentation.morphology import (
+    SPLIT_RADIUS_PX,
     opening_radius_px,
     repair_radius_px,
 )
@@ -51,6 +52,8 @@ class Zones:
                 settings.level_set.iterations, settings.level_set.radius_px
             )
             need = need.grown(radius_px, size_px)
+        if settings.shadow.undecided:
+            need = need.grown(SPLIT_RADIUS_PX, size_px)
         patches = need.grown(border_radius_px(settings.mask.trim_px), size_px)
         zone = patches.grown(slack_px, size_px)
         frame_px = size_px[0] * size_px[1]

@@ -95,7 +95,8 @@ def body_region(
 
 
 def _components(observation: Observation) -> tuple[int, NDArray[np.int32]]:
-    mask = observation.mask.view(np.uint8)
+    """Components of what is person or undecided: count, and label of each pixel (h, w)."""
+    mask = observation.not_background.view(np.uint8)
     count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
     return count, np.asarray(labels)
 
@@ -123,15 +124,11 @@ def _only(
     if kept[1:].all():
         return observation, 0
     selected = kept[labels]
-    part = Observation.from_mask(
-        observation.camera,
-        observation.stamp_ns,
-        selected,
-        observation.edges,
-        size_px=observation.size_px,
-        offset_px=observation.offset_px,
+    mask, undecided = observation.mask, observation.undecided
+    part = observation.with_masks(
+        mask & selected, None if undecided is None else undecided & selected
     )
-    return part, int((labels > 0).sum()) - int(selected.sum())
+    return part, int((mask & ~selected).sum())
 
 
 def _thick_body(

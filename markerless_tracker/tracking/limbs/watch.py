@@ -16,6 +16,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import LimbState, Observation, TrackState
 from markerless_tracker.tracking.limbs.search import other_limb
+from markerless_tracker.tracking.limbs.unexplained import limbs_unexplained
 from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.population import FramePopulation
@@ -90,7 +91,8 @@ class LimbWatch:
             The pose (p,), and the names of the limbs that were taken from elsewhere.
         """
         body, config = searcher.body, searcher.config
-        due = self._due(body, stamp_ns)
+        unexplained = limbs_unexplained(body, pose, observations, self._rig)
+        due = self._due(body, stamp_ns, unexplained)
         if not due:
             return pose, ()
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
@@ -105,11 +107,11 @@ class LimbWatch:
                 found.append(name)
         return pose, tuple(found)
 
-    def _due(self, body: BodyModel, stamp_ns: int) -> list[str]:
-        """Limbs to look for: the lost ones, and at its turn another."""
+    def _due(self, body: BodyModel, stamp_ns: int, unexplained: tuple[str, ...]) -> list[str]:
+        """Limbs to search: lost ones, those near unexplained silhouette, and one more by turns."""
         if not body.limbs:
             return []
-        lost = list(self.lost)
+        lost = [*self.lost, *(name for name in unexplained[:2] if name not in self.lost)]
         if self._turned_ns is not None and 0 <= stamp_ns - self._turned_ns < TURN_NS:
             return lost
         self._turned_ns = stamp_ns
@@ -126,7 +128,8 @@ def inside_fractions(
 ) -> dict[str, float]:
     """By limb, how much of its cones' axes lies inside the silhouettes, mean over the views.
 
-    Points outside a view's region count as outside, those outside its frame not at all.
+    Points outside a view's region count as outside; those outside its frame, and those on
+    undecided pixels, do not count.
     """
     placed = cone_transforms(body, pose)
     along = (body.cone_length[:, None] * _ALONG)[:, :, None]
@@ -161,12 +164,14 @@ def _look(
     """Which of the points (n, 3) a view has in its frame, and which in its silhouette."""
     pixels = project_camera(points, rig[observation.camera])
     with np.errstate(invalid="ignore"):
-        framed = (pixels >= 0.0).all(axis=1) & (pixels <= np.array(observation.size_px) - 1).all(
-            axis=1
-        )
+        last = np.array(observation.size_px) - 1
+        framed = np.asarray((pixels >= 0.0).all(axis=1) & (pixels <= last).all(axis=1))
     inside = np.zeros(len(points), dtype=np.bool_)
-    mask = observation.mask
+    mask, undecided = observation.mask, observation.undecided
     u, v = (np.round(pixels[framed]) - observation.offset_px).astype(np.int64).T
     there = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
-    inside[np.flatnonzero(framed)[there]] = mask[v[there], u[there]]
-    return np.asarray(framed), inside
+    seen = np.flatnonzero(framed)[there]
+    inside[seen] = mask[v[there], u[there]]
+    if undecided is not None:
+        framed[seen] &= ~undecided[v[there], u[there]]
+    return framed, inside

@@ -1,8 +1,10 @@
 """Where somebody is: a coarse visual hull of the silhouettes, and the trunk in it.
 
-The hull is what all silhouettes agree on: a point of the room belongs to it if every camera that
-looks there sees silhouette (Laurentini 1994, on a grid of points). People are where it has a lump
-of a person's size, seen by two cameras at least.
+The hull is what all silhouettes agree on: a point of the room belongs to it if no camera that looks
+there sees background (Laurentini 1994, on a grid of points). Undecided pixels never carve it, since
+legs may look like a shadow in some views. Shadows themselves lie on the floor: points near it count
+only where two cameras see a person. People are where the hull has a lump of a person's size, seen
+by two cameras at least.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,6 +32,10 @@ LEAST_VOLUME_M3 = 0.015
 MOST_VOLUME_M3 = 1.5
 """A person of two metres with the slack of two views; more is a room, not a person."""
 MOST_COARSE_M3 = 6.0
+FLOOR_M = 0.08
+"""Below this height above the floor, z = 0, undecided pixels are taken for shadows."""
+LEAST_PERSON = 0.25
+"""Fraction of a lump's points that two cameras must see as person."""
 _RADIUS_M = 5.0
 _UP_M = 2.5
 _FAR_M = 4.0
@@ -92,7 +98,7 @@ def find_hulls(
     views = [_View.of(camera, observation, middle) for camera, observation in seen]
     low = middle - (_RADIUS_M, _RADIUS_M, _UP_M)
     size = np.ceil(2.0 * np.array([_RADIUS_M, _RADIUS_M, _UP_M]) / COARSE_M).astype(np.int64)
-    inside, looking = _occupied(low, size, COARSE_M, views)
+    inside, looking, _ = _occupied(low, size, COARSE_M, views)
     labels, count = ndimage.label(inside, structure=np.ones((3, 3, 3)))
     support = np.bincount(labels[inside], weights=looking[inside], minlength=count + 1)
     boxes = ndimage.find_objects(labels)
@@ -103,8 +109,12 @@ def find_hulls(
 
 
 def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
-    """The silhouette's components that a hull's points fall on, the very same if that is all."""
-    mask = observation.mask.view(np.uint8)
+    """The silhouette's components that a hull's points fall on, the very same if that is all.
+
+    Undecided pixels that the hull covers are person: what all views allow is no shadow.
+    """
+    observation = decided_by_hull(observation, camera, hull)
+    mask = observation.not_background.view(np.uint8)
     count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
     if count <= 2:
         return observation
@@ -117,14 +127,30 @@ def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Obs
     kept[0] = False
     if not kept.any() or kept[1:].all():
         return observation
-    return Observation.from_mask(
-        observation.camera,
-        observation.stamp_ns,
-        kept[labels],
-        observation.edges,
-        size_px=observation.size_px,
-        offset_px=observation.offset_px,
+    selected, undecided = kept[labels], observation.undecided
+    return observation.with_masks(
+        observation.mask & selected, None if undecided is None else undecided & selected
     )
+
+
+def decided_by_hull(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
+    """The observation with undecided pixels as person where the hull's points fall."""
+    undecided = observation.undecided
+    if undecided is None:
+        return observation
+    pixels = project_camera(hull.points_m, camera) - observation.offset_px
+    with np.errstate(invalid="ignore"):
+        u, v = np.round(pixels).T
+        framed = (u >= 0) & (v >= 0) & (u < observation.width) & (v < observation.height)
+    covered = np.zeros(undecided.shape, dtype=np.uint8)
+    covered[v[framed].astype(np.int64), u[framed].astype(np.int64)] = 1
+    middle = hull.points_m.mean(axis=0)
+    depth = float(camera.T_cam_world[2, :3] @ middle + camera.T_cam_world[2, 3])
+    side = 2 * int(0.75 * FINE_M * float(camera.matrix[0, 0]) / max(depth, 1.0)) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    covered = np.asarray(cv2.morphologyEx(covered, cv2.MORPH_CLOSE, kernel), dtype=np.uint8)
+    person = undecided & (covered > 0)
+    return observation.with_masks(observation.mask | person, undecided & ~person)
 
 
 def _fine(
@@ -141,7 +167,7 @@ def _fine(
     first = low + COARSE_M * (np.array([part.start for part in box]) - 1.0)
     extent = COARSE_M * (np.array([part.stop - part.start for part in box]) + 2.0)
     size = np.ceil(extent / FINE_M).astype(np.int64)
-    inside, looking = _occupied(first, size, FINE_M, views)
+    inside, looking, person = _occupied(first, size, FINE_M, views)
     parts, count = ndimage.label(inside)
     if count == 0:
         return None
@@ -154,6 +180,8 @@ def _fine(
     points = first + FINE_M * (np.argwhere(largest) + 0.5)
     if float(np.ptp(points, axis=0).max()) < LEAST_HEIGHT_M:
         return None
+    if float(person[largest].mean()) < LEAST_PERSON:
+        return None
     return Hull(points, FINE_M * depth[largest], int(np.median(looking[largest])))
 
 
@@ -163,7 +191,8 @@ class _View:
 
     Attributes:
         camera: the camera.
-        masks: by spacing of the grid, (h, w) of the full frame.
+        masks: by spacing of the grid, (h, w) of the full frame: 0 background, 1 undecided,
+            2 person.
     """
 
     camera: CameraModel
@@ -172,10 +201,8 @@ class _View:
     @classmethod
     def of(cls, camera: CameraModel, observation: Observation, middle: FloatArray) -> "_View":
         """The view, its silhouette grown by half a grid spacing at the room's middle."""
-        width, height = observation.size_px
-        u, v = observation.offset_px
-        mask = np.zeros((height, width), dtype=np.uint8)
-        mask[v : v + observation.height, u : u + observation.width] = observation.mask
+        either = observation.not_background.view(np.uint8) + observation.mask.view(np.uint8)
+        mask = observation.full_frame(either)
         depth = float(camera.T_cam_world[2, :3] @ middle + camera.T_cam_world[2, 3])
         scale = float(camera.matrix[0, 0]) / max(depth, 1.0)
         masks = {}
@@ -191,12 +218,16 @@ def _occupied(
     size: NDArray[np.int64],
     spacing: float,
     views: Sequence[_View],
-) -> tuple[NDArray[np.bool_], NDArray[np.int8]]:
-    """Which points of a grid lie in all silhouettes that could show them, and how many look."""
+) -> tuple[NDArray[np.bool_], NDArray[np.int8], NDArray[np.bool_]]:
+    """Points of a grid that no view shows as background, and how many views look at each.
+
+    Also the points that at least two views show as person.
+    """
     axes = [low[i] + spacing * (np.arange(size[i]) + 0.5) for i in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     index = np.arange(len(points))
     looking = np.zeros(len(points), dtype=np.int8)
+    seen = np.zeros(len(points), dtype=np.int8)
     for view in views:
         camera = view.camera
         pixels = project_camera(points[index], camera)
@@ -205,13 +236,17 @@ def _occupied(
             u, v = np.round(pixels[:, 0]), np.round(pixels[:, 1])
             framed = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
         keep = ~framed
-        keep[framed] = mask[v[framed].astype(np.int64), u[framed].astype(np.int64)] > 0
+        shown = mask[v[framed].astype(np.int64), u[framed].astype(np.int64)]
+        keep[framed] = shown > 0
         looking[index] += framed
+        seen[index[framed]] += shown > 1
         index = index[keep]
+    person = seen >= LEAST_VIEWS
     inside = np.zeros(len(points), dtype=np.bool_)
     inside[index] = looking[index] >= LEAST_VIEWS
+    inside &= person | (points[:, 2] > FLOOR_M)
     shape = tuple(int(n) for n in size)
-    return inside.reshape(shape), looking.reshape(shape)
+    return inside.reshape(shape), looking.reshape(shape), person.reshape(shape)
 
 
 def _middle(cameras: Sequence[CameraModel]) -> FloatArray:

@@ -13,8 +13,9 @@ from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.fitness.shape import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
+from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.hull import Hull, find_hulls, hulls_part
+from markerless_tracker.tracking.start.hull import Hull, decided_by_hull, find_hulls, hulls_part
 from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
 from markerless_tracker.tracking.start.postures import put_at
 from markerless_tracker.tracking.start.start_gate import StartGate
@@ -24,8 +25,12 @@ SETTLING_FRAMES = 8
 GENERATIONS = 7
 SECOND_GENERATIONS = 5
 STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
-"""Statures that are tried for somebody unknown, in heights of the hull; raised arms make it
-higher than the person."""
+"""Statures that are tried for an unknown person, in heights of the hull; raised arms make it higher
+than the person."""
+USUAL_STATURES_M = (1.56, 1.63, 1.70, 1.77, 1.84)
+"""Statures that are tried besides: a person who bends, squats or sits is taller than the hull."""
+STANDING_M = 1.45
+"""A lower hull is that of a person who does not stand upright."""
 _STATURE_RANGE_M = (1.2, 2.1)
 _STATURE_SD_M = 0.10
 _STATURE_BELIEF = 0.002
@@ -135,9 +140,10 @@ class Starter:
         if self._population is None or self._searcher is None:
             return self._begin(observed, stamp_ns)
         population = self._population
-        observations, notes = self._select(
-            observed, self._searcher.body, self._best(population).poses[0]
-        )
+        best = self._best(population).poses[0]
+        observations, notes = self._select(observed, self._searcher.body, best)
+        if any(seen.undecided_words is not None for seen in observations.values()):
+            observations = self._decide(observations, best)
         frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
         population = frame.propagated(population)
         if len(self._seen[0]) == 1:
@@ -182,6 +188,19 @@ class Starter:
             return Found(self._searcher, population.poses[0], observations, False)
         return None
 
+    def _decide(
+        self, observations: Mapping[str, Observation], pose: FloatArray
+    ) -> dict[str, Observation]:
+        """Observations whose undecided pixels the hull, or the body at a pose (p,), decides."""
+        assert self._searcher is not None
+        hull = next(find_hulls(self._cameras, observations), None)
+        if hull is not None:
+            observations = {
+                name: decided_by_hull(seen, self._cameras[name], hull)
+                for name, seen in observations.items()
+            }
+        return decide(observations, self._cameras, self._searcher.body, pose)
+
     def _second_look(
         self,
         frame: FramePopulation,
@@ -201,6 +220,8 @@ class Starter:
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> tuple[FramePopulation, Population] | None:
         height_m = float(np.clip(hull.height_m, *_STATURE_RANGE_M))
+        if height_m < STANDING_M:
+            height_m = USUAL_STATURE_M
         body = self._body if self._sized is None else self._sized(height_m)
         self._searcher = self._searcher_for(body)
         near = body.neutral.copy()
@@ -231,8 +252,8 @@ class Starter:
         best = (
             float(population.costs[0]) + _unusual(height_m), frame, population, self._searcher
         )  # fmt: skip
-        for share in STATURES:
-            stature_m = float(np.clip(share * height_m, *_STATURE_RANGE_M))
+        statures = {share * height_m for share in STATURES} | set(USUAL_STATURES_M)
+        for stature_m in sorted({float(np.clip(s, *_STATURE_RANGE_M)) for s in statures}):
             searcher = self._searcher_for(self._sized(stature_m))
             moved = scaled_to(self._searcher.body, searcher.body, population.poses)
             other = FramePopulation(searcher, observations, stamp_ns, moved[0])

@@ -1,0 +1,55 @@
+"""The pixels that a posed body covers, drawn by the kernels of the fitness."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraModel
+from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.arrays import body_arrays, camera_arrays
+from markerless_tracker.fitness.raster.fill import clear_used, fill_outline
+from markerless_tracker.fitness.raster.kernels import cone_ends
+from markerless_tracker.fitness.raster.outline import find_outlines
+from markerless_tracker.fitness.raster.outline_arrays import (
+    HIDDEN,
+    LANES,
+    make_outlines,
+    outlines_of,
+)
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import unpack_mask
+
+
+def body_masks(
+    body: BodyModel, pose: FloatArray, cameras: Sequence[CameraModel]
+) -> dict[str, NDArray[np.bool_]]:
+    """By camera, the mask (h, w) of the pixels whose centres a body at a pose (p,) covers."""
+    views = camera_arrays(cameras)
+    arrays = body_arrays(body)
+    height = int(views.size[:, 1].max())
+    outlines = make_outlines(1, height)
+    world = np.ones(18 * LANES)
+    cone_ends(np.ascontiguousarray(pose), arrays, np.empty((body.node_parent.size, 3, 4)), world)
+    masks = {}
+    for view, camera in enumerate(cameras):
+        width, height = camera.size_px
+        words = int(views.words[view])
+        bits = np.zeros(words * height, dtype=np.uint64)
+        used = np.empty((words, 2), dtype=np.int64)
+        _fill(view, views, len(body.cone_names), world, outlines, bits, used)
+        rows = np.ascontiguousarray(bits.reshape(words, height).T)
+        masks[camera.name] = unpack_mask(rows, width)
+    return masks
+
+
+@kernel
+def _fill(view, views, cones, world, outlines, bits, used):  # type: ignore[no-untyped-def]
+    width, height = views.size[view, 0], views.size[view, 1]
+    out = outlines_of(outlines, 0)
+    count = find_outlines(cones, views, view, world, out)
+    clear_used(views.words[view], height, used)
+    for c in range(cones):
+        if out.form[c] != HIDDEN:
+            fill_outline(c, count, out, width, height, bits, used)
