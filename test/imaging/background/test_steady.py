@@ -19,8 +19,8 @@ def twin(values: np.ndarray, share: float) -> np.ndarray:
     lengths = [bright[i + need - 1] - bright[i] for i in range(len(values) - need + 1)]
     first = int(np.argmin(lengths))
     window = values[order[first : first + need]]
-    reach = max(6.0, 3.0 * min(lengths) / values.shape[1])
-    near = np.abs(window - window.mean(axis=0)).max(axis=1) <= 2.0 * reach
+    tolerance = max(6.0, 3.0 * min(lengths) / values.shape[1])
+    near = np.abs(window - window.mean(axis=0)).max(axis=1) <= 2.0 * tolerance
     return window[near].mean(axis=0) if near.any() else window.mean(axis=0)
 
 
