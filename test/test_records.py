@@ -147,3 +147,14 @@ def test_results_are_read_only_and_may_be_empty() -> None:
         assert array is not None and not array.flags.writeable
     nothing = TrackResult(1, TrackState.LOST, None, None, float("nan"), {}, 0)
     assert nothing.pose is None and nothing.markers_m is None and nothing.warnings == ()
+
+
+def test_a_region_in_its_full_frame() -> None:
+    mask = np.array([[1, 0, 1], [0, 1, 1]], np.uint8)
+    edges = np.zeros(mask.shape, np.uint8)
+    seen = Observation.from_mask("cam01", 0, mask, edges, size_px=(6, 5), offset_px=(2, 3))
+    expected = np.zeros((5, 6), np.uint8)
+    expected[3:5, 2:5] = mask
+    np.testing.assert_array_equal(seen.full_frame(mask), expected)
+    whole = Observation.from_mask("cam01", 0, mask, edges)
+    assert whole.full_frame(mask) is mask

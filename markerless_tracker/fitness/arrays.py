@@ -1,4 +1,4 @@
-"""What the kernels read and write, as tuples of plain arrays."""
+"""Inputs of the kernels: bodies and views as tuples of plain arrays."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class ViewArrays(NamedTuple):
         distortion: (v, 5) k1 k2 p1 p2 k3.
         size: (v, 2) width and height in px.
         words: (v,) words per row.
-        mask: observed silhouettes, flat, column after column of words (see `fitness.bits`); view i
+        mask: observed silhouettes, flat, column after column of words (see `raster.bits`); view i
             starts at mask_start[i].
         edges: edge maps, flat; view i starts at edge_start[i].
         observed: (v,) silhouette pixels.
@@ -62,7 +62,7 @@ class ViewArrays(NamedTuple):
 
 @dataclass(frozen=True)
 class Views:
-    """The views of one frame: names of the cameras that see, and their arrays in that order."""
+    """The views of one frame: cameras that have an observation, and arrays in their order."""
 
     names: tuple[str, ...]
     arrays: ViewArrays
@@ -72,7 +72,7 @@ def body_arrays(body: BodyModel) -> BodyArrays:
     """The kernels' arrays of a body.
 
     Raises:
-        BodyModelError: more cones than the kernels have room for.
+        BodyModelError: more cones than `LANES`.
     """
     if len(body.cone_names) > LANES:
         raise BodyModelError(
@@ -92,7 +92,7 @@ def body_arrays(body: BodyModel) -> BodyArrays:
 
 
 def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Observation]) -> Views:
-    """Lay out the views of the cameras that have an observation, in the cameras' order.
+    """Views of the cameras that have an observation, in the order of the cameras.
 
     Raises:
         ImageError: no camera has one, or a frame's size is not its calibration's.

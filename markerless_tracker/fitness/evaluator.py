@@ -1,4 +1,4 @@
-"""The fitness f = f_s + f_e of SPPSO over all views, the costs, and the evaluators for searches."""
+"""The fitness f = f_s + f_e of SPPSO over all views, its costs, and evaluators for searches."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,9 +11,16 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.fitness.arrays import Views, body_arrays, lay_out_views
-from markerless_tracker.fitness.raster import kernels
-from markerless_tracker.fitness.raster.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule
-from markerless_tracker.fitness.raster.outline_arrays import make_outlines
+from markerless_tracker.fitness.raster import (
+    OUTLINE,
+    SIDES,
+    VISIBLE,
+    EdgeRule,
+    evaluate,
+    evaluate_parallel,
+    make_outlines,
+    make_scratch,
+)
 from markerless_tracker.fitness.raster.static_layer import Drawing, split_static
 from markerless_tracker.fitness.terms import OVERLAP, PROJECTED, CostRule, view_terms
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
@@ -24,7 +31,7 @@ EDGE_RULES = {"sides": SIDES, "visible": VISIBLE, "outline": OUTLINE}
 EDGE_TERMS = ("ssd", "mean")
 COSTS = ("overlap", "bidirectional", "one_sided")
 _CONE_S = 0.4e-6
-"""About how long one cone in one view takes one thread."""
+"""Approximate time of one cone in one view on one thread."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +41,7 @@ class ViewTerms:
     Attributes:
         silhouette, edges: f_s and f_e in [0, 1].
         overlap: IoU of body and silhouette.
-        pixels: what either of them covers.
+        pixels: number of pixels in body or silhouette.
     """
 
     silhouette: float
@@ -50,13 +57,14 @@ class Fitness:
         body: the body.
         cameras: the cameras that may see it.
         threads: threads of an evaluation; the result does not depend on them.
-        edge_rule: 'sides' samples both sides of every cone, 'visible' those that no nearer cone
-            hides, 'outline' those on the outline of the whole body.
+        edge_rule: 'sides' samples both sides of every cone, 'visible' the parts that no nearer cone
+            hides, 'outline' the parts on the outline of the whole body.
         edge_term: 'ssd': f_e = 1 - mean (1 - M)²; 'mean': f_e = mean M.
         edge_spacing_px: distance between samples along a side (at least four a side).
-        edge_step_px: how far outside a sample must be free of the body, for 'outline'.
-        cost: 'overlap': what f lacks (SPPSO); 'bidirectional', 'one_sided': H-MCPSO's costs, see
-            `Evaluator`.
+        edge_step_px: for 'outline', distance outward of a sample at which no cone may cover the
+            pixel.
+        cost: 'overlap': sum of the weights - f (SPPSO); 'bidirectional', 'one_sided': H-MCPSO's
+            costs, see `Evaluator`.
 
     Raises:
         ConfigError: an unknown rule, term or cost.
@@ -97,7 +105,7 @@ class Fitness:
         )
         height = max(camera.size_px[1] for camera in cameras)
         self._outlines = make_outlines(self.threads, height)
-        self._scratch = kernels.make_scratch(
+        self._scratch = make_scratch(
             self.threads,
             body.size,
             body.node_parent.size,
@@ -134,7 +142,7 @@ class Fitness:
         ]
 
     def terms(self, views: Views, pose: FloatArray) -> dict[str, ViewTerms]:
-        """f_s, f_e and overlap of one pose (p,), by the names of the cameras that see."""
+        """f_s, f_e and overlap of one pose (p,), by camera name."""
         every = np.ones(len(self.body.cone_names), dtype=np.bool_)
         counts = self.count(views, np.ascontiguousarray(pose[None]), every, every)[0]
         found = {}
@@ -159,30 +167,31 @@ class Fitness:
         costs = np.empty(len(points))
         args = (
             points, active, centre, cutoff_costs, drawing.body, views.arrays,
-            drawing.silhouette_cones, drawing.edge_cones, self._rule, cost, drawing.still,
+            drawing.silhouette_cones, drawing.edge_cones, self._rule, cost, drawing.static,
             self._scratch, self._outlines, counts, costs,
         )  # fmt: skip
         work_s = len(points) * len(views.names) * drawing.silhouette_cones.size * _CONE_S
         if not worth_waking(work_s, self.threads):
-            kernels.evaluate(*args, 0, 1)
+            evaluate(*args, 0, 1)
         else:
             with ONE_CALLER:
                 numba.set_num_threads(self.threads)
-                kernels.evaluate_parallel(*args)
+                evaluate_parallel(*args)
         return counts, costs
 
 
 class Evaluator:
-    """Costs of one stage: silhouettes and edges weighted as it says, averaged over the views.
+    """Costs of one stage: its weighted silhouette and edge terms, averaged over the views.
 
-    'overlap': weights' sum - f, hence 2 - f with both weights one. H-MCPSO's costs (Saini et al.,
-    2015, Eq 9) always have the squared edge term, mean (1 - M)² (Eq 10). 'one_sided' adds Eq 13:
-    mean (1 - P)² over the body's pixels, with a foreground P of 0 and 1 the share B/(B+Y) of them
-    that is not observed. 'bidirectional' adds ½ B/(B+Y) + ½ R/(R+Y): no formula is printed; this
-    reading [R] is 1 - f_s, so that with the squared term it equals 'overlap'.
+    'overlap': sum of the weights - f, hence 2 - f with both weights one. H-MCPSO's costs (Saini et
+    al., 2015, Eq 9) always have the squared edge term, mean (1 - M)² (Eq 10). 'one_sided' adds
+    Eq 13: mean (1 - P)² over the body's pixels; with a foreground P of 0 and 1 that is the fraction
+    B/(B+Y) of them that is not observed. 'bidirectional' adds ½ B/(B+Y) + ½ R/(R+Y): the paper
+    prints no formula; this reading [R] is 1 - f_s, so that with the squared term it equals
+    'overlap'.
 
     Called with points (n, d) of the stage's active parameters, returns costs (n,); NaN for points
-    that are not finite. What the stage does not move is drawn when the evaluator is made.
+    that are not finite. Cones that the stage does not move are drawn when the evaluator is made.
     """
 
     def __init__(self, fitness: Fitness, views: Views, stage: Stage) -> None:
@@ -197,7 +206,7 @@ class Evaluator:
         )
         self._drawing = split_static(
             fitness.body, fitness._arrays, views.arrays, stage.active, stage.centre,
-            # A term without weight is not looked at.
+            # A term without weight is not computed.
             stage.silhouette_cones, stage.edge_cones & (stage.edge_weight != 0.0),
             fitness._rule, self._cost, fitness._scratch, fitness._outlines,
         )  # fmt: skip

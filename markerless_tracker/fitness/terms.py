@@ -1,4 +1,4 @@
-"""How well counts of pixels and edge samples explain one view: the terms of f, and their cost."""
+"""The terms f_s and f_e of one view from counts of pixels and edge samples, and their cost."""
 
 from typing import NamedTuple
 
@@ -7,15 +7,16 @@ import numpy as np
 from markerless_tracker.compiled import kernel
 
 OVERLAP, PROJECTED, EDGE_SUM, EDGE_COUNT = 0, 1, 2, 3
-"""Columns of the counts: Y, Y + B, sum over the edge samples of (255 - M)² or of M for a map M of
-0 .. 255, and their number. All are whole numbers, so that no order of adding changes them."""
+"""Columns of the counts: Y, Y + B, sum over the edge samples of (255 - M)² or of M (edge map,
+0 .. 255), and their number. All are whole numbers: sums do not depend on the order of adding."""
 EDGE_TOP = 255.0
+"""Largest value of an edge map."""
 
 
 class CostRule(NamedTuple):
-    """Weights of the silhouette and edge terms; whether edges are squared; which silhouette cost.
+    """Weights of the silhouette and edge terms; whether edges are squared; the silhouette's cost.
 
-    One-sided, a silhouette counts the share of the projected pixels that is observed; else f_s.
+    One-sided: the fraction of the projected pixels that is observed takes the place of f_s.
     """
 
     silhouette_weight: float
@@ -28,9 +29,9 @@ class CostRule(NamedTuple):
 def view_terms(counts, observed, squared):  # type: ignore[no-untyped-def]
     """f_s, f_e and the overlap (IoU) of one view from its counts (4,) and silhouette pixels.
 
-    f_s = ½ Y/(B+Y) + ½ Y/(R+Y) with Y in both, B projected only, R observed only. A view where the
-    body is neither projected nor observed is fully explained; where it is only one of the two, not
-    at all. Without edge samples f_e = 0.
+    f_s = ½ Y/(B+Y) + ½ Y/(R+Y) with Y pixels projected and observed, B projected only, R observed
+    only. It is 1 if the body is neither projected nor observed, 0 if it is only one of the two.
+    Without edge samples f_e = 0.
     """
     both, projected, seen = counts[OVERLAP], counts[PROJECTED], np.float64(observed)
     if projected == 0.0 and seen == 0.0:
@@ -51,7 +52,7 @@ def view_terms(counts, observed, squared):  # type: ignore[no-untyped-def]
 
 @kernel
 def view_cost(counts, observed, rule):  # type: ignore[no-untyped-def]
-    """What one view lacks of being fully explained: weights' sum - f, never negative."""
+    """Cost of one view: sum of the weights - f, never negative."""
     silhouette, edges, _ = view_terms(counts, observed, rule.squared)
     if rule.one_sided and counts[PROJECTED] > 0.0:
         silhouette = counts[OVERLAP] / counts[PROJECTED]
@@ -60,9 +61,10 @@ def view_cost(counts, observed, rule):  # type: ignore[no-untyped-def]
 
 @kernel
 def least_cost(counts, observed, rule):  # type: ignore[no-untyped-def]
-    """What a view costs at least once parts with these counts (4,) are drawn.
+    """Least cost of a view in which parts with these counts (4,) are drawn.
 
-    At best everything else that is observed is covered and nothing besides.
+    At best the other parts cover all other observed pixels and nothing besides
+    (docs/early-termination.md).
     """
     seen = np.float64(observed)
     missed = counts[PROJECTED] - counts[OVERLAP]

@@ -1,4 +1,4 @@
-"""The one way into numba's parallel loops."""
+"""Number of threads, and the lock, for numba's parallel loops."""
 
 import threading
 import time
@@ -10,14 +10,14 @@ from numba import prange
 
 from markerless_tracker.compiled import compiled
 
-# The only threading layer without a library to install. It takes one caller at a time.
+# The only threading layer without a further library. It allows one caller at a time.
 numba.config.THREADING_LAYER = "workqueue"
 ONE_CALLER = threading.Lock()
 """Held while a parallel kernel runs."""
 
 _LAUNCHES = 30
 _MARGIN = 3.0
-"""Beside a busy interpreter waking takes longer than when it is measured."""
+"""Factor for a busy interpreter: threads wake slower than during the measurement."""
 
 
 def usable_threads(wanted: int) -> int:
@@ -26,24 +26,24 @@ def usable_threads(wanted: int) -> int:
 
 
 def worth_waking(work_s: float, threads: int) -> bool:
-    """Whether some threads finish work that takes one of them `work_s` sooner than one alone.
+    """Whether several threads finish sooner than one that takes `work_s` alone.
 
-    Waking threads costs between some 10 and some 100 µs, so small batches are better off without.
-    Results do not depend on the number of threads: the answer may differ between machines.
+    Waking threads costs between some 10 and some 100 µs, so small batches run on one thread.
+    The answer may differ between machines; results do not depend on the number of threads.
     """
     return threads > 1 and work_s * (1.0 - 1.0 / threads) > _MARGIN * launch_cost_s(threads)
 
 
 @cache
 def launch_cost_s(threads: int) -> float:
-    """What waking some threads costs on this machine; measured once."""
+    """Time to wake that many threads on this machine; measured once."""
     ticks = np.zeros(threads)
     costs = []
     with ONE_CALLER:
         numba.set_num_threads(threads)
         _nothing(ticks)
         for _ in range(_LAUNCHES):
-            # Workers fall asleep between the swarm's steps.
+            # Workers sleep between the swarm's steps.
             time.sleep(0.0002)
             begin = time.perf_counter()
             _nothing(ticks)

@@ -1,16 +1,20 @@
-"""From camera images to evidence: background, shadows, silhouette, edges."""
+"""From camera images to evidence: background, silhouette, edge map."""
 
-from markerless_tracker.imaging.background.model import BackgroundModel, Mode, learn_background
-from markerless_tracker.imaging.background.model_file import (
+from markerless_tracker.imaging.background import (
+    BackgroundModel,
+    Mode,
+    Plate,
+    background_plate,
+    learn_background,
+    learn_from_recording,
     read_background_model,
+    scale_background_model,
     write_background_model,
 )
-from markerless_tracker.imaging.background.model_scale import scale_background_model
-from markerless_tracker.imaging.background.plate import Plate, background_plate
-from markerless_tracker.imaging.background.recording import learn_from_recording
+from markerless_tracker.imaging.edges import edge_map, edge_radius_px
 from markerless_tracker.imaging.images import Image, check_image, scale_image
 from markerless_tracker.imaging.region import Region
-from markerless_tracker.imaging.segmentation.segmenter import Segmenter
+from markerless_tracker.imaging.segmentation import Segmenter
 from markerless_tracker.imaging.settings import ImagingSettings
 
 __all__ = [
@@ -23,6 +27,8 @@ __all__ = [
     "Segmenter",
     "background_plate",
     "check_image",
+    "edge_map",
+    "edge_radius_px",
     "learn_background",
     "learn_from_recording",
     "read_background_model",

@@ -1,31 +1,31 @@
-"""The edge map: where the silhouette's neighbourhood changes brightness, in [0, 1]."""
+"""The edge map: strength of brightness edges in and near the silhouette."""
 
 import cv2
 import numpy as np
 
 from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image, grey_of
-from markerless_tracker.imaging.segmentation.morphology import Mask
+from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.settings import ImagingSettings
 
 
-def edge_reach(settings: ImagingSettings) -> int:
-    """How far from a pixel its edge strength looks at the mask and the image, px."""
+def edge_radius_px(settings: ImagingSettings) -> int:
+    """Radius of mask and image on which a pixel's edge strength depends, px."""
     return settings.edges.margin_px + settings.edges.blur_px // 2 + 1
 
 
 def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
-    """Edge strength (h, w) uint8, 255 = 1: gradient -> threshold -> dilated silhouette -> blur.
+    """Edge strength (h, w) uint8, 255 = 1: gradient, threshold, dilated silhouette, blur.
 
-    H-MCPSO's order of steps; the published threshold (squared Sobel / 8 gradient >= 16, that is 4
-    grey levels per pixel) and the 7 x 7 blur are those of PARSEC's bodytrack.
-    A gradient per pixel and a blur in pixels depend on the resolution: at half the size the same
-    edge is about twice as steep and the blur reaches twice as far over the body.
+    The steps are in H-MCPSO's order; the published threshold (squared Sobel / 8 gradient >= 16,
+    that is 4 grey levels per pixel) and the 7 x 7 blur are those of PARSEC's bodytrack. Gradient
+    and blur depend on the resolution: at half the size the same edge is about twice as steep, and
+    the blur covers twice as much of the body.
 
     Args:
         image: (h, w) or (h, w, 3) uint8.
-        mask: (h, w) uint8, 0 or 255; all 0 gives an empty map.
-        settings: those beginning with ``edge_``.
+        mask: (h, w) uint8, 0 or 255; an empty mask gives an empty map.
+        settings: the group `edges`.
     """
     height, width = mask.shape
     edges = np.zeros((height, width), dtype=np.uint8)
@@ -33,9 +33,9 @@ def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
     if w == 0 or h == 0:
         return edges
     margin = settings.edges.margin_px
-    reach = margin + settings.edges.blur_px + 1
-    u0, v0 = max(left - reach, 0), max(top - reach, 0)
-    u1, v1 = min(left + w + reach, width), min(top + h + reach, height)
+    border_px = margin + settings.edges.blur_px + 1
+    u0, v0 = max(left - border_px, 0), max(top - border_px, 0)
+    u1, v1 = min(left + w + border_px, width), min(top + h + border_px, height)
     strength = _gradient_strength(grey_of(image[v0:v1, u0:u1]), settings)
     near = mask[v0:v1, u0:u1]
     if margin > 0:
@@ -55,7 +55,7 @@ def _gradient_strength(grey: Image, settings: ImagingSettings) -> Image:
     strength = np.empty_like(grey)
     threshold = 8.0 * settings.edges.gradient
     if settings.edges.form == "published":
-        # From just below the threshold so steep that there is nothing between 0 and 255.
+        # A step at the threshold: no values between 0 and 255.
         low = np.float32(threshold * (1.0 - 1e-6))
         gradient_strength(grey, low, np.float32(np.inf), strength)
     else:

@@ -1,4 +1,4 @@
-"""What counts as an image, and the one way to change its size."""
+"""Images: checks, conversion to grey, scaling."""
 
 from typing import Any
 
@@ -9,18 +9,19 @@ from numpy.typing import NDArray
 from markerless_tracker.errors import ImageError
 
 Image = NDArray[np.uint8]
+"""(h, w) grey or (h, w, 3) BGR."""
 
 
 def check_image(image: Any, what: str, *, size_px: tuple[int, int] | None = None) -> Image:
-    """The image itself if it is uint8 (h, w) or (h, w, 3), not empty, and of that size.
+    """Return the image if it is uint8 (h, w) or (h, w, 3), not empty, and of that size.
 
     Args:
-        image: what came.
+        image: the value to check.
         what: name for the error message (camera or file).
-        size_px: (width, height) it must have, any if None.
+        size_px: expected (width, height); any if None.
 
     Raises:
-        ImageError: it is something else; says what.
+        ImageError: it is none; the message says what came.
     """
     if not isinstance(image, np.ndarray):
         raise ImageError(f"{what}: got {type(image).__name__}, expected an image array")
@@ -42,7 +43,7 @@ def check_image(image: Any, what: str, *, size_px: tuple[int, int] | None = None
 
 
 def grey_of(image: Image) -> Image:
-    """The image (h, w) or (h, w, c) as grey (h, w); three equal channels keep their value."""
+    """The image (h, w) or (h, w, c) in grey (h, w); three equal channels keep their value."""
     if image.ndim == 2:
         return image
     if image.shape[2] == 1:

@@ -32,7 +32,7 @@ class Region(NamedTuple):
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
     def grown(self, px: int, size_px: tuple[int, int]) -> "Region":
-        """Wider by that much on every side, as far as an image of (width, height) goes."""
+        """Grown by that much on every side, clipped to an image of (width, height)."""
         return Region(
             max(self.left - px, 0),
             max(self.top - px, 0),
@@ -41,7 +41,7 @@ class Region(NamedTuple):
         )
 
     def within(self, other: "Region") -> "Region":
-        """The same pixels, counted from the other region's corner."""
+        """The same pixels, relative to the other region's top left corner."""
         return self.moved(-other.left, -other.top)
 
     def moved(self, right_px: int, down_px: int) -> "Region":

@@ -1,4 +1,4 @@
-"""Every number that decides how an image becomes a silhouette and an edge map."""
+"""Settings of segmentation and edge map."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from markerless_tracker.settings import GroupedSettings, SettingsGroup, group, s
 
 @dataclass(frozen=True, kw_only=True)
 class BackgroundSettings(SettingsGroup):
-    """Learning the empty scene, and comparing an image with it."""
+    """Background model, and the comparison of images with it."""
 
     NAME = "background"
 
@@ -28,12 +28,12 @@ class BackgroundSettings(SettingsGroup):
     modes: int = setting(
         1,
         "Gaussians per pixel of a background learned from several images: 1 = mean and variance, "
-        "more = a mixture, for scenes that show things by turns",
+        "more = a mixture, for scenes that alternate (screens, leaves)",
         least=1,
         most=8,
     )
     sigma_min: float = setting(
-        2.0, "smallest noise believed of a background pixel, grey levels", least=0.1, most=50.0
+        2.0, "least noise of a background pixel, grey levels", least=0.1, most=50.0
     )
     sigma_still: float = setting(
         4.0,
@@ -59,14 +59,14 @@ class BackgroundSettings(SettingsGroup):
     )
     exposure_compensation: bool = setting(
         True,
-        "find in every image how much brighter it is than the background (exposure steps, "
-        "flicker), by channel, and compare with the background as bright",
+        "estimate in every image its brightness relative to the background (exposure steps, "
+        "flicker), by channel, and scale the background by it",
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShadowSettings(SettingsGroup):
-    """What counts as a shadow: hue, saturation and value against the background's."""
+    """Shadow test: hue, saturation and value relative to the background's."""
 
     NAME = "shadow"
 
@@ -150,33 +150,33 @@ class ShadowSettings(SettingsGroup):
 
 @dataclass(frozen=True, kw_only=True)
 class TextureSettings(SettingsGroup):
-    """Shadows found by the background's pattern."""
+    """Texture test: a shadow keeps the background's pattern."""
 
     NAME = "texture"
 
     radius_px: int = setting(
         3,
-        "radius of the windows in which the background's pattern is looked for: what shows it in "
-        "any light is shadow, what hides it is none; 0 = do not look",
+        "radius of the windows in which image and background are compared: the background's "
+        "pattern in any light is shadow, a hidden pattern is foreground; 0 = no test",
         least=0,
         most=6,
     )
     light_min: float = setting(
         0.15,
-        "darkest shadow that its pattern can give away, as a ratio of its brightness to the "
+        "darkest shadow that its pattern can show, as a ratio of its brightness to the "
         "background's",
         least=0.0,
         most=1.0,
     )
     reveal: bool = setting(
         True,
-        "grey cameras: what is as bright as the background but hides its pattern is foreground",
+        "grey cameras: pixels as bright as the background that hide its pattern are foreground",
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class MaskSettings(SettingsGroup):
-    """Cleaning the silhouette: morphology, holes, blobs, border."""
+    """Repair of the silhouette: morphology, holes, blobs, border."""
 
     NAME = "mask"
 
@@ -186,7 +186,7 @@ class MaskSettings(SettingsGroup):
     close_px: int = setting(
         5,
         "side of the closing that closes cracks, in images of 640x480 or more; in smaller ones it "
-        "is as much smaller as they are; 0 or 1 = none",
+        "is scaled down with them; 0 or 1 = none",
         least=0,
         most=101,
     )
@@ -213,14 +213,12 @@ class LevelSetSettings(SettingsGroup):
 
     iterations: int = setting(
         0,
-        "steps of a pixel by which the silhouette's contour may move to where the colours beside "
-        "it change (localised active contour); 0 = leave it where the foreground test puts it",
+        "steps of a pixel by which the silhouette's contour may move to the local change of colour "
+        "(localised active contour); 0 = the contour of the foreground test",
         least=0,
         most=20,
     )
-    radius_px: int = setting(
-        5, "distance within which those colours are compared", least=1, most=100
-    )
+    radius_px: int = setting(5, "radius within which colours are compared", least=1, most=100)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel, CameraRig
-from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
+from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 from markerless_tracker.records import Observation, TrackResult, TrackState

@@ -12,9 +12,8 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers, transforms
 from markerless_tracker.body.kinematics import carried
 from markerless_tracker.errors import SearchError
-from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.contour.outline_rows import OutlineRows, outline_rows
-from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
+from markerless_tracker.fitness.contour import ContourFrame, OutlineRows, outline_rows
+from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Confidence
 

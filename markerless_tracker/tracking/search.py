@@ -7,10 +7,9 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, Feasibility
 from markerless_tracker.camera import CameraModel, CameraRig
-from markerless_tracker.fitness import Fitness
-from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.evaluator import ViewTerms
-from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
+from markerless_tracker.fitness import Fitness, ViewTerms
+from markerless_tracker.fitness.contour import ContourFrame
+from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import (
     ALGORITHMS,

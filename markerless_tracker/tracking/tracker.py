@@ -10,7 +10,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import BodyModelError
-from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
 from markerless_tracker.records import Confidence, Observation, TrackResult, TrackState

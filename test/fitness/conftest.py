@@ -12,19 +12,19 @@ from markerless_tracker.body import BodyModel, cone_transforms, load_body
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
-from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, Stage
 from markerless_tracker.synthesis import ring_rig
 
 Mask = NDArray[np.bool_]
 LENS = (-0.15, 0.06, 0.002, -0.0015, 0.01)
-"""A lens that bends lines by some px, more than an ordinary one."""
+"""A lens with strong distortion: lines bend by some px."""
 
 
 @dataclass(frozen=True)
 class Edges:
-    """What sampling edges gave: number of samples, sum of M and of (1 - M)²."""
+    """Edge samples: their number, sum of M and of (1 - M)²."""
 
     count: int
     total: float
@@ -54,7 +54,7 @@ class Twin:
             world = np.concatenate(rings) @ place[:, :3].T + place[:, 3]
             local = world @ camera.T_cam_world[:3, :3].T + camera.T_cam_world[:3, 3]
             ring = np.repeat(np.arange(len(self.sections)), len(circle))
-            # A cone that reaches behind the camera is not drawn.
+            # A cone that extends behind the camera is not drawn.
             seen = bool(local[:, 2].min() > 0.15)
             self.points.append(self.project(world) if seen else np.empty((0, 2)))
             self.ends.append(ring)
@@ -175,7 +175,7 @@ def twin() -> type[Twin]:
 
 
 def random_pose(body: BodyModel, rng: np.random.Generator, *, spread_m: float) -> FloatArray:
-    """A pose anywhere inside the limits' middle half, turned any way, near the rig's target."""
+    """A pose anywhere inside the limits' middle half, in any direction, near the rig's target."""
     held = np.flatnonzero(np.isfinite(body.limits).all(axis=0))
     low, high = body.limits[:, held]
     pose = np.zeros(body.size)

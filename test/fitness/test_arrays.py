@@ -30,7 +30,7 @@ def observation(camera: CameraModel, seed: int) -> Observation:
     )
 
 
-def test_views_stand_in_the_cameras_order_one_after_the_other(cameras):
+def test_views_are_in_the_order_of_the_cameras(cameras):
     seen = {c.name: observation(c, i) for i, c in enumerate(cameras)}
     views = lay_out_views(cameras, {name: seen[name] for name in ("c", "a", "b")})
     assert views.names == ("a", "b", "c")
@@ -62,7 +62,7 @@ def test_a_camera_without_observation_is_left_out(cameras):
     assert views.arrays.rotation.shape == (1, 3, 3)
 
 
-def test_a_region_lands_where_it_was_cut_out(cameras):
+def test_a_region_is_placed_in_the_full_frame(cameras):
     camera = cameras[0]
     full = observation(camera, 3)
     mask, edges = full.mask.copy(), full.edges.copy()

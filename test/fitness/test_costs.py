@@ -79,7 +79,7 @@ def test_unknown_rules_and_terms_are_refused(body, rig):
 
 
 def test_h_mcpsos_costs_by_counted_pixels(body, rig, pose, observations, make_stage):
-    """B/(B+Y) one-sided, ½ B/(B+Y) + ½ R/(R+Y) both ways, beside mean (1 - M)²; view by view."""
+    """B/(B+Y) one-sided, ½ B/(B+Y) + ½ R/(R+Y) else, beside mean (1 - M)²; view by view."""
     every = np.ones(len(body.cone_names), dtype=bool)
     costs = {}
     for cost in COSTS:
@@ -124,7 +124,7 @@ def test_a_black_view_is_not_explained_by_a_body_in_it(make_observation, body, r
     fitness = Fitness(body, rig.cameras)
     for terms in fitness.terms(fitness.lay_out(black(rig, make_observation)), pose).values():
         assert (terms.silhouette, terms.overlap) == (0.0, 0.0)
-        # Samples there are, strength there is none: 1 - mean (1 - 0)².
+        # There are samples of strength 0: 1 - mean (1 - 0)².
         assert terms.edges == 0.0
 
 

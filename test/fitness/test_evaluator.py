@@ -36,8 +36,8 @@ def test_only_active_parameters_leave_the_centre(body, rig, pose, observations, 
     points = np.array([[0.1, 0.9, -0.2], [-0.1, 1.0, 0.0]])
     poses = evaluate.poses(points)
     np.testing.assert_array_equal(poses[:, active], points)
-    still = np.setdiff1d(np.arange(body.size), active)
-    np.testing.assert_array_equal(poses[:, still], np.tile(pose[still], (2, 1)))
+    held = np.setdiff1d(np.arange(body.size), active)
+    np.testing.assert_array_equal(poses[:, held], np.tile(pose[held], (2, 1)))
     whole = fitness.prepare(fitness.lay_out(observations), make_stage(body, pose))
     np.testing.assert_array_equal(evaluate(points), whole(poses))
 
@@ -93,7 +93,7 @@ def test_finite_poses_cost_something_finite_however_far(
     assert np.isfinite(costs).all()
     assert (costs >= 0.0).all()
     assert (costs <= 2.0).all()
-    # What an odd pose left behind must not matter to the next.
+    # An extreme pose must not influence the next one.
     np.testing.assert_array_equal(evaluate(poses[::-1]), costs[::-1])
 
 
@@ -154,7 +154,7 @@ def test_a_missing_camera_leaves_the_mean_of_the_others(body, rig, pose, observa
     assert cost == pytest.approx(2.0 - mean, abs=1e-12)
 
 
-def test_all_views_of_another_world_are_refused(body, rig, observations):
+def test_observations_without_a_known_camera_are_refused(body, rig, observations):
     fitness = Fitness(body, rig.cameras)
     with pytest.raises(ImageError, match="no view to compare with"):
         fitness.lay_out({})
@@ -165,7 +165,7 @@ def test_all_views_of_another_world_are_refused(body, rig, observations):
 def test_cameras_of_different_sizes_share_the_working_memory(
     twin, make_observation, body, rig, pose
 ):
-    """A small frame after a large one, and the other way round, costs what it costs alone."""
+    """A frame beside smaller and larger ones costs the same as alone."""
     sizes = [(320, 240), (96, 130), (200, 60)]
     cameras = [c.resized(size) for c, size in zip(rig.cameras[:3], sizes, strict=True)]
     seen = {c.name: make_observation(c, twin(body, c, pose).silhouette()) for c in cameras}
@@ -181,7 +181,7 @@ def test_cameras_of_different_sizes_share_the_working_memory(
 def test_turning_the_world_and_the_cameras_together_changes_nothing(
     make_pose, body, rig, observations
 ):
-    """Views depend on where the body is relative to the cameras alone."""
+    """Only the position relative to the cameras matters."""
     pose = make_pose(body, np.random.default_rng(4), spread_m=0.2)
     turn, shift = rotation_from_rodrigues([0, 0, 0.7]), np.array([1.0, -2.0, 0.3])
     moved_world = transform(turn, shift)

@@ -1,4 +1,4 @@
-"""When waking threads pays, and that it changes no result."""
+"""When several threads are used; the result does not depend on it."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from markerless_tracker.fitness import Fitness, threads
 from markerless_tracker.fitness.threads import launch_cost_s, usable_threads, worth_waking
 
 
-def test_threads_are_woken_for_work_that_is_worth_it(monkeypatch):
+def test_threads_are_woken_if_they_save_time(monkeypatch):
     monkeypatch.setattr(threads, "launch_cost_s", lambda count: 1e-4)
     assert not worth_waking(10.0, 1)
     # Two threads save half of the work: 0.5 ms against three times 0.1 ms.

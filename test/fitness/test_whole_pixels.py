@@ -13,7 +13,7 @@ FINE = 4
 
 
 def fine_silhouette(twin, body, camera, pose):
-    """Mask (4 h, 4 w) of a posed body: 4 x 4 samples a pixel; each row of a cone is one span."""
+    """Mask (4 h, 4 w) of a posed body: 4 x 4 samples per pixel; each row of a cone is one span."""
     width, height = camera.size_px
     drawn = np.zeros((height * FINE, width * FINE), dtype=bool)
     u = (np.arange(width * FINE) + 0.5) / FINE - 0.5
@@ -55,7 +55,7 @@ def compare(twin, body, cameras, masks, poses) -> tuple[float, float]:
     return float(np.abs(np.subtract(ours, fine)).max()), float(spearmanr(ours, fine).statistic)
 
 
-def test_poses_drawn_around_the_true_one_rank_alike(twin) -> None:
+def test_poses_around_the_true_one_have_the_same_ranks(twin) -> None:
     body = load_body("balan31")
     cameras = ring_rig(2, size_px=(644, 488)).cameras
     pose = body.neutral.copy()

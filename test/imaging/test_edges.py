@@ -51,7 +51,7 @@ def test_an_empty_mask_gives_an_empty_map() -> None:
     assert not edge_map(image, np.zeros_like(mask), ImagingSettings()).any()
 
 
-def test_a_step_is_strongest_where_it_is_and_far_edges_do_not_count() -> None:
+def test_a_step_is_strongest_at_its_place_and_far_edges_do_not_count() -> None:
     image = np.zeros((50, 100), np.uint8)
     image[:, 30:] = 120
     image[:, 80:] = 255

@@ -44,7 +44,7 @@ def test_impossible_sizes(size: tuple[int, int]) -> None:
         np.zeros((0, 4), np.uint8),
     ],
 )
-def test_what_is_no_image_is_refused_with_its_name(image: object) -> None:
+def test_other_values_are_refused_with_their_name(image: object) -> None:
     with pytest.raises(ImageError, match="^camX: got") as caught:
         check_image(image, "camX")
     assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""Working in a region gives what the whole frame gives there."""
+"""A region gives the same evidence as the whole frame there."""
 
 from typing import Any
 

@@ -33,10 +33,10 @@ def test_impossible_values_are_refused_by_name(name: str, value: object) -> None
 
 
 @pytest.mark.parametrize("kind", ["shadow.value", "shadow.grey_value"])
-def test_a_range_upside_down_is_refused(kind: str) -> None:
+def test_a_reversed_range_is_refused(kind: str) -> None:
     with pytest.raises(ConfigError, match=f"{kind}_min: got 0.9, .*_max .0.8"):
         ImagingSettings.from_mapping({f"{kind}_min": 0.9, f"{kind}_max": 0.8})
 
 
-def test_whole_numbers_serve_as_floats() -> None:
+def test_integers_are_accepted_as_floats() -> None:
     assert ImagingSettings.from_mapping({"background.risk": 10}).background.risk == 10.0

@@ -1,4 +1,4 @@
-"""Silhouettes of a made-up person under what real rooms do."""
+"""Silhouettes of a synthetic person under disturbances of real rooms."""
 
 from typing import Any
 
@@ -37,5 +37,5 @@ def overlap(**look: Any) -> float:
     ],
     ids=["plain", "drift", "step", "noise", "grey", "hard shadow", "dull clothes on grey"],
 )
-def test_the_silhouette_holds(look: dict[str, Any]) -> None:
+def test_the_silhouette_stays_accurate(look: dict[str, Any]) -> None:
     assert overlap(**look) >= LEAST

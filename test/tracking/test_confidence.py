@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, markers, root_transform
-from markerless_tracker.fitness.contour.outline_rows import outline_rows
+from markerless_tracker.fitness.contour import outline_rows
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig

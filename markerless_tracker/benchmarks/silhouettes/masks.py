@@ -20,7 +20,7 @@ from markerless_tracker.benchmarks.machine import machine
 from markerless_tracker.benchmarks.silhouettes.scene import JudgedSet, SilhouetteScene
 from markerless_tracker.body import BodyModel
 from markerless_tracker.imaging import Image, ImagingSettings, Segmenter, learn_background
-from markerless_tracker.imaging.segmentation.morphology import clean_mask
+from markerless_tracker.imaging.segmentation import clean_mask
 from markerless_tracker.records import Observation
 from markerless_tracker.results.result import versions
 from markerless_tracker.tracking import TrackerConfig

@@ -22,8 +22,7 @@ from markerless_tracker.benchmarks.speed.scene import SpeedScene
 from markerless_tracker.body import BodyModel
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import BackgroundModel, Segmenter, learn_background
-from markerless_tracker.imaging.edges import edge_map
+from markerless_tracker.imaging import BackgroundModel, Segmenter, edge_map, learn_background
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Observation
 from markerless_tracker.results.result import versions

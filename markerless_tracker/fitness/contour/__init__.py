@@ -1,4 +1,25 @@
-"""Contour residuals and their normal equations.
+"""Distances between the body's outline and the silhouettes' edges, and their normal equations.
 
-Model outline points against the silhouette's signed distance.
+`ContourFrame` compares one frame with poses; `outline_rows` gives the residuals one by one.
 """
+
+from markerless_tracker.fitness.contour.frame import ContourFrame, NormalEquations
+from markerless_tracker.fitness.contour.outline_rows import (
+    OutlineRows,
+    outline_rows,
+    pose_slopes,
+    surface,
+)
+from markerless_tracker.fitness.contour.row_kernels import eliminated, normal_equations, solved
+
+__all__ = [
+    "ContourFrame",
+    "NormalEquations",
+    "OutlineRows",
+    "eliminated",
+    "normal_equations",
+    "outline_rows",
+    "pose_slopes",
+    "solved",
+    "surface",
+]

@@ -1,12 +1,8 @@
 """Normal equations along the kinematic chain, from sums over each part of the body.
 
-A residual r moves with a point X of a rigid part by its gradient g = dr/dX. A joint that turns
-about an axis w through o moves it by w . (X x g) + (o x w) . g, one that slides along w by w . g:
-both are the product of the joint's twist (a vector of 6) and the residual's wrench (g, X x g).
-So JᵀWJ needs no row per residual: the wrenches' outer products are summed per part, then up the
-tree, and each pair of joints on one chain reads its entry off the sum of what both move (as the
-composite-rigid-body algorithm does for inertia: Featherstone, Rigid Body Dynamics Algorithms,
-2008, chapter 6).
+The derivative of a residual by a joint is the product of the joint's twist and the residual's
+wrench (g, X x g), with the gradient g at the point X. So JᵀWJ needs no row per residual: outer
+products of wrenches are summed per part, then up the tree. Derivation: docs/normal-equations.md.
 """
 
 import numpy as np
@@ -14,7 +10,7 @@ import numpy as np
 from markerless_tracker.compiled import compiled, kernel
 
 SUMS = 27
-"""Per part: the upper triangle of the 6x6 sum of weighted outer products, then the 6 of W r."""
+"""Sums per part: upper triangle of Σ W f fᵀ (21 numbers), then Σ W r f (6), f the wrench."""
 
 
 @kernel
@@ -61,9 +57,9 @@ def twist_of(node, body, nodes, twist):  # type: ignore[no-untyped-def]
 
 @compiled()
 def sum_chain(body, nodes, sums, hessian, slope):  # type: ignore[no-untyped-def]
-    """Fill hessian (p, p) and slope (p,) from the parts' sums (m, SUMS), which become the trees'.
+    """Fill hessian (p, p) and slope (p,) from the parts' sums (m, SUMS).
 
-    Parents come before their children.
+    The sums become those of the subtrees. Parents must come before their children.
     """
     hessian[:] = 0.0
     slope[:] = 0.0

@@ -1,4 +1,4 @@
-"""A pose in, residuals and normal equations out: all views, one thread a view or all on one."""
+"""Residuals and normal equations of all views at a pose, serial or with one thread per view."""
 
 from typing import NamedTuple
 
@@ -100,7 +100,7 @@ def _one_view(  # type: ignore[no-untyped-def]
 
 @compiled()
 def _total(body, views, scratch):  # type: ignore[no-untyped-def]
-    """Add up the views' sums, always in the same order, and fill the normal equations."""
+    """Add the views' sums in the order of the views and fill the normal equations."""
     sums = scratch.sums[0]
     for view in range(1, views):
         for m in range(sums.shape[0]):
@@ -123,7 +123,7 @@ def equations_serial(  # type: ignore[no-untyped-def]
     scratch,
     outlines,
 ):  # fmt: skip
-    """Residuals and per-view normal equations at a pose (p,), on the calling thread."""
+    """Fill residuals and normal equations at a pose (p,), on the calling thread."""
     cone_ends(pose, body, scratch.nodes, scratch.world)
     for view in range(views.size.shape[0]):
         _one_view(
@@ -147,7 +147,7 @@ def equations_parallel(  # type: ignore[no-untyped-def]
     scratch,
     outlines,
 ):  # fmt: skip
-    """As `equations_serial`, a thread a view; each view sums for itself, so nothing changes."""
+    """As `equations_serial`, one thread per view. Each view has its own sums: the same result."""
     cone_ends(pose, body, scratch.nodes, scratch.world)
     for view in prange(views.size.shape[0]):
         _one_view(

@@ -21,22 +21,22 @@ from markerless_tracker.fitness.contour.silhouette_contour import (
     edge_of_mask,
     join_edges,
 )
-from markerless_tracker.fitness.raster.outline_arrays import Outlines, make_outlines
+from markerless_tracker.fitness.raster import Outlines, make_outlines
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
 SPACING_M = 0.02
-"""Distance of outline points along the body's outline."""
+"""Distance of neighbouring outline points along the outline, m."""
 _VIEW_S = 0.07e-3
-"""About how long the equations of one view take one thread."""
+"""Approximate time of one view's equations on one thread."""
 
 Mapper = Callable[..., "object"]
 
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """Sums over all residuals r (m) of one pose, weighted by outline length (m) and robustly.
+    """Sums over all residuals r (m) of one pose; weights W are outline length (m) x robust weight.
 
     Attributes:
         hessian: (p, p) JᵀWJ.
@@ -56,10 +56,10 @@ class ContourFrame:
         body: the body.
         cameras: cameras by name.
         observations: the evidence of the views, by camera name.
-        views: the same views as laid out for the silhouettes' kernels.
-        threads: 1, or more for a thread a view; the result does not depend on it.
+        views: the same views as `lay_out_views` gives them.
+        threads: 1, or more for one thread per view; the result does not depend on it.
         pixels_per_m: size of a metre at the body, px, by camera name.
-        step_px: how far outside an outline point must be free of the body.
+        step_px: distance outward of an outline point at which no cone may cover the pixel.
         mapper: `map`, or a thread pool's.
     """
 

@@ -1,11 +1,11 @@
-"""The outline point nearest to a pixel, found through bands of rows."""
+"""Nearest outline point of the model to a pixel; points are sorted into bands of rows."""
 
 import numpy as np
 
 from markerless_tracker.compiled import kernel
 
 BAND_PX = 8
-"""Rows of a frame whose outline points are looked through together for the nearest."""
+"""Height of a band of rows, px."""
 
 
 @kernel
@@ -25,7 +25,7 @@ def sort_into_bands(count, height, pixel, start, order):  # type: ignore[no-unty
         b = int(pixel[s, 1]) // BAND_PX + 1
         start[b] -= 1
         order[start[b]] = s
-    # Each start has moved down to where its band begins, one place too far to the right.
+    # start[b + 1] now holds the begin of band b.
     for b in range(bands):
         start[b] = start[b + 1]
     start[bands] = count
@@ -34,18 +34,18 @@ def sort_into_bands(count, height, pixel, start, order):  # type: ignore[no-unty
 
 @kernel
 def nearest_facing(u, v, nu, nv, bands, pixel, normal, start, order):  # type: ignore[no-untyped-def]
-    """The outline point nearest to a pixel among those that face as (nu, nv) does; -1: none."""
+    """Index of the nearest outline point whose normal is within 60° of (nu, nv); -1: none."""
     best = np.inf
     nearest = -1
     home = min(max(np.int64(v) // BAND_PX, 0), bands - 1)
     for away in range(bands):
-        # No point of a band that is `away` bands off is nearer than this many rows.
+        # Least distance in rows of any point of the bands that are `away` bands off.
         if away > 0:
             rows = min(v - (home - away + 1) * BAND_PX, (home + away) * BAND_PX - v)
             if rows > 0 and rows * rows >= best:
                 break
-        for turn in range(2 if away > 0 else 1):
-            band = home - away if turn == 0 else home + away
+        for side in range(2 if away > 0 else 1):
+            band = home - away if side == 0 else home + away
             if band < 0 or band >= bands:
                 continue
             for i in range(start[band], start[band + 1]):

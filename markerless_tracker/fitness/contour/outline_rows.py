@@ -1,7 +1,6 @@
 """The residuals of a contour frame one by one, for fits of more than a pose.
 
-Contour refinement sums its normal equations without ever writing down a row. Fits of lengths and
-sections happen rarely and want the rows.
+Contour refinement sums normal equations without rows. Fits of lengths and sections need rows.
 """
 
 from dataclasses import dataclass
@@ -15,8 +14,8 @@ from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.geometry import FloatArray
 
-_SLIDES = 3
-"""Kinds of nodes from here on are translations."""
+_TRANSLATIONS = 3
+"""Node kinds of this value and above are translations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,11 +23,11 @@ class OutlineRows:
     """The n residuals of all views of a frame.
 
     Attributes:
-        cone: (n,) the cone that a residual's outline point lies on.
-        place: (n, 5) where on the cone, as `Samples.shape`.
-        gradient: (n, 3) of the residual with respect to that point in the world.
+        cone: (n,) index of the cone of the residual's outline point.
+        place: (n, 5) the point on the cone, as `Samples.shape`.
+        gradient: (n, 3) of the residual with respect to that world point.
         value: (n,) residual, m.
-        weight: (n,) length of outline it stands for, m, times its robust weight.
+        weight: (n,) represented length of outline, m, times the robust weight.
     """
 
     cone: IntArray
@@ -39,7 +38,7 @@ class OutlineRows:
 
 
 def outline_rows(frame: ContourFrame) -> OutlineRows:
-    """What `ContourFrame.collect` collected last."""
+    """The residuals of the last call of `ContourFrame.collect`."""
     r, samples = frame.residuals, frame.samples
     used = [slice(int(n)) for n in r.count]
     sample = [r.sample[v, rows] for v, rows in enumerate(used)]
@@ -100,8 +99,8 @@ def _pose_slopes(  # type: ignore[no-untyped-def]
             if hang[cone[n], m] == 0.0:
                 continue
             x, y, z = axes[m, 0], axes[m, 1], axes[m, 2]
-            if kind[m] < _SLIDES:
-                # A turn about the axis moves a point P by axis x (P - origin).
+            if kind[m] < _TRANSLATIONS:
+                # A rotation about the axis moves a point P by axis x (P - origin).
                 u, v = points[n, 0] - origins[m, 0], points[n, 1] - origins[m, 1]
                 w = points[n, 2] - origins[m, 2]
                 x, y, z = y * w - z * v, z * u - x * w, x * v - y * u

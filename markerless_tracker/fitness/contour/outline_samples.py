@@ -1,4 +1,7 @@
-"""Points on the outline of the whole body as one view sees it, for contour refinement."""
+"""Points on the outline of the whole body in one view, for contour refinement.
+
+Derivation: docs/outlines-of-cones.md.
+"""
 
 from typing import NamedTuple
 
@@ -21,20 +24,20 @@ from markerless_tracker.fitness.raster.tangents import arc_sweep
 from markerless_tracker.geometry import FloatArray
 
 MAX_SAMPLES = 2048
-"""Most outline points of the model in one view; later ones are not looked at."""
+"""Most outline points of the model in one view; further ones are dropped."""
 
 
 class Samples(NamedTuple):
-    """Outline points of the model in v views, at most s each.
+    """Outline points of the model in v views, at most s per view.
 
     Attributes:
-        pixel, normal: (v, s, 2) where, and outward, px.
+        pixel, normal: (v, s, 2) px, and the outward unit normal.
         world: (v, s, 3) the point on the cone's surface, m.
         depth: (v, s) its depth, m.
-        length: (v, s) outline that it stands for, m.
-        cone: (v, s).
-        shape: (v, s, 5) cos and sin on end 0, cos and sin on end 1, share of end 1: the point is
-            (1 - t) (centre_0 + cos a_0 + sin b_0) + t (centre_1 + cos a_1 + sin b_1).
+        length: (v, s) represented length of outline, m.
+        cone: (v, s) index of the cone.
+        shape: (v, s, 5) cos and sin on end 0, cos and sin on end 1, fraction t of end 1: the point
+            is (1 - t) (centre_0 + cos a_0 + sin b_0) + t (centre_1 + cos a_1 + sin b_1).
         count: (v,).
     """
 
@@ -68,10 +71,7 @@ def _pixel(x, y, z, k, distortion, distorted):  # type: ignore[no-untyped-def]
 
 @inlined
 def _shows(pu, pv, nu, nv, step_px, width, height, bits):  # type: ignore[no-untyped-def]
-    """Whether a point lies in the frame and the pixel `step_px` outside it is free of the body.
-
-    Points outside the frame have no evidence.
-    """
+    """Whether a point lies in the frame and no cone covers the pixel `step_px` outward of it."""
     seen = False
     if pu >= 0.0 and pv >= 0.0 and pu <= width - 1.0 and pv <= height - 1.0:
         u = np.int64(np.floor(pu + step_px * nu + 0.5))
@@ -86,16 +86,16 @@ def _sample_arc(  # type: ignore[no-untyped-def]
     kept, c, e, sweep, spacing_px, step_px, k, distortion, distorted, width, height, arcs, flat,
     ends, world, bits, pixel, normal, point, depth, length, cone, shape,
 ):  # fmt: skip
-    """Sample an end's arc; arrays are one view's, of `Samples`. Returns how many are kept now."""
+    """Sample an end's arc into one view's arrays of `Samples`; returns the samples' new number."""
     at = 6 * e * LANES + c
     au, av = flat[at + 2 * LANES], flat[at + 3 * LANES]
     bu, bv = flat[at + 4 * LANES], flat[at + 5 * LANES]
     radius = np.sqrt(max(au * au + av * av, bu * bu + bv * bv))
     n = np.int64(min(max(3.0, np.ceil(radius * k[0] * abs(sweep) / spacing_px)), 200.0))
-    turn = sweep / n
-    turn_cos, turn_sin = np.cos(turn), np.sin(turn)
+    step = sweep / n
+    step_cos, step_sin = np.cos(step), np.sin(step)
     # The arc begins half a step before its first point.
-    half_cos, half_sin = np.cos(0.5 * turn), np.sin(0.5 * turn)
+    half_cos, half_sin = np.cos(0.5 * step), np.sin(0.5 * step)
     cos, sin = arcs[4 * e * LANES + c], arcs[(4 * e + 1) * LANES + c]
     cos, sin = cos * half_cos - sin * half_sin, sin * half_cos + cos * half_sin
     p = 9 * e * LANES + c
@@ -103,7 +103,7 @@ def _sample_arc(  # type: ignore[no-untyped-def]
     xa, ya, za = ends[p + 3 * LANES], ends[p + 4 * LANES], ends[p + 5 * LANES]
     xb, yb, zb = ends[p + 6 * LANES], ends[p + 7 * LANES], ends[p + 8 * LANES]
     for _ in range(n):
-        # Along the arc, in the image; outward is across it, away from the middle.
+        # (tu, tv): tangent in the image; the outward normal is across it, away from the centre.
         tu, tv = k[0] * (cos * bu - sin * au), k[3] * (cos * bv - sin * av)
         mu, mv = k[0] * (cos * au + sin * bu), k[3] * (cos * av + sin * bv)
         norm = np.sqrt(tu * tu + tv * tv)
@@ -123,13 +123,13 @@ def _sample_arc(  # type: ignore[no-untyped-def]
                         world[row] + cos * world[row + 3 * LANES] + sin * world[row + 6 * LANES]
                     )
                 depth[kept] = z
-                length[kept] = norm * abs(turn) * z / k[0]
+                length[kept] = norm * abs(step) * z / k[0]
                 cone[kept] = c
                 shape[kept, 0], shape[kept, 1] = cos, sin
                 shape[kept, 2], shape[kept, 3] = cos, sin
                 shape[kept, 4] = e
                 kept += 1
-        cos, sin = cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin
+        cos, sin = cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin
     return kept
 
 
@@ -139,7 +139,7 @@ def _sample_side(  # type: ignore[no-untyped-def]
     bits, pixel, normal, point, depth, length, cone, shape,
 ):  # fmt: skip
     """Sample a side; as `_sample_arc`."""
-    # Side 0 ends end 0's arc and begins end 1's; side 1 the other way.
+    # Side 0 leads from the end of end 0's arc to the begin of end 1's, side 1 back.
     at_0 = (2 if side == 0 else 0) * LANES + c
     at_1 = (4 if side == 0 else 6) * LANES + c
     c0, s0, c1, s1 = arcs[at_0], arcs[at_0 + LANES], arcs[at_1], arcs[at_1 + LANES]

@@ -1,9 +1,8 @@
-"""Distances between the outlines of the model and of the silhouettes, taken both ways.
+"""Distances between the outlines of the model and of the silhouettes, in both directions.
 
-In metres at the body's depth: outline points of the model to the silhouette's edge (its signed
-distance), and points of the silhouette's edge to the nearest outline point of the model. Each
-carries the gradient with respect to the 3D point on a cone's surface that makes it; the point moves
-rigidly with its cone, since sliding along the surface does not move the outline to first order.
+From outline points of the model to the silhouette's edge (its signed distance), and from points of
+the silhouette's edge to the nearest outline point of the model; in metres at the body's depth.
+Each has the gradient with respect to the point of a cone's surface (docs/normal-equations.md).
 """
 
 from typing import NamedTuple
@@ -18,13 +17,13 @@ from markerless_tracker.geometry import FloatArray
 
 
 class Residuals(NamedTuple):
-    """Residuals of v views, at most s each.
+    """Residuals of v views, at most s per view.
 
     Attributes:
         value: (v, s) m.
-        weight: (v, s) length of outline it stands for (m) times its robust weight.
-        gradient: (v, s, 3) with respect to the world point of its sample.
-        sample: (v, s) index of that sample in its view.
+        weight: (v, s) represented length of outline (m) times the robust weight.
+        gradient: (v, s, 3) with respect to the sample's world point.
+        sample: (v, s) index of that sample among the view's.
         count: (v,).
         cost: (v,) sum of length times the robust cost, m³.
     """
@@ -48,7 +47,7 @@ def make_residuals(views: int, points: int) -> Residuals:
 
 @kernel
 def _distance_at(distance, start, left, top, width, height, u, v):  # type: ignore[no-untyped-def]
-    """Bilinear signed distance, px, and its gradient; whether the pixel is inside the window."""
+    """Whether a pixel is inside the window; its bilinear signed distance, px, and the gradient."""
     x, y = u - left, v - top
     if not (x >= 0.0 and y >= 0.0 and x < width - 1.0 and y < height - 1.0):
         return False, 0.0, 0.0, 0.0
@@ -93,9 +92,9 @@ def _world_gradient(r, t, k, d, point, s, du, dv, out, n):  # type: ignore[no-un
 
 @kernel
 def collect_residuals(view, views, contours, truncation_m, samples, start, order, residuals):  # type: ignore[no-untyped-def]
-    """Fill the residuals of one view, both ways.
+    """Fill the residuals of one view, in both directions.
 
-    With c the truncation, robust weights are Tukey's, (1 - (r / c)²)², and the cost is
+    With the truncation c, robust weights are Tukey's, (1 - (r / c)²)², and the cost is
     c² / 6 (1 - (1 - (r / c)²)³).
     """
     r, t = views.rotation[view], views.translation[view]

@@ -1,6 +1,6 @@
-"""Normal equations of residuals that are written down row by row, and what is eliminated of them.
+"""Normal equations of residuals in rows, elimination of unknowns, solution by Cholesky factors.
 
-Compiled: rows are mostly zeros, and results do not hang on how many threads a library takes.
+Compiled: rows are mostly zeros, and results do not depend on a library's number of threads.
 """
 
 import numpy as np
@@ -26,13 +26,13 @@ def eliminated(
     out_hessian: FloatArray,
     out_slope: FloatArray,
 ) -> FloatArray:
-    """Solve for the first unknowns, and add what is left of the equations to those of the others.
+    """Eliminate the first unknowns; add the reduced equations of the others (Schur complement).
 
     Args:
         hessian: (f + k, f + k), positive definite in its first f rows and columns.
         slope: (f + k,).
         first: f.
-        out_hessian, out_slope: (k, k) and (k,), added to (Schur complement).
+        out_hessian, out_slope: (k, k) and (k,), added to.
 
     Returns:
         (f, k + 1): the step of the first unknowns is minus (these @ [step of the others, 1]).
@@ -46,7 +46,7 @@ def eliminated(
 
 
 def solved(hessian: FloatArray, slope: FloatArray) -> FloatArray:
-    """The step (k,) of positive definite equations (k, k) and (k,)."""
+    """The step (k,) that solves positive definite equations (k, k) and (k,)."""
     step = -slope[:, None]
     _eliminate(hessian.copy(), step)
     return step[:, 0]
@@ -98,7 +98,7 @@ def _eliminate(a, right):  # type: ignore[no-untyped-def]
 
 @kernel
 def _reduce(cross, solved, hessian, slope):  # type: ignore[no-untyped-def]
-    """Take crossᵀ solved (k, k + 1) from hessian and slope."""
+    """Subtract crossᵀ solved (k, k + 1) from hessian and slope."""
     f, k = cross.shape
     for i in range(f):
         for a in range(k):

@@ -1,4 +1,4 @@
-"""The edges of silhouettes: signed distances around them, points and directions along them."""
+"""The edges of silhouettes: signed distances around them, points and normals along them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,8 +30,8 @@ class SilhouetteContour:
     Attributes:
         distance: (h, w) float32 signed distance to the edge, px, positive outside, of a window.
         left, top: the window's first column and row in the frame.
-        points, normals: (n, 2) px, points of the edge and the outward directions there.
-        spacing: (n,) px of edge that each point stands for.
+        points, normals: (n, 2) px, points of the edge, and outward unit normals.
+        spacing: (n,) px, length of edge that each point represents.
     """
 
     distance: NDArray[np.float32]
@@ -52,7 +52,7 @@ class ContourViews(NamedTuple):
         window: (v, 4) left, top, width, height of the window, px.
         points: (n, 2) px, points of the edges, view after view from point_start[i] on.
         normals: (n, 2) outward, unit length.
-        spacing: (n,) px of edge that each point stands for.
+        spacing: (n,) px, length of edge that each point represents.
         point_start: (v + 1,).
     """
 
@@ -150,7 +150,7 @@ def _without_undecided(
 
 @kernel
 def steepest(distance, pixels, out):  # type: ignore[no-untyped-def]
-    """Fill out (n, 2): where distances (h, w) rise at pixels (n, 2), by Sobel's 5x5 px."""
+    """Fill out (n, 2) with gradients of distances (h, w) at pixels (n, 2), by Sobel's 5x5."""
     height, width = distance.shape
     for n in range(pixels.shape[0]):
         along_u, along_v = 0.0, 0.0

@@ -1,4 +1,20 @@
-"""Projected cones as bits: outlines, filling and counting of pixels.
+"""Projected cones as bits: their outlines, filled and counted against silhouettes and edge maps.
 
-The kernels behind f_s and f_e.
+Kernels import each other from their own modules: stored kernels are named after what those import.
 """
+
+from markerless_tracker.fitness.raster.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule
+from markerless_tracker.fitness.raster.kernels import evaluate, evaluate_parallel, make_scratch
+from markerless_tracker.fitness.raster.outline_arrays import Outlines, make_outlines
+
+__all__ = [
+    "OUTLINE",
+    "SIDES",
+    "VISIBLE",
+    "EdgeRule",
+    "Outlines",
+    "evaluate",
+    "evaluate_parallel",
+    "make_outlines",
+    "make_scratch",
+]

@@ -1,4 +1,4 @@
-"""Bits: 64 neighbouring pixels of a row in a word, least significant first.
+"""Bit masks: a word holds 64 neighbouring pixels of a row, the first in the lowest bit.
 
 Word w of row v of a frame lies at w * height + v: column after column of words.
 """
@@ -12,6 +12,7 @@ from numba.extending import intrinsic
 from markerless_tracker.compiled import inlined, kernel
 
 ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
+"""A word with all bits set."""
 
 
 @intrinsic  # type: ignore[misc]

@@ -9,8 +9,9 @@ from markerless_tracker.fitness.raster.bits import is_set
 from markerless_tracker.fitness.raster.outline_arrays import ARC_POINTS, LANES, TAPERED
 
 SIDES, VISIBLE, OUTLINE = 0, 1, 2
-"""Which model edges are sampled: all sides; those no nearer cone hides; the body's outline only."""
+"""Sampled model edges: all sides; sides that no nearer cone hides; the outline of the body."""
 _LONGEST_PX = 1e6
+"""Longer sides are not sampled."""
 
 
 class EdgeRule(NamedTuple):
@@ -24,22 +25,23 @@ class EdgeRule(NamedTuple):
 
 @kernel
 def sample_side(  # type: ignore[no-untyped-def]
-    pu, pv, qu, qv, outward, bits, still, start, edges, edge_start, width, height, rule,
+    pu, pv, qu, qv, outward, bits, static, start, edges, edge_start, width, height, rule,
     listed, listed_count,
 ):  # fmt: skip
     """Add up the edge map along the segment (pu, pv) to (qu, qv).
 
     Args:
-        outward: +1 or -1, the side of the segment that faces away from its cone.
-        bits: what hides a sample: nearer cones (VISIBLE) or the moving parts (OUTLINE).
-        still: the still parts, flat from `start` on, which hide it too (OUTLINE); may be empty.
+        outward: +1 or -1, the side of the segment away from its cone.
+        bits: pixels that hide a sample: of nearer cones (VISIBLE) or of the moving parts (OUTLINE).
+        static: pixels of the static parts, flat from `start` on, that hide it as well (OUTLINE);
+            may be empty.
         edges: uint8 edge map, flat from `edge_start` on.
-        listed: (s, 2): samples that other parts may hide (OUTLINE) are not added but listed there,
-            from row `listed_count` on: word * 64 + bit that hides it, what it adds. With no rows
-            all are added.
+        listed: (s, 2): samples that other parts may hide (OUTLINE) are not added but listed here,
+            from row `listed_count` on: word * 64 + bit that hides the sample, its contribution.
+            With no rows all samples are added.
 
     Returns:
-        Columns EDGE_SUM and EDGE_COUNT of the counts; how many samples are listed now.
+        Contributions to EDGE_SUM and EDGE_COUNT; the number of listed samples.
     """
     total, number = 0, 0
     du, dv = qu - pu, qv - pv
@@ -53,7 +55,7 @@ def sample_side(  # type: ignore[no-untyped-def]
     du, dv = du * share, dv * share
     pu, pv = pu + 0.5 * du, pv + 0.5 * dv
     u_end, v_end = width - 0.5, height - 0.5
-    beside, squared, which = still.size > 0, rule.squared, rule.rule
+    beside, squared, which = static.size > 0, rule.squared, rule.rule
     listing = listed.shape[0] > 0
     qu, qv = pu + (samples - 1) * du, pv + (samples - 1) * dv
     border = abs(rule.step_px) + 1.0
@@ -65,7 +67,7 @@ def sample_side(  # type: ignore[no-untyped-def]
         and max(pu, qu) <= width - 1.0 - border
         and max(pv, qv) <= height - 1.0 - border
     ):
-        # The same as below where nothing is near the frame's border: without any branch.
+        # As below, without branches: the side is away from the frame's border.
         if which == VISIBLE:
             out_u, out_v = 0.5, 0.5
         for i in range(samples):
@@ -74,10 +76,10 @@ def sample_side(  # type: ignore[no-untyped-def]
             there = (far_u >> np.uint64(6)) * np.uint64(height) + far_v
             hiding = bits[there]
             if beside:
-                hiding |= still[np.uint64(start) + there]
+                hiding |= static[np.uint64(start) + there]
             free = int(~(hiding >> (far_u & np.uint64(63))) & np.uint64(1))
             pixel = np.int64(v + 0.5) * width + np.int64(u + 0.5)
-            total += free * _worth(edges[np.uint64(edge_start + pixel)], squared)
+            total += free * _contribution(edges[np.uint64(edge_start + pixel)], squared)
             number += free
         return total, number, listed_count
     for i in range(samples):
@@ -94,32 +96,34 @@ def sample_side(  # type: ignore[no-untyped-def]
                 at = np.uint64((x >> 6) * height + y)
                 word = bits[at]
                 if beside:
-                    word |= still[np.uint64(start) + at]
+                    word |= static[np.uint64(start) + at]
                 if (word >> np.uint64(x & 63)) & np.uint64(1) != np.uint64(0):
                     continue
                 if listing:
                     listed[listed_count, 0] = np.int64(at) * 64 + (x & 63)
-                    worth = _worth(edges[np.uint64(edge_start + row * width + column)], squared)
-                    listed[listed_count, 1] = worth
+                    value = _contribution(
+                        edges[np.uint64(edge_start + row * width + column)], squared
+                    )
+                    listed[listed_count, 1] = value
                     listed_count += 1
                     continue
-        total += _worth(edges[np.uint64(edge_start + row * width + column)], squared)
+        total += _contribution(edges[np.uint64(edge_start + row * width + column)], squared)
         number += 1
     return total, number, listed_count
 
 
 @inlined
-def _worth(strength, squared):  # type: ignore[no-untyped-def]
+def _contribution(strength, squared):  # type: ignore[no-untyped-def]
     missing = 255 - np.int64(strength)
     return missing * missing if squared else 255 - missing
 
 
 @kernel
 def sample_cone(  # type: ignore[no-untyped-def]
-    c, count, wanted, out, bits, still, start, edges, edge_start, width, height, rule,
+    c, count, wanted, out, bits, static, start, edges, edge_start, width, height, rule,
     listed, listed_count,
 ):  # fmt: skip
-    """Sample the sides of one cone, and its far end's edge, where wanted (c, 2).
+    """Sample the sides of one cone, and the edge of its far end, as wanted (c, 2) says.
 
     Arguments and returned values as of `sample_side`.
     """
@@ -138,7 +142,7 @@ def sample_cone(  # type: ignore[no-untyped-def]
             a, b, outward, asked = far, near, 1.0, wanted[c, 1]
         if asked:
             more, found, listed_count = sample_side(
-                u[a], v[a], u[b], v[b], outward, bits, still, start, edges, edge_start, width,
+                u[a], v[a], u[b], v[b], outward, bits, static, start, edges, edge_start, width,
                 height, rule, listed, listed_count,
             )  # fmt: skip
             total, number = total + more, number + found
@@ -146,12 +150,12 @@ def sample_cone(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def recount_still(view, still, bits):  # type: ignore[no-untyped-def]
-    """EDGE_SUM and EDGE_COUNT of a view's still samples that the moving parts do not hide."""
+def recount_static(view, static, bits):  # type: ignore[no-untyped-def]
+    """EDGE_SUM and EDGE_COUNT of a view's static samples that no moving part hides."""
     total, number = 0, 0
-    for s in range(still.sample_start[view], still.sample_start[view + 1]):
-        at = np.uint64(still.samples[s, 0])
+    for s in range(static.sample_start[view], static.sample_start[view + 1]):
+        at = np.uint64(static.samples[s, 0])
         if (bits[at >> np.uint64(6)] >> (at & np.uint64(63))) & np.uint64(1) == np.uint64(0):
-            total += still.samples[s, 1]
+            total += static.samples[s, 1]
             number += 1
     return total, number

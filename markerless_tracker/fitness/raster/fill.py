@@ -1,7 +1,6 @@
-"""Filling outlines as bits: columns of words, each word 64 neighbouring pixels of one row.
+"""Filling outlines as bit masks (`bits`), counting and clearing them.
 
-Word w of row v lies at w * height + v, so that a span of rows of one column of words is worked on
-with vector instructions. Rows are unsigned: an index that may be negative would prevent that.
+Columns of words, and unsigned rows, let the compiler vectorise loops over rows.
 """
 
 import numpy as np
@@ -16,7 +15,7 @@ def fill_outline(c, count, out, width, height, bits, used):  # type: ignore[no-u
     """Set the pixels whose centres lie inside a convex polygon.
 
     Args:
-        c: which of the polygons of `out` (see `find_outlines`).
+        c: index of the polygon in `out` (see `find_outlines`).
         count: number of its points.
         bits: (words * height,) frame.
         used: (words, 2) first and last row that hold bits in each column of words, widened.
@@ -31,7 +30,7 @@ def fill_outline(c, count, out, width, height, bits, used):  # type: ignore[no-u
     before = (count - 1) * LANES + c
     for i in range(count):
         at = i * LANES + c
-        # Rows in [lower, upper) cross this edge; half-open, so a vertex counts once a side.
+        # Rows in [lower, upper) cross this edge: half-open, so that a vertex counts once per side.
         start, stop = np.uint64(out.first[before]), np.uint64(out.first[at])
         if start != stop:
             slope = out.slope[at]
@@ -66,14 +65,14 @@ def fill_outline(c, count, out, width, height, bits, used):  # type: ignore[no-u
 
 @kernel
 def clear_used(words, height, used):  # type: ignore[no-untyped-def]
-    """No row holds bits."""
+    """Mark all columns of words as empty."""
     for w in range(words):
         used[w, 0], used[w, 1] = height, -1
 
 
 @kernel
 def wipe(words, height, bits, used):  # type: ignore[no-untyped-def]
-    """Clear what `used` says was set."""
+    """Clear the rows that `used` marks."""
     for w in range(words):
         for v in range(used[w, 0], used[w, 1] + 1):
             bits[w * height + v] = np.uint64(0)
@@ -99,15 +98,15 @@ def count_and_wipe(words, height, bits, mask, known, start, used):  # type: igno
 
 @kernel
 def count_beside_and_wipe(  # type: ignore[no-untyped-def]
-    words, height, bits, mask, known, still, start, used
+    words, height, bits, mask, known, static, start, used
 ):
-    """As `count_and_wipe`, of the set bits that are not among those of `still`, flat likewise."""
+    """As `count_and_wipe`, of the set bits that are not among those of `static`, flat likewise."""
     overlap = np.uint64(0)
     projected = np.uint64(0)
     for w in range(words):
         base, there = np.uint64(w * height), np.uint64(start + w * height)
         for v in range(np.uint64(used[w, 0]), np.uint64(used[w, 1] + 1)):
-            word = bits[base + v] & ~still[there + v]
+            word = bits[base + v] & ~static[there + v]
             overlap += popcount(word & mask[there + v])
             projected += popcount(word & known[there + v])
             bits[base + v] = np.uint64(0)

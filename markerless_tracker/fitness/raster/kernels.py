@@ -1,9 +1,9 @@
-"""The compiled loops of the fitness: poses in, counts and costs out.
+"""The compiled loops of the fitness: counts and costs of poses.
 
-One particle is one piece of work: kinematics once, then view by view until the particle is known to
-lose. Cones are filled as spans of bits into a frame-sized buffer of the working thread, which is
-counted against the observed silhouette and wiped on the way out, so nothing is allocated per
-particle. A result depends on its particle alone, hence not on the number of threads.
+Each particle is evaluated by itself: kinematics once, then view by view until its cost exceeds the
+cutoff (docs/early-termination.md). Cones are filled as bits into a frame-sized buffer of the
+thread, counted against the observed silhouette and cleared, so nothing is allocated per particle.
+A result depends on its particle alone, hence not on the number of threads.
 """
 
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from markerless_tracker.compiled import compiled, kernel
 from markerless_tracker.fitness.raster.edge_samples import (
     OUTLINE,
     VISIBLE,
-    recount_still,
+    recount_static,
     sample_cone,
 )
 from markerless_tracker.fitness.raster.fill import (
@@ -32,7 +32,7 @@ from markerless_tracker.fitness.terms import EDGE_COUNT, EDGE_SUM, OVERLAP, PROJ
 from markerless_tracker.geometry import FloatArray
 
 _ROUNDING = 1e-9
-"""More than sums of a few costs may be off by."""
+"""Upper bound of the rounding errors of a sum of a few costs."""
 
 
 class Scratch(NamedTuple):
@@ -61,17 +61,16 @@ def make_scratch(
 
 
 class StaticLayer(NamedTuple):
-    """What all poses of a search share, drawn once: the parts that do not move.
+    """The parts of the body that do not move during a search, drawn once.
 
     Attributes:
-        moving: nodes that are worked out for every pose, parents first.
+        moving: nodes that are computed for every pose, parents first.
         nodes: (m, 3, 4) transforms of all nodes at the search's centre.
-        bits: the still parts' silhouette, as `ViewArrays.mask`; empty if everything moves.
-        counts: (v, 4) the still parts' own, without edge samples that something may hide.
-        sample_start: (v + 1,) view i's edge samples that something may hide begin at
-            sample_start[i].
-        samples: (s, 2) word * 64 + bit that hides each, and what it adds.
-        least: (v + 1,) what the views from i on cost together at least.
+        bits: the static parts' silhouette, as `ViewArrays.mask`; empty if everything moves.
+        counts: (v, 4) counts of the static parts, without edge samples that may be hidden.
+        sample_start: (v + 1,) edge samples of view i that may be hidden begin at sample_start[i].
+        samples: (s, 2) word * 64 + bit that hides each sample, and its contribution.
+        least: (v + 1,) least sum of the costs of the views from i on.
     """
 
     moving: NDArray[np.int64]
@@ -95,7 +94,7 @@ def cone_ends(pose, body, nodes, world):  # type: ignore[no-untyped-def]
 
 @kernel
 def place_cones(body, nodes, world):  # type: ignore[no-untyped-def]
-    """As `cone_ends`, the nodes' transforms (m, 3, 4) known."""
+    """As `cone_ends`, from known transforms of the nodes (m, 3, 4)."""
     for c in range(body.cone_node.size):
         node = body.cone_node[c]
         for i in range(3):
@@ -116,7 +115,7 @@ def place_cones(body, nodes, world):  # type: ignore[no-untyped-def]
 
 @kernel
 def _nearest_first(cones, ends, order):  # type: ignore[no-untyped-def]
-    """Sort cones by their middles' depth: what is filled so far hides what comes."""
+    """Sort cones by depth of their middles, so that filled cones hide those that follow."""
     for i in range(1, cones):
         c = order[i]
         depth = ends[2 * LANES + c] + ends[11 * LANES + c]
@@ -129,20 +128,20 @@ def _nearest_first(cones, ends, order):  # type: ignore[no-untyped-def]
 
 @kernel
 def compare_view(  # type: ignore[no-untyped-def]
-    body_cones, edge_cones, views, view, rule, still, world, out, bits, used, order, counts
+    body_cones, edge_cones, views, view, rule, static, world, out, bits, used, order, counts
 ):
     """Draw the moving cones into one view and count.
 
     Args:
-        body_cones: (c,) cones that make the silhouette.
-        edge_cones: (c, 2) whether the sides, and the far edge, of a cone are sampled.
+        body_cones: (c,) cones that are part of the silhouette.
+        edge_cones: (c, 2) whether a cone's sides, and the edge of its far end, are sampled.
         out, bits, used, order: working memory of one thread.
         counts: (4,), filled.
     """
     cones = body_cones.size
     width, height, words = views.size[view, 0], views.size[view, 1], views.words[view]
     start, edge_start = views.mask_start[view], views.edge_start[view]
-    beside = still.bits.size > 0
+    beside = static.bits.size > 0
     count = find_outlines(cones, views, view, world, out)
     clear_used(words, height, used)
     for c in range(cones):
@@ -158,8 +157,8 @@ def compare_view(  # type: ignore[no-untyped-def]
             sampled = True
             if rule.rule != OUTLINE:
                 more, number, _ = sample_cone(
-                    c, count, edge_cones, out, bits, still.bits, start, views.edges, edge_start,
-                    width, height, rule, still.samples[:0], 0,
+                    c, count, edge_cones, out, bits, static.bits, start, views.edges, edge_start,
+                    width, height, rule, static.samples[:0], 0,
                 )  # fmt: skip
                 edge_sum, edge_count = edge_sum + more, edge_count + number
         if body_cones[c]:
@@ -168,8 +167,8 @@ def compare_view(  # type: ignore[no-untyped-def]
         for c in range(cones):
             if out.form[c] != HIDDEN and (edge_cones[c, 0] or edge_cones[c, 1]):
                 more, number, _ = sample_cone(
-                    c, count, edge_cones, out, bits, still.bits, start, views.edges, edge_start,
-                    width, height, rule, still.samples[:0], 0,
+                    c, count, edge_cones, out, bits, static.bits, start, views.edges, edge_start,
+                    width, height, rule, static.samples[:0], 0,
                 )  # fmt: skip
                 edge_sum, edge_count = edge_sum + more, edge_count + number
     if not beside:
@@ -179,30 +178,31 @@ def compare_view(  # type: ignore[no-untyped-def]
         counts[OVERLAP], counts[PROJECTED] = overlap, projected
         counts[EDGE_SUM], counts[EDGE_COUNT] = edge_sum, edge_count
         return
-    more, number = recount_still(view, still, bits)
+    more, number = recount_static(view, static, bits)
     overlap, projected = count_beside_and_wipe(
-        words, height, bits, views.mask, views.known, still.bits, start, used
+        words, height, bits, views.mask, views.known, static.bits, start, used
     )
-    counts[OVERLAP] = still.counts[view, OVERLAP] + overlap
-    counts[PROJECTED] = still.counts[view, PROJECTED] + projected
-    counts[EDGE_SUM] = still.counts[view, EDGE_SUM] + edge_sum + more
-    counts[EDGE_COUNT] = still.counts[view, EDGE_COUNT] + edge_count + number
+    counts[OVERLAP] = static.counts[view, OVERLAP] + overlap
+    counts[PROJECTED] = static.counts[view, PROJECTED] + projected
+    counts[EDGE_SUM] = static.counts[view, EDGE_SUM] + edge_sum + more
+    counts[EDGE_COUNT] = static.counts[view, EDGE_COUNT] + edge_count + number
 
 
 @kernel
 def evaluate(  # type: ignore[no-untyped-def]
-    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, still,
+    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, static,
     scratch, outlines, counts, costs, thread, threads,
 ):  # fmt: skip
-    """Fill costs (n,) and counts (n, v, 4) of points (n, d), every `threads`-th
-    point, from point `thread` on, on the calling thread.
+    """Fill costs (n,) and counts (n, v, 4) of points (n, d) on the calling thread.
+
+    Only every `threads`-th point is evaluated, from point `thread` on.
 
     Args:
         points: values of the active parameters.
         active: (d,) their indices; the others are at centre (p,).
         cutoff_costs: (n,) cutoff per particle: an evaluation may stop once its cost exceeds it.
-            The cost is then a lower bound of at least the cutoff, and the counts of the views not
-            reached are not filled.
+            The cost is then a lower bound of at least the cutoff, and the counts of the remaining
+            views are not filled.
         body: the moving cones, and all nodes.
         body_cones, edge_cones: see `compare_view`.
         rule, cost: see `EdgeRule` and `CostRule`.
@@ -219,7 +219,7 @@ def evaluate(  # type: ignore[no-untyped-def]
     for m in range(nodes.shape[0]):
         for i in range(3):
             for j in range(4):
-                nodes[m, i, j] = still.nodes[m, i, j]
+                nodes[m, i, j] = static.nodes[m, i, j]
     for n in range(thread, points.shape[0], threads):
         finite = True
         for i in range(active.size):
@@ -231,19 +231,19 @@ def evaluate(  # type: ignore[no-untyped-def]
                     counts[n, view, i] = np.nan
             costs[n] = np.nan
             continue
-        for i in range(still.moving.size):
+        for i in range(static.moving.size):
             node_transform(
-                still.moving[i], pose, body.parent, body.fixed, body.kind, body.sign,
+                static.moving[i], pose, body.parent, body.fixed, body.kind, body.sign,
                 body.parameter, nodes,
             )  # fmt: skip
         place_cones(body, nodes, world)
         total = 0.0
         for view in range(seen):
-            low = (total + still.least[view]) / seen - _ROUNDING
+            low = (total + static.least[view]) / seen - _ROUNDING
             if low >= cutoff_costs[n]:
                 break
             compare_view(
-                body_cones, edge_cones, views, view, rule, still, world, out, bits, used, order,
+                body_cones, edge_cones, views, view, rule, static, world, out, bits, used, order,
                 counts[n, view],
             )  # fmt: skip
             total += view_cost(counts[n, view], views.observed[view], cost)
@@ -253,13 +253,13 @@ def evaluate(  # type: ignore[no-untyped-def]
 
 @compiled(parallel=True)
 def evaluate_parallel(  # type: ignore[no-untyped-def]
-    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, still,
+    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, static,
     scratch, outlines, counts, costs,
 ):  # fmt: skip
-    """As `evaluate`, on as many threads as the scratch memory is for."""
+    """As `evaluate`, on as many threads as the scratch memory has room for."""
     threads = scratch.bits.shape[0]
     for thread in prange(threads):
         evaluate(
             points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost,
-            still, scratch, outlines, counts, costs, thread, threads,
+            static, scratch, outlines, counts, costs, thread, threads,
         )  # fmt: skip

@@ -5,7 +5,7 @@ from markerless_tracker.compiled import kernel
 
 @kernel
 def lens(a, b, distortion):  # type: ignore[no-untyped-def]
-    """Where a lens (5,) k1 k2 p1 p2 k3 moves a point of the plane at focal length 1."""
+    """Distorted position of a point of the plane at focal length 1, lens (5,) k1 k2 p1 p2 k3."""
     k1, k2, k3 = distortion[0], distortion[1], distortion[4]
     p1, p2 = distortion[2], distortion[3]
     r2 = a * a + b * b
@@ -19,7 +19,7 @@ def lens(a, b, distortion):  # type: ignore[no-untyped-def]
 
 @kernel
 def distorts(distortion):  # type: ignore[no-untyped-def]
-    """Whether any coefficient (5,) of a lens is not zero."""
+    """Whether any coefficient of a lens (5,) is not zero."""
     for i in range(5):
         if distortion[i] != 0.0:
             return True

@@ -1,8 +1,8 @@
-"""Outlines of all cones that one view sees: convex hulls of their two projected end ellipses.
+"""Outlines of all cones in one view: convex hulls of their two projected end ellipses.
 
-An outline is a closed polygon: around the far end, down one side, around the near end, up the
-other side. Sides touch the end ellipses at their common tangents; ends are sampled. All cones are
-worked on side by side (`outline_arrays`).
+An outline is a closed polygon: around end 1, down one side, around end 0, up the other side. The
+sides are the common tangents of the end ellipses; the ends are sampled. All cones are computed
+side by side (`outline_arrays`). Derivation: docs/outlines-of-cones.md.
 """
 
 import numpy as np
@@ -25,8 +25,8 @@ from markerless_tracker.fitness.raster.outline_points import (
 )
 from markerless_tracker.fitness.raster.tangents import find_forms, find_tangents, to_camera
 
-# cos and sin around a full turn, for polygons without and with points inside the sides.
-_TURNS = tuple(
+# cos and sin around a full circle, for polygons without and with points inside the sides.
+_CIRCLES = tuple(
     np.array([np.cos(angle), np.sin(angle)])
     for angle in (
         2.0 * np.pi * np.arange(2 * ARC_POINTS) / (2 * ARC_POINTS),
@@ -43,15 +43,14 @@ def scan_edges(cones, count, height, u, v, first, slope, box):  # type: ignore[n
     for c in range(n):
         box[c], box[LANES + c] = np.inf, -np.inf
         box[2 * LANES + c], box[3 * LANES + c] = np.inf, -np.inf
-    # Several short loops: the compiler gives up on one that touches many arrays, since any two of
-    # them might overlap.
+    # Several short loops: a loop over many arrays is not vectorised, as any two might overlap.
     for i in range(count):
         at, before = i * LANES, (i - 1 if i > 0 else count - 1) * LANES
         for c in range(n):
             slope[at + c] = (u[at + c] - u[before + c]) / (v[at + c] - v[before + c])
         for c in range(n):
             y = v[at + c]
-            # Comparisons with NaN are false: it comes out as the frame's border.
+            # Comparisons with NaN are false: NaN gives row 0.
             row = np.ceil(y) if y > 0.0 else 0.0
             row = row if row < limit else limit
             first[at + c] = np.int32(row)
@@ -85,10 +84,10 @@ def find_outlines(cones, views, view, world, out):  # type: ignore[no-untyped-de
         place_side(cones, 0, near + ARC_POINTS, out.ends, out.arcs, out.u, out.v)
     for c in range(cones):
         if out.form[c] >= ONLY_END:
-            turn = _TURNS[1] if distorted else _TURNS[0]
+            circle = _CIRCLES[1] if distorted else _CIRCLES[0]
             at = 9 * (out.form[c] - ONLY_END) * LANES + c
             for i in range(count):
-                place_point(turn[0, i], turn[1, i], at, i * LANES + c, out.ends, out.u, out.v)
+                place_point(circle[0, i], circle[1, i], at, i * LANES + c, out.ends, out.u, out.v)
     to_pixels(cones, count, views.intrinsics[view], distortion, distorted, out.u, out.v)
     scan_edges(cones, count, views.size[view, 1], out.u, out.v, out.first, out.slope, out.box)
     return count

@@ -1,7 +1,6 @@
 """Working memory of outlines: all cones of a body side by side.
 
-A quantity is a row of `LANES` numbers, one a cone, and each loop over the cones is one that the
-compiler turns into vector instructions.
+A quantity is a row of `LANES` numbers, one per cone. The compiler vectorises each loop over cones.
 """
 
 from typing import NamedTuple
@@ -13,19 +12,20 @@ from markerless_tracker.compiled import inlined
 from markerless_tracker.geometry import FloatArray
 
 LANES = 64
-"""Numbers in a row, and the most cones of a body."""
+"""Numbers in a row; the largest number of cones of a body."""
 ARC_POINTS = 7
-"""Points of an end's arc between the two tangents, both included."""
+"""Points of an end's arc, both tangent points included."""
 SIDE_POINTS = 2
-"""Points inside a side that is seen through a distorting lens; none otherwise."""
+"""Points inside a side, if the lens distorts; otherwise there are none."""
 MAX_POINTS = 2 * (ARC_POINTS + SIDE_POINTS)
+"""Largest number of points of a polygon."""
 NEAR_M = 0.1
-"""Cones that come nearer to a camera's plane than this are not drawn in it."""
+"""Least distance from the camera's plane; nearer cones are not drawn in that view."""
 HIDDEN, TAPERED, ONLY_END = 0, 1, 2
-"""Forms of an outline: not drawn; both ends show; ONLY_END + e: end e hides all the rest."""
+"""Forms of an outline: not drawn; both ends visible; ONLY_END + e: end e hides everything else."""
 
 VECTOR_LANES = 8
-"""Loops run over a multiple of this many lanes, so that none is left over."""
+"""Loops run over a multiple of this number of lanes, without a remainder."""
 TINY = 1e-300
 
 
@@ -38,14 +38,14 @@ class Outlines(NamedTuple):
         flat: 12 rows: row 6 e + 2 m + i holds their images to first order, at focal length 1.
         arcs: 8 rows: from row 4 e on cos and sin of the angle at which end e's arc begins and of
             that at which it ends. End 1's arc leads from side 0 to side 1, end 0's back. Side 0
-            lies to the right of the way from end 0 to end 1 as the camera sees it (y down).
-        form: one row: HIDDEN, TAPERED, or ONLY_END + e, whose arc is then a full turn.
+            lies to the right of the direction from end 0 to end 1 in the image (v down).
+        form: one row: HIDDEN, TAPERED, or ONLY_END + e; in that case the arc is a full circle.
         u, v: MAX_POINTS rows each, the polygons' points, px.
         first: MAX_POINTS rows, the first pixel row at or below each point, 0 .. height.
         slope: MAX_POINTS rows, du/dv of the edge that leads to each point.
         box: 4 rows, least and largest u (px), least and largest `first`.
-        left, right: where the polygon that is being filled begins and ends in each row of the
-            frame, px.
+        left, right: begin and end of the polygon that is being filled in each row of the frame,
+            px.
     """
 
     ends: FloatArray
@@ -68,7 +68,7 @@ def make_outlines(threads: int, height: int) -> Outlines:
     """
 
     def rows(count: int) -> FloatArray:
-        # Lanes without a cone are worked on too; ones keep them harmless.
+        # Lanes without a cone are computed as well; ones keep their values finite.
         return np.ones((threads, count * LANES))
 
     return Outlines(

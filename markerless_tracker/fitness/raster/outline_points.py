@@ -1,4 +1,7 @@
-"""Points of the outlines' polygons: along the ends' arcs and inside the sides, then in pixels."""
+"""Points of the outlines' polygons: along the ends' arcs and inside the sides, then in pixels.
+
+Derivation: docs/outlines-of-cones.md.
+"""
 
 import numpy as np
 
@@ -13,7 +16,7 @@ from markerless_tracker.fitness.raster.outline_arrays import (
 )
 from markerless_tracker.fitness.raster.tangents import clockwise
 
-# 2 cos(h / 3) as a line in cos h, exact for arcs of no turn and of half a turn.
+# 2 cos(h / 3) as a linear function of cos h, exact for h = 0 and h = π / 2.
 _THIRD_0, _THIRD_1 = np.sqrt(3.0), 2.0 - np.sqrt(3.0)
 
 
@@ -27,18 +30,14 @@ def place_point(cos, sin, at, to, ends, u, v):  # type: ignore[no-untyped-def]
 
 @kernel
 def place_arc(cones, e, row, ends, flat, arcs, u, v):  # type: ignore[no-untyped-def]
-    """Place the points of end e's arc, from a row on.
-
-    The middle halves the arc; points nearly at the thirds of either half are found from its ends
-    a, b as the directions of w a + b and a + w b, without any angle.
-    """
+    """Place the points of end e's arc, from a row on: ends, middle, and thirds of both halves."""
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
-    at, way, to = 9 * e * LANES, 4 * e * LANES, row * LANES
+    at, row_of_arc, to = 9 * e * LANES, 4 * e * LANES, row * LANES
     for c in range(n):
-        ca, sa = arcs[way + c], arcs[way + LANES + c]
-        cb, sb = arcs[way + 2 * LANES + c], arcs[way + 3 * LANES + c]
+        ca, sa = arcs[row_of_arc + c], arcs[row_of_arc + LANES + c]
+        cb, sb = arcs[row_of_arc + 2 * LANES + c], arcs[row_of_arc + 3 * LANES + c]
         sense = -1.0 if clockwise(6 * e * LANES + c, flat) else 1.0
-        # The middle lies across the chord and along the sum; the longer of the two is sure.
+        # The middle lies across the chord and along the sum; the longer of both is well defined.
         hc, hs = cb - ca, sb - sa
         mc, ms = ca + cb, sa + sb
         across = hc * hc + hs * hs > mc * mc + ms * ms
@@ -66,10 +65,7 @@ def place_arc(cones, e, row, ends, flat, arcs, u, v):  # type: ignore[no-untyped
 
 @kernel
 def place_side(cones, e, row, ends, arcs, u, v):  # type: ignore[no-untyped-def]
-    """Place the inner points of the side that leaves end e, from a row on.
-
-    Equal steps along the cone are not equal steps in the image.
-    """
+    """Place the inner points of the side that begins at end e, from a row on."""
     o = 1 - e
     at, to = (4 * e + 2) * LANES, 4 * o * LANES
     for c in range(cones):
@@ -92,7 +88,7 @@ def _depth(e, c, cos, sin, ends):  # type: ignore[no-untyped-def]
 
 @kernel
 def to_pixels(cones, count, k, distortion, distorted, u, v):  # type: ignore[no-untyped-def]
-    """Turn points at focal length 1 into pixels."""
+    """Convert points at focal length 1 to pixels."""
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
     fx, skew, cx, fy, cy = k[0], k[1], k[2], k[3], k[4]
     for i in range(count):

@@ -1,4 +1,4 @@
-"""Drawing once what does not move during a search."""
+"""The static layer: cones that do not move during a search are drawn once."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -27,7 +27,9 @@ from markerless_tracker.fitness.terms import (
 )
 from markerless_tracker.geometry import FloatArray
 
+# Sides of a cone that are sampled, the far end's edge included.
 _SIDES = 3
+# Room beyond the samples of a side across the frame.
 _SPARE = 8
 
 
@@ -37,15 +39,15 @@ class Drawing:
 
     Attributes:
         body: all nodes, and the cones that are drawn for every pose.
-        silhouette_cones: (c,) which of them make the silhouette.
-        edge_cones: (c, 2) whether their sides, and their far edges, are sampled.
-        still: what is drawn once.
+        silhouette_cones: (c,) whether each of these cones is part of the silhouette.
+        edge_cones: (c, 2) whether its sides, and the edge of its far end, are sampled.
+        static: the cones that are drawn once.
     """
 
     body: BodyArrays
     silhouette_cones: NDArray[np.bool_]
     edge_cones: NDArray[np.bool_]
-    still: StaticLayer
+    static: StaticLayer
 
 
 def split_static(
@@ -63,8 +65,8 @@ def split_static(
 ) -> Drawing:
     """Draw the cones that do not depend on the active parameters (d,), at a centre (p,).
 
-    Which edges are visible depends on the order of all cones in depth: where such edges are
-    sampled, nothing counts as still.
+    Which edges are visible depends on the order of all cones in depth: if visible edges are
+    sampled, no cone is static.
 
     Args:
         body: the body.
@@ -72,9 +74,9 @@ def split_static(
         views: the views.
         active: the parameters that vary.
         centre: the pose of the others.
-        silhouette_cones: (c,) cones that make the silhouette.
+        silhouette_cones: (c,) cones that are part of the silhouette.
         edge_cones: (c,) cones whose edges are sampled.
-        rule, cost: how edges are sampled and what terms cost.
+        rule, cost: how edges are sampled, and the weights of the terms.
         scratch, outlines: working memory.
     """
     sampled = body.cone_edges & edge_cones[:, None]
@@ -93,18 +95,18 @@ def split_static(
     bits = np.zeros(views.mask.size if rest.size else 0, dtype=np.uint64)
     listed = np.empty((0, 2), dtype=np.int64)
     if rest.size:
-        # Samples that may be hidden lie inside the frame, so a side has no more than these.
+        # Listed samples lie inside the frame, which bounds their number per side.
         longest = ceil(int(views.size.sum(axis=1).max()) / rule.spacing_px) + _SPARE
         sides = int(sampled[rest].sum()) * _SIDES if rule.rule == OUTLINE else 0
         listed = np.empty((count * sides * longest, 2), dtype=np.int64)
-        _draw_still(
+        _draw_static(
             centre, _some(arrays, rest), views, silhouette_cones[rest], sampled[rest], rule, cost,
             scratch.used[0], nodes, scratch.world[0], outlines, bits, counts, start, listed, least,
         )  # fmt: skip
-    still = StaticLayer(
+    static = StaticLayer(
         np.flatnonzero(moves), nodes, bits, counts, start, listed[: start[-1]], least,
     )  # fmt: skip
-    return Drawing(_some(arrays, drawn), silhouette_cones[drawn], sampled[drawn], still)
+    return Drawing(_some(arrays, drawn), silhouette_cones[drawn], sampled[drawn], static)
 
 
 def _some(arrays: BodyArrays, cones: NDArray[np.int64]) -> BodyArrays:
@@ -118,7 +120,7 @@ def _some(arrays: BodyArrays, cones: NDArray[np.int64]) -> BodyArrays:
 
 
 @kernel
-def _draw_still(  # type: ignore[no-untyped-def]
+def _draw_static(  # type: ignore[no-untyped-def]
     centre, body, views, silhouette_cones, edge_cones, rule, cost, used, nodes, world, outlines,
     bits, counts, start, listed, least,
 ):  # fmt: skip

@@ -1,4 +1,7 @@
-"""Common tangents of the two projected end ellipses of each cone."""
+"""Common tangents of the two projected end ellipses of each cone.
+
+Derivation: docs/outlines-of-cones.md.
+"""
 
 import numpy as np
 
@@ -16,7 +19,7 @@ from markerless_tracker.fitness.raster.outline_arrays import (
 
 @kernel
 def to_camera(cones, world, rotation, translation, ends):  # type: ignore[no-untyped-def]
-    """Cone ends (18 rows) of the world in a camera's frame."""
+    """Transform cone ends (18 rows) from the world into a camera's frame."""
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
     for e in range(2):
         for i in range(3):
@@ -37,7 +40,7 @@ def to_camera(cones, world, rotation, translation, ends):  # type: ignore[no-unt
 
 @kernel
 def find_forms(cones, ends, flat, form):  # type: ignore[no-untyped-def]
-    """Fill flat and form from ends."""
+    """Fill flat (first-order images of the ends) and form from ends."""
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
     for e in range(2):
         p, q = 9 * e * LANES, 6 * e * LANES
@@ -54,14 +57,14 @@ def find_forms(cones, ends, flat, form):  # type: ignore[no-untyped-def]
         gu, gv = flat[6 * LANES + c] - flat[c], flat[7 * LANES + c] - flat[LANES + c]
         apart = gu * gu + gv * gv > 1e-18
         du, dv = (gu if apart else 1.0), (gv if apart else 0.0)
-        # How far each end reaches from its centre along the way between them, times its length.
+        # Extent of each end from its centre along the line of centres, times that line's length.
         pa = flat[2 * LANES + c] * du + flat[3 * LANES + c] * dv
         pb = flat[4 * LANES + c] * du + flat[5 * LANES + c] * dv
         qa = flat[8 * LANES + c] * du + flat[9 * LANES + c] * dv
         qb = flat[10 * LANES + c] * du + flat[11 * LANES + c] * dv
-        reach = np.sqrt(qa * qa + qb * qb) - np.sqrt(pa * pa + pb * pb)
+        wider = np.sqrt(qa * qa + qb * qb) - np.sqrt(pa * pa + pb * pb)
         gap = gu * du + gv * dv
-        only = ONLY_END if gap + reach <= 0.0 else (ONLY_END + 1 if gap - reach <= 0.0 else TAPERED)
+        only = ONLY_END if gap + wider <= 0.0 else (ONLY_END + 1 if gap - wider <= 0.0 else TAPERED)
         near_0 = ends[2 * LANES + c] - abs(ends[5 * LANES + c]) - abs(ends[8 * LANES + c])
         near_1 = ends[11 * LANES + c] - abs(ends[14 * LANES + c]) - abs(ends[17 * LANES + c])
         near = near_0 if near_0 < near_1 else near_1
@@ -70,10 +73,7 @@ def find_forms(cones, ends, flat, form):  # type: ignore[no-untyped-def]
 
 @kernel
 def find_tangents(cones, flat, form, arcs):  # type: ignore[no-untyped-def]
-    """Fill arcs: where the common tangents touch the ends.
-
-    The line through the two points that reach farthest along its normal gives a better normal.
-    """
+    """Fill arcs: the angles at which the common tangents touch the ends, by iterated normals."""
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
     for side in range(2):
         sense = 1.0 if side == 0 else -1.0
@@ -109,7 +109,7 @@ def find_tangents(cones, flat, form, arcs):  # type: ignore[no-untyped-def]
 
 @kernel
 def arc_sweep(e, c, flat, form, arcs):  # type: ignore[no-untyped-def]
-    """The angle (rad) that end e's arc of cone c sweeps, by the way that leads over the outside."""
+    """Signed angle (rad) of end e's arc of cone c."""
     if form[c] == ONLY_END + e:
         return 2.0 * np.pi
     at = 4 * e * LANES + c

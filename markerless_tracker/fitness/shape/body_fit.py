@@ -1,9 +1,8 @@
-"""Lengths and sections of a body from several frames, their poses free along with them.
+"""Lengths and sections of a body, fitted together with its poses in several frames.
 
-Silhouettes alone let a pose and a body trade against each other: a longer thigh and a bent knee,
-a deeper chest and a trunk farther back. What holds them is what is known of people: lengths and
-sections scatter by little about those of a stature, so the outlines are made to weigh little
-against that. Frames differ, and where they do, one body has to explain them all.
+Silhouettes alone do not separate pose and body: a longer thigh looks like a bent knee, a deeper
+chest like a trunk farther back. Priors separate them: lengths and sections vary little among people
+of one stature. The outlines therefore get a small weight. All frames share one body.
 """
 
 from dataclasses import dataclass
@@ -12,20 +11,27 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.sizes import LengthBelief, Sizes
-from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.contour.outline_rows import outline_rows, pose_slopes, surface
-from markerless_tracker.fitness.contour.row_kernels import eliminated, normal_equations, solved
+from markerless_tracker.fitness.contour import (
+    ContourFrame,
+    eliminated,
+    normal_equations,
+    outline_rows,
+    pose_slopes,
+    solved,
+    surface,
+)
 from markerless_tracker.fitness.shape.section_fit import CORRELATION_M, RESIDUAL_SIGMA_M
 from markerless_tracker.fitness.shape.sections import Sections
 from markerless_tracker.geometry import FloatArray
 
 ALONG = 9.0
-"""Sections are wrong along a whole limb: residuals agree over so many pieces of outline."""
+"""Number of pieces of outline with correlated residuals: sections are wrong along a whole limb."""
 AMONG = 3.0
-"""And from frame to frame: so many frames tell what one would alone."""
+"""Number of frames that count as one independent frame."""
 _STEP = 1e-4
+"""Change of a log length in the finite differences."""
 _LONGEST_STEP = 0.1
-"""Of a length, as a share of it, in one iteration."""
+"""Largest change of a log length in one iteration."""
 _DAMPING = 1e-3
 
 
@@ -40,8 +46,8 @@ class BodyFit:
 
     Args:
         sizes: makes the body of other lengths.
-        body: the body to begin with; its lengths' generic sections are believed in.
-        belief: about the lengths.
+        body: the initial body; the prior of the sections is the generic one of its lengths.
+        belief: prior of the lengths.
         limits: (2, p) of the poses.
     """
 
@@ -68,21 +74,21 @@ class BodyFit:
         return np.array([frame.pose for frame in self._frames])
 
     def add(self, contours: ContourFrame, pose: FloatArray) -> None:
-        """Take a frame's contours and about its pose (p,)."""
+        """Add a frame: its contours and its approximate pose (p,)."""
         self._frames.append(_Frame(contours, pose))
 
     def iterate(self, truncation_m: float) -> None:
         """One damped Gauss-Newton step of lengths, sections and all poses.
 
-        The poses are eliminated first (Schur complement): each meets the others only by the body.
-        Equations that cannot be solved change nothing.
+        The poses are eliminated first (Schur complement), as they are coupled through the body
+        alone (docs/normal-equations.md). Equations that cannot be solved change nothing.
 
         Args:
-            truncation_m: outline further than this from a silhouette's edge is an outlier.
+            truncation_m: residuals beyond this distance are outliers.
         """
         body = self.body
         longer = [self._made(self._lengths + step) for step in _STEP * np.eye(len(self._lengths))]
-        hessian, slope = self._believed()
+        hessian, slope = self._prior()
         parts = []
         for frame in self._frames:
             own, pull = self._equations(frame, body, longer, truncation_m)
@@ -104,22 +110,22 @@ class BodyFit:
         sized = self._sizes.body(np.exp(log_lengths), self._like)
         return self._sections.put(sized, self._numbers)
 
-    def _believed(self) -> tuple[FloatArray, FloatArray]:
-        """Normal equations of what is believed of lengths and sections."""
+    def _prior(self) -> tuple[FloatArray, FloatArray]:
+        """Normal equations of the priors of lengths and sections."""
         sections, split = self._sections, len(self._lengths)
         size = split + sections.size
         hessian, slope = np.zeros((size, size)), np.zeros(size)
         hessian[:split, :split] = self._belief.precision
         slope[:split] = self._belief.precision @ (self._lengths - self._belief.mean)
         rest = np.arange(split, size)
-        hessian[rest, rest] = 1.0 / sections.spread**2
-        slope[split:] = (self._numbers - sections.generic) / sections.spread**2
+        hessian[rest, rest] = 1.0 / sections.prior_sd**2
+        slope[split:] = (self._numbers - sections.generic) / sections.prior_sd**2
         return hessian, slope
 
     def _equations(
         self, frame: _Frame, body: BodyModel, longer: list[BodyModel], truncation_m: float
     ) -> tuple[FloatArray, FloatArray]:
-        """One frame's normal equations (p + k, p + k) and (p + k,): of its pose, of the body."""
+        """One frame's normal equations (p + k, p + k) and (p + k,): its pose, then the body."""
         frame.contours.collect(frame.pose, truncation_m, body)
         rows = outline_rows(frame.contours)
         points = surface(body, frame.pose, rows)
@@ -132,8 +138,8 @@ class BodyFit:
         slopes = np.column_stack([by_pose, *by_length, by_section])
         weight = rows.weight / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG * AMONG)
         hessian, slope = normal_equations(slopes, weight, rows.value)
-        usual = 1.0 / (AMONG * body.prior_sd**2)
+        prior_precision = 1.0 / (AMONG * body.prior_sd**2)
         pose = np.arange(body.size)
-        hessian[pose, pose] = (hessian[pose, pose] + usual + 1e-9) * (1.0 + _DAMPING)
-        slope[pose] += usual * (frame.pose - body.prior_mean)
+        hessian[pose, pose] = (hessian[pose, pose] + prior_precision + 1e-9) * (1.0 + _DAMPING)
+        slope[pose] += prior_precision * (frame.pose - body.prior_mean)
         return hessian, slope

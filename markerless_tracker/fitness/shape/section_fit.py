@@ -1,21 +1,20 @@
-"""The body's shape from silhouettes, its pose known: sections and offsets of the cones."""
+"""Sections and offsets of the cones, fitted to silhouettes at known poses."""
 
 import numpy as np
 
 from markerless_tracker.body import BodyModel
-from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.contour.outline_rows import outline_rows
-from markerless_tracker.fitness.contour.row_kernels import normal_equations
+from markerless_tracker.fitness.contour import ContourFrame, normal_equations, outline_rows
 from markerless_tracker.fitness.shape.sections import Sections
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 
 ITERATIONS = 12
 TRUNCATION_M = (0.10, 0.04)
-"""Outline further than this from the silhouette's edge is an outlier, at first and at last."""
+"""Residuals beyond this distance are outliers, in the first and in the last iteration."""
 RESIDUAL_SIGMA_M = 0.010
-"""Noise believed of an outline's position, for pieces of outline `CORRELATION_M` long."""
+"""Assumed standard deviation of an outline's position, for pieces `CORRELATION_M` long."""
 CORRELATION_M = 0.05
+"""Length of outline with one independent residual."""
 
 
 def fit_shape(
@@ -27,12 +26,12 @@ def fit_shape(
     """The body with sections and offsets fitted to silhouettes, at known poses.
 
     Bounded least squares on contour distances with a prior on the generic shape; left and right
-    are alike, the trunk and head symmetric. Poses are held: fitting both together drifts.
+    limbs are equal, trunk and head symmetric. Poses are fixed: fitting both together drifts.
 
     Args:
         body: the body with generic sections (those of the subject's lengths).
         frames: contour evidence of some frames and the pose (p,) in each.
-        tightness: factor on the prior's precision; higher trusts the generic shape more.
+        tightness: factor of the prior's precision.
     """
     sections = Sections(body)
     scale = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * len(frames))
@@ -49,7 +48,7 @@ def fit_shape(
             slope += one[1]
         return hessian * scale, slope * scale
 
-    prior = Prior(sections.generic, tightness / sections.spread**2)
+    prior = Prior(sections.generic, tightness / sections.prior_sd**2)
     fitted = refine(
         equations,
         sections.generic,

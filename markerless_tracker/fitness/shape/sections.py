@@ -1,4 +1,4 @@
-"""What is free about a body's sections: radii and offsets, left and right alike."""
+"""Free numbers of a body's sections: radii and offsets, equal on the left and on the right."""
 
 from dataclasses import replace
 
@@ -6,15 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
-from markerless_tracker.fitness.contour.outline_rows import OutlineRows
+from markerless_tracker.fitness.contour import OutlineRows
 from markerless_tracker.geometry import FloatArray
 
-RADIUS_SPREAD = 0.20
-"""How far a person's radii deviate from the generic ones, as a share of them (prior)."""
-OFFSET_SPREAD_M = 0.015
+RADIUS_SD_RATIO = 0.20
+"""Standard deviation of radii among people, relative to the generic ones (prior)."""
+OFFSET_SD_M = 0.015
+"""Standard deviation of offsets among people (prior)."""
 RADIUS_RANGE = (0.6, 1.6)
 """Radii stay within this multiple of the generic ones (bounds)."""
 OFFSET_RANGE_M = 0.06
+"""Offsets stay within this distance of the generic ones (bounds)."""
 
 
 class Sections:
@@ -23,11 +25,11 @@ class Sections:
     Limbs of both sides share theirs, offsets to the side mirrored; trunk and head are symmetric.
 
     Args:
-        generic: the body with the sections that are believed in before anything is seen.
+        generic: the body with the sections of the prior.
 
     Attributes:
-        generic: (k,).
-        spread: (k,) how far people deviate from it.
+        generic: (k,) prior mean.
+        prior_sd: (k,) prior standard deviation.
         bounds: (2, k).
     """
 
@@ -36,7 +38,7 @@ class Sections:
         self.generic = self.of(generic)
         radius = np.zeros(self._size, dtype=np.bool_)
         radius[self._index[:, :, :2].ravel()] = True
-        self.spread = np.where(radius, RADIUS_SPREAD * self.generic, OFFSET_SPREAD_M)
+        self.prior_sd = np.where(radius, RADIUS_SD_RATIO * self.generic, OFFSET_SD_M)
         self.bounds = np.where(
             radius,
             np.outer(RADIUS_RANGE, self.generic),
@@ -49,7 +51,7 @@ class Sections:
         return self._size
 
     def of(self, body: BodyModel) -> FloatArray:
-        """A body's numbers (k,); tied ones are averaged."""
+        """The numbers (k,) of a body; entries that share a number are averaged."""
         used = self._index >= 0
         index = self._index[used]
         total = np.bincount(index, (self._sign * body.cone_shape)[used], self._size)
@@ -75,13 +77,13 @@ class Sections:
                 index = self._index[rows.cone, end, entry]
                 free = index >= 0
                 value = share * slope * self._sign[rows.cone, end, entry]
-                # A row has one entry of each kind: no index comes twice in it.
+                # No index occurs twice in a row: a row has one entry of each kind.
                 out[every[free], index[free]] += value[free]
         return out
 
 
 def _tie(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray, int]:
-    """Which number each entry (c, 2, 4) of `cone_shape` follows (-1: none), its sign, and k."""
+    """Number of each entry (c, 2, 4) of `cone_shape` (-1: none), its sign, and k."""
     index = np.full((len(body.cone_names), 2, 4), -1, dtype=np.int64)
     sign = np.ones(index.shape)
     known: dict[tuple[str, int, int], int] = {}
@@ -90,7 +92,7 @@ def _tie(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray, int]:
         for end in range(2):
             for entry in range(4):
                 if entry == 3:
-                    # Offsets to the side: none on the middle line, mirrored on the limbs.
+                    # Offsets to the side: none for trunk and head, mirrored for the limbs.
                     if not paired:
                         continue
                     sign[c, end, entry] = 1.0 if name[0] == "l" else -1.0

@@ -1,4 +1,32 @@
-"""Background models: what each pixel shows without the person.
+"""What a camera's images show without the person.
 
-Learned from empty scenes or from recordings with people in them; stored, scaled, adapted.
+Learned from empty frames or from recordings of the person, kept in files, adapted to slow changes.
 """
+
+from markerless_tracker.imaging.background.live import MOVING_SHARE, LiveBackground
+from markerless_tracker.imaging.background.model import BackgroundModel, Mode, learn_background
+from markerless_tracker.imaging.background.model_file import (
+    SUFFIX as MODEL_SUFFIX,
+)
+from markerless_tracker.imaging.background.model_file import (
+    read_background_model,
+    write_background_model,
+)
+from markerless_tracker.imaging.background.model_scale import scale_background_model
+from markerless_tracker.imaging.background.plate import Plate, background_plate
+from markerless_tracker.imaging.background.recording import learn_from_recording
+
+__all__ = [
+    "MODEL_SUFFIX",
+    "MOVING_SHARE",
+    "BackgroundModel",
+    "LiveBackground",
+    "Mode",
+    "Plate",
+    "background_plate",
+    "learn_background",
+    "learn_from_recording",
+    "read_background_model",
+    "scale_background_model",
+    "write_background_model",
+]

@@ -1,4 +1,4 @@
-"""A background that follows slow changes of light where the body is not."""
+"""Adaptation of a background to slow changes of light away from the silhouette."""
 
 import math
 
@@ -6,20 +6,20 @@ import cv2
 import numpy as np
 
 from markerless_tracker.compiled import compiled
-from markerless_tracker.imaging.segmentation.morphology import Mask, disc
+from markerless_tracker.imaging.masks import Mask, disc
 
-# A longer gap, or time going backwards, is a new beginning: nothing is learned across it.
+# After a longer gap, or a step back in time, nothing is learned from the first image.
 GAP_NS = 1_000_000_000
-# Every frame takes each so many-th row, in turns.
+# Each frame adapts every STRIDE-th row, the next frame the next rows.
 STRIDE = 4
 
 
 @compiled()
 def adapt_means(image, gain, keep_out, mean, scale, share, first, stride):  # type: ignore[no-untyped-def]
-    """Move the Gaussian that explains a pixel towards it: mean += share (image / gain - mean).
+    """Move the mean of a pixel's Gaussian towards the pixel: mean += share (image / gain - mean).
 
-    Only rows first, first + stride, ..., and only pixels that `keep_out` (h, w) leaves and that
-    pass the background test. image (h, w, c); mean, scale (k, h, w, c); gain (c,).
+    Only rows first, first + stride, ..., and only pixels where `keep_out` (h, w) is 0 and the
+    background test passes. image (h, w, c); mean, scale (k, h, w, c); gain (c,).
     """
     modes, height, width, channels = mean.shape
     for v in range(first, height, stride):
@@ -41,11 +41,11 @@ def adapt_means(image, gain, keep_out, mean, scale, share, first, stride):  # ty
 
 
 class Adaptation:
-    """When and how fast the background of one camera follows.
+    """Adapts the background of one camera.
 
     Args:
-        time_constant_s: how long the background takes to follow a change by 63 %.
-        margin_px: distance from the silhouette that is left alone.
+        time_constant_s: time after which the background has followed a change by 63 %.
+        margin_px: distance from the silhouette that does not adapt.
     """
 
     def __init__(self, time_constant_s: float, margin_px: int) -> None:
@@ -54,17 +54,17 @@ class Adaptation:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the times seen."""
+        """Forget all stamps."""
         self._seen_ns: int | None = None
         self._followed_ns: int | None = None
-        self._turn = 0
+        self._first_row = 0
 
     def pass_over(self, stamp_ns: int) -> None:
-        """An image came that is not followed: time goes on."""
+        """Note the stamp of an image from which nothing is learned."""
         before, self._seen_ns = self._seen_ns, stamp_ns
         if before is None or not 0 < stamp_ns - before <= GAP_NS:
             self._followed_ns = None
-            self._turn = 0
+            self._first_row = 0
 
     def follow(
         self,
@@ -75,12 +75,12 @@ class Adaptation:
         mean: np.ndarray[tuple[int, ...], np.dtype[np.float32]],
         scale: np.ndarray[tuple[int, ...], np.dtype[np.float32]],
     ) -> None:
-        """Let `mean` (k, h, w, c) follow the image (h, w, c), away from the mask (h, w)."""
+        """Adapt `mean` (k, h, w, c) to the image (h, w, c), away from the mask (h, w), in place."""
         self.pass_over(stamp_ns)
         before, self._followed_ns = self._followed_ns, stamp_ns
         if before is None:
             return
         share = 1.0 - math.exp(-STRIDE * (stamp_ns - before) / self._tau_ns)
         keep_out = np.asarray(cv2.dilate(mask, self._brush), dtype=np.uint8)
-        adapt_means(image, gain, keep_out, mean, scale, np.float32(share), self._turn, STRIDE)
-        self._turn = (self._turn + 1) % STRIDE
+        adapt_means(image, gain, keep_out, mean, scale, np.float32(share), self._first_row, STRIDE)
+        self._first_row = (self._first_row + 1) % STRIDE

@@ -1,4 +1,4 @@
-"""Bringing a picture of the same scene to the geometry and exposure of another."""
+"""Alignment of a picture to another of the same scene: geometry, then exposure."""
 
 import cv2
 import numpy as np
@@ -8,18 +8,18 @@ from markerless_tracker.imaging.images import Image, grey_of
 
 FloatImage = NDArray[np.float32]
 
-# Tiles along the longer side of the image when the misalignment is measured.
+# Tiles along the longer side of the image, for each of which a shift is measured.
 _TILES = 6
-# Phase correlation peaks below this are no measurement.
+# Phase correlations with a lower peak are not used.
 _LEAST_RESPONSE = 0.15
 
 
 def align_geometry(image: Image, reference: Image) -> Image:
     """``image`` resized to the reference and moved onto it by an affine map.
 
-    The shift of each tile is measured by phase correlation of edges, and one affine map fitted to
-    them; tiles that hold a person in either image are its outliers. Stays at the plain resize if
-    too few tiles agree or if they ask for less than a quarter of a pixel.
+    Phase correlation of edges measures the shift of each tile; RANSAC fits one affine map to the
+    shifts. Tiles with a person in either image are outliers. The image is only resized if too few
+    tiles agree or if the map moves no corner by a quarter of a pixel.
 
     Args:
         image: (h', w') or (h', w', 3) uint8.
@@ -81,8 +81,8 @@ def _starts(length: int, tile: int) -> list[int]:
 def align_exposure(image: FloatImage, reference: FloatImage) -> FloatImage:
     """``image`` with gain and offset per channel fitted to the reference, then a smooth offset.
 
-    Robust: pixels that differ after the fit (people, moved things) do not count. The smooth part
-    takes up what a gain cannot, such as light from a window.
+    Pixels that differ after the fit (people, moved objects) are outliers. The smooth offset
+    corrects local differences, such as light from a window.
 
     Args:
         image: (h, w, c) float32, in the reference's geometry.
@@ -103,7 +103,7 @@ def align_exposure(image: FloatImage, reference: FloatImage) -> FloatImage:
 def _robust_line(x: FloatImage, y: FloatImage) -> tuple[float, float]:
     step = max(1, x.size // 40000)
     a, b = x.ravel()[::step].astype(np.float64), y.ravel()[::step].astype(np.float64)
-    # Clipped pixels say nothing about the gain.
+    # Clipped pixels carry no information about the gain.
     open_range = (a > 3) & (a < 250) & (b > 3) & (b < 250)
     keep = open_range.copy()
     gain, offset = 1.0, float(np.median(b - a))

@@ -1,4 +1,4 @@
-"""Several Gaussians per pixel: what an empty scene shows by turns (screens, leaves, flicker)."""
+"""Several Gaussians per pixel, for scenes that alternate: screens, leaves, flicker."""
 
 from collections.abc import Iterable, Iterator
 from itertools import chain
@@ -11,27 +11,27 @@ from markerless_tracker.imaging.images import Image
 
 FloatImage = NDArray[np.float32]
 
-# Values within this many deviations of the sensor's noise, and at least so many grey levels, are
-# of one mode.
-_REACH_SIGMAS = 4.0
-_REACH_LEAST = 12.0
-# A mode that fewer of the frames show is none: something passed.
+# Values of one mode differ by at most so many standard deviations of the sensor's noise, or by
+# _LEAST_TOLERANCE grey levels if that is more.
+_TOLERANCE_SIGMAS = 4.0
+_LEAST_TOLERANCE = 12.0
+# A mode seen in fewer of the frames is dropped: a passing object.
 _LEAST_SHARE = 0.05
 _LEAST_FRAMES = 2
 
 
 @compiled()
-def add_frame(image, reach, count, mean, moment):  # type: ignore[no-untyped-def]
-    """Give every pixel (h, w, c) to the nearest of its modes within ``reach`` in each channel.
+def add_frame(image, tolerance, count, mean, moment):  # type: ignore[no-untyped-def]
+    """Assign every pixel (h, w, c) to its nearest mode within ``tolerance`` in each channel.
 
-    One that fits none begins a new mode, in a free place or that of a mode seen only once.
+    A pixel without such a mode begins a new one, in a free slot or that of a mode seen only once.
     count (k, h, w), mean and moment (k, h, w, c) float32 are updated: Welford's sums.
     """
     modes, height, width, channels = mean.shape
     for v in range(height):
         for u in range(width):
             best = -1
-            nearest = reach
+            nearest = tolerance
             for k in range(modes):
                 if count[k, v, u] == 0.0:
                     continue
@@ -72,19 +72,21 @@ def learn_modes(
 
     Returns:
         Number of frames; counts (k, h, w), means (k, h, w, c) and summed squared deviations
-        (k, h, w, c), the most frequent mode first; modes that hardly any frame shows are 0.
+        (k, h, w, c), the most frequent mode first; the counts of rare modes are 0.
     """
     first, second, rest = _two_and_rest(frames)
-    reach = _REACH_LEAST
+    tolerance = _LEAST_TOLERANCE
     if second is not None:
         change = np.abs(second.astype(np.int16) - first.astype(np.int16))
-        reach = max(reach, _REACH_SIGMAS * 1.4826 / np.sqrt(2.0) * float(np.median(change)))
+        tolerance = max(
+            tolerance, _TOLERANCE_SIGMAS * 1.4826 / np.sqrt(2.0) * float(np.median(change))
+        )
     count = np.zeros((modes, *first.shape[:2]), dtype=np.float32)
     mean = np.zeros((modes, *first.shape), dtype=np.float32)
     moment = np.zeros_like(mean)
     total = 0
     for frame in rest:
-        add_frame(frame, np.float32(reach), count, mean, moment)
+        add_frame(frame, np.float32(tolerance), count, mean, moment)
         total += 1
     least = max(float(_LEAST_FRAMES), _LEAST_SHARE * total)
     order = np.argsort(-count, axis=0, kind="stable")

@@ -1,4 +1,4 @@
-"""What each pixel looks like without the person: a diagonal Gaussian per pixel, or a few."""
+"""The background model: one or several diagonal Gaussians per pixel."""
 
 import math
 import re
@@ -25,10 +25,10 @@ _PRIOR_FRAMES = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """One more thing that pixels show by turns.
+    """One further Gaussian of the mixture.
 
     Attributes:
-        weight: (h, w) float32, part of the time; 0 where a pixel has no such mode; read-only.
+        weight: (h, w) float32, fraction of the frames; 0 where a pixel has no such mode; read-only.
         mean, variance: (h, w, c) float32 as in `BackgroundModel`; read-only.
     """
 
@@ -48,12 +48,12 @@ class BackgroundModel:
     Attributes:
         mean: (h, w, c) float32, grey levels, c = 1 (grey) or 3 (BGR); read-only.
         variance: (h, w, c) float32, squared grey levels, above 0; read-only.
-        note: how it was made, and what that costs.
+        note: how it was learned, and what that implies.
         modes: further Gaussians of the mixture; `mean` and `variance` are the most frequent one,
             which has the rest of the weight.
 
     Raises:
-        ImageError: shapes that do not belong together, or numbers that are no background.
+        ImageError: shapes that do not match, or values that are not finite or no variances.
     """
 
     mean: FloatImage
@@ -93,7 +93,7 @@ class BackgroundModel:
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """(width, height) of the images it belongs to."""
+        """(width, height) of the camera's images."""
         return int(self.mean.shape[1]), int(self.mean.shape[0])
 
     @property
@@ -115,16 +115,16 @@ def learn_background(
     camera: str = "background",
     note: str | None = None,
 ) -> BackgroundModel:
-    """The empty scene from frames of it, in one pass: mean and variance per pixel, or a mixture.
+    """Learn a background from frames of the empty scene, in one pass.
 
-    A few frames say little about one pixel's variance, so the image's median variance counts as
-    four more of them. A single still says nothing: `background.sigma_still` is assumed.
+    A few frames do not determine a pixel's variance, so the image's median variance counts as four
+    more frames. For a single image `background.sigma_still` is assumed.
 
     Args:
         frames: one or more images of the same size and channels.
         settings: `background.modes`, `background.sigma_min` and `background.sigma_still`.
         camera: name for error messages.
-        note: what the model's note says, instead of how many frames it was learned from.
+        note: the model's note; by default the number of frames.
 
     Raises:
         ImageError: no frame, or frames that differ in size or channels.
@@ -170,7 +170,7 @@ def _mixture(
     total, counts, means, moments = learn_modes(frames, settings.background.modes)
     if total == 1:
         return model_from_moments(means[0], moments[0], 1, settings, note=note)
-    # What the most frequent modes vary by is the sensor's noise; it holds for the others too.
+    # The variance of the most frequent modes is the sensor's noise, which holds for all modes.
     free = np.maximum(counts[0] - 1.0, 1.0)[..., None]
     typical = np.median(moments[0] / free, axis=(0, 1))
     least = settings.background.sigma_min**2
@@ -215,15 +215,15 @@ def foreground_limit(
 
     H-MCPSO Eq 11 in logs, N(pix; mu, rho) < 1 / (256^3 delta) with intensities in 0..1 as HumanEva
     has them: d^2 > 2 ln(256^c delta^(c/3)) - sum_c ln(2 pi rho_c). One channel takes a third of the
-    exponent of three. At least 1, so that no background is foreground at its own mean.
-    For one Gaussian of a mixture its log weight is added to the density. A pixel is then foreground
-    if every one of its k Gaussians says so: the sum of the densities is replaced by the largest
-    term, wrong by at most ln k of a bound that is some 30 wide.
+    exponent of three. At least 1, so that a value at the mean is always background.
+    For one Gaussian of a mixture its log weight is added to the log density. A pixel is foreground
+    if it is beyond the limit of all k Gaussians: the sum of densities is replaced by its largest
+    term, an error of at most ln k in a bound of about 30.
 
     Args:
         variance: (h, w, c), squared grey levels.
         risk: log10(delta).
-        weight: (h, w) part of the mixture, 1 unless given.
+        weight: (h, w) weight in the mixture; 1 if None.
     """
     channels = variance.shape[2]
     bound = 2.0 * channels * (math.log(256.0) + risk * math.log(10.0) / 3.0)
@@ -238,7 +238,7 @@ def risk_of(camera: str, settings: ImagingSettings) -> float:
     """log10 of the risk factor for a camera.
 
     `background.risk`, or with `background.risks` = humaneva the published 80, 60, 30 and 80 of its
-    colour cameras C1 to C4, told apart by the number at the end of the camera's name.
+    colour cameras C1 to C4, by the number at the end of the camera's name.
     """
     if settings.background.risks == "humaneva":
         digits = re.search(r"(\d+)\D*$", camera)

@@ -1,4 +1,4 @@
-"""A learned background for smaller images of the same camera."""
+"""Scaling of a background model to smaller images of the same camera."""
 
 import cv2
 import numpy as np
@@ -9,10 +9,9 @@ from markerless_tracker.imaging.background.model import BackgroundModel, FloatIm
 def scale_background_model(model: BackgroundModel, size_px: tuple[int, int]) -> BackgroundModel:
     """The model at ``size_px`` = (width, height); the same object if it already has that size.
 
-    Means and variances are averaged over areas, as `scale_image` averages images, a mode's by its
-    weight. A mean of pixels is less noisy than they are, by how much depends on the camera (noise
-    of neighbours is alike after demosaicing and compression): the variance is that of one pixel,
-    which is too large rather than too small.
+    Means and variances are averaged over areas, as `scale_image` averages images; those of modes
+    are weighted. The variance stays that of one pixel. That is an upper bound: a mean of pixels is
+    less noisy, by an unknown factor, since demosaicing and compression correlate neighbours.
     """
     if size_px == model.size_px:
         return model

@@ -1,4 +1,4 @@
-"""An image of the empty scene, put together from clips and stills in which people appear."""
+"""An image of the empty scene, composed of clips and photographs in which people appear."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,21 +22,21 @@ from markerless_tracker.records import locked
 FloatImage = NDArray[np.float32]
 BoolImage = NDArray[np.bool_]
 
-# Frames kept of all clips together: enough for a mode, little enough for memory.
+# Frames kept of all clips together: enough for a mode, within memory.
 _FRAMES = 36
-# Grey levels within which two pictures show the same thing.
-_REACH = 14.0
-# A change from frame to frame beyond this is a body's, not the light's.
+# Largest difference of pictures that show the same object, grey levels.
+_TOLERANCE = 14.0
+# Larger changes from frame to frame are a body's, smaller ones may be the light's; grey levels.
 _ABRUPT = 28.0
-# Where things are covered for this share of the time, someone is burnt into the steady image.
+# Fraction of the time that a place is covered above which the steady image shows the person there.
 _RESTLESS = 0.15
-# A frame is calm around a pixel if less than this share of what is known there differs.
+# A frame is calm around a pixel if less than this fraction of the known pixels there differs.
 _CALM = 0.05
-# A value shown in this share of the frames around nothing but scene is scene.
+# A value is scene if it appears in this fraction of the frames that are calm around the pixel.
 _OFTEN = 0.35
-# Size of the neighbourhood that is judged together, as a share of the image's longer side.
+# Size of the neighbourhood that is assessed together, relative to the image's longer side.
 _WINDOW = 0.03
-# A value seen in this share of the frames was really there.
+# Values seen in a smaller fraction of the frames are discarded.
 _SEEN_SHARE = 0.05
 
 
@@ -46,8 +46,8 @@ class Plate:
 
     Attributes:
         image: (h, w) or (h, w, 3) uint8, in the geometry and exposure of the first clip (or still).
-        unsure: (h, w) bool, pixels that only one source ever showed while others disagreed.
-        note: what it was made from, and what that costs.
+        unsure: (h, w) bool, pixels known from one source alone while others disagree.
+        note: the sources, and what they imply.
     """
 
     image: Image
@@ -65,24 +65,24 @@ def background_plate(
     *,
     camera: str = "background",
 ) -> Plate:
-    """The empty scene of one camera from clips and stills in which people appear.
+    """Compose the empty scene of one camera from clips and stills in which people appear.
 
-    Where nothing moves in the clips, what they show is the scene: something that stands still all
-    the time cannot be told from furniture. Where something moves, the scene is
-    (a) what a still shows, if the clips show it too at some time;
-    (b) else what the clips show while everything around it is known to be scene;
-    (c) else what a still shows: the person never uncovered it in the clips;
-    (d) without stills, what the clips show most steadily.
-    A still may have another size, exposure and a slight misalignment; people in it do no harm where
-    the clips are calm or uncover the floor.
+    Where nothing moves in the clips, they show the scene: an object that never moves is furniture.
+    Where something moves, the scene is
+    (a) the value of a still that the clips show at some time;
+    (b) else the value of the clips while everything around it is known to be scene;
+    (c) else the value of a still: the person never uncovers it in the clips;
+    (d) without stills, the steadiest value of the clips.
+    A still may differ in size, exposure and, slightly, in alignment. People in it have no effect
+    where the clips are calm or uncover the floor.
 
     Args:
-        clips: frames of each clip, all of one camera; the first clip fixes size and exposure.
-        stills: further pictures of the scene.
+        clips: frames of each clip, all of one camera; the first clip defines size and exposure.
+        stills: photographs of the scene.
         camera: name for error messages.
 
     Raises:
-        ImageError: neither clips nor stills, or frames that do not belong together.
+        ImageError: neither clips nor stills, or frames of different sizes or channels.
     """
     sequences = list(clips.values()) if isinstance(clips, Mapping) else list(clips)
     frames = _clip_frames(sequences, camera)
@@ -106,8 +106,8 @@ def background_plate(
     pictures = [align_exposure(_float(align_geometry(still, guide)), steady) for still in stills]
     if not pictures:
         note = (
-            f"{len(stack)} frames of {len(frames)} clip(s), no still: whoever covers a "
-            "place for most of the time is burnt in there"
+            f"{len(stack)} frames of {len(frames)} clip(s), no still: places that the "
+            "person covers for most of the time show the person"
         )
         return _finish(steady, np.zeros(steady.shape[:2], dtype=bool), reference, note)
     filled, unsure = _fill(stack, steady, pictures)
@@ -142,7 +142,7 @@ def _float(image: Image) -> FloatImage:
 
 
 def _stack(frames: list[list[Image]]) -> Image:
-    """(n, h, w, c): all clips, the later ones in the exposure of the first."""
+    """(n, h, w, c): all clips, adjusted to the exposure of the first."""
     parts = [np.stack(clip).reshape(len(clip), *clip[0].shape[:2], -1) for clip in frames]
     if len(parts) == 1:
         return np.asarray(parts[0])
@@ -157,13 +157,13 @@ def _stack(frames: list[list[Image]]) -> Image:
 def _covered(
     share: FloatImage, jump: FloatImage, steady: FloatImage, picture: FloatImage
 ) -> BoolImage:
-    """Where the clips show a person and the still does not: they differ, the clips are restless.
+    """Where the clips show a person and the still does not: they differ, and the clips move.
 
-    How restless is averaged over the neighbourhood that differs: plain clothes show motion at their
-    outline only, and an arm that sweeps over a person of the still for a moment is outvoted.
+    Motion is averaged over the neighbourhood that differs: plain clothes show motion at their
+    outline only, and an arm that briefly passes over a person of the still has little weight.
     """
     apart = np.abs(picture - steady).max(axis=2)
-    differ = (apart > _REACH).astype(np.uint8)
+    differ = (apart > _TOLERANCE).astype(np.uint8)
     differ = np.asarray(cv2.morphologyEx(differ, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)))
     weight = differ.astype(np.float32)
     sigma = _WINDOW * max(differ.shape)
@@ -171,24 +171,26 @@ def _covered(
     blurred = cv2.GaussianBlur(restless, (0, 0), sigma)
     mass = cv2.GaussianBlur(weight, (0, 0), sigma)
     covered = ((differ > 0) & (blurred > _RESTLESS * mass)).astype(np.uint8)
-    # The soft fringe of a person differs less than the person.
-    return np.asarray((cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0) & (apart > 0.5 * _REACH))
+    # The blurred border of a person differs less than the person.
+    return np.asarray(
+        (cv2.dilate(covered, np.ones((5, 5), np.uint8)) > 0) & (apart > 0.5 * _TOLERANCE)
+    )
 
 
 def _fill(
     stack: Image, steady: FloatImage, pictures: list[FloatImage]
 ) -> tuple[FloatImage, BoolImage]:
-    """Replace who moves by what the stills show; returns the plate and where only a still knew."""
-    share, jump = motion(stack, steady, _REACH)
+    """Replace moving people by the stills; returns the plate and where a still alone is known."""
+    share, jump = motion(stack, steady, _TOLERANCE)
     least = max(2.0, _SEEN_SHARE * len(stack))
     filled = steady.copy()
     best = np.zeros(steady.shape[:2])
     covered = np.zeros(steady.shape[:2], dtype=bool)
     doubtful = covered.copy()
     for index, picture in enumerate(pictures):
-        matches, mean = matching_frames(stack, picture, _REACH)
+        matches, mean = matching_frames(stack, picture, _TOLERANCE)
         others = sum(
-            (np.abs(picture - other).max(axis=2) <= _REACH).astype(float)
+            (np.abs(picture - other).max(axis=2) <= _TOLERANCE).astype(float)
             for place, other in enumerate(pictures)
             if place != index
         )
@@ -199,7 +201,7 @@ def _fill(
         filled[better] = np.where(seen[:, :, None], mean, picture)[better]
         best[better] = score[better]
         covered |= here
-        doubtful |= (np.abs(picture - steady).max(axis=2) > 2.0 * _REACH) & ~here
+        doubtful |= (np.abs(picture - steady).max(axis=2) > 2.0 * _TOLERANCE) & ~here
     if not covered.any():
         return filled, covered
     return _grow(stack, filled, steady, covered, doubtful)
@@ -208,17 +210,17 @@ def _fill(
 def _grow(
     stack: Image, filled: FloatImage, steady: FloatImage, covered: BoolImage, doubtful: BoolImage
 ) -> tuple[FloatImage, BoolImage]:
-    """Work inward from what is known, with the frames in which all known pixels around are scene.
+    """Grow the known area inward, with the frames in which all known pixels around are scene.
 
-    What such frames show confirms the still, or overrules it next to people of the still
-    (``doubtful``): a person of the still may stand behind the one in the clips.
+    Such frames confirm the still, or overrule it next to people of the still (``doubtful``): a
+    person of the still may stand behind the one in the clips.
 
     Returns:
-        The plate, and where neither clips confirmed nor overruled the still.
+        The plate, and the pixels where the clips neither confirmed nor overruled the still.
     """
     longer = max(covered.shape)
     side = max(5, round(0.25 * _WINDOW * longer) | 1)
-    # Islands that happen to agree inside a covered area are no knowledge.
+    # Islands inside a covered area agree by chance.
     brush = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * side + 1, 2 * side + 1))
     closed = cv2.morphologyEx(covered.astype(np.uint8), cv2.MORPH_CLOSE, brush)
     v, u = np.nonzero(closed)
@@ -229,9 +231,9 @@ def _grow(
     plate, unknown = filled[box].copy(), closed[box] > 0
     frames, doubt = stack[:, box[0], box[1]], doubtful[box].copy()
     person = steady[box]
-    far = np.stack([np.abs(frame - plate).max(axis=2) > _REACH for frame in frames])
+    far = np.stack([np.abs(frame - plate).max(axis=2) > _TOLERANCE for frame in frames])
     wide = 2 * side + 1
-    reach = np.ones((side, side), dtype=np.uint8)
+    square = np.ones((side, side), dtype=np.uint8)
     for _ in range(4 * max(unknown.shape) // side):
         known = (~unknown).astype(np.float32)
         front = np.nonzero(unknown & (cv2.boxFilter(known, -1, (side, side)) > 0.3))
@@ -245,10 +247,10 @@ def _grow(
         values = frames[:, front[0], front[1]].astype(np.float32)
         count, agreed_count = calm.sum(axis=0), agreeing.sum(axis=0)
         shown, same = _mean(values, calm), _mean(values, agreeing)
-        # What the clips show most of the time may be a person: only if it is shown often around
-        # nothing but scene, or is something else, does it overrule a still.
-        apart = np.abs(shown - person[front]).max(axis=1) > 2.0 * _REACH
-        suspect = cv2.dilate(doubt.astype(np.uint8), reach)[front] > 0
+        # The steadiest value of the clips may be a person. It overrules a still only if it appears
+        # often while everything around is scene, or if the shown value differs from it.
+        apart = np.abs(shown - person[front]).max(axis=1) > 2.0 * _TOLERANCE
+        suspect = cv2.dilate(doubt.astype(np.uint8), square)[front] > 0
         agreed = (agreed_count >= 2) & (agreed_count >= 0.5 * count)
         overruled = ~agreed & suspect & (count >= 2) & (apart | (count > _OFTEN * len(stack)))
         settled = agreed | overruled
@@ -256,7 +258,9 @@ def _grow(
             break
         where = (front[0][settled], front[1][settled])
         plate[where] = np.where(agreed[:, None], same, shown)[settled]
-        far[:, where[0], where[1]] = np.abs(values[:, settled] - plate[where]).max(axis=2) > _REACH
+        far[:, where[0], where[1]] = (
+            np.abs(values[:, settled] - plate[where]).max(axis=2) > _TOLERANCE
+        )
         doubt[front[0][overruled], front[1][overruled]] = True
         unknown[where] = False
     filled = filled.copy()
@@ -267,7 +271,7 @@ def _grow(
 
 
 def _mean(values: FloatImage, chosen: BoolImage) -> FloatImage:
-    """Mean over the frames chosen, per pixel: values (n, k, c), chosen (n, k); 0 where none is."""
+    """Mean over chosen frames per pixel: values (n, k, c), chosen (n, k); 0 if none is chosen."""
     total = np.einsum("nkc,nk->kc", values, chosen.astype(np.float32))
     return np.asarray(total / np.maximum(chosen.sum(axis=0), 1)[:, None], dtype=np.float32)
 
@@ -277,18 +281,18 @@ def _from_stills(stills: Sequence[Image]) -> Plate:
     base = _float(reference)
     if len(stills) == 1:
         unsure = np.zeros(base.shape[:2], dtype=bool)
-        return Plate(reference.copy(), unsure, "one still, taken as it is: whoever is in it stays")
+        return Plate(reference.copy(), unsure, "one still, unchanged: people in it remain")
     aligned = [base] + [
         align_exposure(_float(align_geometry(still, reference)), base) for still in stills[1:]
     ]
-    apart = np.abs(np.stack([picture - base for picture in aligned[1:]])).max(axis=(0, 3)) > _REACH
+    apart = (
+        np.abs(np.stack([picture - base for picture in aligned[1:]])).max(axis=(0, 3)) > _TOLERANCE
+    )
     if len(stills) == 2:
-        note = (
-            "two stills, the first taken as it is: where they differ nothing tells which is empty"
-        )
+        note = "two stills, the first unchanged: where they differ, either may show a person"
         return Plate(reference.copy(), apart, note)
     median = np.median(np.stack(aligned), axis=0).astype(np.float32)
-    note = f"median of {len(stills)} stills: whoever is at one place in half of them stays"
+    note = f"median of {len(stills)} stills: a person at one place in half of them remains"
     return _finish(median, apart & False, reference, note)
 
 

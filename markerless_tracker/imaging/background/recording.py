@@ -1,4 +1,4 @@
-"""A background where nothing but the person's own video exists."""
+"""A background from the person's own recording."""
 
 from collections.abc import Iterable
 
@@ -10,7 +10,7 @@ from markerless_tracker.imaging.background.steady import ALONE_SHARE, steady_ima
 from markerless_tracker.imaging.images import Image, check_image
 from markerless_tracker.imaging.settings import ImagingSettings
 
-# Frames kept of the recording; their number bounds memory and time.
+# Frames kept of the recording: a bound of memory and time.
 _FRAMES = 48
 
 
@@ -20,14 +20,14 @@ def learn_from_recording(
     *,
     camera: str = "background",
 ) -> BackgroundModel:
-    """Background from frames in which the person is, spread over the whole recording.
+    """Learn a background from frames with the person, spread over the whole recording.
 
-    Each pixel's most steady value (see `steady.steady_image`). The price: a place that the person
-    covers for most of the time, or where he stands quite still, is learned as the person, and the
-    silhouette has a hole there; of someone who never leaves his place little is found.
+    The background is each pixel's steadiest value (see `steady.steady_image`). Where the person
+    covers a pixel for most of the time, or stands motionless, the person is learned and the
+    silhouette has a hole. Of a person who never moves away little is found.
 
     Args:
-        frames: frames in the order of time, any number; read once, a few dozen are kept.
+        frames: in temporal order, any number; read once, a few dozen are kept.
         settings: `background.sigma_min` and, for a single frame, `background.sigma_still`.
         camera: name for error messages.
 

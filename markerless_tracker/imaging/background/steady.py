@@ -1,4 +1,4 @@
-"""What a pixel shows most steadily over time, and how often it shows something else."""
+"""Steadiest value of each pixel over time, and how often the pixel differs from it."""
 
 from collections.abc import Iterable, Iterator
 
@@ -13,10 +13,10 @@ from markerless_tracker.imaging.images import Image
 def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-def]
     """Per pixel, the mean of the frames in the shortest brightness interval that holds ``share``.
 
-    Choosing whole frames by their brightness (and not each channel for itself) keeps colours that
-    the pixel really had; frames of the interval far from its mean colour are left out again.
-    ``variance`` gets the mean square, per channel, of the deviations from
-    that value of all frames within three times the interval (at least 6 grey levels).
+    Frames are chosen by brightness, not channel by channel, so that only colours occur that the
+    pixel had. Frames of the interval whose colour is far from its mean are left out. ``variance``
+    is, per channel, the mean square deviation from the result over all frames within three times
+    the interval (at least 6 grey levels).
     """
     count, height, width, channels = stack.shape
     need = max(1, int(np.ceil(share * count)))
@@ -42,20 +42,20 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
                 if length < least:
                     least = length
                     best = first
-            reach = max(np.float32(6.0), np.float32(3.0) * least / channels)
+            tolerance = max(np.float32(6.0), np.float32(3.0) * least / channels)
             for c in range(channels):
                 total = 0
                 for i in range(best, best + need):
                     total += int(stack[keys[i] & 4095, v, u, c])
                 rough[c] = np.float32(total) / np.float32(need)
                 sums[c] = 0
-            # As bright but of another colour: something else that passed.
+            # The same brightness but another colour: a passing object.
             kept = 0
             for i in range(best, best + need):
                 t = keys[i] & 4095
                 near = True
                 for c in range(channels):
-                    near = near and abs(np.float32(stack[t, v, u, c]) - rough[c]) <= 2.0 * reach
+                    near = near and abs(np.float32(stack[t, v, u, c]) - rough[c]) <= 2.0 * tolerance
                 if near:
                     kept += 1
                     for c in range(channels):
@@ -67,28 +67,32 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
                 inside = 0
                 for t in range(count):
                     deviation = np.float32(stack[t, v, u, c]) - value
-                    if abs(deviation) <= reach:
+                    if abs(deviation) <= tolerance:
                         square += deviation * deviation
                         inside += 1
                 variance[v, u, c] = square / np.float32(max(inside, 1))
 
 
-# Where clips are all there is: a fifth of the frames is enough to prefer a floor seen now and then,
-# which stands perfectly still, to a body that is there more often but never quite the same.
 ALONE_SHARE = 0.2
+"""Fraction of the frames that must agree if there are only clips.
+
+Small enough to prefer a motionless floor that is seldom visible to a body that is often there, but
+never quite the same.
+"""
 
 
 def steady_image(
     stack: Image, *, share: float = 0.4
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """What each pixel shows most steadily, and how much that varies.
+    """Steadiest value of each pixel, and its variance.
 
-    A pixel covered by something moving for up to 1 - ``share`` of the time still shows what is
-    behind; a median gives way at one half. What stands still longer than that is burnt in.
+    A pixel that moving objects cover for up to 1 - ``share`` of the time keeps the value of the
+    scene behind them; a median does so up to one half. Objects that stay longer without moving
+    become part of the image.
 
     Args:
         stack: (n, h, w, c) uint8 frames, n at most 4096.
-        share: part of the frames that must agree.
+        share: fraction of the frames that must agree.
 
     Returns:
         Steady value and variance, (h, w, c) float32 each, grey levels and their square.
@@ -101,8 +105,8 @@ def steady_image(
 
 
 @compiled()
-def match_kernel(stack, target, reach, matches, total):  # type: ignore[no-untyped-def]
-    """Count and add up the frames that lie within ``reach`` of ``target`` in every channel."""
+def match_kernel(stack, target, tolerance, matches, total):  # type: ignore[no-untyped-def]
+    """Count and sum the frames within ``tolerance`` of ``target`` in every channel."""
     count, height, width, channels = stack.shape
     for v in range(height):
         for u in range(width):
@@ -110,7 +114,7 @@ def match_kernel(stack, target, reach, matches, total):  # type: ignore[no-untyp
             for t in range(count):
                 near = True
                 for c in range(channels):
-                    if abs(np.float32(stack[t, v, u, c]) - target[v, u, c]) > reach:
+                    if abs(np.float32(stack[t, v, u, c]) - target[v, u, c]) > tolerance:
                         near = False
                 if near:
                     found += 1
@@ -120,23 +124,23 @@ def match_kernel(stack, target, reach, matches, total):  # type: ignore[no-untyp
 
 
 def matching_frames(
-    stack: Image, target: NDArray[np.float32], reach: float
+    stack: Image, target: NDArray[np.float32], tolerance: float
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """How many frames show ``target`` (h, w, c) at each pixel, and the mean of those that do.
+    """Number of frames that agree with ``target`` (h, w, c) at each pixel, and their mean.
 
     Returns:
         Counts (h, w) int32, and the mean (h, w, c) float32, ``target`` where no frame agrees.
     """
     matches = np.empty(target.shape[:2], dtype=np.int32)
     total = np.zeros_like(target)
-    match_kernel(stack, target, np.float32(reach), matches, total)
+    match_kernel(stack, target, np.float32(tolerance), matches, total)
     mean = total / np.maximum(matches, 1)[:, :, None].astype(np.float32)
     return matches, np.where(matches[:, :, None] > 0, mean, target).astype(np.float32)
 
 
 @compiled()
-def motion_kernel(stack, steady, reach, share, jump):  # type: ignore[no-untyped-def]
-    """Share of the frames that differ from the steady value, and the largest change at once."""
+def motion_kernel(stack, steady, tolerance, share, jump):  # type: ignore[no-untyped-def]
+    """Fraction of the frames that differ from the steady value, and the largest single change."""
     count, height, width, channels = stack.shape
     for v in range(height):
         for u in range(width):
@@ -146,7 +150,7 @@ def motion_kernel(stack, steady, reach, share, jump):  # type: ignore[no-untyped
                 far = False
                 for c in range(channels):
                     value = np.float32(stack[t, v, u, c])
-                    far = far or abs(value - steady[v, u, c]) > reach
+                    far = far or abs(value - steady[v, u, c]) > tolerance
                     if t > 0:
                         largest = max(largest, abs(value - np.float32(stack[t - 1, v, u, c])))
                 away += far
@@ -155,29 +159,29 @@ def motion_kernel(stack, steady, reach, share, jump):  # type: ignore[no-untyped
 
 
 def motion(
-    stack: Image, steady: NDArray[np.float32], reach: float
+    stack: Image, steady: NDArray[np.float32], tolerance: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """How often something covers each pixel, and how abruptly it comes.
+    """How often each pixel is covered, and how abruptly.
 
-    Light (reflections, soft shadows) changes gradually, a body arrives at once.
+    Light (reflections, soft shadows) changes gradually, a body arrives from one frame to the next.
 
     Args:
-        stack: (n, h, w, c) uint8 frames in the order of time.
+        stack: (n, h, w, c) uint8 frames in temporal order.
         steady: (h, w, c) float32, of `steady_image`.
-        reach: grey levels within which two values are the same.
+        tolerance: largest difference of two values that count as equal, grey levels.
 
     Returns:
-        Share of the frames that differ from the steady value, (h, w) float32 in 0..1, and the
+        Fraction of the frames that differ from the steady value, (h, w) float32 in 0..1, and the
         largest change from one frame to the next, (h, w) float32, grey levels.
     """
     share = np.empty(steady.shape[:2], dtype=np.float32)
     jump = np.empty_like(share)
-    motion_kernel(stack, steady, np.float32(reach), share, jump)
+    motion_kernel(stack, steady, np.float32(tolerance), share, jump)
     return share, jump
 
 
 def thinned(frames: Iterable[Image], most: int) -> Iterator[tuple[int, Image]]:
-    """At most ``most`` frames, evenly spread, of a sequence whose length need not be known.
+    """At most ``most`` frames, evenly spread, of a sequence of unknown length.
 
     Yields (index, frame). Holds up to ``most`` frames at a time.
     """

@@ -1,4 +1,9 @@
 """From one image to the silhouette of the person.
 
-Foreground test, shadow test, morphology and the border of the silhouette.
+Labels of pixels (background, shadow, foreground), then repair of patches, border and contour.
 """
+
+from markerless_tracker.imaging.segmentation.morphology import clean_mask
+from markerless_tracker.imaging.segmentation.segmenter import Segmenter
+
+__all__ = ["Segmenter", "clean_mask"]

@@ -1,6 +1,6 @@
-"""Connected patches of a mask too small to count, where more of the mask may lie outside.
+"""Removal of small connected patches of a mask, also where patches continue outside of it.
 
-Patches are found from the runs of each row, which a silhouette has few of.
+Patches are built from the runs of each row, of which a silhouette has few.
 """
 
 import cv2
@@ -11,7 +11,7 @@ from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.region import Region
 
 LEFT, TOP, RIGHT, BOTTOM = 1, 2, 4, 8
-"""Sides of a rectangle, to be combined."""
+"""Sides of a rectangle, as bits of a set."""
 EVERY = LEFT | TOP | RIGHT | BOTTOM
 
 
@@ -39,7 +39,7 @@ def _count_runs(mask, part, target):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _same_until(values, words, u, value):  # type: ignore[no-untyped-def]
-    """First place from u on whose value differs; eight at a time, ``value`` is 0 or 255."""
+    """First index from u on whose value differs from ``value`` (0 or 255); eight at a time."""
     n = values.size
     whole = np.uint64(0) if value == 0 else np.uint64(0xFFFFFFFFFFFFFFFF)
     while u < n:
@@ -53,23 +53,25 @@ def _same_until(values, words, u, value):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def flip_small(mask, part, need, target, least, reach, spared, unknown):  # type: ignore[no-untyped-def]
+def flip_small(mask, part, need, target, least, connectivity, spared, unknown):  # type: ignore[no-untyped-def]
     """Turn patches of ``target`` with fewer than ``least`` pixels into 255 - target, in place.
 
     Args:
         mask: (h, w) uint8, 0 or 255.
-        part: (left, top, right, bottom) that is looked at.
-        need: the same, where the result is needed.
+        part: (left, top, right, bottom) that is searched.
+        need: (left, top, right, bottom) where the result is needed.
         target: 0 or 255.
-        least: pixels.
-        reach: 0: patches are 4-connected, 1: 8-connected.
+        least: least number of pixels of a patch that stays.
+        connectivity: 4 or 8.
         spared: sides of the part; patches that touch them stay.
-        unknown: sides of the part beyond which patches may go on.
+        unknown: sides of the part beyond which patches may continue.
 
     Returns:
-        Whether a patch in ``need`` may be larger than what is seen of it, so that its size is not
-        known; it is left as it is.
+        Whether the size of a patch in ``need`` is unknown, as it may continue outside the part;
+        such a patch stays.
     """
+    # Runs of neighbouring rows touch at a corner too if 8-connected.
+    touch = 1 if connectivity == 8 else 0
     count = _count_runs(mask, part, target)
     begin = np.empty(count, dtype=np.int32)
     end = np.empty(count, dtype=np.int32)
@@ -78,7 +80,7 @@ def flip_small(mask, part, need, target, least, reach, spared, unknown):  # type
     first = np.empty(rows + 1, dtype=np.int32)
     n = 0
     columns = part[2] - part[0]
-    # Filled up with what is not looked for: a run never ends in the filling.
+    # Padded with the other value, so that every run ends before the padding.
     values = np.full((columns + 7) // 8 * 8, 255 - target, dtype=np.uint8)
     words = values.view(np.uint64)
     for i in range(rows):
@@ -97,7 +99,7 @@ def flip_small(mask, part, need, target, least, reach, spared, unknown):  # type
         a = first[i - 1]
         b = first[i]
         while a < first[i] and b < n:
-            if begin[a] < end[b] + reach and begin[b] < end[a] + reach:
+            if begin[a] < end[b] + touch and begin[b] < end[a] + touch:
                 x = _root(parent, a)
                 y = _root(parent, b)
                 parent[max(x, y)] = min(x, y)
@@ -155,14 +157,14 @@ def clear_small(
 
     Args:
         mask: (h, w) uint8, 0 or 255, C-contiguous.
-        least_px: size from which on a patch stays.
+        least_px: least size of a patch that stays.
         connectivity: 4 or 8.
-        zone: part of the mask that is looked at; all of it if None.
+        zone: part of the mask that is searched; all of it if None.
         need: where the result is needed; all of the zone if None.
-        unknown: sides of the zone beyond which patches may go on.
+        unknown: sides of the zone beyond which patches may continue.
 
     Returns:
-        Whether a needed patch's size is not known (it is left).
+        Whether the size of a needed patch is unknown; such a patch stays.
     """
     zone = zone or Region(0, 0, mask.shape[1], mask.shape[0])
     part = occupied(mask, zone)
@@ -170,7 +172,7 @@ def clear_small(
         return False
     return bool(
         flip_small(
-            mask, part, need or zone, np.uint8(255), float(least_px), int(connectivity == 8), 0,
+            mask, part, need or zone, np.uint8(255), float(least_px), connectivity, 0,
             unknown & _shared_sides(zone, part),
         )
     )  # fmt: skip
@@ -195,13 +197,13 @@ def fill_small(
     unknown &= _shared_sides(zone, part)
     return bool(
         flip_small(
-            mask, part, need or zone, np.uint8(0), float(largest_px), 0, EVERY & ~unknown, unknown
+            mask, part, need or zone, np.uint8(0), float(largest_px), 4, EVERY & ~unknown, unknown
         )
     )
 
 
 def occupied(mask: NDArray[np.uint8], zone: Region) -> Region:
-    """Bounding box of what is set in a zone of the mask; without columns if nothing is."""
+    """Bounding box of the set pixels in a zone of the mask; of width 0 if there are none."""
     left, top, width, height = cv2.boundingRect(mask[zone.slices])
     return Region(left, top, left + width, top + height).moved(zone.left, zone.top)
 

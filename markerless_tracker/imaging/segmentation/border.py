@@ -1,9 +1,8 @@
-"""Where the silhouette ends: pixels that the body covers by less than half are not the body's.
+"""Trimming of the silhouette's border: pixels that the body covers by less than half are cleared.
 
-The foreground test asks whether a pixel is anything but background, so that it also takes the
-pixels at the border that the body only touches, and the silhouette is half a pixel too wide. What
-such a pixel shows is a mixture, I = a F + (1 - a) B, of the background B there and the body F
-beside it; a is the part that is covered.
+The foreground test passes for any difference from the background, hence also for border pixels of
+which the body covers a small part, and the silhouette is half a pixel too wide. Such a pixel is a
+mixture, I = a F + (1 - a) B, of its background B and the body F beside it; a is the covered part.
 """
 
 import cv2
@@ -14,22 +13,22 @@ from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.region import Region
 
-# Radius of the window in which the body beside a pixel is looked up, px.
+# Radius of the window from which the colour of the body beside a pixel is taken, px.
 _NEAR_PX = 3
 
 
 @compiled()
 def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, gone):  # type: ignore[no-untyped-def]
-    """Mark pixels of the mask's border that are covered by less than half.
+    """Mark pixels of the mask's border that the body covers by less than half.
 
     Args:
         image: (a, b, c) uint8, a part of an image.
         mean: (c, h, w) float32, the background; gain (c,) brightness relative to it.
-        left, top: where the part begins in the image.
+        left, top: the part's first column and row in the image.
         mask: (a, b) uint8, 0 or 255.
-        inner, deep: (a, b) the mask without its border, and without two layers more.
-        least: squared difference of body and background, grey levels, below which nothing is told.
-        gone: (a, b) uint8, 255 where the mask should end; written.
+        inner, deep: (a, b) the mask without its border, and without two layers.
+        least: least squared difference of body and background; smaller ones are not decided.
+        gone: (a, b) uint8, 255 at pixels to clear; written.
     """
     rows, columns = mask.shape
     channels = image.shape[2]
@@ -56,15 +55,15 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, go
             length = np.float32(0.0)
             for c in range(channels):
                 base = min(gain[c] * mean[c, top + i, left + j], np.float32(255.0))
-                way = body[c] / np.float32(count) - base
-                along += (np.float32(image[i, j, c]) - base) * way
-                length += way * way
+                contrast = body[c] / np.float32(count) - base
+                along += (np.float32(image[i, j, c]) - base) * contrast
+                length += contrast * contrast
             if length >= least and along < np.float32(0.5) * length:
                 gone[i, j] = 255
 
 
-def border_reach(layers: int) -> int:
-    """How far from a pixel `trim_border` looks, px."""
+def border_radius_px(layers: int) -> int:
+    """Radius on which a pixel's result of `trim_border` depends, px."""
     return layers * (_NEAR_PX + 2)
 
 
@@ -78,7 +77,7 @@ def trim_border(
     layers: int,
     least: float,
 ) -> None:
-    """Take pixels covered by less than half from the border of a mask, in place.
+    """Clear pixels of a mask's border that the body covers by less than half, in place.
 
     Args:
         image: (a, b, c) uint8, a part of an image.
@@ -86,8 +85,8 @@ def trim_border(
         gain: (c,) brightness of the image relative to the background's.
         mask: (a, b) uint8, 0 or 255, of the part.
         part: its place in the image.
-        layers: pixels that may go, one after the other.
-        least: difference of body and background, grey levels, below which nothing is told.
+        layers: largest number of border layers to clear, one after the other.
+        least: least difference of body and background, grey levels; smaller ones are not decided.
     """
     gone = np.empty_like(mask)
     for _ in range(layers):

@@ -1,8 +1,8 @@
-"""How much brighter an image is than the background it is compared with, by channel.
+"""Brightness of an image relative to its background, by channel.
 
-Exposure control, flicker and clouds multiply a whole image. The factor is the value that the ratios
-of pixels to their background crowd around: a person or a shadow gives other ratios, but none that
-so many pixels share. It is found anew in every image and remembers nothing.
+Exposure control, flicker and clouds multiply a whole image by a factor. It is the mode of the
+ratios of pixels to their background: a person or a shadow gives other ratios, but in fewer pixels.
+The factor of an image depends on this image alone.
 """
 
 import math
@@ -13,28 +13,28 @@ from numpy.typing import NDArray
 from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 
-# Pixels looked at; a grid over the image.
+# Pixels of the sampling grid.
 _SAMPLES = 6_000
-# Ratios are counted in bins of their logarithm, from 1/4 to 4.
-_REACH = math.log(4.0)
+# Range of the histogram of log ratios: ratios from 1/4 to 4.
+_LOG_RANGE = math.log(4.0)
 _BINS = 1024
-# Width of the crowd in bins: about +-5 %.
-_CROWD = 37
-# Darker pixels are noise, brighter ones may be clipped.
+# Width of the mode in bins: about +-5 %.
+_WINDOW = 37
+# Usable grey levels: darker ones are noise, brighter ones may be clipped.
 _DARK, _BRIGHT = 20.0, 250.0
-# A crowd with less than this share of the samples, or with fewer samples, says nothing.
+# A mode with a smaller fraction of the samples, or with fewer samples, is not used.
 _LEAST_SHARE = 0.2
 _LEAST_SAMPLES = 200
 
 
 @compiled()
-def crowded_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-untyped-def]
+def modal_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-untyped-def]
     """Fill gain (c,) from the pixels where (n, 2) = (v, u) of an image (h, w, c).
 
-    base_logs: (n, c) log of the background there, NaN where it says nothing; value_logs: (256,) log
-    of each grey level, NaN where it says nothing.
+    base_logs: (n, c) log of the background there; value_logs: (256,) log of each grey level; NaN
+    where not usable.
     """
-    per_log = _BINS / (2.0 * _REACH)
+    per_log = _BINS / (2.0 * _LOG_RANGE)
     counts = np.empty(_BINS, dtype=np.int64)
     sums = np.empty(_BINS, dtype=np.float64)
     for c in range(gain.size):
@@ -43,20 +43,20 @@ def crowded_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no
         total = 0
         for i in range(where.shape[0]):
             ratio = value_logs[image[where[i, 0], where[i, 1], c]] - base_logs[i, c]
-            if abs(ratio) < _REACH:  # not for NaN either
-                place = min(int((ratio + _REACH) * per_log), _BINS - 1)
+            if abs(ratio) < _LOG_RANGE:  # not for NaN either
+                place = min(int((ratio + _LOG_RANGE) * per_log), _BINS - 1)
                 counts[place] += 1
                 sums[place] += ratio
                 total += 1
         gain[c] = 1.0
         inside = 0
-        for place in range(_CROWD):
+        for place in range(_WINDOW):
             inside += counts[place]
         most = inside
         first = 0
         equals = 1
-        for place in range(1, _BINS - _CROWD + 1):
-            inside += counts[place + _CROWD - 1] - counts[place - 1]
+        for place in range(1, _BINS - _WINDOW + 1):
+            inside += counts[place + _WINDOW - 1] - counts[place - 1]
             if inside > most:
                 most = inside
                 first = place
@@ -65,23 +65,23 @@ def crowded_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no
                 equals += 1
         if most < max(_LEAST_SAMPLES, _LEAST_SHARE * total):
             continue
-        # Of equal crowds the middle one: a flat top has no bias then.
+        # The middle one of equal maxima: a flat maximum then causes no bias.
         inside = most
         place = first
         seen = 1
         while seen <= equals // 2:
-            inside += counts[place + _CROWD] - counts[place]
+            inside += counts[place + _WINDOW] - counts[place]
             place += 1
             if inside == most:
                 seen += 1
         middle = 0.0
-        for k in range(place, place + _CROWD):
+        for k in range(place, place + _WINDOW):
             middle += sums[k]
         gain[c] = math.exp(middle / most)
 
 
 class ExposureMeter:
-    """Compares images with one background.
+    """Measures the brightness of images relative to one background.
 
     Args:
         mean: (h, w, c) float32, the background.
@@ -97,9 +97,9 @@ class ExposureMeter:
         self._channels = channels
 
     def gain(self, image: Image) -> NDArray[np.float32]:
-        """(c,) float32: brightness of an image (h, w, c) uint8; 1 where it cannot tell."""
+        """(c,) float32: relative brightness of an image (h, w, c) uint8; 1 if it has no mode."""
         gain = np.empty(self._channels, dtype=np.float32)
-        crowded_ratio(image, self._where, self._base_logs, self._value_logs, gain)
+        modal_ratio(image, self._where, self._base_logs, self._value_logs, gain)
         return gain
 
 
@@ -109,7 +109,7 @@ def _logs(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def exposure_gain(image: Image, mean: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Brightness of the image relative to the background's, (c,) float32; 1 where it cannot tell.
+    """Brightness of the image relative to the background's, (c,) float32; 1 if it has no mode.
 
     Args:
         image: (h, w, c) uint8.

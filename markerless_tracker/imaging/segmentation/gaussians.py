@@ -13,12 +13,12 @@ from markerless_tracker.imaging.images import Image, grey_of
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.settings import ImagingSettings
 
-# Largest difference of a background's channels, grey levels, that a grey camera still has.
+# Largest difference between the channels of a grey camera's background, grey levels.
 _GREY_TOLERANCE = 0.5
 _LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
 # Window of the Gaussian blur that noisy images get.
 _SMOOTH_PX = (5, 5)
-# Mean of a mode that a pixel lacks: no value is near it, or a shadow of it.
+# Mean of a mode that a pixel lacks: no value is near it or in its shadow.
 _NOWHERE = np.float32(-1e6)
 
 

@@ -1,8 +1,7 @@
-"""The compiled pass over an image: foreground test and shadow test in one, no allocation.
+"""Compiled foreground and shadow test of an image, in one pass.
 
-Plain loops that release the interpreter lock, so that cameras can be segmented in threads of the
-caller. Not `parallel=True`: numba's own threads must not be entered by two callers at once.
-All in one file: numba's cache does not notice changes in functions inlined from another.
+The loops release the interpreter lock, so that the caller's threads can segment several cameras at
+once. They are not `parallel=True`: numba's own threads allow one caller at a time.
 """
 
 import numpy as np
@@ -13,16 +12,17 @@ from markerless_tracker.compiled import compiled
 FOREGROUND = 255
 SHADOW = 127
 LEVELS = 256
-"""Steps of one grey level in `coarse` means."""
+"""Integer steps per grey level of the means in `coarse`."""
 
 
 def coarse(
     mean: NDArray[np.float32], scale: NDArray[np.float32]
 ) -> tuple[NDArray[np.uint16], np.float32]:
-    """Means and scales (c, h, w) as whole numbers (2, c, h, w), and the number of steps of scale 1.
+    """Means and scales (c, h, w) as integers (2, c, h, w), and the number of steps of scale 1.
 
-    Half the memory: reading the background is what the pass over an image waits for. Means are off
-    by 1/512 grey level at most, scales by less than a thousandth if none is 60 times another.
+    Integers of 16 bits halve the memory traffic, which limits the pass over an image. The error of
+    means is at most 1/512 grey level, that of scales below a thousandth if none is 60 times
+    another.
     """
     unit = np.float32(65535.0 / max(float(scale.max()), 1e-9))
     steps = np.stack([np.clip(mean, 0.0, 255.0) * np.float32(LEVELS), scale * unit])
@@ -57,18 +57,18 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
     mean_saturation = mean_chroma / mean_value if mean_value > np.float32(0.0) else np.float32(0.0)
     if saturation - mean_saturation > rule[2]:
         return False
-    # In the dark hue is noise: it is compared where the shadowed background would have colour.
+    # Hue of dark pixels is noise: it is compared where the shadowed background would have colour.
     if mean_chroma * value < rule[4] * mean_value:
         return True
     if chroma <= np.float32(0.0) or mean_chroma <= np.float32(0.0):
         return chroma == mean_chroma
-    turn = abs(
+    difference = abs(
         hue_deg(b, g, r, value, chroma) - hue_deg(mean_b, mean_g, mean_r, mean_value, mean_chroma)
     )
-    return min(turn, np.float32(360.0) - turn) <= rule[3]
+    return min(difference, np.float32(360.0) - difference) <= rule[3]
 
 
-# Loops over one row with few arrays each: what the compiler turns into vector instructions.
+# Loops over one row with few arrays each, which the compiler vectorises.
 @compiled()
 def _split_row(pixel, blue, green, red):  # type: ignore[no-untyped-def]
     for j in range(blue.size):
@@ -81,7 +81,7 @@ def _split_row(pixel, blue, green, red):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _add_square(value, mean, scale, gain, distance):  # type: ignore[no-untyped-def]
-    """Add ((value - gain mean) scale)^2 of one row; mean and scale in whole numbers."""
+    """Add ((value - gain mean) scale)^2 of one row; mean and scale are integers."""
     white = np.float32(255.0)
     for j in range(distance.size):
         x = (np.float32(value[j]) - min(gain * np.float32(mean[j]), white)) * np.float32(scale[j])
@@ -102,12 +102,12 @@ def label_colour(image, first, unit, mean, scale, gain, rule, left, top, labels)
 
     Args:
         image: (a, b, 3) uint8, BGR: the part alone.
-        first, unit: the first Gaussians of `coarse`, from which most pixels are told.
+        first, unit: the first Gaussians, of `coarse`; most pixels are decided by them.
         mean: (k, 3, h, w) float32, grey levels, of the k Gaussians of each pixel.
         scale: (k, 3, h, w) float32, 1 / (sigma * sqrt(limit)): the foreground test is |.|^2 > 1.
         gain: (3,) float32, brightness of the image relative to the background's.
         rule: of `shadow.shadow_rule`.
-        left, top: where the part begins in the image.
+        left, top: the part's first column and row in the image.
         labels: (a, b) uint8, written.
     """
     one = np.float32(1.0)
@@ -117,13 +117,13 @@ def label_colour(image, first, unit, mean, scale, gain, rule, left, top, labels)
     rows, columns = labels.shape
     gain_b, gain_g, gain_r = gain[0], gain[1], gain[2]
     distance = np.empty(columns, dtype=np.float32)
-    # Eight pixels are passed over at a time where all are background.
+    # Groups of eight background pixels are skipped at once.
     marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
     words = marks.view(np.uint64)
     split = np.empty((3, columns), dtype=np.uint8)
     for i in range(rows):
         v = top + i
-        # Whole rows first, without a branch: most pixels are background of the first Gaussian.
+        # First whole rows without branches: most pixels are background of the first Gaussian.
         _split_row(image[i].ravel(), split[0], split[1], split[2])
         distance[:] = 0.0
         for c in range(3):
@@ -164,7 +164,7 @@ def label_colour(image, first, unit, mean, scale, gain, rule, left, top, labels)
 def label_grey(image, first, unit, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
     """As `label_colour` with one channel: image (a, b), mean and scale (k, 1, h, w), gain (1,).
 
-    The ratio of brightness alone tells a shadow.
+    The ratio of brightness alone decides on shadow.
     """
     one = np.float32(1.0)
     level = np.float32(1.0 / LEVELS)
@@ -173,7 +173,7 @@ def label_grey(image, first, unit, mean, scale, gain, rule, left, top, labels): 
     rows, columns = labels.shape
     gain_v = gain[0]
     distance = np.empty(columns, dtype=np.float32)
-    # Eight pixels are passed over at a time where all are background.
+    # Groups of eight background pixels are skipped at once.
     marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
     words = marks.view(np.uint64)
     for i in range(rows):

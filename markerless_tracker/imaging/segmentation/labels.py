@@ -1,4 +1,4 @@
-"""What each pixel of an image shows: background, the background in shadow, or foreground."""
+"""Label of each pixel of an image: background, background in shadow, or foreground."""
 
 import cv2
 import numpy as np
@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 from markerless_tracker.imaging.background.adapt import Adaptation
 from markerless_tracker.imaging.background.model import BackgroundModel
 from markerless_tracker.imaging.images import Image, grey_of
+from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation import kernels
 from markerless_tracker.imaging.segmentation.blobs import occupied
 from markerless_tracker.imaging.segmentation.exposure import ExposureMeter
 from markerless_tracker.imaging.segmentation.gaussians import BackgroundGaussians
-from markerless_tracker.imaging.segmentation.morphology import Mask
 from markerless_tracker.imaging.segmentation.shadow import shadow_rule
-from markerless_tracker.imaging.segmentation.texture import correct_labels, texture_reach
+from markerless_tracker.imaging.segmentation.texture import correct_labels, correction_radius_px
 from markerless_tracker.imaging.settings import ImagingSettings
 
 WEAK_RADIUS_PX = 3
@@ -28,7 +28,7 @@ _SOLID = np.ones((3, 3), dtype=np.uint8)
 class PixelLabeller:
     """Labels pixels of one camera's images: 0 background, 127 shadow, 255 foreground.
 
-    A pixel's label depends on the colours near it, never on the shape of what it belongs to.
+    A pixel's label depends on colours near it, not on the size or shape of patches.
 
     Args:
         camera: the camera's name.
@@ -64,7 +64,7 @@ class PixelLabeller:
         self._memory = np.empty(height * width, dtype=np.uint8)
 
     def reset(self) -> None:
-        """Back to the background that was given; what was learned since is forgotten."""
+        """Return to the initial background."""
         if self._adaptation is not None:
             self._adaptation.reset()
             self.background.reset()
@@ -81,7 +81,7 @@ class PixelLabeller:
 
         Args:
             image: the whole image.
-            window: what is labelled.
+            window: the labelled region.
             corrected: inside the window; texture corrects labels here alone.
         """
         part = self.background.pixels(image, window)
@@ -129,14 +129,14 @@ class PixelLabeller:
         options, is_grey = self._settings, self.background.is_grey
         part, looked_at = window, labels
         if not is_grey:
-            # Specks are not worth the look.
+            # Specks are removed later: their texture is not tested.
             solid = cv2.threshold(labels, kernels.SHADOW, 255, cv2.THRESH_BINARY)[1]
             cv2.morphologyEx(solid, cv2.MORPH_OPEN, _SOLID, dst=solid)
             looked_at = np.asarray(cv2.dilate(solid, _SOLID), dtype=np.uint8)
             part = occupied(looked_at, corrected.within(window)).moved(window.left, window.top)
         if part.width <= 0:
             return
-        seen = part.grown(texture_reach(options.texture.radius_px), self.background.size_px)
+        seen = part.grown(correction_radius_px(options.texture.radius_px), self.background.size_px)
         correct_labels(
             grey_of(self.background.pixels(image, seen)),
             self.background.grey_mean,
@@ -158,7 +158,7 @@ class PixelLabeller:
 
         Args:
             image: the whole image.
-            mask: (h, w) its silhouette; None: of a part alone, from which nothing is learned.
+            mask: (h, w) its silhouette; None if only a part was segmented: nothing is learned.
             stamp_ns: capture time.
         """
         if self._adaptation is None:

@@ -1,21 +1,21 @@
-"""The silhouette's contour moved to where the colours beside it change."""
+"""Localised active contour: the silhouette's contour moves to the local change of colour."""
 
 import cv2
 import numpy as np
 
 from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.images import Image
-from markerless_tracker.imaging.segmentation.morphology import Mask
+from markerless_tracker.imaging.masks import Mask
 
-# Window in which the contour is kept smooth, px.
+# Window of the smoothing force, px.
 _SMOOTH_PX = 5
-# Sum of both forces from which on a pixel changes sides: less is noise.
+# Least sum of both forces for which a pixel changes sides.
 _LEAST_FORCE = np.float32(0.2)
 
 
 @kernel
 def move_contour(image, total, inside, size, count, smooth, mask, band, least, out):  # type: ignore[no-untyped-def]
-    """One step of the contour: pixels on either side of it that belong to the other change over.
+    """One step of the contour: pixels beside it that fit the other side better change sides.
 
     Args:
         image: (a, b, c) uint8.
@@ -24,8 +24,8 @@ def move_contour(image, total, inside, size, count, smooth, mask, band, least, o
         size, count: (a, b) int32, pixels of the window, and those in the mask.
         smooth: (a, b) int32, pixels in the mask of a small window.
         mask: (a, b) uint8, 0 or 1.
-        band: (a, b) uint8, 0 where nothing may change.
-        least: squared difference of both sides' means, grey levels, below which nothing is told.
+        band: (a, b) uint8, 0 where no pixel may change.
+        least: least squared difference of both sides' means; below it the contour stays.
         out: (a, b) uint8, the new mask; written.
     """
     rows, columns = mask.shape
@@ -62,8 +62,8 @@ def move_contour(image, total, inside, size, count, smooth, mask, band, least, o
                 out[i, j] = 1
 
 
-def level_set_reach(iterations: int, radius_px: int) -> int:
-    """How far from a pixel `refine_contour` looks, px."""
+def refinement_radius_px(iterations: int, radius_px: int) -> int:
+    """Radius on which a pixel's result of `refine_contour` depends, px."""
     return iterations * (radius_px + 1)
 
 
@@ -74,24 +74,24 @@ def refine_contour(
 
     Localised region-based active contour with the uniform modelling energy: Lankton & Tannenbaum
     (2008), "Localizing region-based active contours", Eq 12 and 13. At each point of the contour
-    the image nearby, inside and outside, has the means u and v; the point moves so that its colour
-    is with the nearer mean, against a force that keeps the contour smooth. Unlike in the paper:
+    the local image has the means u inside and v outside. The point moves to the side whose mean is
+    nearer to its colour; a second force keeps the contour smooth. Differences from the paper:
 
-    - the contour runs between pixels, a step is one pixel: the level set function is the sign
-      alone, which needs neither its gradient nor its reinitialisation;
+    - the contour runs between pixels in steps of a pixel: the level set function is its sign alone,
+      without gradient and reinitialisation;
     - the force is (u - v)(2 I - u - v) of the point's own colour I, over all channels, relative to
       the contrast (u - v)^2; the paper sums it along the contour in the ball;
     - smoothness is the part of a 5x5 window that the mask fills, not the curvature;
     - the ball is a square, since sums over squares cost the same for every radius;
-    - where the contrast is below `least` the contour stays, and it never goes further from where it
-      began than it has iterations: the foreground test knows more than colours nearby do.
+    - the contour stays where the contrast is below `least`, and moves by at most one pixel per
+      iteration from its origin: the foreground test has more information than local colours.
 
     Args:
         image: (h, w, c) uint8.
         mask: (h, w) uint8, 0 or 255.
         iterations: steps of a pixel.
         radius_px: half the side of the square.
-        least: difference of both sides' means, grey levels, below which nothing is told.
+        least: least difference of both sides' means, grey levels.
     """
     side = 2 * radius_px + 1
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
@@ -113,7 +113,7 @@ def refine_contour(
 
 
 def _sums(values: Mask, side: int) -> np.ndarray[tuple[int, ...], np.dtype[np.int32]]:
-    """Sums (h, w) or (h, w, c) over squares, exact; beyond the image there is nothing."""
+    """Exact sums (h, w) or (h, w, c) over squares; zero beyond the image."""
     sums = cv2.boxFilter(
         values, cv2.CV_32S, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT
     )

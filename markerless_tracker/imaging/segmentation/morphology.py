@@ -1,30 +1,22 @@
-"""Small repairs of a silhouette: specks, cracks, holes and blobs."""
+"""Morphology of silhouettes: specks, cracks, holes and blobs."""
 
 import math
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from markerless_tracker.imaging.masks import Mask, disc
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_small
 from markerless_tracker.imaging.segmentation.kernels import SHADOW
 from markerless_tracker.imaging.settings import ImagingSettings
 
-Mask = NDArray[np.uint8]
-
-# From this size of the images on, lengths set in pixels are meant as they are.
+# In images of at least this size, lengths in pixels are used unscaled.
 _FULL_FRAME_PX = 640 * 480
 
 
-def disc(side_px: int) -> Mask:
-    """A round structuring element of that side."""
-    shape = cv2.MORPH_ELLIPSE if side_px > 3 else cv2.MORPH_CROSS
-    return np.asarray(cv2.getStructuringElement(shape, (side_px, side_px)), dtype=np.uint8)
-
-
-def patch_reach(settings: ImagingSettings, *, grey: bool) -> int:
-    """How far from a pixel `shadow_patches` looks, px, but for the size of its patch."""
+def opening_radius_px(settings: ImagingSettings, *, grey: bool) -> int:
+    """Radius on which `shadow_patches` depends, px, apart from the size of patches."""
     return 2 if grey or settings.shadow.undecided else 0
 
 
@@ -38,18 +30,18 @@ def shadow_patches(
     need: Region | None = None,
     unknown: int = 0,
 ) -> bool:
-    """The patches of pixels labelled shadow that are large enough to be shadows.
+    """Find the patches of pixels labelled shadow that are large enough to be shadows.
 
     Args:
         labels: (h, w) uint8: 0 background, 127 shadow, 255 foreground.
         shadow: (h, w) uint8, written: 0 or 255.
-        least_px: smaller patches (4-connected) are none; all are none up to 1 with shadows off.
-        opened: take away what is thinner than 3 px first: pixels that the person covers in part
-            are darker than a bright background, too.
+        least_px: smaller patches (4-connected) are cleared; none are if it is 1 or less.
+        opened: whether to open the patches first, by 3 px: pixels that the person covers in part
+            are darker than a bright background as well.
         zone, need, unknown: as `blobs.clear_small` takes them.
 
     Returns:
-        Whether a needed patch's size is not known.
+        Whether the size of a needed patch is unknown.
     """
     cv2.inRange(labels, (SHADOW,), (SHADOW,), dst=shadow)
     if opened:
@@ -87,8 +79,8 @@ def closing_px(settings: ImagingSettings, frame_px: int) -> int:
     return 2 * round((side - 1.0) / 2.0) + 1 if side > 1.0 else 1
 
 
-def repair_reach(settings: ImagingSettings, frame_px: int) -> int:
-    """How far from a pixel opening and closing look, px."""
+def repair_radius_px(settings: ImagingSettings, frame_px: int) -> int:
+    """Radius on which a pixel depends through opening and closing, px."""
     return 2 * (settings.mask.open_px // 2) + 2 * (closing_px(settings, frame_px) // 2)
 
 

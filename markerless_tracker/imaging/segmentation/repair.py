@@ -4,16 +4,13 @@ import cv2
 import numpy as np
 
 from markerless_tracker.imaging.images import Image
+from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_small, occupied
 from markerless_tracker.imaging.segmentation.border import trim_border
 from markerless_tracker.imaging.segmentation.labels import PixelLabeller
 from markerless_tracker.imaging.segmentation.level_set import refine_contour
-from markerless_tracker.imaging.segmentation.morphology import (
-    Mask,
-    open_and_close,
-    shadow_patches,
-)
+from markerless_tracker.imaging.segmentation.morphology import open_and_close, shadow_patches
 from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
 
@@ -31,21 +28,21 @@ def repair_mask(
     grey: bool,
     least_shadow_px: float,
 ) -> bool:
-    """Fill a mask from labels, without what is too small to be a shadow, a person or a hole.
+    """Fill a mask from labels; small shadow patches, blobs and holes are removed.
 
     With three classes the mask holds shadows, too.
 
     Args:
         labels: (h, w) uint8 of `zones.window`: 0 background, 127 shadow, 255 foreground.
-        mask: (h, w) uint8, written: 0 or 255; right within `zones.zone` alone.
+        mask: (h, w) uint8, written: 0 or 255; correct within `zones.zone` alone.
         shadow: (h, w) uint8, written: 0 or 255, patches of shadow.
         zones: where the labels lie in the image, and where the mask is needed.
-        settings: those beginning with ``mask_``.
+        settings: the group `mask`.
         grey: whether the camera is a grey one.
         least_shadow_px: smaller patches of shadow become foreground.
 
     Returns:
-        False if a patch that matters goes on outside the zone and may be larger than is seen.
+        False if the size of a needed patch is unknown, as it may continue outside the zone.
     """
     frame_px, window = zones.frame_px, zones.window
     opened = settings.shadow.undecided or (grey and least_shadow_px > 1.0)
@@ -58,7 +55,7 @@ def repair_mask(
     cv2.threshold(labels, 0, 255, cv2.THRESH_BINARY, dst=mask)
     if not settings.shadow.undecided:
         cv2.subtract(mask, shadow, dst=mask)
-    # Outside of `zone_before_repair` the mask is wrong, but opening and closing look no further.
+    # Outside of `zone_before_repair` the mask is wrong; opening and closing do not depend on that.
     open_and_close(mask, settings, frame_px)
     zone, need, unknown = zones.zone.within(window), zones.patches.within(window), zones.open_sides
     least, largest = settings.mask.blob_share * frame_px, settings.mask.hole_share * frame_px
@@ -74,10 +71,10 @@ def fit_border(
 
     Args:
         image: the whole image.
-        mask: (h, w) uint8 of `zones.window`, 0 or 255; right within `zones.zone`.
+        mask: (h, w) uint8 of `zones.window`, 0 or 255; correct within `zones.zone`.
         zones: as in `repair_mask`.
         labeller: what labelled this image.
-        settings: `mask.trim_px` and those beginning with ``level_set_``.
+        settings: `mask.trim_px` and the group `level_set`.
     """
     zone = zones.zone.within(zones.window)
     _trim(image, mask, zone, zones.window, labeller, settings.mask.trim_px)
@@ -91,7 +88,7 @@ def _trim(
     body = occupied(mask, zone)
     if layers == 0 or body.width <= 0:
         return
-    # One pixel more, so that the body ends inside; but it goes on beyond the image.
+    # One pixel more, so that the body ends inside the box, except at the image's border.
     box = body.grown(1, (mask.shape[1], mask.shape[0]))
     part = np.ascontiguousarray(mask[box.slices])
     place = box.moved(window.left, window.top)

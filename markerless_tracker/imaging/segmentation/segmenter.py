@@ -4,17 +4,18 @@ import numpy as np
 
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging.background.model import BackgroundModel
-from markerless_tracker.imaging.edges import edge_map, edge_reach
+from markerless_tracker.imaging.edges import edge_map, edge_radius_px
 from markerless_tracker.imaging.images import Image, check_image
+from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.labels import PixelLabeller
-from markerless_tracker.imaging.segmentation.morphology import Mask, split_undecided
+from markerless_tracker.imaging.segmentation.morphology import split_undecided
 from markerless_tracker.imaging.segmentation.repair import fit_border, repair_mask
 from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.records import Observation
 
-# How much more than needed is labelled, at first, for patches that go on there.
+# Margin that is labelled at first beyond the needed region, for patches that continue there.
 _SLACK_PX = 8
 
 
@@ -40,7 +41,7 @@ class Segmenter:
         settings: ImagingSettings | None = None,
     ) -> None:
         if background is None:
-            raise ImageError(f"{camera}: no background came, expected one to tell the person from")
+            raise ImageError(f"{camera}: no background came, expected one to compare images with")
         self.camera = camera
         self.background = background
         self.settings = settings or ImagingSettings()
@@ -59,7 +60,7 @@ class Segmenter:
         return tuple(float(value) for value in self._labeller.gain)
 
     def reset(self) -> None:
-        """Back to the background that was given; what was learned since is forgotten."""
+        """Return to the initial background."""
         self._labeller.reset()
 
     def mask(self, image: Image, region: Region | None = None) -> Mask:
@@ -85,7 +86,7 @@ class Segmenter:
         return mask[inside], None if undecided is None else undecided[inside]
 
     def labels(self, image: Image) -> Mask:
-        """(h, w) uint8: 0 background, 127 shadow, 255 foreground, before any repair; to look at.
+        """(h, w) uint8: 0 background, 127 shadow, 255 foreground, before any repair; for display.
 
         Raises:
             ImageError: not an image of the background's size and channels; names the camera.
@@ -104,11 +105,11 @@ class Segmenter:
         Args:
             image: (h, w, 3) BGR or (h, w) grey, uint8, of the background's size and channels.
             stamp_ns: capture time, goes into the observation.
-            region: the part of the image to work in; all of it if None. The background follows
-                only where the whole frame is looked at.
+            region: the part of the image to segment; all of it if None. The background follows only
+                images that are segmented whole.
 
         Raises:
-            ImageError: another kind of image came, or a region outside it; names the camera.
+            ImageError: another size or other channels, or a region outside; names the camera.
         """
         self._check(image)
         region = region or self._whole
@@ -117,7 +118,7 @@ class Segmenter:
                 f"{self.camera}: got a region of {tuple(region)}, expected one inside the image of "
                 f"{self._size_px[0]}x{self._size_px[1]} px"
             )
-        mask, undecided, zone = self._silhouette(image, region, edge_reach(self.settings))
+        mask, undecided, zone = self._silhouette(image, region, edge_radius_px(self.settings))
         inside = region.within(zone).slices
         either = mask if undecided is None else mask | undecided
         edges = edge_map(image[zone.slices], either, self.settings)[inside]
@@ -143,15 +144,15 @@ class Segmenter:
             )
 
     def _silhouette(
-        self, image: Image, region: Region, reach: int
+        self, image: Image, region: Region, radius_px: int
     ) -> tuple[Mask, Mask | None, Region]:
-        """Person and undecided of a zone that holds the region and `reach` px around, and the zone.
+        """Person and undecided of a zone that contains the region and `radius_px` px around it.
 
-        What is decided by the size of a patch needs all of the patch: more is labelled until no
-        patch that is needed and may be too small goes on outside.
+        Decisions by the size of a patch need the whole patch: the margin grows until no needed
+        patch of unknown size continues outside.
         """
         self._labeller.measure_exposure(image)
-        need = region.grown(reach, self._size_px)
+        need = region.grown(radius_px, self._size_px)
         slack = _SLACK_PX
         while True:
             found = self._try_silhouette(image, need, slack)
@@ -162,7 +163,7 @@ class Segmenter:
     def _try_silhouette(
         self, image: Image, need: Region, slack: int
     ) -> tuple[Mask, Mask | None, Region] | None:
-        """`_silhouette` with so much more around what is needed; None if that is too little."""
+        """As `_silhouette`, with a margin of `slack` px; None if that is too small."""
         zones = Zones.around(need, slack, self._size_px, self.settings, grey=self._grey)
         window = zones.window
         labels = self._labeller.label(image, window, zones.zone_before_repair)

@@ -1,10 +1,10 @@
-"""What a patch's texture tells about it: a shadow keeps the floor's pattern, a body hides it.
+"""Texture test: a shadow keeps the background's pattern, a body hides it.
 
-Brightness alone cannot tell a hard shadow from dark trousers, nor grey clothes from a grey wall as
-bright as they are. In a small window, image I and background B are compared by
-e^2 = var(I - p B) with p = mean(I) / mean(B): that of the sensor's noise where the window shows
-the background in any light, and larger by p^2 var(B) where something covers it. A window says
-something only where p^2 var(B), the pattern, stands out from the noise.
+Brightness alone does not separate a hard shadow from dark trousers, nor grey clothes from a grey
+wall of the same brightness. In a small window, image I and background B are compared by
+e^2 = var(I - p B) with the light p = mean(I) / mean(B). Where the window shows the background in
+any light, e^2 is the variance of the sensor's noise; where something covers the background it is
+larger by p^2 var(B), the pattern. A window is decided only if its pattern exceeds the noise.
 """
 
 import cv2
@@ -15,24 +15,23 @@ from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.region import Region
 
-# The pattern's variance, in those of the noise, from which on a window can show that the pattern is
-# there, and from which on that it is hidden.
-SURE, TOLD = 6.0, 6.0
-# What is left of the pattern's variance after it is taken away: less is the same, more is other.
+SHOWN_LEAST, HIDDEN_LEAST = 6.0, 6.0
+"""Least variance of the pattern, relative to the noise's, to decide that it is shown, or hidden."""
 SAME, OTHER = 0.15, 0.85
-# Windows without a pattern: this plus their light.
+"""e^2 minus noise variance, relative to the pattern: below SAME shown, above OTHER hidden."""
 UNKNOWN = 100.0
-# Change of light from one pixel to the next that may be the same shadow, and how far windows
-# without a pattern take it over along a row and then along a column, px.
+"""Added to the light of windows without a pattern."""
 STEP = 0.006
+"""Largest change of light between neighbouring pixels of one shadow."""
 SPREAD_PX = 24
-# Largest radius of a window.
+"""Distance over which windows without a pattern take over light, along rows, then along columns."""
 MOST_RADIUS = 6
-# Deviations of the noise within which a pixel agrees with a window's light.
+"""Largest radius of a window, px."""
+# Standard deviations of the noise within which a pixel agrees with a window's light.
 _AGREE = 3.5
 
 
-# Loops over one row with few arrays each: what the compiler turns into vector instructions.
+# Loops over one row with few arrays each, which the compiler vectorises.
 @compiled()
 def _slide(total, came, gone):  # type: ignore[no-untyped-def]
     for j in range(came.size):
@@ -63,13 +62,13 @@ def _sum_across(part, side, total):  # type: ignore[no-untyped-def]
             total[j] += one[j] + other[j]
 
 
-# Division as in NumPy: a test for zero would be a branch in the loop.
+# NumPy's error model: a test for division by zero would be a branch in the loop.
 @compiled(error_model="numpy")
 def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[no-untyped-def]
     for j in range(out.size):
         n = down * across[j]
         share = np.float32(1.0) / np.float32(n)
-        # n times sums of squares fits 31 bits up to a radius of `MOST_RADIUS`.
+        # n times a sum of squares fits into 31 bits up to a radius of `MOST_RADIUS`.
         var_a = np.float32(n * aa[j] - a[j] * a[j]) * share * share
         cov = np.float32(n * ab[j] - a[j] * b[j]) * share * share
         var_b = np.float32(n * bb[j] - b[j] * b[j]) * share * share
@@ -77,9 +76,11 @@ def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[
         pattern = p * p * var_b
         rest = var_a - np.float32(2.0) * p * cov + pattern - noise
         found = np.float32(UNKNOWN) + p if rest < noise else np.float32(0.0)
-        hidden = (pattern >= np.float32(TOLD) * noise) & (rest > np.float32(OTHER) * pattern)
+        hidden = (pattern >= np.float32(HIDDEN_LEAST) * noise) & (
+            rest > np.float32(OTHER) * pattern
+        )
         found = np.float32(-1.0) if hidden else found
-        shown = (pattern >= np.float32(SURE) * noise) & (rest < np.float32(SAME) * pattern)
+        shown = (pattern >= np.float32(SHOWN_LEAST) * noise) & (rest < np.float32(SAME) * pattern)
         found = p if shown else found
         out[j] = found if (a[j] > 0) & (b[j] > 0) else np.float32(0.0)
 
@@ -94,26 +95,33 @@ def _whole_levels(image, mean, gain, a, b):  # type: ignore[no-untyped-def]
 
 @compiled()
 def window_light(image, mean, gain, noise, radius, left, top, light):  # type: ignore[no-untyped-def]
-    """Light of the windows on a part of an image: p > 0 where they show the background in light p.
+    """Light of the windows around the pixels of a part of an image.
 
-    image (a, b) uint8, the part alone; mean (h, w) float32, the part begins at (left, top) of it;
-    gain, noise (variance) of the image; light (a, b) float32: p; -1 where something else covers the
-    background; UNKNOWN + p where there is no pattern; 0 where the window says nothing. Windows end
-    at the part's border.
+    Windows end at the part's border.
+
+    Args:
+        image: (a, b) uint8, the part alone.
+        mean: (h, w) float32, the background; the part begins at (left, top) of it.
+        gain, noise: brightness relative to the background's, and variance of the noise.
+        radius: of the windows, px.
+        left, top: the part's first column and row in the image.
+        light: (a, b) float32, written: p > 0 where the window shows the background in the light p;
+            -1 where something covers the background; UNKNOWN + p where there is no pattern; 0 if
+            undecided.
     """
     rows, columns = light.shape
     side = 2 * radius + 1
-    # Column sums of whole numbers, the same whatever the order, with room for windows at the sides.
+    # Column sums of integers (exact in any order), with room for windows at the sides.
     sums = np.zeros((5, columns + 2 * radius), dtype=np.int32)
     window = np.empty((5, columns), dtype=np.int32)
-    # The rows of the window, in turns; rows beyond the part are 0.
+    # Ring buffer of the window's rows; rows beyond the part are 0.
     grey = np.zeros((side + 1, columns), dtype=np.int32)
     base = np.zeros((side + 1, columns), dtype=np.int32)
     across = np.empty(columns, dtype=np.int32)
     for j in range(columns):
         across[j] = min(j + radius, columns - 1) - max(j - radius, 0) + 1
     for v in range(rows + radius):
-        # The row that leaves the window lies just after the one that comes.
+        # In the ring, the row that leaves the window follows the one that enters.
         came = v % (side + 1)
         gone = (v + 1) % (side + 1)
         a, b = grey[came], base[came]
@@ -141,7 +149,7 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
 
 @compiled()
 def _spread_run(row, start, stop, step, out):  # type: ignore[no-untyped-def]
-    """Along a row of light from a window on, windows without a pattern take over its light."""
+    """Windows without a pattern take over light along a run of a row, from the window at start."""
     near = row[start]
     j = start + step
     taken = 0
@@ -157,10 +165,10 @@ def _spread_run(row, start, stop, step, out):  # type: ignore[no-untyped-def]
 
 @compiled()
 def spread_light(light, spread):  # type: ignore[no-untyped-def]
-    """Let plain windows take part in the light next to them if theirs is the same.
+    """Windows without a pattern take over the light of windows next to them if theirs is similar.
 
-    First along rows, then along columns, `SPREAD_PX` each: whatever part of an image is looked at,
-    what lies further away has no influence. light (a, b) is changed; spread (a, b) is written.
+    First along rows, then along columns, `SPREAD_PX` each, so that a result depends on a bounded
+    neighbourhood. light (a, b) is changed; spread (a, b) is written.
     """
     rows, columns = light.shape
     spread[:] = light
@@ -181,16 +189,16 @@ def spread_light(light, spread):  # type: ignore[no-untyped-def]
     light[:] = spread
     nears = np.zeros(columns, dtype=np.float32)
     steps_of = np.zeros(columns, dtype=np.int32)
-    for turn in range(2):
+    for upward in range(2):
         nears[:] = 0.0
         for k in range(rows):
-            i = k if turn == 0 else rows - 1 - k
+            i = k if upward == 0 else rows - 1 - k
             _spread_row(light[i], nears, steps_of, spread[i])
 
 
 @compiled()
 def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
-    """One row of light takes over what comes from the row before; as `_spread_run`, branchless."""
+    """A row of light takes over light from the row before; as `_spread_run`, without branches."""
     for j in range(row.size):
         p = row[j]
         own = p - np.float32(UNKNOWN)
@@ -205,7 +213,7 @@ def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
 
 @compiled()
 def lit(light, least, most, valid):  # type: ignore[no-untyped-def]
-    """Drop light that is not between least and most; valid (a, b) uint8 is 1 where any is left."""
+    """Set light outside of [least, most] to 0 or less; valid (a, b) uint8 is 1 inside."""
     for i in range(light.shape[0]):
         row = light[i]
         out = valid[i]
@@ -223,18 +231,18 @@ def apply_light(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Correct labels by the light of the windows around each pixel, in place.
 
-    A pixel that agrees with the light of any valid window that holds it is background, or shadow
-    if it was not background before. Else, if its own window is covered, with ``protect`` shadow
-    becomes foreground, and with ``reveal`` background too.
+    A pixel that agrees with the light of any valid window around it is background, or shadow if its
+    label was not background. Otherwise, if its own window is covered, shadow becomes foreground
+    with ``protect``, and background becomes foreground with ``reveal`` as well.
 
     Args:
         image, mean, gain, left, top, light: as in `window_light`; light is 0 where not valid,
             below 0 where covered.
-        agree: grey levels within which a pixel agrees.
+        agree: largest difference with which a pixel agrees, grey levels.
         near_valid: (a, b), not 0 where a window within the radius is valid.
         part: (left, top, right, bottom) of the light's array to correct.
         corner: column and row of the labels' array where that array begins.
-        looked_at: (c, d) labels that are not background are corrected only where this is not 0.
+        looked_at: (c, d) shadow and foreground are corrected only where this is not 0.
         labels: (c, d).
     """
     rows, columns = light.shape
@@ -267,8 +275,8 @@ def apply_light(  # type: ignore[no-untyped-def]
                 labels[y, x] = 255
 
 
-def texture_reach(radius: int) -> int:
-    """How far from a pixel its correction looks, px."""
+def correction_radius_px(radius: int) -> int:
+    """Radius on which the correction of a pixel depends, px."""
     return SPREAD_PX + 2 * radius
 
 
@@ -288,18 +296,19 @@ def correct_labels(
     protect: bool,
     reveal: bool,
 ) -> None:
-    """Correct labels of `kernels` by texture, in place.
+    """Correct labels by texture, in place.
 
     Args:
-        grey: what is seen of the image, (c, d) uint8.
+        grey: (c, d) uint8, the seen part of the image.
         mean: (h, w) grey background of the whole image.
         gain: brightness of the image relative to the background's.
-        sigma: the sensor's noise, grey levels.
+        sigma: standard deviation of the sensor's noise, grey levels.
         labels: (a, b) of a window: 0 background, 127 shadow, 255 foreground.
         window: the window's place in the image.
-        part: what is corrected, inside the window.
-        seen: place of ``grey``: the part and `texture_reach` around it, as far as the image goes.
-        looked_at: (a, b), 0 where shadow and foreground are left as they are.
+        part: the corrected region, inside the window.
+        seen: place of ``grey``: the part and `correction_radius_px` around it, cut at the image's
+            border.
+        looked_at: (a, b), 0 where shadow and foreground stay.
         radius: of the windows, px.
         light: least and largest light of a shadow.
         protect: whether shadow may become foreground.

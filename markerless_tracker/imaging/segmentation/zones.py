@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.blobs import BOTTOM, LEFT, RIGHT, TOP
-from markerless_tracker.imaging.segmentation.border import border_reach
+from markerless_tracker.imaging.segmentation.border import border_radius_px
 from markerless_tracker.imaging.segmentation.labels import LOOK_PX
-from markerless_tracker.imaging.segmentation.level_set import level_set_reach
+from markerless_tracker.imaging.segmentation.level_set import refinement_radius_px
 from markerless_tracker.imaging.segmentation.morphology import (
     SPLIT_RADIUS_PX,
-    patch_reach,
-    repair_reach,
+    opening_radius_px,
+    repair_radius_px,
 )
 from markerless_tracker.imaging.settings import ImagingSettings
 
@@ -23,8 +23,8 @@ class Zones:
         patches: where patches must have the right size, before border and contour are moved.
         zone: `patches` and some slack, in which patches are measured.
         patches_before_repair, zone_before_repair: the same before opening and closing.
-        window: what is labelled.
-        open_sides: sides of `zone` beyond which the image goes on, and with it its patches.
+        window: the labelled region.
+        open_sides: sides of `zone` beyond which the image continues.
         frame_px: pixels of the whole image.
     """
 
@@ -48,21 +48,23 @@ class Zones:
     ) -> "Zones":
         """The zones from which the silhouette in `need` follows, with slack for its patches."""
         if settings.level_set.iterations:
-            reach = level_set_reach(settings.level_set.iterations, settings.level_set.radius_px)
-            need = need.grown(reach, size_px)
+            radius_px = refinement_radius_px(
+                settings.level_set.iterations, settings.level_set.radius_px
+            )
+            need = need.grown(radius_px, size_px)
         if settings.shadow.undecided:
             need = need.grown(SPLIT_RADIUS_PX, size_px)
-        patches = need.grown(border_reach(settings.mask.trim_px), size_px)
+        patches = need.grown(border_radius_px(settings.mask.trim_px), size_px)
         zone = patches.grown(slack_px, size_px)
         frame_px = size_px[0] * size_px[1]
-        repair = repair_reach(settings, frame_px)
+        repair = repair_radius_px(settings, frame_px)
         before = zone.grown(repair, size_px)
         return cls(
             patches=patches,
             zone=zone,
             patches_before_repair=patches.grown(repair, size_px),
             zone_before_repair=before,
-            window=before.grown(LOOK_PX + patch_reach(settings, grey=grey), size_px),
+            window=before.grown(LOOK_PX + opening_radius_px(settings, grey=grey), size_px),
             open_sides=_open_sides(zone, size_px),
             frame_px=frame_px,
         )

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.errors import TrackerError
 from markerless_tracker.imaging import BackgroundModel, ImagingSettings, write_background_model
-from markerless_tracker.imaging.background.live import MOVING_SHARE, LiveBackground
-from markerless_tracker.imaging.background.model_file import SUFFIX
+from markerless_tracker.imaging.background import MODEL_SUFFIX, MOVING_SHARE, LiveBackground
 from markerless_tracker.records import TrackState
 
 PATIENCE_S = 10.0
@@ -111,7 +110,7 @@ class Learning:
         if self._folder is not None:
             try:
                 for name, model in models.items():
-                    write_background_model(self._folder / f"{name}{SUFFIX}", model)
+                    write_background_model(self._folder / f"{name}{MODEL_SUFFIX}", model)
                 self.message += f", written to {self._folder}"
             except TrackerError as error:
                 self.success = False

@@ -7,8 +7,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import ImageError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
-from markerless_tracker.imaging.edges import edge_reach
+from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter, edge_radius_px
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.selection import (
@@ -41,7 +40,7 @@ class EvidenceMaker:
         self._rig = rig
         self._config = config
         self._margin_px = config.region.component_margin_px
-        self._clear_px = edge_reach(config) + config.region.component_margin_px
+        self._clear_px = edge_radius_px(config) + config.region.component_margin_px
         self._every = config.region.full_frame_every
         self._turn = 0
         self._pool = pool

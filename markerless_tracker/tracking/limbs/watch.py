@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.camera import CameraRig, project_camera
-from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import LimbState, Observation, TrackState

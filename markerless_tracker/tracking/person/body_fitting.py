@@ -7,8 +7,8 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.sizes import Sizes
-from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.shape.body_fit import BodyFit
+from markerless_tracker.fitness.contour import ContourFrame
+from markerless_tracker.fitness.shape import BodyFit
 from markerless_tracker.geometry import FloatArray
 
 FRAMES = 10

@@ -13,10 +13,8 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.sizes import Sizes
-from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.contour.outline_rows import outline_rows, surface
-from markerless_tracker.fitness.contour.row_kernels import normal_equations
-from markerless_tracker.fitness.shape.section_fit import CORRELATION_M, fit_shape
+from markerless_tracker.fitness.contour import ContourFrame, normal_equations, outline_rows, surface
+from markerless_tracker.fitness.shape import CORRELATION_M, fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 from markerless_tracker.tracking.config import TrackerConfig

@@ -7,8 +7,8 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.anatomy import heading, turned_by
-from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
+from markerless_tracker.fitness.contour import ContourFrame
+from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, keyed_generator, refine
 from markerless_tracker.records import CONTOUR, Observation, Stage

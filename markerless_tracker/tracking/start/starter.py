@@ -9,8 +9,8 @@ from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.anatomy import turned_by
 from markerless_tracker.body.sizes import USUAL_STATURE_M
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.shape.section_fit import fit_shape
+from markerless_tracker.fitness.contour import ContourFrame
+from markerless_tracker.fitness.shape import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.evidence.undecided import decide

@@ -79,7 +79,7 @@ def posed(request, make_pose) -> Scene:
 
 @dataclass(frozen=True, eq=False)
 class SlowResiduals:
-    """Residuals of one view: values (n,), weights (n,), samples (n,), and what they measure.
+    """Residuals of one view: values (n,), weights (n,), samples (n,), and gradients.
 
     Attributes:
         along: (n, 2) the residual's change by its sample's pixel.
@@ -110,7 +110,7 @@ def bilinear(edge: SilhouetteContour, point):
 
 
 def residuals_one_by_one(made: Scene, view: int, truncation: float) -> SlowResiduals:
-    """Both ways, one at a time, as the documentation of the kernels says."""
+    """In both directions, one at a time, as documented in the kernels."""
     camera, samples = made.rig.cameras[view], made.frame.samples
     focal, n = camera.matrix[0, 0], samples.count[view]
     pixel, normal, depth, length = (
@@ -124,7 +124,7 @@ def residuals_one_by_one(made: Scene, view: int, truncation: float) -> SlowResid
         if kept:
             value, slope = found[0] * depth[s] / focal, found[1]
             steep = np.linalg.norm(slope)
-            # Neither on ridges of the distance nor where the edge faces another way.
+            # Neither on ridges of the distance nor where the edge has another direction.
             kept = steep >= 0.3 and slope @ normal[s] >= 0.5 * steep and abs(value) < truncation
         cost += length[s] * (tukey(value, truncation) if kept else truncation**2 / 6.0)
         if kept:

@@ -54,7 +54,7 @@ def window(edge: SilhouetteContour):
     st.floats(60.0, 160.0), st.floats(60.0, 140.0), st.floats(8.0, 55.0), st.floats(1.0, 8.0)
 )  # fmt: skip
 def test_disc(u, v, radius, spacing_px) -> None:
-    """A disc of whole pixels is half a pixel off; the distance itself is within 2 %."""
+    """A disc of pixels is off by up to half a pixel; the distance itself by up to 2 %."""
     edge = edge_of_mask(observed(disc((u, v), radius)), spacing_px)
     at = window(edge)
     error = edge.distance - (np.hypot(at[0] - u, at[1] - v) - radius)
@@ -143,7 +143,7 @@ def test_specks_have_no_points() -> None:
 
 
 @pytest.mark.parametrize("mask", [np.zeros((50, 60), bool), disc((3, 3), 1.0)])
-def test_nothing_to_see(mask) -> None:
+def test_an_empty_silhouette(mask) -> None:
     edge = edge_of_mask(observed(mask), 3.0)
     assert edge.points.shape == edge.normals.shape == (0, 2) and edge.spacing.shape == (0,)
     assert edge.distance.shape == (0, 0) or np.isfinite(edge.distance).all()
@@ -168,7 +168,7 @@ def test_a_region_says_the_same_as_the_full_frame(margin) -> None:
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name))
 
 
-def test_joined_edges_can_be_taken_apart() -> None:
+def test_joined_edges_hold_each_views_edge() -> None:
     masks = [disc((120, 100), 40.0), np.zeros(SIZE[::-1], bool), disc((70, 60), 25.0)]
     edges = [edge_of_mask(observed(mask), 3.0) for mask in masks]
     joined = join_edges(edges)
@@ -194,7 +194,7 @@ LENS = (-0.15, 0.06, 0.002, -0.0015, 0.01)
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """A body, its true pose, and what four cameras see of it."""
+    """A body, its true pose, and the evidence of four cameras."""
 
     body: BodyModel
     rig: CameraRig
@@ -229,7 +229,7 @@ class Person:
 
 
 def person(name, seed, **angles) -> Person:
-    """Somebody with limbs apart and bent, turned any way; named angles (rad) replace drawn ones."""
+    """Limbs apart and bent, in any rotation; named angles (rad) replace drawn ones."""
     body = load_body(name, 1.75)
     rng = np.random.default_rng(seed)
     pose = body.neutral.copy()
@@ -265,7 +265,7 @@ def refined(shown: Person, frame: ContourFrame, start: FloatArray, prior: Prior,
 
 @pytest.mark.parametrize("name", ["balan31", "person31"])
 @pytest.mark.parametrize("seed", range(4))
-def test_a_disturbed_pose_is_found_again(name, seed) -> None:
+def test_a_disturbed_pose_is_recovered(name, seed) -> None:
     shown = person(name, seed)
     start, prior = shown.start(100 + seed)
     found = refined(shown, shown.frame(), start, prior)
@@ -292,7 +292,7 @@ def test_threads_give_the_same_bytes() -> None:
 @pytest.mark.parametrize("joint", ["l_elbow", "r_elbow", "l_knee", "r_knee"])
 @pytest.mark.parametrize("beyond", [0.0, 0.3])
 def test_limits_are_kept(joint, beyond) -> None:
-    """A limb straight to its limit, or bent beyond it by what nobody can."""
+    """A limb straight up to its limit, or bent beyond it."""
     body = load_body("person31", 1.75)
     most = body.limits[1, body.index(joint)]
     shown = person("person31", 2, **{joint: most + beyond})
@@ -304,7 +304,7 @@ def test_limits_are_kept(joint, beyond) -> None:
     assert shown.error_mm(found) < (25.0 if beyond else 5.0)
 
 
-def test_a_black_camera_is_no_trouble() -> None:
+def test_a_black_camera_does_not_matter() -> None:
     shown = person("person31", 3)
     start, prior = shown.start(4, offset_m=0.03, turn_rad=0.08)
     found = refined(shown, shown.frame(black=["cam02"]), start, prior)

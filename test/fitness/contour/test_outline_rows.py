@@ -7,7 +7,7 @@ import pytest
 
 from markerless_tracker.body import cone_transforms, load_body
 from markerless_tracker.fitness.contour.outline_rows import outline_rows, pose_slopes, surface
-from markerless_tracker.fitness.shape.sections import Sections
+from markerless_tracker.fitness.shape import Sections
 from markerless_tracker.synthesis import ring_rig
 
 BODY = load_body("person31", 1.75)
@@ -35,7 +35,7 @@ def frame(contours_of):
 
 
 def slow_surface(body, pose, cone, place):
-    """World points of places on cones: cos, sin on both ends, share of end 1."""
+    """World points of places on cones: cos, sin on both ends, fraction of end 1."""
     placed = cone_transforms(body, pose)[cone]
     t = place[:, 4:]
     ends = []
@@ -47,7 +47,7 @@ def slow_surface(body, pose, cone, place):
     return np.einsum("nij,nj->ni", placed[:, :, :3], local) + placed[:, :, 3]
 
 
-def test_rows_are_the_views_residuals_one_after_the_other(frame) -> None:
+def test_rows_are_the_residuals_of_all_views_in_order(frame) -> None:
     rows = outline_rows(frame)
     counts = frame.residuals.count
     assert rows.value.size == counts.sum() and counts.min() > 300
@@ -83,7 +83,7 @@ def test_slopes_by_the_pose(frame) -> None:
 
 
 def test_normal_equations_are_the_refinements(frame) -> None:
-    """The kernels that sum along the chain get the same without writing a row."""
+    """The kernels that sum along the chain give the same without rows."""
     sums = frame.equations(POSE, 0.1)
     rows = outline_rows(frame)
     slopes = pose_slopes(BODY, POSE, rows)
@@ -110,5 +110,5 @@ def test_slopes_by_the_sections(frame) -> None:
         )
         slow = ((there - back) / (2 * H) * rows.gradient).sum(axis=1)
         np.testing.assert_allclose(slopes[:, k], slow, atol=1e-7)
-    # Nearly every section is seen by some camera.
+    # Nearly every section is visible in some camera.
     assert (np.abs(slopes).max(axis=0) > 0.05).mean() > 0.9

@@ -120,7 +120,7 @@ def test_world_points_project_onto_their_pixels(posed) -> None:
 
 
 def test_the_place_on_the_cone_gives_the_world_point(posed) -> None:
-    """cos and sin on both ends' ellipses and the share of end 1."""
+    """cos and sin on both ends' ellipses and the fraction of end 1."""
     placed = cone_transforms(posed.body, posed.pose)
     samples = posed.frame.samples
     for v in range(len(posed.rig)):
@@ -140,7 +140,7 @@ def test_the_place_on_the_cone_gives_the_world_point(posed) -> None:
 
 
 def test_lengths_add_up_to_the_outline(posed) -> None:
-    """What a sample stands for, back in px: the whole free outline, but for the corners.
+    """The represented length, in px: the whole free outline apart from the corners.
 
     Where two cones' outlines run along each other, less than the free step apart, both count.
     """
@@ -168,7 +168,7 @@ def test_samples_along_a_side_are_evenly_spaced_in_the_image(make_pose, make_sce
                 if on.size < 4:
                     continue
                 gap = np.linalg.norm(np.diff(samples.pixel[v, on], axis=0), axis=1)
-                # Points that other parts hide are left out.
+                # Points that other parts hide are missing.
                 steps = gap / gap.min()
                 np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
                 compared += on.size
@@ -206,8 +206,8 @@ def test_a_body_behind_a_camera_has_no_samples_there(make_pose, make_scene) -> N
     assert np.isfinite(made.frame.equations(pose, 0.1).cost)
 
 
-def test_more_samples_than_there_is_room_for() -> None:
-    """A giant; the last ones are left out, and nothing is written beyond the room."""
+def test_more_samples_than_fit() -> None:
+    """A giant: further samples are dropped, and nothing is written out of bounds."""
     description = load_description("person31")
     body = load_body("person31", Subject("giant", dict.fromkeys(description.lengths, 2.9)))
     (camera,) = rig = ring_rig(1, (2400, 1800), distance_m=30.0, distortion=(0.0,) * 5)

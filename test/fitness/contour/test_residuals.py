@@ -70,7 +70,7 @@ def test_one_residual_by_hand(make_scene) -> None:
         found = value[leg & (sense * side > 0.99)]
         assert found.size > 15
         assert np.median(found) == pytest.approx(sense * 0.020, abs=0.0035)
-        # From both ways: the body's points to the edge, the edge's points to the body.
+        # In both directions: the body's points to the edge, the edge's points to the body.
         assert found.std() < 0.005
     first = int(np.flatnonzero(leg & (np.abs(side) > 0.99))[0])
     # 1 - (20 mm / 50 mm)² = 0.84, squared 0.7056.
@@ -79,7 +79,7 @@ def test_one_residual_by_hand(make_scene) -> None:
     assert share == pytest.approx(0.7056, abs=0.12)
 
 
-def test_no_evidence_costs_the_most_and_pulls_nowhere(make_pose, make_scene) -> None:
+def test_no_evidence_costs_the_most_and_has_no_gradient(make_pose, make_scene) -> None:
     made = make_scene("person31", 8, make_pose)
     blank = {
         name: Observation.from_mask(name, 0, np.zeros_like(o.mask), o.edges)

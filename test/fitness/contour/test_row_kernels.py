@@ -38,7 +38,7 @@ def test_elimination_gives_the_same_step_as_solving_all_at_once(rows) -> None:
     np.testing.assert_allclose(-part @ np.append(step, 1.0), whole[:6], rtol=1e-9)
 
 
-def test_what_is_left_is_added(rows) -> None:
+def test_the_reduced_equations_are_added(rows) -> None:
     hessian, slope = normal_equations(*rows)
     hessian += 0.1 * np.eye(14)
     once, twice = (np.zeros((8, 8)), np.zeros(8)), (np.zeros((8, 8)), np.zeros(8))

@@ -34,7 +34,7 @@ def test_samples_of_one_side_by_hand():
     assert sample([np.nan, 5], [5, 5], edges, "sides") == (0, 0.0)
 
 
-def test_what_hides_a_sample():
+def test_body_pixels_hide_a_sample():
     edges = np.zeros((40, 64), dtype=np.uint8)
     body = Observation.from_mask("c", 0, np.zeros((40, 64), bool), edges).mask_words.copy()
     body[20:, :] = np.uint64(2**64 - 1)

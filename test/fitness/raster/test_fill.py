@@ -11,11 +11,11 @@ from markerless_tracker.fitness.raster.outline_arrays import LANES, make_outline
 from markerless_tracker.records import unpack_mask
 
 LANE = 3
-"""Which of the polygons that are worked on side by side the tests fill."""
+"""Index of the polygon, of those computed side by side, that the tests fill."""
 
 
 def fill(points, width: int, height: int):
-    """Words (w, h) and mask (h, w) that `fill_outline` sets, and the rows it says it used."""
+    """Words (w, h) and mask (h, w) that `fill_outline` sets, and the rows it marks as used."""
     words = (width + 63) // 64
     bits = np.zeros(words * height, dtype=np.uint64)
     used = np.empty((words, 2), dtype=np.int64)
@@ -23,7 +23,7 @@ def fill(points, width: int, height: int):
     out = outlines_of(make_outlines(1, height), 0)
     for i, (u, v) in enumerate(np.asarray(points, dtype=np.float64)):
         out.u[i * LANES + LANE], out.v[i * LANES + LANE] = u, v
-    # Whatever an earlier polygon left behind must not matter.
+    # Remains of an earlier polygon must not matter.
     out.left[:], out.right[:] = 7.0, 20.0
     scan_edges(LANE + 1, len(points), height, out.u, out.v, out.first, out.slope, out.box)
     fill_outline(LANE, len(points), out, width, height, bits, used)
@@ -64,13 +64,13 @@ def test_convex_polygons_fill_exactly_the_pixel_centres_inside(seed, corners, si
     words, filled, used = fill(points, width, height)
     inside, undecided = inside_convex(points, width, height)
     np.testing.assert_array_equal(filled[~undecided], inside[~undecided])
-    # Only what is said to be used is wiped afterwards.
+    # Only rows marked as used are cleared afterwards.
     for column, (first, last) in zip(words, used, strict=True):
         assert not column[:first].any() and not column[last + 1 :].any()
 
 
 def test_two_polygons_that_share_an_edge_leave_no_gap():
-    """Between the pixels of two halves lies none that neither holds."""
+    """No pixel between two halves belongs to neither."""
     left = np.array([[10.2, 5.1], [30.7, 8.3], [25.4, 40.9], [8.8, 33.3]])
     right = np.array([[30.7, 8.3], [55.5, 3.2], [60.1, 44.4], [25.4, 40.9]])
     whole = inside_convex(left, 80, 60)[0] | inside_convex(right, 80, 60)[0]
@@ -87,7 +87,7 @@ def test_two_polygons_that_share_an_edge_leave_no_gap():
     ],
     ids=["huge", "nan", "infinite", "empty"],
 )
-def test_polygons_that_are_none_stay_inside_the_frame(points):
+def test_degenerate_polygons_stay_inside_the_frame(points):
     words, _, _ = fill(np.array(points), 70, 30)
     padding = unpack_mask(np.ascontiguousarray(words.T), 128)[:, 70:]
     assert not padding.any()

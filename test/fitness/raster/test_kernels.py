@@ -25,7 +25,7 @@ END_ON_STRIP_PX = 0.1
 def check_silhouettes(
     twin, body: BodyModel, cameras, poses, make_observation, strip_px: float = STRIP_PX
 ) -> int:
-    """Compare counts and f_s of poses seen by cameras; returns the pixels that were compared."""
+    """Compare counts and f_s of poses seen by cameras; returns the number of compared pixels."""
     fitness = Fitness(body, cameras, threads=1)
     every = np.ones(len(body.cone_names), dtype=bool)
     compared = 0
@@ -43,7 +43,7 @@ def check_silhouettes(
             both = int((drawn & mask).sum())
             assert abs(row[OVERLAP] - both) <= strip
             assert abs(row[PROJECTED] - drawn.sum()) <= strip
-            # Four samples a pixel in each direction: whole pixels are not biased.
+            # Four samples per pixel in each direction: pixel centres are unbiased.
             assert abs(row[PROJECTED] - slow.silhouette(samples=4).sum() / 16) <= strip
             if drawn.any() and mask.any():
                 f_s = 0.5 * both / drawn.sum() + 0.5 * both / mask.sum()

@@ -1,4 +1,4 @@
-"""What does not move is drawn once, and evaluations end early: the numbers stay the same."""
+"""Static layer and early termination: the same numbers."""
 
 import numpy as np
 import pytest
@@ -67,7 +67,7 @@ def test_only_moving_parts_are_drawn_for_every_pose(scene, body, rig):
 
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(PARTS), st.floats(0.0, 1.0))
-def test_a_cost_that_matters_is_exact_and_one_that_does_not_is_a_bound(
+def test_a_cost_below_its_cutoff_is_exact_and_above_it_a_bound(
     scene, body, rig, seed, part, edge_weight
 ):
     pose, seen = scene(body, rig.cameras, 5)
@@ -86,7 +86,7 @@ def test_a_cost_that_matters_is_exact_and_one_that_does_not_is_a_bound(
     assert (found[~wins] <= full[~wins]).all()
 
 
-def test_points_that_are_not_finite_cost_nan_whatever_the_bar(scene, body, rig):
+def test_points_that_are_not_finite_cost_nan_at_any_cutoff(scene, body, rig):
     pose, seen = scene(body, rig.cameras, 6)
     fitness = Fitness(body, rig.cameras)
     evaluate = fitness.prepare(
@@ -123,20 +123,20 @@ def test_a_swarm_that_stops_evaluations_early_finds_the_same(scene, body, rig, p
         np.testing.assert_array_equal(ours, theirs)
 
 
-def test_an_early_end_spares_views(scene, body, rig):
+def test_early_termination_saves_views(scene, body, rig):
     pose, seen = scene(body, rig.cameras, 8)
     fitness = Fitness(body, rig.cameras)
     views = fitness.lay_out(seen)
     evaluate = fitness.prepare(views, limb_stage(body, body.root, pose, edge_weight=0.0))
     point = pose[body.root] + 3.0
     assert 0.0 < evaluate(point[None])[0] <= 1.0
-    # Nothing is looked at where nothing can win.
+    # No view is drawn for particles that cannot win.
     untouched = np.full((1, len(views.names), 4), -7.0)
     costs = np.empty(1)
     evaluate_some(
         point[None].copy(), body.root, pose, np.array([-np.inf]), evaluate._drawing.body,
         views.arrays, evaluate._drawing.silhouette_cones, evaluate._drawing.edge_cones,
-        fitness._rule, evaluate._cost, evaluate._drawing.still, fitness._scratch,
+        fitness._rule, evaluate._cost, evaluate._drawing.static, fitness._scratch,
         fitness._outlines, untouched, costs, 0, 1,
     )  # fmt: skip
     assert (untouched == -7.0).all()

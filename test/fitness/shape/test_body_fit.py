@@ -1,4 +1,4 @@
-"""Lengths and sections from several frames, their poses known about only."""
+"""Lengths and sections from several frames with approximate poses."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ FRAMES = 4
 
 
 def person(seed):
-    """Somebody of 1.80 m with longer and shorter parts, stouter or slimmer."""
+    """A person of 1.80 m with longer and shorter parts, stouter or slimmer."""
     rng = np.random.default_rng(seed)
     lengths = SIZES.of(SIZES.of_stature(1.80))
     own = SIZES.body(lengths * np.exp(PROPORTIONS * rng.uniform(-1.5, 1.5, lengths.size)))
@@ -29,7 +29,7 @@ def person(seed):
 
 
 def poses(seed):
-    """Poses (n, p) of somebody who moves all limbs."""
+    """Poses (n, p) of a person moving all limbs."""
     rng = np.random.default_rng(seed)
     out = np.tile(GENERIC.neutral, (FRAMES, 1))
     out[:, GENERIC.joints] += rng.uniform(-0.25, 0.25, (FRAMES, GENERIC.joints.size))
@@ -45,7 +45,7 @@ def poses(seed):
 
 @pytest.fixture(scope="module", params=[0, 1])
 def fit(request, contours_of):
-    """The person, the poses, and the fit after twelve iterations from poses that are a bit off."""
+    """The person, the poses, and the fit after twelve iterations from disturbed poses."""
     true, moves = person(request.param), poses(request.param)
     rng = np.random.default_rng(request.param)
     fit = BodyFit(SIZES, GENERIC, SIZES.usual(None), LIMITS)
@@ -59,7 +59,7 @@ def fit(request, contours_of):
     return true, moves, fit
 
 
-def test_lengths_come_nearer_to_the_persons(fit) -> None:
+def test_lengths_approach_the_persons(fit) -> None:
     true, _, fitted = fit
     before = np.abs(np.log(SIZES.of(GENERIC) / SIZES.of(true)))
     after = np.abs(np.log(SIZES.of(fitted.body) / SIZES.of(true)))
@@ -67,8 +67,8 @@ def test_lengths_come_nearer_to_the_persons(fit) -> None:
     assert after.mean() < 0.035
 
 
-def test_joints_come_nearer_to_the_persons(fit) -> None:
-    """What lengths, sections and poses trade against each other leaves the joints in place."""
+def test_joints_approach_the_persons(fit) -> None:
+    """Errors of lengths, sections and poses that compensate each other do not move the joints."""
     true, moves, fitted = fit
     gaps = [
         np.linalg.norm(markers(fitted.body, pose) - markers(true, move), axis=1).mean()
@@ -77,7 +77,7 @@ def test_joints_come_nearer_to_the_persons(fit) -> None:
     assert max(gaps) < 0.025
 
 
-def test_both_sides_stay_alike_and_all_bounds_are_kept(fit) -> None:
+def test_both_sides_stay_equal_and_all_bounds_are_kept(fit) -> None:
     _, _, fitted = fit
     body = fitted.body
     for name, value in body.lengths_m.items():
@@ -92,8 +92,8 @@ def test_both_sides_stay_alike_and_all_bounds_are_kept(fit) -> None:
     assert (fitted.poses >= LIMITS[0]).all() and (fitted.poses <= LIMITS[1]).all()
 
 
-def test_without_evidence_the_belief_stays(contours_of) -> None:
-    """Nothing seen: the lengths go to what is usual, the sections stay generic."""
+def test_without_evidence_the_prior_remains(contours_of) -> None:
+    """Without evidence the lengths move to the prior mean, the sections stay generic."""
     fit = BodyFit(SIZES, SIZES.of_stature(1.9), SIZES.usual(None), LIMITS)
     fit.iterate(0.1)
     fit.iterate(0.1)
@@ -101,7 +101,7 @@ def test_without_evidence_the_belief_stays(contours_of) -> None:
     np.testing.assert_allclose(fit.body.cone_shape, SIZES.of_stature(1.9).cone_shape, rtol=1e-9)
 
 
-def test_a_frame_without_silhouettes_says_nothing(contours_of) -> None:
+def test_a_frame_without_silhouettes_changes_nothing(contours_of) -> None:
     pose = poses(0)[0]
     away = pose.copy()
     away[GENERIC.index("pelvis_tx")] = 500.0
@@ -123,8 +123,8 @@ def test_equations_that_are_not_finite_change_nothing(contours_of) -> None:
     np.testing.assert_array_equal(SIZES.of(fit.body), before)
 
 
-def test_a_told_stature_holds_the_lengths_back(contours_of) -> None:
-    """Told 1.60 m of somebody of 1.80 m: the outlines win, but by less than if it was unknown."""
+def test_a_given_stature_restrains_the_lengths(contours_of) -> None:
+    """A given 1.60 m for a person of 1.80 m: the lengths grow, by less than without a stature."""
     true, moves = person(0), poses(0)[:2]
     sizes = []
     for stature in (1.60, None):
@@ -134,5 +134,5 @@ def test_a_told_stature_holds_the_lengths_back(contours_of) -> None:
         for truncation_m in np.geomspace(0.10, 0.035, 6):
             fit.iterate(truncation_m)
         sizes.append(np.log(SIZES.of(fit.body)).mean())
-    told = np.log(SIZES.of(SIZES.of_stature(1.60))).mean()
-    assert told < sizes[0] < sizes[1] - 0.01
+    given = np.log(SIZES.of(SIZES.of_stature(1.60))).mean()
+    assert given < sizes[0] < sizes[1] - 0.01

@@ -10,7 +10,7 @@ from markerless_tracker.body import BodyModel, load_body
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
-from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.fitness.shape.section_fit import fit_shape
 from markerless_tracker.fitness.shape.sections import OFFSET_RANGE_M, RADIUS_RANGE
 from markerless_tracker.geometry import FloatArray
@@ -26,7 +26,7 @@ MIDDLE = [i for i, name in enumerate(NAMES) if name[:2] not in ("l_", "r_")]
 
 
 def open_pose(seed) -> FloatArray:
-    """Limbs apart and bent, turned any way."""
+    """Limbs apart and bent, in any rotation."""
     rng = np.random.default_rng(seed)
     pose = GENERIC.neutral.copy()
     pose[GENERIC.joints] += rng.uniform(-0.15, 0.15, GENERIC.joints.size)
@@ -39,7 +39,7 @@ def open_pose(seed) -> FloatArray:
     return pose
 
 
-def somebody(seed, *, alike=True) -> BodyModel:
+def random_person(seed, *, alike=True) -> BodyModel:
     """A person whose sections differ from the generic ones by up to 25 % and 15 mm."""
     rng = np.random.default_rng(seed)
     shape = GENERIC.cone_shape.copy()
@@ -53,7 +53,7 @@ def somebody(seed, *, alike=True) -> BodyModel:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What the rig sees of a body at a pose."""
+    """Evidence of a body at a pose in all cameras of the rig."""
 
     pose: FloatArray
     observations: dict[str, Observation]
@@ -86,8 +86,8 @@ def seen(body, pose, change=lambda mask: mask) -> Seen:
 
 @pytest.fixture(scope="module", params=[0, 1])
 def case(request) -> tuple[BodyModel, Seen, BodyModel]:
-    """A person, what is seen of that person, and the body fitted to it."""
-    true = somebody(request.param)
+    """A person, the evidence of that person, and the fitted body."""
+    true = random_person(request.param)
     view = seen(true, open_pose(request.param))
     return true, view, fit_shape(GENERIC, [(view.frame(), view.pose)])
 
@@ -95,13 +95,13 @@ def case(request) -> tuple[BodyModel, Seen, BodyModel]:
 # --- the fit --------------------------------------------------------------------------------
 
 
-def test_a_known_shape_is_found_again(case) -> None:
+def test_a_known_shape_is_recovered(case) -> None:
     true, view, fitted = case
     assert view.f_s(GENERIC) < 0.96
     assert view.f_s(fitted) > 0.985
     error = np.abs(fitted.cone_shape - true.cone_shape) * 1000.0
     before = np.abs(GENERIC.cone_shape - true.cone_shape) * 1000.0
-    # Ends inside other parts are not seen; all others are.
+    # Only ends inside other parts are invisible.
     radii, offsets = error[:, :, :2], error[:, :, 2:]
     assert radii.mean() < 4.0 < 7.0 < before[:, :, :2].mean()
     assert np.quantile(radii, 0.75) < 4.8
@@ -117,11 +117,11 @@ def test_the_contours_cost_falls_to_the_true_shapes(case) -> None:
         costs.append(frame.residuals.cost.sum())
     generic, least, found, again = costs
     assert found - least < 0.1 * (generic - least)
-    # The frame's own body is still the generic one.
+    # The frame keeps its own, generic body.
     assert again == generic
 
 
-def test_left_and_right_are_alike_and_the_trunk_symmetric(case) -> None:
+def test_left_and_right_are_equal_and_the_trunk_symmetric(case) -> None:
     fitted = case[2].cone_shape
     np.testing.assert_array_equal(fitted[RIGHT], fitted[LEFT] * [1.0, 1.0, 1.0, -1.0])
     assert not fitted[MIDDLE, :, 3].any()
@@ -129,7 +129,7 @@ def test_left_and_right_are_alike_and_the_trunk_symmetric(case) -> None:
 
 
 def test_sides_that_differ_are_averaged() -> None:
-    """A left calf 20 % thicker, a right one 20 % thinner: both come out as they were."""
+    """A left calf 20 % thicker, a right one 20 % thinner: the average is the generic one."""
     shape = GENERIC.cone_shape.copy()
     for side, factor in (("l", 1.2), ("r", 0.8)):
         for part in ("calf", "shin"):
@@ -145,7 +145,7 @@ def test_sides_that_differ_are_averaged() -> None:
 
 @pytest.mark.parametrize("grow", [True, False], ids=["swollen", "shrunken"])
 def test_bounds_are_kept(grow) -> None:
-    """Silhouettes of somebody 80 mm thicker, or of a skeleton, all around."""
+    """Silhouettes of a person 80 mm thicker everywhere, or of a skeleton."""
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (25, 25) if grow else (9, 9))
     view = seen(GENERIC, open_pose(3), lambda m: (cv2.dilate if grow else cv2.erode)(m, kernel))
     fitted = fit_shape(GENERIC, [(view.frame(), view.pose)], tightness=0.01).cone_shape
@@ -158,14 +158,14 @@ def test_bounds_are_kept(grow) -> None:
     assert np.abs(moved).max() <= OFFSET_RANGE_M * (1 + 1e-12)
 
 
-def test_nothing_to_see_leaves_the_generic_shape() -> None:
+def test_empty_silhouettes_leave_the_generic_shape() -> None:
     view = seen(GENERIC, open_pose(4), np.zeros_like)
     fitted = fit_shape(GENERIC, [(view.frame(), view.pose)])
     np.testing.assert_allclose(fitted.cone_shape, GENERIC.cone_shape, atol=1e-12)
 
 
-def test_one_black_camera_is_no_trouble() -> None:
-    true = somebody(5)
+def test_one_black_camera_does_not_matter() -> None:
+    true = random_person(5)
     view = seen(true, open_pose(5))
     nothing = np.zeros((490, 656), np.uint8)
     dark = view.observations | {"cam02": Observation.from_mask("cam02", 0, nothing, nothing)}
@@ -174,8 +174,8 @@ def test_one_black_camera_is_no_trouble() -> None:
     assert view.f_s(fitted) > 0.97 > view.f_s(GENERIC)
 
 
-def test_a_tight_prior_holds_the_generic_shape() -> None:
-    view = seen(somebody(6), open_pose(6))
+def test_a_tight_prior_keeps_the_generic_shape() -> None:
+    view = seen(random_person(6), open_pose(6))
     frames = [(view.frame(), view.pose)]
     held, loose = (fit_shape(GENERIC, frames, tightness=t).cone_shape for t in (1e7, 1.0))
     np.testing.assert_allclose(held, GENERIC.cone_shape, atol=1e-5)
@@ -183,8 +183,8 @@ def test_a_tight_prior_holds_the_generic_shape() -> None:
 
 
 def test_frames_are_averaged() -> None:
-    """The same frame twice says what it says once; another one adds something."""
-    true = somebody(7)
+    """The same frame twice gives the same fit as once; another frame changes it."""
+    true = random_person(7)
     first, second = (seen(true, open_pose(seed)) for seed in (7, 8))
     frames = [(view.frame(), view.pose) for view in (first, second)]
     once, twice, both = (

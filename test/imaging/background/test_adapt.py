@@ -32,7 +32,7 @@ def run(settings: ImagingSettings, channels: int, seconds: float = 12.0) -> list
 
 
 @pytest.mark.parametrize("channels", [1, 3])
-def test_slow_light_is_followed_and_a_still_person_stays(channels: int) -> None:
+def test_slow_light_is_followed_and_a_motionless_person_stays(channels: int) -> None:
     last = run(FOLLOW, channels)[-1]
     assert not last[:, :38].any()
     assert last[17:43, 52:63].all()

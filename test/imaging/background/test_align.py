@@ -18,11 +18,11 @@ def apart(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a[inner].astype(float) - b[inner]).mean())
 
 
-def test_a_moved_and_stretched_still_comes_back() -> None:
+def test_a_moved_and_stretched_picture_is_aligned() -> None:
     reference = scene(360, 480)
     there = np.array([[1.0, 0.0, 1.5], [0.0, 1.009, -3.0]])
     moved = cv2.warpAffine(reference, there, (360, 480), borderMode=cv2.BORDER_REPLICATE)
-    cv2.rectangle(moved, (150, 150), (200, 300), (0, 0, 255), -1)  # someone stands there
+    cv2.rectangle(moved, (150, 150), (200, 300), (0, 0, 255), -1)  # a person stands there
     aligned = align_geometry(moved, reference)
     outside = np.ones((480, 360), bool)
     outside[140:310, 140:210] = False
@@ -31,7 +31,7 @@ def test_a_moved_and_stretched_still_comes_back() -> None:
     assert before > 4.0 and after < 1.5
 
 
-def test_what_is_aligned_stays_the_same_bytes() -> None:
+def test_an_aligned_picture_keeps_its_bytes() -> None:
     reference = scene(200, 150)
     assert (align_geometry(reference, reference) == reference).all()
 

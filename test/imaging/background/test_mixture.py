@@ -4,7 +4,7 @@ import pytest
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging import BackgroundModel, ImagingSettings, Mode, learn_background
 from markerless_tracker.imaging.background.model import foreground_limit, risk_of
-from markerless_tracker.imaging.segmentation.segmenter import Segmenter
+from markerless_tracker.imaging.segmentation import Segmenter
 
 TWO = ImagingSettings.from_mapping({"background.modes": 3})
 
@@ -21,7 +21,7 @@ def blinking(channels: int = 3) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("channels", [1, 3])
-def test_both_things_that_a_screen_shows_are_background(channels: int) -> None:
+def test_both_states_of_a_screen_are_background(channels: int) -> None:
     frames = blinking(channels)
     model = learn_background(frames, TWO)
     assert model.mean[20, 30] == pytest.approx(60.0, abs=3.0)
@@ -49,14 +49,14 @@ def test_one_mode_of_a_quiet_scene_is_the_single_gaussian() -> None:
     np.testing.assert_allclose(one.variance, several.variance, rtol=1e-4)
 
 
-def test_something_that_passes_once_is_no_mode() -> None:
+def test_an_object_that_passes_once_is_no_mode() -> None:
     frames = blinking()
     frames[5][40:50, 60:70] = 255
     model = learn_background(frames, TWO)
     assert all(mode.weight[45, 65] == 0.0 for mode in model.modes)
 
 
-def test_a_rare_mode_must_be_met_more_closely() -> None:
+def test_a_rare_mode_has_a_lower_limit() -> None:
     variance = np.full((1, 1, 3), 4.0, np.float32)
     often = foreground_limit(variance, 8.0, weight=np.full((1, 1), 0.9, np.float32))
     seldom = foreground_limit(variance, 8.0, weight=np.full((1, 1), 0.1, np.float32))

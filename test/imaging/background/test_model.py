@@ -28,7 +28,7 @@ def test_mean_and_variance_agree_with_numpy(grey: bool) -> None:
     assert "200 frames" in model.note
 
 
-def test_few_frames_never_claim_a_noise_below_the_floor() -> None:
+def test_few_frames_never_give_a_noise_below_the_floor() -> None:
     frame = np.full((5, 6, 3), 90, np.uint8)
     model = learn_background(
         [frame, frame, frame], ImagingSettings.from_mapping({"background.sigma_min": 3.0})
@@ -36,7 +36,7 @@ def test_few_frames_never_claim_a_noise_below_the_floor() -> None:
     assert (model.variance == 9.0).all()
 
 
-def test_a_single_still_says_what_it_assumes() -> None:
+def test_the_note_of_a_single_still_names_the_assumed_noise() -> None:
     model = learn_background(
         [np.full((5, 6, 3), 90, np.uint8)],
         ImagingSettings.from_mapping({"background.sigma_still": 7.0}),
@@ -71,7 +71,7 @@ def test_no_frame_and_mixed_frames_name_the_camera() -> None:
         (np.zeros((0, 5, 3)), np.ones((0, 5, 3))),
     ],
 )
-def test_what_is_no_model_is_refused(mean: np.ndarray, variance: np.ndarray) -> None:
+def test_invalid_models_are_refused(mean: np.ndarray, variance: np.ndarray) -> None:
     with pytest.raises(ImageError, match="^background"):
         BackgroundModel(mean, variance, "")
 
@@ -91,6 +91,6 @@ def test_the_limit_is_equation_11(channels: int) -> None:
         assert log_density == pytest.approx(expected, rel=1e-5)
 
 
-def test_no_risk_makes_a_pixel_foreground_at_its_own_mean() -> None:
+def test_a_pixel_at_its_mean_is_background_at_any_risk() -> None:
     wild = np.full((2, 2, 3), 1e6, np.float32)
     assert (foreground_limit(wild, -6.0) >= 1.0).all()

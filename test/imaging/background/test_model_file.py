@@ -19,7 +19,7 @@ def model() -> BackgroundModel:
     return BackgroundModel(mean, mean + 1.0, "what it is made of", (mode,))
 
 
-def test_there_and_back(tmp_path: Path) -> None:
+def test_a_written_model_is_read_back(tmp_path: Path) -> None:
     path, twin = tmp_path / "new" / "cam01.npz", tmp_path / "twin"
     write_background_model(path, model())
     write_background_model(twin, model())

@@ -19,8 +19,8 @@ def twin(values: np.ndarray, share: float) -> np.ndarray:
     lengths = [bright[i + need - 1] - bright[i] for i in range(len(values) - need + 1)]
     first = int(np.argmin(lengths))
     window = values[order[first : first + need]]
-    reach = max(6.0, 3.0 * min(lengths) / values.shape[1])
-    near = np.abs(window - window.mean(axis=0)).max(axis=1) <= 2.0 * reach
+    tolerance = max(6.0, 3.0 * min(lengths) / values.shape[1])
+    near = np.abs(window - window.mean(axis=0)).max(axis=1) <= 2.0 * tolerance
     return window[near].mean(axis=0) if near.any() else window.mean(axis=0)
 
 
@@ -33,7 +33,7 @@ def test_agrees_with_one_pixel_at_a_time(seed: int, count: int, share: float) ->
     assert np.isfinite(variance).all() and (variance >= 0).all()
 
 
-def test_what_covers_less_than_the_rest_is_ignored_and_noise_is_measured() -> None:
+def test_brief_covers_are_ignored_and_noise_is_measured() -> None:
     rng = np.random.default_rng(2)
     stack = np.rint(100.0 + rng.normal(0.0, 3.0, (40, 8, 9, 3))).astype(np.uint8)
     stack[:18] = rng.integers(0, 256, (18, 8, 9, 3))
@@ -50,7 +50,7 @@ def test_matching_frames_counts_and_averages() -> None:
     assert mean[0, :, 0].tolist() == [12.0, 12.0]
 
 
-def test_motion_tells_how_often_and_how_abruptly() -> None:
+def test_motion_measures_how_often_and_how_abruptly() -> None:
     stack = np.full((10, 1, 2, 1), 100, np.uint8)
     stack[:, 0, 0, 0] = [100, 100, 105, 110, 115, 120, 125, 130, 135, 140]  # light
     stack[4:6, 0, 1, 0] = 30  # a body passes

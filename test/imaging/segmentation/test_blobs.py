@@ -31,7 +31,7 @@ def cleared(mask: np.ndarray, least: float, connectivity: int) -> np.ndarray:
     least=st.integers(0, 60),
 )
 @settings(max_examples=100, deadline=None)
-def test_small_patches_go(
+def test_small_patches_are_cleared(
     connectivity: int, seed: int, height: int, width: int, share: float, least: int
 ) -> None:
     mask = noise(seed, height, width, share)
@@ -58,14 +58,14 @@ def test_small_gaps_inside_are_filled(seed: int, share: float, largest: int) -> 
     np.testing.assert_array_equal(mask, expected)
 
 
-def test_a_patch_that_may_go_on_outside_is_told_and_left() -> None:
+def test_a_patch_that_may_continue_outside_is_reported_and_stays() -> None:
     mask = np.zeros((20, 30), np.uint8)
-    mask[5:8, 20:30] = 255  # reaches the right side
-    mask[0:2, 3:5] = 255  # reaches the top
+    mask[5:8, 20:30] = 255  # touches the right side
+    mask[0:2, 3:5] = 255  # touches the top
     both = mask.copy()
     assert clear_small(mask, 100.0, connectivity=8, unknown=RIGHT | TOP)
     np.testing.assert_array_equal(mask, both)
-    # Where its size does not matter nobody asks for it.
+    # Not reported where it is not needed.
     need = Region(0, 4, 15, 20)
     assert not clear_small(mask, 100.0, connectivity=8, need=need, unknown=RIGHT | TOP)
     np.testing.assert_array_equal(mask, both)

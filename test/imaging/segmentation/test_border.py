@@ -30,7 +30,7 @@ def shot(
 
 
 @pytest.mark.parametrize("layers", [1, 2])
-def test_half_covered_pixels_are_where_it_ends(layers: int) -> None:
+def test_the_border_is_where_half_a_pixel_is_covered(layers: int) -> None:
     covered = coverage((60.3, 44.6), 25.2)
     body, floor = (30.0, 60.0, 160.0), (120.0, 120.0, 120.0)
     image = shot(covered, body, floor, 0.0, 0)
@@ -42,7 +42,7 @@ def test_half_covered_pixels_are_where_it_ends(layers: int) -> None:
     assert ((mask > 0) == (covered >= 0.5))[clear].all()
 
 
-def test_a_body_like_the_background_is_left() -> None:
+def test_a_body_like_the_background_stays() -> None:
     image = np.full((90, 120, 1), 100, np.uint8)
     mask = np.zeros((90, 120), np.uint8)
     mask[20:60, 30:70] = 255

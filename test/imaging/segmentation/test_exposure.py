@@ -22,19 +22,19 @@ def test_the_factor_is_found_beside_a_person(gain: float) -> None:
     assert exposure_gain(image, wall()) == pytest.approx(gain, rel=0.01)
 
 
-def test_channels_have_their_own() -> None:
+def test_each_channel_has_its_own_factor() -> None:
     gain = np.array([0.8, 1.0, 1.2], np.float32)
     assert exposure_gain(shot(wall(), gain), wall()) == pytest.approx(gain, rel=0.01)
 
 
-def test_an_image_of_something_else_tells_nothing() -> None:
+def test_an_image_of_another_scene_gives_no_factor() -> None:
     assert (exposure_gain(np.zeros((120, 160, 1), np.uint8), wall(1)) == 1.0).all()
     noise = np.random.default_rng(5).integers(0, 256, (120, 160, 1), dtype=np.uint8)
     assert (exposure_gain(noise, wall(1)) == 1.0).all()
 
 
 @pytest.mark.parametrize("channels", [1, 3])
-def test_a_step_is_told_and_leaves_the_silhouette_empty(channels: int) -> None:
+def test_an_exposure_step_is_measured_and_the_silhouette_stays_empty(channels: int) -> None:
     mean = wall(channels)
     frames = [shot(mean, 1.0, i) for i in range(8)]
     bright = shot(mean, 1.3, 9)

@@ -19,7 +19,7 @@ def planes(image: np.ndarray) -> np.ndarray:
 
 
 def first(mean: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.float32]:
-    """What the first Gaussians (h, w, c) are told from."""
+    """The coarse form of the first Gaussians (h, w, c)."""
     return coarse(planes(mean)[0], planes(scale)[0])
 
 
@@ -75,7 +75,7 @@ def test_colour_agrees_with_the_twin(removal: bool, seed: int) -> None:
         labels,
     )
     twin = twin_colour(image, mean, scale, options)
-    # float32 against float64 may fall on the other side of a threshold now and then.
+    # float32 and float64 may differ at a threshold.
     assert (labels != twin).mean() < 2e-3
     assert {0, 255} <= set(np.unique(labels))
     assert (127 in labels) == removal

@@ -1,4 +1,4 @@
-"""The contour is drawn to the contrast beside it, and to nothing else."""
+"""The contour moves to the contrast beside it, and only there."""
 
 import cv2
 import numpy as np
@@ -60,25 +60,25 @@ def shrunk(mask: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize(("wrong", "least"), [(dented, 0.97), (shifted, 0.97), (grown, 0.97),
                                               (shrunk, 0.97)])  # fmt: skip
-def test_a_wrong_contour_goes_back(channels: int, wrong, least: float) -> None:
+def test_a_displaced_contour_moves_back(channels: int, wrong, least: float) -> None:
     right = truth()
     image, mask = picture(right, channels), wrong(right)
     better = refined(image, mask)
     assert iou(better, right) > max(least, iou(mask, right)), (iou(mask, right), iou(better, right))
 
 
-def test_the_right_contour_stays() -> None:
+def test_a_correct_contour_stays() -> None:
     right = truth()
     assert iou(refined(picture(right, 3), right), right) > 0.985
 
 
-def test_without_contrast_it_stays_exactly() -> None:
+def test_without_contrast_the_contour_stays() -> None:
     mask = shifted(truth())
     image = picture(truth(), 3, contrast=4.0)
     np.testing.assert_array_equal(refined(image, mask), mask)
 
 
-def test_it_goes_no_further_than_its_iterations() -> None:
+def test_the_contour_moves_by_at_most_one_pixel_per_iteration() -> None:
     mask = np.roll(truth(), 12, axis=1)
     out = refined(picture(truth(), 3), mask, iterations=2)
     far = (
@@ -91,8 +91,8 @@ def test_it_goes_no_further_than_its_iterations() -> None:
 
 @pytest.mark.parametrize("channels", [1, 3])
 def test_a_region_is_refined_as_the_whole_image(channels: int) -> None:
-    nobody = np.zeros_like(truth())
-    empty = [picture(nobody, channels, seed=seed) for seed in range(1, 7)]
+    nothing = np.zeros_like(truth())
+    empty = [picture(nothing, channels, seed=seed) for seed in range(1, 7)]
     if channels == 1:
         empty = [image[:, :, 0] for image in empty]
     background = learn_background(empty)

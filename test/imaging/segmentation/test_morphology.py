@@ -17,7 +17,7 @@ def body() -> np.ndarray:
     return mask
 
 
-def test_specks_go_and_the_body_stays() -> None:
+def test_specks_are_removed_and_the_body_stays() -> None:
     mask = body()
     mask[5, 5] = mask[110:112, 150] = 255
     clean_mask(mask, ImagingSettings())
@@ -34,14 +34,14 @@ def test_small_holes_fill_and_large_ones_stay() -> None:
     assert mask[40, 70] == 255 and mask[70, 80] == 0
 
 
-def test_a_gap_open_to_the_outside_is_no_hole() -> None:
+def test_a_gap_that_is_open_to_the_outside_is_no_hole() -> None:
     mask = body()
     mask[50, 60:64] = 0
     fill_holes(mask, 10)
     assert (mask[50, 60:64] == 0).all()
 
 
-def test_small_images_are_closed_less() -> None:
+def test_the_closing_is_smaller_in_small_images() -> None:
     options = ImagingSettings.from_mapping({"mask.close_px": 5})
     sides = [
         closing_px(options, w * h) for w, h in ((1920, 1080), (640, 480), (320, 240), (64, 48))
@@ -71,7 +71,7 @@ def test_repairs_do_not_grow_or_shrink_a_round_body() -> None:
     assert abs(int((mask > 0).sum()) - area) < 0.005 * area
 
 
-def test_small_shadow_patches_are_the_person() -> None:
+def test_small_shadow_patches_become_foreground() -> None:
     labels = body()
     labels[30:34, 70:74] = 127
     labels[100:110, 60:140] = 127
@@ -85,7 +85,7 @@ def test_small_shadow_patches_are_the_person() -> None:
 def test_grey_shadows_are_opened_first() -> None:
     labels = body()
     labels[100:110, 60:140] = 127
-    labels[60:100, 80] = 127  # one pixel wide, hangs on the large patch
+    labels[60:100, 80] = 127  # one pixel wide, attached to the large patch
     mask = np.empty_like(labels)
     foreground_mask(labels, mask, 50, grey=True)
     assert mask[70, 80] == 255 and mask[105, 100] == 0

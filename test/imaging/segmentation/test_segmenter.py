@@ -80,7 +80,7 @@ def test_grey_cameras_in_one_or_three_channels(channels: int) -> None:
     assert overlap(observation.mask, mask) > 0.95
 
 
-def test_labels_tell_body_shadow_and_room() -> None:
+def test_labels_separate_body_shadow_and_room() -> None:
     empty = room()
     image, mask = person(shaded(empty, 0.65), (200, 60, 20))
     segmenter = Segmenter("cam01", model(empty))
@@ -163,7 +163,7 @@ def frames_of(path: Path, wanted: set[int] | None = None) -> list[np.ndarray]:
 
 @pytest.mark.parametrize(("grey", "least"), [(False, 0.95), (True, 0.85)])
 def test_exact_masks_of_a_rendered_walk(render_walk: Path, grey: bool, least: float) -> None:
-    """Two lights cast shadows; grey images leave only brightness to tell them from trousers."""
+    """Two lights cast shadows; grey images leave only brightness to separate them from trousers."""
     overlaps, leaks = [], []
     for camera in ("cam01", "cam02"):
         empty = frames_of(render_walk / "background" / f"{camera}.mp4")

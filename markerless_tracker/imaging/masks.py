@@ -1,0 +1,14 @@
+"""Masks of an image, and the round element that widens or narrows them."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Mask = NDArray[np.uint8]
+"""(h, w), 0 or 255."""
+
+
+def disc(side_px: int) -> Mask:
+    """A round structuring element of that side."""
+    shape = cv2.MORPH_ELLIPSE if side_px > 3 else cv2.MORPH_CROSS
+    return np.asarray(cv2.getStructuringElement(shape, (side_px, side_px)), dtype=np.uint8)
