@@ -118,7 +118,7 @@ class Motion:
         self._angles, frequency, self._radius_m, self._stride_m, self._anchors = self.courses[kind]
         rng = np.random.default_rng([seed, 2])
         self._frequency_hz = frequency * rng.uniform(0.94, 1.0)
-        self._amplitude = rng.uniform(0.94, 1.0)
+        self._amplitude = rng.uniform(*self._amplitudes(kind))
         self._phase, self._heading = rng.uniform(0.0, 1.0), rng.uniform(-np.pi, np.pi)
         scale = _leg_m(body) / _LEG_M
         self._radius_m *= scale
@@ -146,6 +146,10 @@ class Motion:
         """The pose at the origin with heading 0 and height 0."""
         angles = self._angles(phase)
         return posture(self.body, {n: self._amplitude * angle for n, angle in angles.items()})
+
+    def _amplitudes(self, kind: str) -> tuple[float, float]:
+        """Least and largest factor of all angles."""
+        return 0.94, 1.0
 
     def _lowest_m(self) -> Callable[[FloatArray], float]:
         """Height of the body's lowest point by pose (p,)."""

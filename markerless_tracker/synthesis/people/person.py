@@ -72,20 +72,23 @@ class Person:
 
     def posed(self, pose: FloatArray) -> PosedSurface:
         """The surface at a pose (p,): linear blend skinning, then loose cloth hangs down."""
+        return PosedSurface(self._posed(pose, slice(None)), self.part, self.triangles)
+
+    def lowest_m(self, pose: FloatArray) -> float:
+        """Height of the soles' lowest point at a pose (p,)."""
+        return float(self._posed(pose, self._soles)[:, 2].min())
+
+    def _posed(self, pose: FloatArray, chosen: IntArray | slice) -> FloatArray:
         moves = self.rest.moved(pose)
-        blended = (self._weights @ moves.reshape(len(moves), 12)).reshape(-1, 3, 4)
-        vertices = np.einsum("nij,nj->ni", blended[:, :, :3], self._vertices) + blended[:, :, 3]
-        axis = np.einsum("nij,nj->ni", blended[:, :, :3], self._axis)
+        blended = (self._weights[chosen] @ moves.reshape(len(moves), 12)).reshape(-1, 3, 4)
+        rotation = blended[:, :, :3]
+        vertices = np.einsum("nij,nj->ni", rotation, self._vertices[chosen]) + blended[:, :, 3]
+        axis = np.einsum("nij,nj->ni", rotation, self._axis[chosen])
         axis /= np.maximum(np.linalg.norm(axis, axis=1), 1e-9)[:, None]
         # Gravity across the line that the cloth is around; along it the cloth does not slide.
         down = axis * axis[:, 2:]
         down[:, 2] -= 1.0
-        vertices += self._slack[:, None] * down
-        return PosedSurface(vertices, self.part, self.triangles)
-
-    def lowest_m(self, pose: FloatArray) -> float:
-        """Height of the surface's lowest point at a pose (p,)."""
-        return float(self.posed(pose).vertices[self._soles, 2].min())
+        return np.asarray(vertices + self._slack[chosen, None] * down)
 
     @cached_property
     def _soles(self) -> IntArray:

@@ -9,8 +9,12 @@ from markerless_tracker.synthesis.motion import Angles, Course, Motion
 from markerless_tracker.synthesis.people.person import Person
 
 _TURN = 2.0 * np.pi
-_ANKLE_RAD = (-0.80, 0.45)
+_ANKLE_RAD = (-0.80, 0.42)
 """Range of the ankle, rad: toes down, toes up."""
+
+
+_HABITS = {"motion": 0.05, "posture": 0.10}
+"""Standard deviation of a person's own angles about those of the action, rad."""
 
 
 def _both(**angles: float) -> dict[str, float]:
@@ -29,9 +33,9 @@ def _squat(phase: float) -> Angles:
 def _bent(phase: float) -> Angles:
     slow = np.sin(_TURN * phase)
     return _both(
-        hip_y=1.0, knee=0.25 + 0.03 * slow, shoulder_y=1.45 + 0.15 * slow, shoulder_x=0.05,
+        hip_y=1.15, knee=0.25 + 0.03 * slow, shoulder_y=1.60 + 0.15 * slow, shoulder_x=0.05,
         elbow=0.25,
-    ) | {"pelvis_ry": 0.80 + 0.03 * slow, "thorax_y": 0.60, "head_y": -0.10}  # fmt: skip
+    ) | {"pelvis_ry": 0.95 + 0.03 * slow, "thorax_y": 0.65, "head_y": -0.10}  # fmt: skip
 
 
 def _seated(phase: float) -> Angles:
@@ -45,24 +49,22 @@ def _seated(phase: float) -> Angles:
 def _raised(phase: float) -> Angles:
     slow = np.sin(_TURN * phase)
     return _both(
-        hip_y=0.04, knee=0.06, shoulder_y=2.55 + 0.10 * slow, shoulder_x=0.20,
-        elbow=0.30 + 0.10 * slow,
+        hip_y=0.04, knee=0.06, shoulder_y=2.80 + 0.10 * slow, shoulder_x=0.15,
+        elbow=0.20 + 0.10 * slow,
     ) | {"thorax_y": -0.05, "head_y": -0.05}  # fmt: skip
 
 
 def _wide(phase: float) -> Angles:
     slow = np.sin(_TURN * phase)
-    return _both(hip_y=0.04, hip_x=0.12, knee=0.06, shoulder_x=1.45 + 0.12 * slow, elbow=0.15) | {
+    return _both(hip_y=0.04, hip_x=0.12, knee=0.06, shoulder_x=1.55 + 0.10 * slow, elbow=0.12) | {
         "thorax_z": 0.1 * slow
     }
 
 
 def _crossed(phase: float) -> Angles:
     slow = np.sin(_TURN * phase)
-    return _both(
-        hip_y=0.04, knee=0.06, shoulder_y=0.42 + 0.03 * slow, shoulder_x=0.10, elbow=1.85
-    ) | {
-        "l_shoulder_z": 1.15, "r_shoulder_z": -1.15, "r_shoulder_y": 0.58, "r_elbow": 1.75,
+    return _both(hip_y=0.04, knee=0.06, shoulder_y=0.50 + 0.03 * slow, shoulder_x=-0.04) | {
+        "l_shoulder_z": 1.36, "l_elbow": 1.62, "r_shoulder_z": -1.30, "r_elbow": 1.50,
         "thorax_y": 0.05, "head_z": 0.15 * slow,
     }  # fmt: skip
 
@@ -104,13 +106,17 @@ class Action(Motion):
         self._person = person
         self._place_m = place_m
         rng = np.random.default_rng([seed, 5])
-        names = ("shoulder_x", "shoulder_y", "shoulder_z", "elbow", "hip_x")
+        spread = _HABITS["posture" if kind in POSTURES else "motion"]
+        names = [f"{side}_{name}" for side in "lr" for name in ("shoulder_x", "shoulder_y",
+                 "shoulder_z", "elbow", "hip_x")]  # fmt: skip
         self._habit = {
-            f"{side}_{name}": float(np.clip(rng.normal(0.0, 0.05), -0.12, 0.12))
-            for side in "lr"
-            for name in names
-        } | {"spine_x": float(np.clip(rng.normal(0.0, 0.04), -0.1, 0.1))}
+            name: spread * float(np.clip(rng.standard_normal(), -2.0, 2.0))
+            for name in (*names, "spine_x", "head_y", "head_z")
+        }
         super().__init__(person.body, kind, seed)
+
+    def _amplitudes(self, kind: str) -> tuple[float, float]:
+        return (0.90, 1.06) if kind in POSTURES else super()._amplitudes(kind)
 
     def pose(self, time_s: float) -> FloatArray:
         """The pose (p,) at a time in s."""

@@ -39,7 +39,8 @@ class Rest:
         frames = np.tile(np.eye(4), (len(FRAMES), 1, 1))
         frames[:, :3] = transforms(body, body.neutral)[[body.frames[name] for name in FRAMES]]
         joints = dict(zip(MARKER_NAMES, markers(body, body.neutral), strict=True))
-        return cls(body, joints, np.linalg.inv(frames), frames[_INDEX["loins"], :3, 3])
+        inverse = np.asarray(np.linalg.inv(frames), dtype=float)
+        return cls(body, joints, inverse, frames[_INDEX["loins"], :3, 3])
 
     def moved(self, pose: FloatArray) -> FloatArray:
         """Transforms (f, 3, 4) from the rest pose to a pose (p,)."""

@@ -28,7 +28,7 @@ def skeleton(lengths_m: Mapping[str, float]) -> BodyModel:
         BodyModelError: a length is missing or impossible.
     """
     shipped = _person35()
-    frames = {}
+    frames: dict[str, Mapping[str, str]] = {}
     for name, entry in shipped.frames.items():
         if name == "thorax":
             frames["loins"] = {

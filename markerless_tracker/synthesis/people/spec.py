@@ -25,6 +25,11 @@ LOWER = ("trousers", "shorts", "skirt")
 UPPER = ("shirt", "jacket")
 
 
+_HAIR_SHARES = {"female": (0.05, 0.2, 0.2, 0.35, 0.2), "male": (0.15, 0.5, 0.3, 0.05, 0.0)}
+_LOWER_SHARES = {"female": (0.62, 0.13, 0.25), "male": (0.8, 0.2, 0.0)}
+_SLEEVES, _SLEEVE_SHARES = (0.0, 0.35, 0.45, 0.97), (0.1, 0.3, 0.3, 0.3)
+
+
 @dataclass(frozen=True)
 class PersonSpec:
     """One person, all lengths in m, factors about 1.
@@ -119,7 +124,7 @@ def sample_person(rng: np.random.Generator) -> PersonSpec:
         upper=upper,
         upper_length=float(rng.uniform(0.15, 0.45) if jacket else rng.uniform(-0.02, 0.22)),
         trunk_ease_m=float(rng.uniform(0.02, 0.05) if jacket else rng.uniform(0.008, 0.04)),
-        sleeve=float(rng.uniform(0.9, 1.0) if jacket else rng.choice([0.0, 0.35, 0.45, 0.97], p=[0.1, 0.3, 0.3, 0.3])),
+        sleeve=float(rng.uniform(0.9, 1.0) if jacket else rng.choice(_SLEEVES, p=_SLEEVE_SHARES)),
         sleeve_ease_m=float(rng.uniform(0.012, 0.028) if jacket else rng.uniform(0.005, 0.022)),
         wrinkle_m=float(rng.uniform(0.0005, 0.0032)),
         sole_m=float(rng.uniform(0.008, 0.035)),

@@ -109,13 +109,13 @@ def add_visible(points, depth, nearness, tolerance_m, weight, total):  # type: i
 def shine(paint, ambient, lamps, hidden, light):  # type: ignore[no-untyped-def]
     """Fill light (h, w, 3): paint under the ambient light and what arrives of each lamp.
 
-    paint (h, w, 3); ambient (3,); lamps (l, h, w, 4): blue, green, red of each lamp on the surface
-    and nothing in the fourth; hidden (l, h, w): the part of the lamp that is hidden.
+    paint, ambient (h, w, 3); lamps (l, h, w, 3): what arrives of each lamp where it is not
+    hidden; hidden (l, h, w): the part of the lamp that is hidden.
     """
     count, height, width = hidden.shape
     for v in range(height):
         for u in range(width):
-            blue, green, red = ambient[0], ambient[1], ambient[2]
+            blue, green, red = ambient[v, u, 0], ambient[v, u, 1], ambient[v, u, 2]
             for n in range(count):
                 open_part = 1.0 - hidden[n, v, u]
                 blue += open_part * lamps[n, v, u, 0]

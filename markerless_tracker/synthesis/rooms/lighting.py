@@ -21,6 +21,9 @@ _MAP = 200
 """Texels of a lamp's depth map along each side."""
 _TOLERANCE_M = 0.035
 _MOST = 1.6
+_WRAP = 0.3
+_BOUNCE = 0.4
+"""Part of the light on upright surfaces that comes back from floor and walls, from everywhere."""
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
 
@@ -53,7 +56,6 @@ class Lighting:
     def __init__(self, room: RoomSpec) -> None:
         self.room = room
         self.planes = planes_of(room)
-        self.ambient = room.ambient * np.array(room.ambient_tint)
         self._points = [_points_of(lamp) for lamp in room.lamps]
 
     def arriving(self, points: FloatArray, normals: FloatArray) -> FloatArray:
@@ -63,7 +65,9 @@ class Lighting:
         """
         return np.stack(
             [
-                _strength(np.array(lamp.place_m), lamp, points, normals)[:, None]
+                (_direct(normals) * _strength(np.array(lamp.place_m), lamp, points, normals))[
+                    :, None
+                ]
                 * np.array(lamp.tint)
                 for lamp in self.room.lamps
             ]
@@ -71,7 +75,7 @@ class Lighting:
 
     def on_surface(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """All light (n, 3) at points with unit normals, nothing hidden."""
-        return np.asarray(self.arriving(points, normals).sum(axis=0)) + self._ambient(normals)
+        return np.asarray(self.arriving(points, normals).sum(axis=0)) + self.ambient(normals)
 
     def hidden(self, solid: Triangles) -> NDArray[np.float32]:
         """Part (l, rows, columns) of each lamp that triangles hide from the sheet's texels."""
@@ -96,18 +100,26 @@ class Lighting:
         normals = solid.normals()
         middle = 0.5 * (solid.vertices.min(axis=0) + solid.vertices.max(axis=0))
         radius = float(np.linalg.norm(solid.vertices - middle, axis=1).max())
-        light = self._ambient(normals)
+        light = self.ambient(normals)
         for lamp, points in zip(self.room.lamps, self._points, strict=True):
             arrived = np.zeros(len(normals))
             for place in points:
                 open_part = np.zeros(len(normals))
                 _add_open(solid, place, middle, radius, open_part)
-                arrived += open_part * _strength(place, lamp, solid.vertices, normals)
-            light += (arrived / len(points))[:, None] * np.array(lamp.tint)
+                arrived += open_part * _strength(place, lamp, solid.vertices, normals, _WRAP)
+            light += (_direct(normals) * arrived / len(points))[:, None] * np.array(lamp.tint)
         return np.minimum(light, _MOST)
 
-    def _ambient(self, normals: FloatArray) -> FloatArray:
-        return np.asarray((0.8 + 0.2 * normals[:, 2:]) * self.ambient)
+    def ambient(self, normals: FloatArray) -> FloatArray:
+        """Light (n, 3) on surfaces with unit normals (n, 3) that casts no shadow."""
+        direct = _direct(normals)
+        level = direct * (0.8 + 0.2 * normals[:, 2]) * self.room.ambient + 1.0 - direct
+        return np.asarray(level[:, None] * np.array(self.room.ambient_tint))
+
+
+def _direct(normals: FloatArray) -> FloatArray:
+    """The part (n,) of the light that comes straight from lamps: all of it on the floor."""
+    return np.asarray(1.0 - _BOUNCE * (1.0 - np.maximum(normals[:, 2], 0.0)))
 
 
 def _points_of(lamp: LampSpec) -> FloatArray:
@@ -127,12 +139,16 @@ def _points_of(lamp: LampSpec) -> FloatArray:
 
 
 def _strength(
-    place: FloatArray, lamp: LampSpec, points: FloatArray, normals: FloatArray
+    place: FloatArray, lamp: LampSpec, points: FloatArray, normals: FloatArray, wrap: float = 0.0
 ) -> FloatArray:
-    """Light (n,) from a point of a lamp; falls with the distance, more slowly than in the open."""
+    """Light (n,) from a point of a lamp; falls with the distance, more slowly than in the open.
+
+    `wrap` is how far past grazing incidence light arrives, as a cosine: cloth and skin scatter it.
+    """
     towards = place - points
     distance = np.linalg.norm(towards, axis=1)
-    cosine = np.maximum(np.einsum("ni,ni->n", towards, normals), 0.0) / distance
+    cosine = np.einsum("ni,ni->n", towards, normals) / distance
+    cosine = np.maximum((cosine + wrap) / (1.0 + wrap), 0.0)
     middle = np.array(lamp.place_m)
     usual = float(np.linalg.norm(middle))
     return np.asarray(

@@ -17,7 +17,7 @@ class SurfaceSpec:
     Attributes:
         colour: mean, grey levels 0..255 under a light of 1.
         pattern: one of `PATTERNS`.
-        contrast: standard deviation of the pattern, grey levels.
+        contrast: standard deviation of the pattern, grey levels where the mean is 128.
         posters: number of pictures on it.
         seed: of pattern and posters.
     """
@@ -116,7 +116,7 @@ class SensorSpec:
 
 
 def sample_room(rng: np.random.Generator) -> RoomSpec:
-    """Draw a room; shadows leave 0.4 to 0.8 of the floor's light where the strongest lamp is hidden."""
+    """Draw a room; where the strongest lamp is hidden 0.4 to 0.8 of the floor's light is left."""
     floor = _surface(rng, _dull(rng, 60.0, 190.0), patterns=PATTERNS, most=25.0, posters=0)
     base = _dull(rng, 90.0, 210.0)
     other = _dull(rng, 90.0, 210.0)
@@ -149,37 +149,37 @@ def _light(rng: np.random.Generator, most_m: float) -> tuple[tuple[LampSpec, ...
             leaves nothing but a bright spot.
     """
     azimuth = rng.uniform(-np.pi, np.pi)
-    distance, height = rng.uniform(1.2, most_m), rng.uniform(2.5, 4.2)
+    distance, height = rng.uniform(0.8, min(most_m, 3.6)), rng.uniform(2.6, 4.6)
     hard = rng.uniform() < 0.5
-    key_share = float(rng.uniform(0.2, 0.6))
+    key_share = float(rng.uniform(0.18, 0.55))
     lamps = [
         LampSpec(
             (float(distance * np.cos(azimuth)), float(distance * np.sin(azimuth)), float(height)),
             float(rng.uniform(0.01, 0.06) if hard else rng.uniform(0.1, 0.6)),
             4 if hard else 12,
             key_share,
-            _tint(rng, 0.05),
+            _tint(rng, 0.035),
         )
     ]
     left = 1.0 - key_share
     if rng.uniform() < 0.55:
         azimuth += rng.uniform(0.5, 2.0 * np.pi - 0.5)
-        distance = rng.uniform(0.8, most_m)
-        share = float(min(rng.uniform(0.1, 0.4), 0.9 * key_share, 0.7 * left))
+        distance = rng.uniform(0.8, min(most_m, 3.2))
+        share = float(min(rng.uniform(0.08, 0.3), 0.8 * key_share, 0.6 * left))
         lamps.append(
             LampSpec(
                 (
                     float(distance * np.cos(azimuth)), float(distance * np.sin(azimuth)),
-                    float(rng.uniform(2.5, 3.6)),
+                    float(rng.uniform(2.6, 4.2)),
                 ),
-                float(rng.uniform(0.03, 0.4)), 8, share, _tint(rng, 0.05),
+                float(rng.uniform(0.03, 0.4)), 8, share, _tint(rng, 0.035),
             )
         )  # fmt: skip
         left -= share
     # A wide ceiling: the soft darkness where feet touch the floor.
-    ceiling = float(left * rng.uniform(0.25, 0.6))
+    ceiling = float(left * rng.uniform(0.2, 0.5))
     x, y = (float(v) for v in rng.uniform(-0.5, 0.5, 2))
-    tint = _tint(rng, 0.05)
+    tint = _tint(rng, 0.035)
     lamps.append(LampSpec((x, y, 3.0), 2.2, 16, ceiling, tint))
     return tuple(lamps), left - ceiling, tint
 
@@ -193,7 +193,7 @@ def sample_cameras(
     for i in range(count):
         azimuth = start + 2.0 * np.pi * (i + rng.uniform(-0.14, 0.14)) / count
         distance, height = rng.uniform(3.6, 5.2), rng.uniform(1.1, 2.6)
-        target = (*(float(v) for v in rng.uniform(-0.1, 0.1, 2)), float(rng.uniform(0.80, 1.00)))
+        x, y, z = (float(v) for v in rng.uniform([-0.1, -0.1, 0.80], [0.1, 0.1, 1.00]))
         # 2.9 m across the image's shorter side where the person is.
         focal = min(size_px) * distance / rng.uniform(2.75, 3.3)
         bend = rng.uniform(-0.16, 0.03)
@@ -203,7 +203,7 @@ def sample_cameras(
                     float(distance * np.cos(azimuth)), float(distance * np.sin(azimuth)),
                     float(height),
                 ),
-                target_m=target,
+                target_m=(x, y, z),
                 focal_px=float(focal),
                 distortion=(
                     float(bend), float(-0.3 * bend), *(float(v) for v in rng.normal(0, 0.0006, 2)),
@@ -222,8 +222,8 @@ def sample_sensor(rng: np.random.Generator, size_px: tuple[int, int]) -> SensorS
     return SensorSpec(
         size_px=size_px,
         level=float(rng.uniform(75.0, 150.0)),
-        cast=_tint(rng, 0.06),
-        gamma=float(rng.uniform(0.85, 1.15)),
+        cast=_tint(rng, 0.045),
+        gamma=float(rng.uniform(0.75, 1.05)),
         noise=float(np.exp(rng.uniform(0.0, np.log(6.0)))),
         grey=bool(rng.uniform() < 0.15),
         drift=float(rng.choice([0.0, rng.uniform(0.01, 0.08)])),
@@ -247,7 +247,7 @@ def _surface(
 def _dull(rng: np.random.Generator, least: float, most: float) -> Colour:
     """A colour of rooms: its brightness even between two grey levels, its channels some % apart."""
     level = rng.uniform(least, most)
-    blue, green, red = level * np.exp(rng.normal([-0.06, 0.0, 0.04], [0.10, 0.03, 0.08]))
+    blue, green, red = level * np.exp(rng.normal([-0.05, 0.0, 0.03], [0.08, 0.02, 0.06]))
     return float(blue), float(green), float(red)
 
 

@@ -79,7 +79,7 @@ def _surface(spec: SurfaceSpec, rows: int) -> Picture:
         pattern = (pattern - pattern.mean()) * np.float32(spec.contrast / spread)
     colour = np.array(spec.colour, dtype=np.float32)
     # Texture changes brightness: its colour is the surface's.
-    factor = np.clip(1.0 + pattern / max(float(colour.mean()), 1.0), 0.15, 2.5)
+    factor = np.clip(1.0 + pattern / np.float32(128.0), 0.15, 2.5)
     sheet = factor[..., None] * colour
     for _ in range(spec.posters):
         _poster(sheet, rng)

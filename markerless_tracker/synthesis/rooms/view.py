@@ -56,17 +56,19 @@ class View:
         sheet: NDArray[np.float32],
     ) -> None:
         self.camera = camera
-        self._spec, self._sensor, self._lighting = spec, sensor, lighting
+        self._spec, self._sensor = spec, sensor
         self._texels, points, seen = _seen(camera, lighting, 1)
         normals = np.array([p.normal for p in lighting.planes])[seen]
         fine, _, nothing = _seen(camera, lighting, _PAINT_SAMPLES)
-        paint = cv2.remap(sheet, fine, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        paint = _sampled(sheet, fine)
         paint[nothing < 0] = 12.0
         width, height = camera.size_px
         self._paint = np.asarray(
             cv2.resize(paint, (width, height), interpolation=cv2.INTER_AREA), dtype=np.float32
         )
-        arriving = lighting.arriving(points.reshape(-1, 3), normals.reshape(-1, 3))
+        normals = normals.reshape(-1, 3)
+        arriving = lighting.arriving(points.reshape(-1, 3), normals)
+        self._ambient = lighting.ambient(normals).reshape(height, width, 3).astype(np.float32)
         self._lamps = arriving.reshape(-1, height, width, 3).astype(np.float32)
         v, u = np.indices((height, width))
         off = np.hypot(u - 0.5 * width, v - 0.5 * height) / np.hypot(0.5 * width, 0.5 * height)
@@ -75,39 +77,42 @@ class View:
 
     def level(self) -> float:
         """Mean of the empty room's image before exposure."""
-        light = self._lamps.sum(axis=0) + self._lighting.ambient.astype(np.float32)
+        light = self._lamps.sum(axis=0) + self._ambient
         return float((self._paint * light * self._gain).mean())
 
-    def image(
+    def light_on(
         self,
         hidden: NDArray[np.float32],
         solid: Triangles,
         colours: FloatArray,
         person: Mask,
-        rng: np.random.Generator,
-        *,
-        light: float,
-    ) -> tuple[Image, Mask]:
-        """The image (h, w, 3) BGR or (h, w) grey, and the exact mask (h, w) of the person.
+    ) -> tuple[NDArray[np.float32], Mask]:
+        """The light (h, w, 3) that arrives at the lens, and the exact mask (h, w) of the person.
 
         Args:
             hidden: as `Lighting.hidden` gives it.
             solid: what stands in the room.
             colours: (k, 3) of its vertices, light included.
             person: (m,) whether a triangle is the person's.
-            rng: source of the noise.
-            light: factor of all light, exposure included.
         """
         width, height = self.camera.size_px
-        on_pixels = np.stack(
-            [cv2.remap(part, self._texels, None, cv2.INTER_LINEAR) for part in hidden]
-        )
+        on_pixels = np.stack([_sampled(part, self._texels) for part in hidden])
         picture = np.empty((height, width, 3), dtype=np.float32)
-        shine(self._paint, self._lighting.ambient, self._lamps, on_pixels, picture)
+        shine(self._paint, self._ambient, self._lamps, on_pixels, picture)
         covered = np.zeros((height, width), dtype=np.float32)
         self._draw(picture, solid, colours, person, covered)
-        picture *= self._gain * np.float32(light)
-        return self._taken(picture, rng), covered >= 0.5
+        picture *= self._gain
+        return picture, covered >= 0.5
+
+    def visible(self, solid: Triangles) -> IntArray:
+        """Triangles seen at the pixels that show any, as many times as they are seen."""
+        width, height = self.camera.size_px
+        points = project_camera(solid.vertices, self.camera)
+        depth = apply(self.camera.T_cam_world, solid.vertices)[:, 2]
+        nearness = np.zeros((height, width), dtype=np.float32)
+        number = np.full((height, width), -1, dtype=np.int32)
+        nearest_triangles(np.column_stack([points, 1.0 / depth]), solid.triangles, nearness, number)
+        return np.asarray(number[number >= 0], dtype=np.int64)
 
     def _draw(
         self, picture: NDArray[np.float32], solid: Triangles, colours: FloatArray, person: Mask,
@@ -133,9 +138,12 @@ class View:
             SAMPLES, covered,
         )  # fmt: skip
 
-    def _taken(self, picture: NDArray[np.float32], rng: np.random.Generator) -> Image:
-        """What the sensor makes of the light: blur, tone curve, noise."""
+    def taken(
+        self, picture: NDArray[np.float32], rng: np.random.Generator, exposure: float
+    ) -> Image:
+        """What the sensor makes of the light (h, w, 3): the image (h, w, 3) BGR or (h, w) grey."""
         sensor = self._sensor
+        picture = picture * np.float32(exposure)
         if self._spec.blur_px >= _LEAST_BLUR_PX:
             picture = np.asarray(
                 cv2.GaussianBlur(picture, (0, 0), self._spec.blur_px), dtype=np.float32
@@ -143,15 +151,20 @@ class View:
         if sensor.grey:
             picture = picture @ _LUMA
         np.clip(picture, 0.0, 255.0, out=picture)
-        if sensor.gamma != 1.0:
-            picture = np.asarray(
-                cv2.pow(picture * np.float32(1.0 / 255.0), sensor.gamma), dtype=np.float32
-            ) * np.float32(255.0)
+        tone = cv2.pow(picture * np.float32(1.0 / 255.0), sensor.gamma)
+        picture = np.asarray(tone, dtype=np.float32) * np.float32(255.0)
         # Half of the variance is the light's own: it grows with the level.
         noise = rng.standard_normal(picture.shape, dtype=np.float32)
         noise *= np.float32(sensor.noise) * np.sqrt(0.5 + picture * np.float32(1.0 / 256.0))
-        picture = picture + noise
-        return np.clip(np.rint(picture), 0.0, 255.0).astype(np.uint8)
+        return np.asarray(np.clip(np.rint(picture + noise), 0.0, 255.0), dtype=np.uint8)
+
+
+def _sampled(sheet: NDArray[np.float32], texels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Values of the sheet (rows, columns, ...) at texels (h, w, 2)."""
+    u, v = np.ascontiguousarray(texels[..., 0]), np.ascontiguousarray(texels[..., 1])
+    return np.asarray(
+        cv2.remap(sheet, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), dtype=np.float32
+    )
 
 
 def _seen(

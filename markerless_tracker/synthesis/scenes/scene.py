@@ -1,8 +1,10 @@
 """A generated scene, frame by frame: images, exact masks and the true markers."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.body import (
     MARKER_NAMES,
@@ -21,12 +23,14 @@ from markerless_tracker.synthesis.rooms.chair import chair
 from markerless_tracker.synthesis.rooms.lighting import Lighting, Triangles
 from markerless_tracker.synthesis.rooms.surfaces import painted
 from markerless_tracker.synthesis.rooms.view import Image, Mask, View, camera_model
-from markerless_tracker.synthesis.scenes.colours import vertex_colours
+from markerless_tracker.synthesis.scenes.colours import part_colours, part_light, vertex_colours
 from markerless_tracker.synthesis.scenes.spec import SceneSpec, sample_scene
 
 _PERSON, _EMPTY = 8, 9
 # Apart from each other: noise of frames with the person and of empty frames.
 _START_TOLERANCE_M = 0.03
+_MATCHED_S = (0.0, 1.0, 2.0)
+# Times at which clothes that look like the room are compared with it.
 _CHAIR = (70.0, 90.0, 120.0)
 
 
@@ -44,7 +48,7 @@ class GeneratedScene:
         rig: the true cameras.
         person: skeleton and surface.
         body: the skeleton; no tracker has it.
-        action: the motion.
+        motion: what the person does.
 
     Raises:
         ConfigError: the motion is unknown, or the seed is negative.
@@ -59,8 +63,7 @@ class GeneratedScene:
         self.seed = spec.seed
         self.person = Person(spec.person)
         self.body: BodyModel = self.person.body
-        self.motion = motion or spec.motion
-        self.action = Action(self.person, self.motion, spec.seed, spec.place_m)
+        self.motion = Action(self.person, motion or spec.motion, spec.seed, spec.place_m)
         self.rig = CameraRig(
             tuple(
                 camera_model(f"cam{i + 1:02d}", camera, spec.sensor.size_px)
@@ -68,14 +71,14 @@ class GeneratedScene:
             )
         )
         self._lighting = Lighting(spec.room)
-        self._colours = vertex_colours(spec, self._lighting, self.person)
-        self._furniture = self._chair() if self.motion == "seated" else _NOTHING
+        self._furniture = self._chair() if self.motion.kind == "seated" else _NOTHING
         sheet = painted(spec.room)
         self._views = {
             model.name: View(model, camera, spec.sensor, self._lighting, sheet)
             for model, camera in zip(self.rig, spec.cameras, strict=True)
         }
         level = float(np.mean([view.level() for view in self._views.values()]))
+        self._colours = self._painted()
         self._exposure = spec.sensor.level / level
 
     def stamp_ns(self, index: int) -> int:
@@ -84,7 +87,7 @@ class GeneratedScene:
 
     def pose(self, index: int) -> FloatArray:
         """True pose (p,) of the skeleton in a frame."""
-        return self.action.pose(index / self.fps)
+        return self.motion.pose(index / self.fps)
 
     def markers(self, index: int) -> FloatArray:
         """True markers (15, 3) in m, world frame, of a frame."""
@@ -115,23 +118,27 @@ class GeneratedScene:
             np.concatenate([surface.triangles, self._furniture.triangles + shift]),
         )
         person = np.arange(len(solid.triangles)) < len(surface.triangles)
-        images = self._taken(
-            solid, np.concatenate([self._colours, self._wood]), person, _PERSON, index,
-            self._drift(index / self.fps),
-        )  # fmt: skip
-        return (
-            {name: image for name, (image, _) in images.items()},
-            {name: mask for name, (_, mask) in images.items()},
-            pose,
-        )
+        colours = np.concatenate([self._colours, self._wood])
+        images, masks = {}, {}
+        exposure = self._exposure * self._drift(index / self.fps)
+        for number, (name, (picture, mask)) in enumerate(self._seen(solid, colours, person)):
+            rng = np.random.default_rng([self.seed, _PERSON, number, index])
+            images[name], masks[name] = self._views[name].taken(picture, rng, exposure), mask
+        return images, masks, pose
 
     def backgrounds(self, count: int) -> dict[str, list[Image]]:
         """That many images of the empty room by camera."""
         nobody = np.zeros(len(self._furniture.triangles), dtype=np.bool_)
-        taken = [
-            self._taken(self._furniture, self._wood, nobody, _EMPTY, i, 1.0) for i in range(count)
-        ]
-        return {name: [images[name][0] for images in taken] for name in self.rig.names}
+        seen = self._seen(self._furniture, self._wood, nobody)
+        return {
+            name: [
+                self._views[name].taken(
+                    picture, np.random.default_rng([self.seed, _EMPTY, number, i]), self._exposure
+                )
+                for i in range(count)
+            ]
+            for number, (name, (picture, _)) in enumerate(seen)
+        }
 
     def values(self) -> dict[str, Any]:
         """All sampled values, plain."""
@@ -141,19 +148,22 @@ class GeneratedScene:
     def _wood(self) -> FloatArray:
         return np.tile(_CHAIR, (len(self._furniture.vertices), 1))
 
-    def _taken(
-        self, solid: Triangles, paint: FloatArray, person: Mask, kind: int, index: int, light: float
-    ) -> dict[str, tuple[Image, Mask]]:
+    def _seen(
+        self, solid: Triangles, paint: FloatArray, person: Mask
+    ) -> Iterator[tuple[str, tuple[NDArray[np.float32], Mask]]]:
+        """By camera the light (h, w, 3) at its lens and the person's mask (h, w)."""
         hidden = self._lighting.hidden(solid)
         colours = paint * self._lighting.on_solid(solid) if len(paint) else paint
-        return {
-            name: view.image(
-                hidden, solid, colours, person,
-                np.random.default_rng([self.seed, kind, number, index]),
-                light=light * self._exposure,
-            )
-            for number, (name, view) in enumerate(self._views.items())
-        }  # fmt: skip
+        for name, view in self._views.items():
+            yield name, view.light_on(hidden, solid, colours, person)
+
+    def _painted(self) -> FloatArray:
+        """Colours (k, 3) of the person's vertices, matched at some times of the motion."""
+        poses = [self.motion.pose(time_s) for time_s in _MATCHED_S]
+        hips = np.array([markers(self.body, p)[MARKER_NAMES.index("Pelvis")] for p in poses])
+        light = part_light(self.person, self._lighting, list(self._views.values()), poses)
+        palette = part_colours(self.spec, self._lighting, light, hips * [1.0, 1.0, 0.0])
+        return vertex_colours(self.spec, self.person, palette)
 
     def _drift(self, time_s: float) -> float:
         sensor = self.spec.sensor
