@@ -11,20 +11,27 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from markerless_tracker.body import MARKER_NAMES, Subject, write_pose, write_subject
+from markerless_tracker.body import MARKER_NAMES, write_pose, write_subject
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.datasets.writer import new_recording
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.synthesis import LIGHTS, MILD_LENS, MOTIONS, SyntheticScene
+from markerless_tracker.synthesis.people import ACTIONS
+from markerless_tracker.synthesis.scenes import GeneratedScene
 
 HELP = (
     "Render a synthetic person (shaded cones in a textured room) as a recording folder: "
     "calibration, videos, empty-scene images, exact masks and markers, subject and start pose. "
-    "Errors on it test the software; they do not measure the accuracy on real images."
+    "Errors on it test the software; they do not measure the accuracy on real images. --scene "
+    "SEED renders a sampled room and a clothed person with other shapes than the tracker's cones."
 )
 EXAMPLE = "markerless_tracker synthesize recordings/synthetic --seconds 2 --motion balance"
 EMPTY_IMAGES = 10
 _MOST_FRAMES = 100_000
+_NOT_WITH_SCENE = (
+    "cameras", "size", "seed", "stature", "body", "noise", "shadow", "light", "grey", "dull",
+    "undistorted",
+)  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,8 +40,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seconds", type=float, default=4.0, help="duration in s (default 4)")
     parser.add_argument("--fps", type=float, default=60.0, help="frames per second (default 60)")
     parser.add_argument(
-        "--motion", choices=MOTIONS, default="walk", help="motion of the person (default walk)"
-    )
+        "--motion", choices=ACTIONS,
+        help="motion of the person (default walk, or the scene's); without --scene "
+        f"{', '.join(MOTIONS)}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--scene", metavar="SEED", type=int,
+        help="render the generated scene of this seed: room, lamps, cameras, clothes, person; "
+        "with --seconds, --fps, --motion, --lossless and --json only",
+    )  # fmt: skip
     parser.add_argument("--cameras", type=int, default=4, help="number of cameras (default 4)")
     parser.add_argument(
         "--size",
@@ -79,21 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the recording; returns the exit status."""
     frames = _frames(args.seconds, args.fps)
-    scene = SyntheticScene(
-        body=args.body,
-        stature_m=args.stature,
-        motion=args.motion,
-        cameras=args.cameras,
-        size_px=_size(args.size),
-        fps=args.fps,
-        seed=args.seed,
-        noise=args.noise,
-        shadow=args.shadow,
-        light=args.light,
-        grey=args.grey,
-        dull=args.dull,
-        distortion=(0.0,) * 5 if args.undistorted else MILD_LENS,
-    )
+    scene = _synthetic(args) if args.scene is None else _generated(args)
     with Progress(console=Console(file=sys.stderr)) as bar:
         task = bar.add_task("frames", total=frames)
         synthesize(
@@ -105,17 +105,44 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.json:
         print(json.dumps({
-            "path": str(args.out), "frames": frames, "fps": args.fps, "motion": args.motion,
-            "cameras": list(scene.rig.names), "seed": args.seed, "body": scene.body.name,
+            "path": str(args.out), "frames": frames, "fps": args.fps, "motion": scene.motion.kind,
+            "cameras": list(scene.rig.names), "seed": scene.seed, "body": scene.body.name,
         }))  # fmt: skip
     else:
         print(f"{args.out}: {frames} frames of {len(scene.rig)} cameras, with exact truth")
     return 0
 
 
+def _synthetic(args: argparse.Namespace) -> SyntheticScene:
+    return SyntheticScene(
+        body=args.body,
+        stature_m=args.stature,
+        motion=args.motion or "walk",
+        cameras=args.cameras,
+        size_px=_size(args.size),
+        fps=args.fps,
+        seed=args.seed,
+        noise=args.noise,
+        shadow=args.shadow,
+        light=args.light,
+        grey=args.grey,
+        dull=args.dull,
+        distortion=(0.0,) * 5 if args.undistorted else MILD_LENS,
+    )
+
+
+def _generated(args: argparse.Namespace) -> GeneratedScene:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    for name in _NOT_WITH_SCENE:
+        if getattr(args, name) != parser.get_default(name):
+            raise ConfigError(f"--scene samples everything itself, expected no --{name}")
+    return GeneratedScene(args.scene, fps=args.fps, motion=args.motion)
+
+
 def synthesize(
     out: str | Path,
-    scene: SyntheticScene,
+    scene: SyntheticScene | GeneratedScene,
     *,
     frames: int,
     mask_every: int = 50,
@@ -127,7 +154,8 @@ def synthesize(
     Written: `calibration.toml`, `camNN.mp4` (`.mkv` if lossless: some 0.6 MB per image of 656x490),
     `background/camNN/` with empty images, `masks/camNN/FFFFFF.png` for every `mask_every`-th frame,
     `ground_truth.trc` (the 15 markers of every frame), `subject.yaml` and `start.yaml` (the true
-    pose of frame 0).
+    pose of frame 0; missing where the tracker's body cannot take it), and `scene.json` with the
+    sampled values of a generated scene.
 
     Args:
         out: a new or an empty folder.
@@ -143,8 +171,13 @@ def synthesize(
     with new_recording(out, scene.rig, scene.fps, lossless=lossless) as writer:
         for name, images in scene.backgrounds(EMPTY_IMAGES).items():
             writer.write_background(name, images)
-        write_subject(writer.folder / "subject.yaml", Subject("made up", scene.body.lengths_m))
-        write_pose(writer.folder / "start.yaml", scene.body, scene.pose(0))
+        write_subject(writer.folder / "subject.yaml", scene.subject())
+        start = scene.start()
+        if start is not None:
+            write_pose(writer.folder / "start.yaml", *start)
+        if isinstance(scene, GeneratedScene):
+            values = json.dumps(scene.values(), indent=2)
+            (writer.folder / "scene.json").write_text(values + "\n", encoding="utf-8")
         for index in range(frames):
             views, masks, _ = scene.frame(index)
             wanted = masks if index % mask_every == 0 else {}

@@ -1,4 +1,8 @@
-"""Made-up people: motions, cameras, pictures. Errors on them are never accuracy."""
+"""Made-up people: motions, cameras, pictures. Errors on them are never accuracy.
+
+`scenes` generates rooms and people in clothes that are not a tracker's cones, from `rooms` and
+`people`.
+"""
 
 from markerless_tracker.synthesis.motion import MOTIONS, Motion
 from markerless_tracker.synthesis.rig import MILD_LENS, look_at, ring_rig

@@ -76,9 +76,11 @@ def _stand(phase: float) -> Angles:
     }  # fmt: skip
 
 
-# Angles by phase, periods per second, radius of the circle walked (m), metres per period,
-# markers that stay over one point of the floor.
-_MOTIONS: Mapping[str, tuple[Callable[[float], Angles], float, float, float, tuple[str, ...]]] = {
+Course = tuple[Callable[[float], Angles], float, float, float, tuple[str, ...]]
+"""Angles by phase, periods per second, radius of the circle walked (m), metres per period,
+markers that stay over one point of the floor."""
+
+_MOTIONS: Mapping[str, Course] = {
     "walk": (_walk, 0.66, 0.90, 4.0 * _LEG_M * np.sin(0.36), ()),
     "jog": (_jog, 1.15, 1.20, 4.0 * _LEG_M * np.sin(0.50), ()),
     "balance": (_balance, 0.40, 0.0, 0.0, ("LAnkle",)),
@@ -105,20 +107,22 @@ class Motion:
         ConfigError: the motion is unknown.
     """
 
+    courses: Mapping[str, Course] = _MOTIONS
+    """The motions that there are."""
+
     def __init__(self, body: BodyModel, kind: str, seed: int = 0) -> None:
-        if kind not in _MOTIONS:
-            raise ConfigError(f"motion is {kind!r}, expected one of {', '.join(MOTIONS)}")
+        if kind not in self.courses:
+            raise ConfigError(f"motion is {kind!r}, expected one of {', '.join(self.courses)}")
         self.body = body
         self.kind = kind
-        self._angles, frequency, self._radius_m, self._stride_m, self._anchors = _MOTIONS[kind]
+        self._angles, frequency, self._radius_m, self._stride_m, self._anchors = self.courses[kind]
         rng = np.random.default_rng([seed, 2])
         self._frequency_hz = frequency * rng.uniform(0.94, 1.0)
-        self._amplitude = rng.uniform(0.94, 1.0)
+        self._amplitude = rng.uniform(*self._amplitudes(kind))
         self._phase, self._heading = rng.uniform(0.0, 1.0), rng.uniform(-np.pi, np.pi)
         scale = _leg_m(body) / _LEG_M
         self._radius_m *= scale
         self._stride_m *= scale
-        self._mesh = body_mesh(body)
         self._height = self._solve_height()
 
     def pose(self, time_s: float) -> FloatArray:
@@ -143,12 +147,19 @@ class Motion:
         angles = self._angles(phase)
         return posture(self.body, {n: self._amplitude * angle for n, angle in angles.items()})
 
+    def _amplitudes(self, kind: str) -> tuple[float, float]:
+        """Least and largest factor of all angles."""
+        return 0.94, 1.0
+
+    def _lowest_m(self) -> Callable[[FloatArray], float]:
+        """Height of the body's lowest point by pose (p,)."""
+        mesh = body_mesh(self.body)
+        return lambda pose: float(mesh.posed(self.body, pose)[0][:, 2].min())
+
     def _solve_height(self) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
         """Fourier coefficients of the pelvis' height that keeps the feet on the floor."""
-        heights = [
-            -self._mesh.posed(self.body, self._posture(i / _HEIGHT_SAMPLES))[0][:, 2].min()
-            for i in range(_HEIGHT_SAMPLES)
-        ]
+        lowest = self._lowest_m()
+        heights = [-lowest(self._posture(i / _HEIGHT_SAMPLES)) for i in range(_HEIGHT_SAMPLES)]
         return np.fft.rfft(heights)[: _HEIGHT_HARMONICS + 1] / _HEIGHT_SAMPLES
 
     def _height_at(self, phase: float) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from markerless_tracker.body import BodyModel, load_body, markers
+from markerless_tracker.body import BodyModel, Subject, load_body, markers
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
@@ -119,6 +119,14 @@ class SyntheticScene:
     def markers(self, index: int) -> FloatArray:
         """True markers (15, 3) in m, world frame, of a frame."""
         return markers(self.body, self.pose(index))
+
+    def subject(self) -> Subject:
+        """The person's segment lengths."""
+        return Subject("made up", self.body.lengths_m)
+
+    def start(self) -> tuple[BodyModel, FloatArray]:
+        """The body and its true pose (p,) in frame 0."""
+        return self.body, self.pose(0)
 
     def frame(self, index: int) -> tuple[dict[str, Image], dict[str, Mask], FloatArray]:
         """Images (h, w, 3) or (h, w) and exact masks (h, w) by camera, and the true pose (p,)."""

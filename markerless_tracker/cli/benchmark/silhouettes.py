@@ -3,7 +3,7 @@
 import argparse
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,9 @@ from rich.table import Table
 
 from markerless_tracker.cli.benchmark.arguments import count, progress_bars
 from markerless_tracker.cli.track import read_config
+from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import Image
+from markerless_tracker.tracking import TrackerConfig
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
@@ -32,8 +34,15 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         help="recording; default: a made-up walk, 4 x 656x490",
     )  # fmt: skip
     parser.add_argument(
+        "--generated", choices=("development", "test"),
+        help="40 generated rooms, people and clothes instead; nothing may be set by `test`",
+    )  # fmt: skip
+    parser.add_argument(
+        "--scenes", type=count, metavar="N", help="only the first N generated scenes"
+    )
+    parser.add_argument(
         "--frames", type=count, metavar="N",
-        help="at most N frames, evenly spread (all with exact masks; 10 with markers)",
+        help="at most N frames, evenly spread (all with exact masks; 10 with markers; 3 generated)",
     )  # fmt: skip
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
     parser.add_argument(
@@ -56,6 +65,10 @@ def run(args: argparse.Namespace) -> int:
     from markerless_tracker.datasets import write_image
 
     config = read_config(args.config, {})
+    if args.generated is not None:
+        return _run_generated(args, config)
+    if args.scenes is not None:
+        raise ConfigError("--scenes is given without --generated, expected both")
     results = []
     with progress_bars() as bars:
         for source in args.sources or (None,):
@@ -85,6 +98,59 @@ def run(args: argparse.Namespace) -> int:
     for figures in results:
         console.print(silhouette_table(figures))
     return 0
+
+
+def _run_generated(args: argparse.Namespace, config: TrackerConfig) -> int:
+    from markerless_tracker.benchmarks.silhouettes.generated import FRAMES, measure_generated
+    from markerless_tracker.datasets import write_image
+
+    if args.sources or args.scale != 1.0:
+        raise ConfigError("--generated makes its own scenes: expected no SOURCE and no --scale")
+
+    def picture(name: str) -> Callable[[str, int, Image], None]:
+        stem = name.replace(" ", "_")
+        return lambda camera, frame, image: write_image(
+            args.pictures / f"{stem}-{camera}-{frame:06d}.png", image
+        )
+
+    with progress_bars() as bars:
+        task = bars.add_task(f"generated {args.generated}", total=None)
+        figures = measure_generated(
+            args.generated,
+            config,
+            scenes=args.scenes,
+            frames=args.frames or FRAMES,
+            progress=lambda done, total: bars.update(task, completed=done, total=total),
+            picture=picture if args.pictures else None,
+        )
+    if args.json:
+        json.dump(figures, sys.stdout, indent=2)
+        sys.stdout.write("\n")
+    else:
+        console = Console(width=None if sys.stdout.isatty() else 100)
+        console.print(generated_table(figures))
+    return 0
+
+
+def generated_table(figures: Mapping[str, Any]) -> Table:
+    """The figures of `benchmarks.silhouettes.generated.measure_generated` for people."""
+    undecided = "undecided_share" in figures
+    table = Table(title=f"{figures['recording']}, {len(figures['scenes'])} scenes")
+    headings = ["IoU", "of the motion", "of the posture", "shadow leak", "MOG2", "KNN"]
+    for heading in ("seed", "motion", "posture", *headings, *(["undecided"] if undecided else [])):
+        table.add_column(heading, justify="left" if heading in ("motion", "posture") else "right")
+    for row in figures["scenes"]:
+        leak = [camera["shadow_leak"] for camera in row["cameras"].values()]
+        values = [row["iou_mean"], row["motion_iou"], row["posture_iou"], sum(leak) / len(leak)]
+        values += [row["opencv"][name]["iou_mean"] for name in ("mog2", "knn")]
+        values += [row["undecided_share"]] if undecided else []
+        cells = (f"{value:.3f}" for value in values)
+        table.add_row(str(row["seed"]), row["motion"], row["posture"], *cells)
+    table.add_section()
+    for label, value in (("median", figures["iou_median"]), ("mean", figures["iou_mean"]),
+                         (f"worst, {figures['worst_seed']}", figures["iou_worst"])):  # fmt: skip
+        table.add_row(label, "", "", f"{value:.3f}")
+    return table
 
 
 def silhouette_table(figures: Mapping[str, Any]) -> Table:
