@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import load_body, load_description
-from markerless_tracker.body.sizes import PROPORTIONS, TOLD, UNUSUAL, USUAL_STATURE_M, Sizes
+from markerless_tracker.body.sizes import (
+    GIVEN_STATURE_SD,
+    MEAN_STATURE_M,
+    PROPORTION_SD,
+    STATURE_SD,
+    Sizes,
+)
 from markerless_tracker.errors import BodyModelError
 
 SIZES = Sizes(load_description("person31"))
@@ -43,13 +49,13 @@ def test_an_impossible_length_is_named() -> None:
         SIZES.body(np.full(len(SIZES.names), -1.0))
 
 
-@pytest.mark.parametrize(("stature", "common"), [(None, UNUSUAL), (1.9, TOLD)])
+@pytest.mark.parametrize(("stature", "common"), [(None, STATURE_SD), (1.9, GIVEN_STATURE_SD)])
 def test_beliefs_scatter_by_stature_and_by_proportions(stature, common) -> None:
     """One length alone may be off by both; the ratio of two only by their own parts."""
-    belief = SIZES.usual(stature)
+    belief = SIZES.prior(stature)
     covariance = np.linalg.inv(belief.precision)
-    generic = SIZES.of(SIZES.of_stature(stature or USUAL_STATURE_M))
+    generic = SIZES.of(SIZES.of_stature(stature or MEAN_STATURE_M))
     np.testing.assert_allclose(np.exp(belief.mean), generic)
-    assert covariance[0, 0] == pytest.approx(PROPORTIONS**2 + common**2)
+    assert covariance[0, 0] == pytest.approx(PROPORTION_SD**2 + common**2)
     ratio = covariance[0, 0] + covariance[1, 1] - 2.0 * covariance[0, 1]
-    assert ratio == pytest.approx(2.0 * PROPORTIONS**2)
+    assert ratio == pytest.approx(2.0 * PROPORTION_SD**2)

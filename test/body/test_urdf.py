@@ -110,11 +110,11 @@ def test_a_parameter_of_two_joints_is_mimicked() -> None:
 def test_a_frame_beside_the_root_is_an_error() -> None:
     parents = BODY.node_parent.copy()
     parents[BODY.frames["head"] - 2] = -1
-    with pytest.raises(BodyModelError, match="does not hang from the root frame pelvis"):
+    with pytest.raises(BodyModelError, match="is no descendant of the root frame pelvis"):
         urdf(dataclasses.replace(BODY, node_parent=parents))
 
 
 def test_links_of_one_name_are_an_error() -> None:
     frames = {("LKnee" if name == "l_knee" else name): node for name, node in BODY.frames.items()}
-    with pytest.raises(BodyModelError, match="must differ in name"):
+    with pytest.raises(BodyModelError, match="must be distinct"):
         urdf(dataclasses.replace(BODY, frames=frames))

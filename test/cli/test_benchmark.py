@@ -31,12 +31,12 @@ def test_the_same_figures_as_track_and_evaluate(walk, tmp_path: Path, capsys) ->
     )
     capsys.readouterr()
     assert main(["evaluate", f"{result}.trc", truth, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    scored = json.loads(capsys.readouterr().out)
     # Marker files hold µm.
     for key in ("mean_mm", "max_mm", "worst_joint_mm", "limbs_mm"):
-        assert row[key] == pytest.approx(told[key], abs=2e-3)
-    assert row["joints"] == pytest.approx(told["joints"], abs=2e-3)
-    assert row["frames"] == told["frames"] == 2
+        assert row[key] == pytest.approx(scored[key], abs=2e-3)
+    assert row["joints"] == pytest.approx(scored["joints"], abs=2e-3)
+    assert row["frames"] == scored["frames"] == 2
     frames = json.loads(Path(f"{result}.json").read_text())["frames"]
     assert row["evaluations"] == sum(frame["evaluations"] for frame in frames) / 2
 
@@ -188,13 +188,13 @@ def test_the_table_of_speed(capsys) -> None:
         ([], "required: KIND", 2),
         (["tables"], "required: SOURCE", 2),
         (["tables", "x", "--seeds", "0"], "expected a whole number from 1", 2),
-        (["tables", "x", "--fps", "60,,20"], "no list with commas", 2),
+        (["tables", "x", "--fps", "60,,20"], "expected values with commas", 2),
         (["tables", "x", "--fps", "0"], "expected a number above 0", 2),
         (["tables", "x", "--start-noise", "nan"], "expected a number from 0", 2),
         (["tables", "x", "--vary", "partition"], "expected KEY=VALUE,VALUE...", 2),
         (["tables", "x", "--vary", "a={"], "a value cannot be read", 2),
         (["tables", "x", "--vary", "partitions=soft"], "did you mean 'partition'?", 1),
-        (["tables", "x", "--vary", "seed=1", "--vary", "seed=2"], "seed stands twice", 1),
+        (["tables", "x", "--vary", "seed=1", "--vary", "seed=2"], "seed is given twice", 1),
         (["tables", "x", "--table", "hmcpso_1"], "table 'hmcpso_1' is unknown", 1),
         (["tables", "x", "--table", "all", "--optimizer", "apf"], "does not go with", 1),
         (["tables", "nowhere"], "nowhere: no such file or folder", 1),
@@ -232,7 +232,7 @@ def test_starts_without_a_start(walk, capsys) -> None:
     (row,) = json.loads(capsys.readouterr().out)["rows"]
     assert row["count"] == len(row["starts"]) == 2 and row["found"] == 1.0
     assert [start["frame"] for start in row["starts"]] == [0, 2]
-    assert row["reached"] == 1.0 and row["wrong_heading"] == 0.0
+    assert row["succeeded"] == 1.0 and row["wrong_heading"] == 0.0
 
 
 def test_values_for_each_recording(walk, capsys) -> None:
@@ -244,7 +244,7 @@ def test_what_a_recording_is_too_short_for_is_left_out(walk, capsys) -> None:
     words = ["recovery", walk, "--stature", "1.72", "--seeds", "1", "--threads", "1", "--json"]
     assert main(["benchmark", *words]) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
-    assert row["runs"] == [] and len(row["usual_mm"]) == 1
+    assert row["runs"] == [] and len(row["undisturbed_mm"]) == 1
 
 
 def test_fewer_cameras(walk, capsys) -> None:

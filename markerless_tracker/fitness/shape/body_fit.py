@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from markerless_tracker.body import BodyModel
-from markerless_tracker.body.sizes import LengthBelief, Sizes
+from markerless_tracker.body.sizes import LengthPrior, Sizes
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.contour.outline_rows import outline_rows, pose_slopes, surface
 from markerless_tracker.fitness.contour.row_kernels import eliminated, normal_equations, solved
@@ -46,7 +46,7 @@ class BodyFit:
     """
 
     def __init__(
-        self, sizes: Sizes, body: BodyModel, belief: LengthBelief, limits: FloatArray
+        self, sizes: Sizes, body: BodyModel, belief: LengthPrior, limits: FloatArray
     ) -> None:
         self._sizes = sizes
         self._belief = belief

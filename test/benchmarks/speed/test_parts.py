@@ -1,4 +1,4 @@
-"""The yardstick is honest, and speed's figures are all there. Nothing here judges a time."""
+"""The reference computes the same fitness; all figures of speed are there. No time is tested."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -114,8 +114,8 @@ def test_a_recording_as_the_scene(tmp_path: Path, make_recording) -> None:
 
 
 def test_the_machine_tells_its_name(tmp_path: Path) -> None:
-    told = tmp_path / "cpuinfo"
-    told.write_text("processor\t: 0\nmodel name\t: Some CPU @ 2.45GHz\nflags: a b\n")
-    assert processor(told) == "Some CPU @ 2.45GHz"
+    cpuinfo = tmp_path / "cpuinfo"
+    cpuinfo.write_text("processor\t: 0\nmodel name\t: Some CPU @ 2.45GHz\nflags: a b\n")
+    assert processor(cpuinfo) == "Some CPU @ 2.45GHz"
     assert processor(tmp_path / "none") != ""
     assert machine()["cores"] == usable_cores() >= 1
