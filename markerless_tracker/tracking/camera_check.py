@@ -153,7 +153,7 @@ def _refined(
     """The result's pose (p,) as these views alone would have it."""
     assert result.pose is not None
     contours = searcher.frame(observations, result.stamp_ns, result.pose).contours
-    scale = 1.0 / (CORRELATION_M * searcher.config.refine_sigma_m**2)
+    scale = 1.0 / (CORRELATION_M * searcher.config.refine.sigma_m**2)
 
     def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
         sums = contours.equations(pose, truncation_m)

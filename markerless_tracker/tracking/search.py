@@ -59,10 +59,10 @@ class Searcher:
             body,
             rig.cameras,
             threads=threads,
-            edge_rule=config.edge_rule,
-            edge_term=config.edge_term,
-            edge_spacing_px=config.edge_spacing_px,
-            edge_step_px=config.edge_step_px,
+            edge_rule=config.edges.rule,
+            edge_term=config.edges.term,
+            edge_spacing_px=config.edges.spacing_px,
+            edge_step_px=config.edges.step_px,
             cost=config.cost,
         )
         self.particle_sets: dict[str, ParticleSet] = {}
@@ -119,7 +119,7 @@ class FrameSearch:
                 self._views,
                 pixels_per_m=self._pixels_per_m(),
                 threads=searcher.threads,
-                step_px=searcher.config.edge_step_px,
+                step_px=searcher.config.edges.step_px,
                 mapper=searcher.mapper,
             )
         return self._contours
@@ -176,7 +176,7 @@ class FrameSearch:
 
     def _refine(self, stage: Stage) -> FloatArray:
         searcher, config = self._searcher, self._searcher.config
-        scale = 1.0 / (CORRELATION_M * config.refine_sigma_m**2)
+        scale = 1.0 / (CORRELATION_M * config.refine.sigma_m**2)
         contours = self.contours
 
         def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
@@ -193,7 +193,7 @@ class FrameSearch:
             ),
             bounds=searcher.limits,
             iterations=stage.iterations,
-            truncation=(config.refine_truncation_m, config.refine_truncation_end_m),
+            truncation=(config.refine.truncation_m, config.refine.truncation_end_m),
         )
 
     def _pixels_per_m(self) -> dict[str, float]:

@@ -181,7 +181,7 @@ class Tracker:
     def regions(self, stamp_ns: int) -> dict[str, Region | None]:
         """Where in each camera's image `step` would look at a time; None for all of it.
 
-        Each camera's turn to be looked at whole comes besides (`full_frame_every`).
+        Each camera's turn to be looked at whole comes besides (`region.full_frame_every`).
         """
         margin_m = self._region_margin(stamp_ns)
         return self._evidence.regions(self.body, self._predict(stamp_ns), margin_m)
@@ -381,7 +381,7 @@ class Tracker:
         if self._stamp_ns is None or stamp_ns <= self._stamp_ns:
             return self._pose
         elapsed_ns = min(
-            stamp_ns - self._stamp_ns, self.config.sigma_rate_max / TRAINING_RATE_HZ * 1e9
+            stamp_ns - self._stamp_ns, self.config.sigma.rate_max / TRAINING_RATE_HZ * 1e9
         )
         moved = self._pose + self.config.prediction * elapsed_ns * self._velocity_per_ns
         return np.asarray(np.clip(moved, *self._searcher.limits))
@@ -395,14 +395,14 @@ class Tracker:
         ):
             return None
         elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
-        return self.config.region_margin_m + LIMB_SPEED_M_S * elapsed_s
+        return self.config.region.margin_m + LIMB_SPEED_M_S * elapsed_s
 
     def _rate_factor(self, stamp_ns: int) -> float:
         """How much wider than at the training rate to search, by the time since the last step."""
         if self._stamp_ns is None or stamp_ns <= self._stamp_ns:
             return 1.0
         frames = (stamp_ns - self._stamp_ns) * 1e-9 * TRAINING_RATE_HZ
-        return min(frames, self.config.sigma_rate_max)
+        return min(frames, self.config.sigma.rate_max)
 
     def _searcher_for(self, body: BodyModel) -> Searcher:
         return Searcher(

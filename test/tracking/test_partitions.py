@@ -46,7 +46,7 @@ def test_the_published_evaluations_are_the_default(optimizer, evaluations, body)
 @pytest.mark.parametrize("evaluations", [3600, 7200, 10800])
 @pytest.mark.parametrize("sub_swarms", [2, 3, 4, 5])
 def test_tables_3_and_4_scale_the_particles_of_h_mcpso(evaluations, sub_swarms):
-    found = stages(optimizer="hmcpso", evaluations=evaluations, sub_swarms=sub_swarms)
+    found = stages(optimizer="hmcpso", evaluations=evaluations, **{"hmcpso.sub_swarms": sub_swarms})
     assert spent(found) == evaluations
     assert [(s.particles, s.iterations) for s in found] == [(evaluations // 180, 30)] * 6
     assert {s.options["sub_swarms"] for s in found} == {sub_swarms}
@@ -75,7 +75,7 @@ def test_other_budgets_keep_the_iterations(optimizer, evaluations, shape):
         ({"optimizer": "mcpso", "evaluations": 360}, "2 particles for 3 sub-swarms"),
         ({"optimizer": "hpso", "evaluations": 1000}, "hpso cannot .* 720 or 1080"),
         ({"optimizer": "apf", "evaluations": 1001}, "apf cannot .* 1000 or 1005"),
-        ({"optimizer": "apf", "evaluations": 1000, "layers": 7}, "apf cannot .* 994 or 1001"),
+        ({"optimizer": "apf", "evaluations": 1000, "apf.layers": 7}, "apf cannot .* 994 or 1001"),
     ],
 )
 def test_a_budget_that_cannot_be_spent_is_refused(settings, message):
@@ -123,7 +123,7 @@ def test_sppsos_hard_partition_leaves_the_root():
     ],
 )
 def test_hpsos_own_twelve_steps(body, sizes):
-    found = stages(optimizer="hpso", hierarchy="twelve", evaluations=7200, body=body)
+    found = stages(optimizer="hpso", **{"hmcpso.hierarchy": "twelve"}, evaluations=7200, body=body)
     assert [s.active.size for s in found] == sizes
     assert {(s.particles, s.iterations) for s in found} == {(10, 60)}
     assert sorted(np.concatenate([s.active for s in found])) == list(range(sum(sizes)))
@@ -156,7 +156,7 @@ def test_spreads_grow_with_the_time_between_frames():
         config = TrackerConfig.from_mapping({"preset": "paper", "optimizer": "pso", **settings})
         return [frame_stages(body, config, body.neutral, k * body.sigma)[0].sigma for k in (1, 3)]
 
-    one, three = sigmas(angle_sigma=0.0)
+    one, three = sigmas(**{"sigma.angle": 0.0})
     np.testing.assert_allclose(three, 3.0 * one)
     one, three = sigmas()
     at, knee, head = (body.index(name) for name in ("pelvis_tx", "l_knee", "head_x"))
@@ -207,12 +207,12 @@ def test_every_optimizer_has_its_stages_and_its_paper():
     [
         ({}, [6, 31], [(10, 20), (20, 40)]),
         ({"partition": "hard"}, [6, 25], [(10, 20), (20, 40)]),
-        ({"sppso_stages": "three"}, [6, 11, 31], [(10, 20), (10, 20), (20, 30)]),
+        ({"sppso.stages": "three"}, [6, 11, 31], [(10, 20), (10, 20), (20, 30)]),
         (
-            {"sppso_stages": "three", "partition": "hard"}, [6, 5, 20],
+            {"sppso.stages": "three", "partition": "hard"}, [6, 5, 20],
             [(10, 20), (10, 20), (20, 30)],
         ),
-        ({"sppso_stages": "global"}, [31], [(20, 50)]),
+        ({"sppso.stages": "global"}, [31], [(20, 50)]),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("factor", [1, 4])
@@ -229,21 +229,21 @@ def test_what_earlier_stages_of_sppso_found_keeps_a_small_spread():
     """Positions of the root, and all of torso and head, a tenth; the root's angles as they are."""
     body = BODIES["balan31"]
     at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
-    root, trunk, whole = stages(optimizer="sppso", sppso_stages="three")
+    root, trunk, whole = stages(optimizer="sppso", **{"sppso.stages": "three"})
     np.testing.assert_array_equal(root.sigma, body.sigma)
     expected = body.sigma.copy()
     expected[at] /= 10.0
     np.testing.assert_allclose(trunk.sigma, expected)
     expected[body.subspaces["torso_head"]] /= 10.0
     np.testing.assert_allclose(whole.sigma, expected)
-    (alone,) = stages(optimizer="sppso", sppso_stages="global")
+    (alone,) = stages(optimizer="sppso", **{"sppso.stages": "global"})
     np.testing.assert_array_equal(alone.sigma, body.sigma)
     assert not root.edge_cones.all() and trunk.edge_cones.all() and alone.edge_cones.all()
 
 
 @pytest.mark.parametrize("kind", ["two", "three", "global"])
 def test_beside_a_refinement_the_ablation_looks_widely_for_its_share(kind):
-    found = stages(optimizer="sppso", sppso_stages=kind, preset="tuned")
+    found = stages(optimizer="sppso", **{"sppso.stages": kind}, preset="tuned")
     swarms = found[1:-5]
     assert spent(swarms) == 1000 * SWARM_SHARE
     assert max(s.iterations for s in swarms) == 10
@@ -255,6 +255,6 @@ def test_three_stages_need_a_subspace_for_the_second():
     whole = BODIES["balan31"]
     bare = {name: part for name, part in whole.subspaces.items() if name != "torso_head"}
     body = dataclasses.replace(whole, subspaces=bare)
-    config = TrackerConfig.from_mapping({"preset": "paper", "sppso_stages": "three"})
+    config = TrackerConfig.from_mapping({"preset": "paper", "sppso.stages": "three"})
     with pytest.raises(BodyModelError, match="'three': body balan31 has no subspace 'torso_head'"):
         frame_stages(body, config, body.neutral, body.sigma)

@@ -100,7 +100,7 @@ def test_edges_of_stage_1_lie_on_every_cone_that_is_rigid_with_the_root(swarm_se
 
 
 def test_the_swarm_alone_searches_with_scaled_spreads(body, swarm_settings):
-    config = swarm(swarm_settings, sigma_scale=0.25)
+    config = swarm(swarm_settings, **{"sigma.scale": 0.25})
     stages = frame_stages(body, config, body.neutral, body.sigma)
     assert [s.algorithm for s in stages] == ["sppso", "sppso"]
     np.testing.assert_allclose(stages[0].sigma, 0.25 * body.sigma, rtol=1e-15)
@@ -108,7 +108,7 @@ def test_the_swarm_alone_searches_with_scaled_spreads(body, swarm_settings):
 
 
 def test_refinement_stands_before_and_after_a_smaller_swarm(body, refined_settings):
-    config = swarm(refined_settings, refine_iterations=7)
+    config = swarm(refined_settings, **{"refine.iterations": 7})
     stages = frame_stages(body, config, body.neutral, body.sigma)
     assert [s.algorithm for s in stages] == [CONTOUR, *["sppso"] * 6, CONTOUR]
     assert len({s.name for s in stages}) == 8
@@ -117,7 +117,7 @@ def test_refinement_stands_before_and_after_a_smaller_swarm(body, refined_settin
 
 
 def test_each_limb_has_a_small_wide_swarm_of_its_own(body, refined_settings):
-    config = swarm(refined_settings, limb_spread=3.0)
+    config = swarm(refined_settings, **{"refine.limb_spread": 3.0})
     limbs = {s.name: s for s in frame_stages(body, config, body.neutral, body.sigma)[3:7]}
     assert list(limbs) == ["l_arm", "r_arm", "l_leg", "r_leg"]
     for name, stage in limbs.items():

@@ -139,7 +139,7 @@ def _view_evaluations(
         if key != "full":
             continue
         reference = ReferenceFitness(
-            body, scene.rig.cameras, observations, pose, spacing_px=config.edge_spacing_px
+            body, scene.rig.cameras, observations, pose, spacing_px=config.edges.spacing_px
         )
         timed["reference"] = (reference, scattered(body, pose, _REFERENCE_POSES))
         for part, active in _ARM.items():
@@ -295,10 +295,10 @@ def _fitness(scene: SpeedScene, body: BodyModel, config: TrackerConfig, *, threa
         body,
         scene.rig.cameras,
         threads=threads,
-        edge_rule=config.edge_rule,
-        edge_term=config.edge_term,
-        edge_spacing_px=config.edge_spacing_px,
-        edge_step_px=config.edge_step_px,
+        edge_rule=config.edges.rule,
+        edge_term=config.edges.term,
+        edge_spacing_px=config.edges.spacing_px,
+        edge_step_px=config.edges.step_px,
     )
 
 

@@ -65,9 +65,9 @@ class TruthScore:
             self._fitness = Fitness(
                 body,
                 self._tracker.rig.cameras,
-                edge_rule=config.edge_rule,
-                edge_term=config.edge_term,
-                edge_spacing_px=config.edge_spacing_px,
-                edge_step_px=config.edge_step_px,
+                edge_rule=config.edges.rule,
+                edge_term=config.edges.term,
+                edge_spacing_px=config.edges.spacing_px,
+                edge_step_px=config.edges.step_px,
             )
         return self._fitness

@@ -98,7 +98,7 @@ def _settled(
     limits: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Free lengths (k,) and pose (p,) that fit contours and markers."""
-    scale = 1.0 / (CORRELATION_M * config.refine_sigma_m**2)
+    scale = 1.0 / (CORRELATION_M * config.refine.sigma_m**2)
     begin = start.sizes.of(body)
     seen = np.isfinite(start.positions_m).all(axis=1)
     p = body.size
@@ -133,6 +133,6 @@ def _settled(
         ),
         bounds=np.concatenate([limits, np.outer(_LENGTH_RANGE, begin)], axis=1),
         iterations=_ITERATIONS,
-        truncation=(config.refine_truncation_m, config.refine_truncation_end_m),
+        truncation=(config.refine.truncation_m, config.refine.truncation_end_m),
     )
     return z[p:], z[:p]

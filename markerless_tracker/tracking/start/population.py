@@ -137,7 +137,7 @@ class FramePopulation:
     ) -> FloatArray:
         """Poses (n, p), each refined on the contours."""
         searcher = self._searcher
-        scale = 1.0 / (CORRELATION_M * searcher.config.refine_sigma_m**2)
+        scale = 1.0 / (CORRELATION_M * searcher.config.refine.sigma_m**2)
         usual = Prior(searcher.body.prior_mean, _PRIOR / searcher.body.prior_sd**2)
 
         def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
