@@ -1,4 +1,4 @@
-"""Reading a body's declarative description: frames as chains of moves, lengths, cones, markers."""
+"""Body descriptions (YAML): frames as chains of moves, lengths, cones, markers."""
 
 import re
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ _MOVE = re.compile(
 
 @dataclass(frozen=True)
 class Move:
-    """One elementary move of a chain: ``tz(-0.4*torso)`` moves along z by -0.4 times 'torso'."""
+    """One elementary move of a chain: ``tz(-0.4*torso)`` translates along z by -0.4 'torso'."""
 
     kind: str
     factor: float
@@ -30,7 +30,7 @@ class Move:
 
 @dataclass(frozen=True)
 class BodyDescription:
-    """A body as its YAML file declares it; `BodyModel` is what it becomes for one subject."""
+    """A body as declared by its YAML file; `build_body` makes a `BodyModel` for a subject."""
 
     name: str
     lengths: Mapping[str, Mapping[str, Any]]
@@ -48,7 +48,7 @@ def parse_chain(text: str, where: str) -> tuple[Move, ...]:
     """Parse moves such as ``ry(180) ty(+l_hip) tz(0.4*torso) rx(-l_hip_x)``.
 
     Raises:
-        BodyModelError: something in the text is no move.
+        BodyModelError: a part of the text is no move.
     """
     if _MOVE.sub("", text).strip():
         raise BodyModelError(
@@ -67,8 +67,7 @@ def read_description(path: Path) -> BodyDescription:
     """Read a body description file.
 
     Raises:
-        BodyModelError: the file cannot be read, is not YAML, or does not have the shape that
-            `check_description` asks for.
+        BodyModelError: the file cannot be read, is no YAML, or fails `check_description`.
     """
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
