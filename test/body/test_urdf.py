@@ -1,4 +1,4 @@
-"""The URDF moves as the body does."""
+"""The kinematics of the URDF are those of the body."""
 
 import dataclasses
 import xml.etree.ElementTree as ElementTree
@@ -53,7 +53,7 @@ def link_transforms(text, values, T_world_root):
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_links_and_markers_lie_where_the_body_has_them(seed) -> None:
+def test_links_and_markers_agree_with_the_body(seed) -> None:
     pose = np.random.default_rng(seed).uniform(-3, 3, BODY.size)
     values = dict(zip(BODY.parameter_names, pose, strict=True))
     root, links = link_transforms(urdf(BODY), values, root_transform(BODY, pose))
@@ -66,7 +66,7 @@ def test_links_and_markers_lie_where_the_body_has_them(seed) -> None:
         np.testing.assert_allclose(links[frame][:3], nodes[node], atol=1e-9)
 
 
-def test_joints_carry_the_joint_names_and_limits() -> None:
+def test_joints_have_names_and_limits() -> None:
     robot = ElementTree.fromstring(urdf(BODY))
     moving = [joint for joint in robot.findall("joint") if joint.get("type") != "fixed"]
     assert sorted(joint.get("name") for joint in moving) == sorted(BODY.joint_names)
@@ -107,14 +107,14 @@ def test_a_parameter_of_two_joints_is_mimicked() -> None:
     assert len({joint.get("name") for joint in joints}) == len(joints)
 
 
-def test_a_frame_beside_the_root_is_an_error() -> None:
+def test_a_frame_that_does_not_descend_from_the_root_is_an_error() -> None:
     parents = BODY.node_parent.copy()
     parents[BODY.frames["head"] - 2] = -1
     with pytest.raises(BodyModelError, match="is no descendant of the root frame pelvis"):
         urdf(dataclasses.replace(BODY, node_parent=parents))
 
 
-def test_links_of_one_name_are_an_error() -> None:
+def test_links_with_the_same_name_are_an_error() -> None:
     frames = {("LKnee" if name == "l_knee" else name): node for name, node in BODY.frames.items()}
     with pytest.raises(BodyModelError, match="must be distinct"):
         urdf(dataclasses.replace(BODY, frames=frames))

@@ -1,4 +1,4 @@
-"""Mosaics of named pictures."""
+"""Contact sheets of named pictures."""
 
 import numpy as np
 import pytest

@@ -48,7 +48,7 @@ def test_the_reference_computes_the_same_fitness(scene, name) -> None:
         assert 2.0 - reference(one[None])[0] == pytest.approx(f, abs=0.03)
 
 
-def test_the_reference_evaluates_a_batch_as_it_does_one_by_one(scene) -> None:
+def test_the_reference_gives_the_same_costs_one_by_one(scene) -> None:
     body = scene.body("balan31")
     poses = scattered(body, scene.pose(body), 4)
     reference = ReferenceFitness(body, scene.rig.cameras, evidence(scene), poses[0])
@@ -113,7 +113,7 @@ def test_a_recording_as_the_scene(tmp_path: Path, make_recording) -> None:
         recorded_scene(tmp_path / "walk", frames=1)
 
 
-def test_the_machine_tells_its_name(tmp_path: Path) -> None:
+def test_the_name_of_the_processor(tmp_path: Path) -> None:
     cpuinfo = tmp_path / "cpuinfo"
     cpuinfo.write_text("processor\t: 0\nmodel name\t: Some CPU @ 2.45GHz\nflags: a b\n")
     assert processor(cpuinfo) == "Some CPU @ 2.45GHz"

@@ -1,4 +1,4 @@
-"""The same table from the workers of a cluster; what can go wrong there is named."""
+"""The same table from the workers of a cluster; errors on a worker name the worker."""
 
 import sys
 from dataclasses import replace
