@@ -219,7 +219,7 @@ def test_moving_nodes_are_those_whose_transforms_change(part) -> None:
     moved = pose.copy()
     moved[active] += 0.3
     changes = np.abs(transforms(body, moved) - transforms(body, pose)).max(axis=(1, 2)) > 1e-9
-    # A joint at a node turns what hangs on it; the mask may not miss any.
+    # A joint at a node moves its descendants; the mask must contain all of them.
     assert (moving_nodes(body, active) | ~changes).all()
     assert moving_nodes(body, active).sum() < len(changes) or part == "root"
     assert not moving_nodes(body, np.empty(0, dtype=int)).any()

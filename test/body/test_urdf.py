@@ -15,7 +15,7 @@ from markerless_tracker.errors import BodyModelError
 BODY = load_body("balan31", 1.8)
 
 
-def turn(axis, angle):
+def rotation(axis, angle):
     x, y, z = axis
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
@@ -25,7 +25,9 @@ def origin(element):
     at = element.find("origin")
     roll, pitch, yaw = map(float, at.get("rpy").split())
     result = np.eye(4)
-    result[:3, :3] = turn((0, 0, 1), yaw) @ turn((0, 1, 0), pitch) @ turn((1, 0, 0), roll)
+    result[:3, :3] = (
+        rotation((0, 0, 1), yaw) @ rotation((0, 1, 0), pitch) @ rotation((1, 0, 0), roll)
+    )
     result[:3, 3] = list(map(float, at.get("xyz").split()))
     return result
 
@@ -46,7 +48,7 @@ def link_transforms(text, values, T_world_root):
             if joint.get("type") in ("revolute", "continuous"):
                 axis = np.array(list(map(float, joint.find("axis").get("xyz").split())))
                 assert np.linalg.norm(axis) == pytest.approx(1)
-                move[:3, :3] = turn(axis, values[joint.get("name")])
+                move[:3, :3] = rotation(axis, values[joint.get("name")])
             known[child] = known[parent] @ origin(joint) @ move
     return root, known
 

@@ -114,7 +114,7 @@ def measure(
     }
 
 
-def scattered(body: BodyModel, pose: FloatArray, count: int) -> FloatArray:
+def poses_around(body: BodyModel, pose: FloatArray, count: int) -> FloatArray:
     """Poses (count, p) drawn around one with the published sigma; the same in every call."""
     rng = keyed_generator(0, 0, "speed")
     return pose + body.sigma * rng.standard_normal((count, body.size))
@@ -132,7 +132,7 @@ def _view_evaluations(
         config = TrackerConfig.from_mapping({"body": name, "refinement": "none"})
         fitness = _fitness(scene, body, config, threads=1)
         seen = fitness.lay_out(observations)
-        poses = scattered(body, pose, _POSES)
+        poses = poses_around(body, pose, _POSES)
         # The second stage of SPPSO: all parameters, all cones.
         stage = replace(frame_stages(body, config, pose, body.sigma)[-1], edge_weight=1.0)
         timed[key] = (fitness.prepare(seen, stage), poses)
@@ -141,7 +141,7 @@ def _view_evaluations(
         reference = ReferenceFitness(
             body, scene.rig.cameras, observations, pose, spacing_px=config.edges.spacing_px
         )
-        timed["reference"] = (reference, scattered(body, pose, _REFERENCE_POSES))
+        timed["reference"] = (reference, poses_around(body, pose, _REFERENCE_POSES))
         for part, active in _ARM.items():
             indices = np.sort([body.index(parameter) for parameter in active])
             limb = fitness.prepare(seen, replace(stage, active=indices))
@@ -280,7 +280,7 @@ def _thousand(
 ) -> Callable[[Mapping[str, Observation]], float]:
     """A function that returns the time in s of 1000 evaluations of a body on a frame's evidence."""
     fitness = _fitness(scene, body, config, threads=config.threads)
-    poses = scattered(body, scene.pose(body), THOUSAND)
+    poses = poses_around(body, scene.pose(body), THOUSAND)
     every = np.ones(len(body.cone_names), dtype=np.bool_)
 
     def run(observations: Mapping[str, Observation]) -> float:
