@@ -7,8 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from markerless_tracker.body.files import read_yaml
 from markerless_tracker.body.schema import check_description
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.resources import config_dir
@@ -69,11 +68,7 @@ def read_description(path: Path) -> BodyDescription:
     Raises:
         BodyModelError: the file cannot be read, is no YAML, or fails `check_description`.
     """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        first = str(error).splitlines()[0]
-        raise BodyModelError(f"{path}: cannot read the body description: {first}") from error
+    data = read_yaml(path, "body description")
     check_description(data, str(path))
     return BodyDescription(
         name=data["name"],

@@ -8,6 +8,7 @@ import yaml
 from scipy.optimize import least_squares
 
 from markerless_tracker.body import kinematics
+from markerless_tracker.body.files import read_yaml
 from markerless_tracker.body.model import MARKER_NAMES, BodyModel
 from markerless_tracker.body.subject import complete_markers
 from markerless_tracker.errors import BodyModelError
@@ -72,12 +73,7 @@ def read_pose(path: Path, body: BodyModel) -> FloatArray:
         BodyModelError: the file cannot be read, names an unknown parameter, or a value is no
             number.
     """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        raise BodyModelError(
-            f"{path}: cannot read the pose: {str(error).splitlines()[0]}"
-        ) from error
+    data = read_yaml(path, "pose")
     if not isinstance(data, dict):
         raise BodyModelError(f"{path}: expected a mapping of parameter names to m or rad")
     pose = body.neutral.copy()

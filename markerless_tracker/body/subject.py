@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 
 from markerless_tracker.body.description import BodyDescription, shipped_lengths
+from markerless_tracker.body.files import read_yaml
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
@@ -159,12 +160,7 @@ def read_subject(path: Path) -> Subject:
     Raises:
         BodyModelError: it cannot be read, or has unknown or impossible entries.
     """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        raise BodyModelError(
-            f"{path}: cannot read the subject: {str(error).splitlines()[0]}"
-        ) from error
+    data = read_yaml(path, "subject")
     if not isinstance(data, dict) or not isinstance(data.get("lengths_m"), dict):
         raise BodyModelError(
             f"{path}: expected name, lengths_m and optionally cones_m and measured"

@@ -66,7 +66,7 @@ def test_evidence_of_every_second_frame(walk, evidence, tmp_path) -> None:
     assert stamps == list(evidence.stamps_ns[::2]) and len(stamps) == 3
     thinned = make_evidence(open_recording(walk), SWARM, tmp_path, start=1, every=2, frames=3)
     assert thinned.stamps_ns == evidence.stamps_ns[1:4:2]
-    with pytest.raises(DatasetError, match="every 3th frame was asked for, every 2th"):
+    with pytest.raises(DatasetError, match="every 3th frame requested, expected a multiple of 2"):
         next(thinned.frames(every=3))
 
 
