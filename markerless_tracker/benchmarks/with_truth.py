@@ -9,11 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.benchmarks.tables.accuracy import TRUTH
 from markerless_tracker.benchmarks.tables.evidence import Evidence, make_evidence
 from markerless_tracker.body import MARKER_NAMES
-from markerless_tracker.datasets import MarkerTrack, open_recording, read_trc
-from markerless_tracker.errors import DatasetError
+from markerless_tracker.datasets import MarkerTrack, existing_truth, open_recording, read_trc
 from markerless_tracker.records import TrackResult
 from markerless_tracker.results.score import MM_PER_M, match_rows
 from markerless_tracker.tracking import TrackerConfig, build_tracker
@@ -120,9 +118,7 @@ def open_with_truth(
         TrackerError: the recording cannot be read or has no `ground_truth.trc`.
     """
     recording = open_recording(source, scale=scale)
-    path = (source if source.is_dir() else source.parent) / TRUTH
-    if not path.is_file():
-        raise DatasetError(f"{source}: no {TRUTH}, expected one as the reference")
+    path = existing_truth(source)
     reference = read_trc(path).with_pelvis()
     with tempfile.TemporaryDirectory(prefix="markerless_tracker_") as folder:
         evidence = make_evidence(

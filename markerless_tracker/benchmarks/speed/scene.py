@@ -13,7 +13,7 @@ from markerless_tracker.body import (
 )
 from markerless_tracker.body.build import build_body
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.datasets import FrameSet, open_recording
+from markerless_tracker.datasets import FrameSet, existing_truth, open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
@@ -67,10 +67,7 @@ def recorded_scene(source: Path, *, frames: int, scale: float = 1.0) -> SpeedSce
             second frame.
     """
     recording = open_recording(source, scale=scale)
-    truth = (source if source.is_dir() else source.parent) / "ground_truth.trc"
-    if not truth.is_file():
-        raise DatasetError(f"{source}: no {truth.name}, expected one with the start pose")
-    row = first_row(truth)
+    row = first_row(existing_truth(source))
     sets = []
     for images in recording.frames(start=recording.start_index(row.stamp_ns)):
         sets.append(images)

@@ -18,13 +18,16 @@ from markerless_tracker.benchmarks.tables.pool import run_all
 from markerless_tracker.benchmarks.tables.runs import Run, describe
 from markerless_tracker.benchmarks.tables.variants import variants
 from markerless_tracker.body import load_description
-from markerless_tracker.datasets import Recording, every_for_fps, open_recording
-from markerless_tracker.errors import DatasetError
+from markerless_tracker.datasets import (
+    Recording,
+    every_for_fps,
+    existing_truth,
+    open_recording,
+)
 from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.setup import first_row
 
-TRUTH = "ground_truth.trc"
 COLUMNS = (
     "recording", "optimizer", "preset", "body", "refinement", "variant", "fps",
     "start_noise_mm", "seeds", "evaluations", "refinements", "mean_mm", "sd_mm", "max_mm",
@@ -134,10 +137,8 @@ class _Piece:
         self.plan = plan
         self.source = source
         self.recording: Recording = open_recording(source, scale=plan.scale)
-        folder = source if source.is_dir() else source.parent
-        self.reference = folder.resolve() / TRUTH
-        if not self.reference.is_file():
-            raise DatasetError(f"{source}: no {TRUTH}, expected one as the reference")
+        # Workers have another working directory.
+        self.reference = existing_truth(source).resolve()
         self.start = self.recording.start_index(first_row(self.reference).stamp_ns)
         self.rates = _rates(self.recording.fps, plan.rates)
         self.runs = [
