@@ -1,4 +1,4 @@
-"""Remake the published figures: `make bench`; `bench/run.py PART...` for some of them."""
+"""Measure the published figures: `make bench`; `bench/run.py PART...` for some of them."""
 
 import argparse
 import sys
@@ -9,12 +9,12 @@ from markerless_tracker.cli.main import main
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT.parent / "shared" / "data"
-# Full size has four times the pixels and hardly a millimetre more to say.
+# At full size balance_real has four times the pixels and nearly the same error.
 RECORDINGS = {"render_walk": "1", "balance_real": "0.5"}
 STATURES = {"render_walk": "1.72", "balance_real": "1.70"}
 PARTS = ("accuracy", "start", "automatic", "cameras", "recovery", "jitter", "speed")
 STAND = "--motion stand --seconds 3 --body person31 --noise 8 --seed 2".split()
-# Hours: only when named.
+# Takes hours, runs only if named.
 LONG = ("papers",)
 
 
@@ -31,7 +31,7 @@ def bench(parts: list[str], data: Path, out: Path, seeds: int) -> None:
         if (data / name / "ground_truth.trc").is_file():
             found.append(name)
         else:
-            print(f"{name}: left out, there is no such recording in {data}", flush=True)
+            print(f"{name}: left out, no such recording in {data}", flush=True)
     for name in found:
         tables = [
             "benchmark", "tables", str(data / name), "--scale", RECORDINGS[name],
@@ -45,13 +45,13 @@ def bench(parts: list[str], data: Path, out: Path, seeds: int) -> None:
             for noise in ("10", "20"):
                 where = str(out / f"{name}_start_{noise}")
                 run([*tables, where, "--preset", "tuned", "--start-noise", noise])
-        told = ["--stature", STATURES[name], "--scale", RECORDINGS[name], "--seeds", "5"]
+        person = ["--stature", STATURES[name], "--scale", RECORDINGS[name], "--seeds", "5"]
         if "automatic" in parts:
-            run(["benchmark", "start", str(data / name), *told])
+            run(["benchmark", "start", str(data / name), *person])
         if "cameras" in parts:
-            run(["benchmark", "cameras", str(data / name), *told[:4]])
+            run(["benchmark", "cameras", str(data / name), *person[:4]])
         if "recovery" in parts and name == "render_walk":
-            run(["benchmark", "recovery", str(data / name), *told])
+            run(["benchmark", "recovery", str(data / name), *person])
     if "jitter" in parts:
         stand = out / "stand"
         if not stand.exists():
@@ -68,7 +68,7 @@ if __name__ == "__main__":
         "parts",
         nargs="*",
         metavar="PART",
-        help=f"of {', '.join((*PARTS, *LONG))}; all but the last",
+        help=f"of {', '.join((*PARTS, *LONG))}; default: all but the last",
     )
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the recordings")
     parser.add_argument("-o", dest="out", type=Path, default=ROOT / "out" / "bench")

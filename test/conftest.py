@@ -6,12 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from markerless_tracker.body import MARKER_NAMES
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets import MarkerTrack, new_recording
 from markerless_tracker.geometry import rotation_from_rodrigues, transform
 from markerless_tracker.synthesis import SyntheticScene
+
+# Property tests have no deadline: no test depends on the speed of the machine.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED_DATA = ROOT.parent / "shared" / "data"

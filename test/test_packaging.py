@@ -1,4 +1,4 @@
-"""The package as colcon and pip see it: one version, all files, entry points that exist."""
+"""The package as colcon and pip install it: version, files, entry points."""
 
 import ast
 import re
@@ -23,7 +23,7 @@ EXECUTABLES = {
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
-    """The wheel that pip builds from a copy of the source tree, without the network."""
+    """The wheel that pip builds from a copy of the source tree, offline."""
     pytest.importorskip("setuptools", minversion="70.1", reason="needed to build the wheel")
     root = Path(__file__).resolve().parent.parent
     work = tmp_path_factory.mktemp("wheel")
@@ -46,7 +46,7 @@ def package_xml(root: Path) -> ElementTree.Element:
     return ElementTree.parse(root / "package.xml").getroot()
 
 
-def test_one_version_everywhere(project_root: Path) -> None:
+def test_the_version_is_the_same_everywhere(project_root: Path) -> None:
     assert package_xml(project_root).findtext("version") == __version__
     changelog = (project_root / "CHANGELOG.md").read_text(encoding="utf-8")
     assert re.search(rf"^## \[{re.escape(__version__)}\]", changelog, re.MULTILINE)
@@ -64,7 +64,7 @@ def test_manifest(project_root: Path) -> None:
     assert "END OF TERMS AND CONDITIONS" in licence
 
 
-def test_ros_finds_its_executables_where_it_looks(project_root: Path) -> None:
+def test_executables_are_in_the_folder_of_ros(project_root: Path) -> None:
     text = (project_root / "setup.cfg").read_text(encoding="utf-8")
     assert f"script_dir=$base/lib/{NAME}" in text
     assert f"install_scripts=$base/lib/{NAME}" in text
@@ -81,6 +81,10 @@ def test_entry_points_exist(project_root: Path, executable: str, target: str) ->
 def test_wheel_holds_every_module(wheel: zipfile.ZipFile, project_root: Path) -> None:
     sources = {p.relative_to(project_root).as_posix() for p in (project_root / NAME).rglob("*.py")}
     assert sources <= set(wheel.namelist())
+
+
+def test_wheel_states_that_it_has_types(wheel: zipfile.ZipFile) -> None:
+    assert f"{NAME}/py.typed" in wheel.namelist()
 
 
 def test_wheel_holds_config_and_manifest(wheel: zipfile.ZipFile, project_root: Path) -> None:
@@ -109,7 +113,7 @@ def test_ros_is_an_extra_only(wheel: zipfile.ZipFile) -> None:
     assert all('extra == "ros"' in line.replace("'", '"') for line in ros)
 
 
-def test_lock_pins_everything_asked_for(project_root: Path) -> None:
+def test_lock_pins_every_direct_dependency(project_root: Path) -> None:
     lock = (project_root / "requirements" / "lock.txt").read_text(encoding="utf-8")
     pinned = {
         re.sub(r"[-_.]+", "-", line.split("==")[0]).lower()

@@ -1,4 +1,4 @@
-"""The laboratory: measured accuracy and speed on recordings.
+"""Benchmarks: accuracy and speed measured on recordings.
 
-Nothing that `track` or the nodes need.
+`track` and the nodes need nothing of it.
 """

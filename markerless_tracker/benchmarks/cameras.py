@@ -1,4 +1,4 @@
-"""What fewer cameras cost: whole runs with every choice of some of a recording's cameras."""
+"""Error with fewer cameras: whole runs with every subset of a recording's cameras."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -8,75 +8,79 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.benchmarks.judged import Beginning, Report, judged, tracked_markers
 from markerless_tracker.benchmarks.tables.runs import LOST_LIMB_MM, longest_run
+from markerless_tracker.benchmarks.with_truth import (
+    Report,
+    RunStart,
+    no_report,
+    open_with_truth,
+    tracked_markers,
+)
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.results.score import MM_PER_M
 from markerless_tracker.tracking import TrackerConfig
 
 SETTLED_FRAMES = 30
-"""Frames at the beginning of a run without a start that are not judged."""
+"""Frames at the beginning of a run with an automatic start that are not scored."""
 
 
 def measure_cameras(
     source: Path,
     config: TrackerConfig,
     *,
-    beginnings: Sequence[Beginning],
+    starts: Sequence[RunStart],
     counts: Sequence[int] = (3, 2),
     scale: float = 1.0,
-    report: Report | None = None,
+    report: Report = no_report,
 ) -> dict[str, Any]:
-    """Track a recording with a `ground_truth.trc` by all its cameras and by fewer.
+    """Track a recording with a `ground_truth.trc` with all its cameras and with subsets of them.
 
     Args:
         source: the recording.
         config: every setting.
-        beginnings: each gives a run per choice.
-        counts: numbers of cameras; every choice of as many is run.
+        starts: each subset is run once with each.
+        counts: sizes of the subsets; all subsets of these sizes are run.
         scale: factor for the images.
-        report: told what is done, how much of it, and of how much.
+        report: receives progress.
 
     Returns:
-        `recording`, `source`, `scale`, and `runs`: per beginning and choice `start`, `cameras`
-        (names), and the figures of `judge`; `ratio`: its mean error over that of all cameras.
+        `recording`, `source`, `scale`, and `runs`: per start and subset `start`, `cameras`
+        (names), the figures of `score_run`, and `ratio`: its mean error over that of all cameras.
 
     Raises:
         TrackerError: the recording cannot be read, has no truth or too few cameras.
     """
     runs: list[dict[str, Any]] = []
-    with judged(source, config, scale=scale, report=report) as recording:
+    with open_with_truth(source, config, scale=scale, report=report) as recording:
         names = recording.evidence.rig.names
         if not all(0 < count < len(names) for count in counts):
             raise ConfigError(
                 f"{source}: {', '.join(map(str, counts))} of {len(names)} cameras, expected "
                 f"fewer than {len(names)}"
             )
-        choices = [names, *(c for count in counts for c in combinations(names, count))]
-        for beginning in beginnings:
-            skipped = 0 if beginning.measured else SETTLED_FRAMES
-            usual = None
-            for choice in choices:
-                results, truth = recording.run(config, beginning, cameras=choice)
-                figures = judge(tracked_markers(results)[skipped:], truth[skipped:])
-                if choice is names:
-                    usual = figures["mean_mm"]
-                ratio = figures["mean_mm"] / usual if usual and figures["mean_mm"] else None
+        subsets = [names, *(c for count in counts for c in combinations(names, count))]
+        for start in starts:
+            skipped = 0 if start.measured else SETTLED_FRAMES
+            of_all = None
+            for subset in subsets:
+                results, truth = recording.run(config, start, cameras=subset)
+                figures = score_run(tracked_markers(results)[skipped:], truth[skipped:])
+                if subset is names:
+                    of_all = figures["mean_mm"]
+                ratio = figures["mean_mm"] / of_all if of_all and figures["mean_mm"] else None
                 runs.append(
-                    {"start": beginning.name, "cameras": list(choice), **figures, "ratio": ratio}
+                    {"start": start.name, "cameras": list(subset), **figures, "ratio": ratio}
                 )
-                if report is not None:
-                    total = len(choices) * len(beginnings)
-                    report(f"runs on {recording.name}", len(runs), total)
+                report(f"runs on {recording.name}", len(runs), len(subsets) * len(starts))
     return {"recording": recording.name, "source": str(source), "scale": scale, "runs": runs}
 
 
-def judge(points_m: NDArray[np.float64], truth_m: NDArray[np.float64]) -> dict[str, Any]:
-    """Figures of tracked markers (n, 15, 3) beside true ones, NaN where there is none.
+def score_run(points_m: NDArray[np.float64], truth_m: NDArray[np.float64]) -> dict[str, Any]:
+    """Errors of tracked markers (n, 15, 3) against reference markers, m; NaN where there is none.
 
-    `mean_mm`, `max_mm` (mean and greatest of the frames' mean errors, None without any),
-    `worst_joint_mm`, `lost_run` (longest run of frames with any joint more than `LOST_LIMB_MM`
-    off), `found` (share of the frames with a truth that have a pose).
+    `mean_mm`, `max_mm`: mean and maximum of the frames' mean errors, None without any pose;
+    `worst_joint_mm`; `lost_run`: longest run of frames in which a joint is more than
+    `LOST_LIMB_MM` off; `found`: fraction of the frames with a reference that have a pose.
     """
     apart_mm: NDArray[np.float64] = np.linalg.norm(points_m - truth_m, axis=2) * MM_PER_M
     known = np.asarray(np.isfinite(truth_m).all(axis=2)).any(axis=1)

@@ -1,4 +1,4 @@
-"""What the filter of the results does: how calm who stands becomes, how late who moves."""
+"""Effect of the result filter: jitter of a standing person, lag of a moving one."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,17 +10,24 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
-from markerless_tracker.benchmarks.judged import Beginning, Report, judged, tracked_markers
+from markerless_tracker.benchmarks.with_truth import (
+    Report,
+    RunStart,
+    no_report,
+    open_with_truth,
+    tracked_markers,
+)
 from markerless_tracker.body import MARKER_NAMES
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.score import MM_PER_M
 from markerless_tracker.tracking import TrackerConfig
 
 SLOW_S = 1.0
-"""What the mean over as much time shows is motion, what it leaves is jitter."""
-MOST_LAG = 8.0
-"""Lags are looked for up to so many frames."""
+"""Window of the moving average, s: the average is motion, the rest is jitter."""
+MAX_LAG_FRAMES = 8.0
+"""Greatest lag that is searched for, in frames."""
 FILTERS = ("none", "one_euro")
+"""Values of the setting `smoothing` that are compared."""
 
 Points = NDArray[np.float64]
 
@@ -29,36 +36,36 @@ def measure_jitter(
     source: Path,
     config: TrackerConfig,
     *,
-    beginning: Beginning,
+    start: RunStart,
     scale: float = 1.0,
-    report: Report | None = None,
+    report: Report = no_report,
 ) -> dict[str, Any]:
     """Track a recording with a `ground_truth.trc` without and with the filter.
 
-    Frames before the longest run of frames with a pose, or after it, are left out.
+    Only the longest run of consecutive frames with a pose is evaluated.
 
     Returns:
-        `recording`, `start`, `scale`, `fps`, `frames`, `speed_m_s` (mean of the true markers) and
-        per filter (`none`, `one_euro`) `mean_mm`, `jitter_mm` (mean over the joints, see
-        `jitter_mm`), `worst_jitter_mm`, `worst_joint`, `lag_frames`, `worst_lag_frames` (of one
-        joint): behind the unfiltered track, see `lag_frames`.
+        `recording`, `start`, `scale`, `fps`, `frames`, `speed_m_s` (mean of the reference markers)
+        and per filter (`none`, `one_euro`) `mean_mm`, `jitter_mm` (mean over the joints, see
+        `jitter_mm`), `worst_jitter_mm`, `worst_joint`, `lag_frames` behind the unfiltered track
+        (see `lag_frames`), `worst_lag_frames` (largest lag of a single joint).
 
     Raises:
-        TrackerError: the recording cannot be read, has no truth, or nobody was tracked.
+        TrackerError: the recording cannot be read, has no truth, or too few frames in a row were
+            tracked.
     """
     found: dict[str, Points] = {}
-    with judged(source, config, scale=scale, report=report) as recording:
+    with open_with_truth(source, config, scale=scale, report=report) as recording:
         for number, name in enumerate(FILTERS):
-            results, truth = recording.run(replace(config, smoothing=name), beginning)
+            results, truth = recording.run(replace(config, smoothing=name), start)
             found[name] = tracked_markers(results)
-            if report is not None:
-                report(f"runs on {recording.name}", number + 1, len(FILTERS))
-    kept = longest_whole(np.asarray(np.isfinite(found["none"]).all(axis=(1, 2))))
+            report(f"runs on {recording.name}", number + 1, len(FILTERS))
+    kept = longest_true_run(np.asarray(np.isfinite(found["none"]).all(axis=(1, 2))))
     names = np.flatnonzero(np.isfinite(truth[kept]).all(axis=(0, 2)))
-    if kept.stop - kept.start < 4.0 * MOST_LAG or names.size == 0:
+    if kept.stop - kept.start < 4.0 * MAX_LAG_FRAMES or names.size == 0:
         raise DatasetError(
             f"{source}: tracked for {kept.stop - kept.start} frames in a row with "
-            f"{names.size} markers of the truth, expected {4.0 * MOST_LAG:g} frames or more"
+            f"{names.size} markers of the truth, expected {4.0 * MAX_LAG_FRAMES:g} frames or more"
         )
     true = truth[kept][:, names]
     tracks = {name: points[kept][:, names] for name, points in found.items()}
@@ -66,7 +73,7 @@ def measure_jitter(
     return {
         "recording": recording.name,
         "source": str(source),
-        "start": beginning.name,
+        "start": start.name,
         "scale": scale,
         "fps": recording.fps,
         "frames": len(true),
@@ -95,48 +102,52 @@ def _figures(
 
 
 def jitter_mm(points_m: Points, window: int) -> NDArray[np.float64]:
-    """Jitter (m,) of tracks (n, m, 3) in m: rms distance from their own slow motion, mm.
+    """Jitter (m,) in mm of tracks (n, m, 3) in m: rms distance from their moving average.
 
-    Given offsets from the truth, what the person really does is no jitter.
+    Offsets from the reference can be given instead of tracks, which excludes the person's true
+    motion from the jitter.
 
     Args:
-        points_m: tracks, or their offsets from the truth.
-        window: frames over whose mean is slow, centred on each frame; fewer at the ends, as many
-            on both sides.
+        points_m: tracks, or their offsets from the reference.
+        window: length of the moving average in frames, centred; it is shortened symmetrically at
+            both ends.
     """
     count = len(points_m)
     sums = np.concatenate([np.zeros((1, *points_m.shape[1:])), np.cumsum(points_m, axis=0)])
     index = np.arange(count)
     half = np.minimum(window // 2, np.minimum(index, count - 1 - index))
     widths = (2 * half + 1)[:, None, None]
-    quick = points_m - (sums[index + half + 1] - sums[index - half]) / widths
-    return np.asarray(np.sqrt((quick**2).sum(axis=2).mean(axis=0)) * MM_PER_M)
+    fast = points_m - (sums[index + half + 1] - sums[index - half]) / widths
+    return np.asarray(np.sqrt((fast**2).sum(axis=2).mean(axis=0)) * MM_PER_M)
 
 
 def lag_frames(points: Points, reference: Points) -> float:
-    """By how many frames tracks (n, m, 3) are behind others: the shift with the least squares left.
+    """Lag in frames of tracks (n, m, 3) behind reference tracks.
 
-    A fraction counts (cubic interpolation); each coordinate's constant offset does not. Tracks that
-    run ahead are below 0.
+    The shift with the least squared differences; fractional (cubic interpolation), a constant
+    offset of each coordinate ignored. Negative if the tracks run ahead.
     """
     count = len(points)
     times = np.arange(count)
     behind = CubicSpline(times, reference.reshape(count, -1))
-    kept = times[int(MOST_LAG) : count - int(MOST_LAG)]
+    kept = times[int(MAX_LAG_FRAMES) : count - int(MAX_LAG_FRAMES)]
     flat = points.reshape(count, -1)[kept]
 
-    def left(shift: float) -> float:
+    def residual(shift: float) -> float:
         gap = flat - behind(kept - shift)
         return float(((gap - gap.mean(axis=0)) ** 2).sum())
 
     found = minimize_scalar(
-        left, bounds=(-MOST_LAG, MOST_LAG), method="bounded", options={"xatol": 1e-3}
+        residual,
+        bounds=(-MAX_LAG_FRAMES, MAX_LAG_FRAMES),
+        method="bounded",
+        options={"xatol": 1e-3},
     )
     return float(found.x)
 
 
-def longest_whole(flags: NDArray[np.bool_]) -> slice:
-    """Where the longest run of true values in (n,) is; empty without any."""
+def longest_true_run(flags: NDArray[np.bool_]) -> slice:
+    """Slice of the longest run of true values in (n,); empty without any."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
     if edges.size == 0:
         return slice(0, 0)

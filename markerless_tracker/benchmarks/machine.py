@@ -1,4 +1,4 @@
-"""Where a figure was measured."""
+"""The machine on which a figure was measured."""
 
 import os
 import platform
@@ -11,8 +11,8 @@ CPUINFO = Path("/proc/cpuinfo")
 def machine() -> dict[str, Any]:
     """Processor, cores this process may use, memory, system and load, as plain values.
 
-    Times taken under a load (of the last minute) well above the number of busy threads are too
-    long, those of parallel parts most of all.
+    `load` is the mean of the last minute. Times measured under a load well above the number of
+    this process's threads are too long, above all those of parallel parts.
     """
     return {
         "cpu": processor(),
@@ -24,7 +24,7 @@ def machine() -> dict[str, Any]:
 
 
 def processor(cpuinfo: Path = CPUINFO) -> str:
-    """The processor's name; its architecture where the system does not tell."""
+    """The processor's name, or its architecture if the system does not state the name."""
     try:
         for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
             key, _, value = line.partition(":")

@@ -1,7 +1,6 @@
-"""How soon the tracker is back after it saw nothing, or less, for a while."""
+"""Recovery: frames until the person is tracked again after views were missing or black."""
 
-import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,21 +8,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.benchmarks.starts import error_mm, true_markers
-from markerless_tracker.benchmarks.tables.accuracy import TRUTH
-from markerless_tracker.benchmarks.tables.evidence import make_evidence
-from markerless_tracker.datasets import open_recording, read_trc
+from markerless_tracker.benchmarks.with_truth import (
+    Report,
+    error_mm,
+    no_report,
+    open_with_truth,
+)
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.records import Observation, pack_mask
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 from markerless_tracker.tracking.tracker import Tracker
 
 WITHIN_FRAMES = 15
-OVER_USUAL_MM = 20.0
+"""A run has recovered if it is back within this many frames."""
+TOLERANCE_MM = 20.0
+"""A run is back when its error exceeds that of the undisturbed run by this at most."""
 SETTLED_S = 0.5
-"""The usual error is that of an undisturbed run, without as much at its beginning."""
-_STAYS = 5
+"""Time at the beginning of the undisturbed run that its mean error leaves out."""
+_STABLE_FRAMES = 5
+"""The error must stay low for this many frames."""
 _FIRST_S, _LATER_S = 0.6, 0.15
+"""Start of the disturbance with the first seed, and the delay from one seed to the next."""
 
 Views = Mapping[str, Observation]
 Frames = Sequence[tuple[int, Views]]
@@ -31,14 +36,14 @@ Frames = Sequence[tuple[int, Views]]
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What happens to the views for a while.
+    """A temporary disturbance of the views.
 
     Attributes:
-        name: for tables.
-        seconds: how long.
-        blind: how many cameras see black; None = all.
-        keep_hz: rate of the frames that come, None = all of them.
-        stopped: how many cameras send nothing.
+        name: name in tables.
+        seconds: duration.
+        blind: number of cameras with black images; None = all.
+        keep_hz: rate of the frames that arrive, None = all of them.
+        stopped: number of cameras without any image.
     """
 
     name: str
@@ -64,62 +69,61 @@ def measure_recovery(
     stature_m: float | None,
     scale: float = 1.0,
     seeds: int = 5,
-    progress: Callable[[str, int, int | None], None] | None = None,
+    report: Report = no_report,
 ) -> dict[str, Any]:
-    """Disturb runs on a recording with a `ground_truth.trc`, which only judges.
+    """Track a recording with a `ground_truth.trc` from an automatic start, with disturbances.
 
-    Each seed is disturbed at another moment, from another camera on. What a recording is too short
-    for is left out.
+    Each seed disturbs at another time, beginning with another camera. Disturbances for which the
+    recording is too short are left out.
+
+    Args:
+        source: the recording.
+        config: every setting; the seed is replaced.
+        stature_m: stature given to the start, m; None = unknown.
+        scale: factor for the images.
+        seeds: seeds 0 .. seeds - 1.
+        report: receives progress.
 
     Returns:
-        `recording`, `usual_mm` (per seed), and `runs`: one entry per disturbance and seed with
-        `frames_until_back` (frames seen again until the error is at most the usual one +
-        `OVER_USUAL_MM` and stays so; None if it never is) and `back` (whether that is within
-        `WITHIN_FRAMES`); `meanwhile_mm`, `worst_mm`: mean error of the disturbed frames that have
-        a pose (None if none has), and greatest frame error afterwards.
+        `recording`, `scale`, `undisturbed_mm` (mean error of the undisturbed run per seed), and
+        `runs`: one entry per disturbance and seed with `frames_until_back` (frames after the
+        disturbance until the error is at most the undisturbed one + `TOLERANCE_MM` and stays so;
+        None if it never is), `back` (whether that is within `WITHIN_FRAMES`), `meanwhile_mm` (mean
+        error of the disturbed frames with a pose, None without any) and `worst_mm` (largest frame
+        error afterwards).
 
     Raises:
-        TrackerError: the recording cannot be read or has no truth.
+        TrackerError: the recording cannot be read, has no truth, or the person was not found.
     """
-    report = progress or (lambda part, done, total: None)
-    recording = open_recording(source, scale=scale)
-    path = (source if source.is_dir() else source.parent) / TRUTH
-    if not path.is_file():
-        raise DatasetError(f"{source}: no {TRUTH}, expected one to judge by")
-    reference = read_trc(path).with_pelvis()
     runs: list[dict[str, Any]] = []
-    usual: list[float] = []
-    with tempfile.TemporaryDirectory(prefix="markerless_tracker_") as folder:
-        evidence = make_evidence(
-            recording,
-            config,
-            Path(folder),
-            progress=lambda n: report(f"evidence of {recording.name}", n, recording.frame_count),
-        )
-        truth = true_markers(evidence, reference)
-        frames = list(evidence.frames(every=1))
-        total = seeds * (1 + len(DISTURBANCES))
+    undisturbed: list[float] = []
+    with open_with_truth(source, config, scale=scale, report=report) as recording:
+        truth, fps = recording.truth_m, recording.fps
+        frames = list(recording.evidence.frames(every=1))
+        part = f"runs on {recording.name}"
+        per_seed = 1 + len(DISTURBANCES)
         for seed in range(seeds):
             seeded = replace(config, seed=seed)
-            tracker = build_tracker(evidence.rig, seeded, stature=stature_m).tracker
+            tracker = build_tracker(recording.evidence.rig, seeded, stature=stature_m).tracker
             tracker.warm_up()
-            begins = round((_FIRST_S + _LATER_S * seed) * recording.fps)
-            calm = _errors(tracker, frames, truth)
-            settled = min(round(SETTLED_S * recording.fps), len(calm) // 2)
-            if not np.isfinite(calm[settled:]).any():
-                raise DatasetError(f"{source}: nobody was tracked, seed {seed}: nothing to disturb")
-            usual.append(float(np.nanmean(calm[settled:])))
-            report(f"runs on {recording.name}", seed * (1 + len(DISTURBANCES)) + 1, total)
+            begins = round((_FIRST_S + _LATER_S * seed) * fps)
+            errors = _errors(tracker, frames, truth)
+            settled = min(round(SETTLED_S * fps), len(errors) // 2)
+            if not np.isfinite(errors[settled:]).any():
+                raise DatasetError(
+                    f"{source}: the person was not found with seed {seed}, expected a track that "
+                    "can be disturbed"
+                )
+            undisturbed.append(float(np.nanmean(errors[settled:])))
+            report(part, seed * per_seed + 1, seeds * per_seed)
             for number, disturbance in enumerate(DISTURBANCES):
-                ends = begins + round(disturbance.seconds * recording.fps)
-                last = ends + WITHIN_FRAMES + _STAYS
+                ends = begins + round(disturbance.seconds * fps)
+                last = ends + WITHIN_FRAMES + _STABLE_FRAMES
                 if last > len(frames):
                     continue
-                seen = disturbed(
-                    frames[:last], begins, ends, disturbance, recording.fps, first=seed
-                )
+                seen = disturbed(frames[:last], begins, ends, disturbance, fps, first=seed)
                 errors = _errors(tracker, seen, truth)
-                until = frames_until(errors[ends:], usual[-1] + OVER_USUAL_MM)
+                until = frames_until(errors[ends:], undisturbed[-1] + TOLERANCE_MM)
                 runs.append(
                     {
                         "disturbance": disturbance.name,
@@ -131,17 +135,21 @@ def measure_recovery(
                         "worst_mm": float(np.nanmax(errors[ends:], initial=0.0)),
                     }
                 )
-                report(f"runs on {recording.name}", seed * (1 + len(DISTURBANCES)) + 2 + number,
-                       total)  # fmt: skip
-    return {"recording": recording.name, "scale": scale, "usual_mm": usual, "runs": runs}
+                report(part, seed * per_seed + 2 + number, seeds * per_seed)
+    return {
+        "recording": recording.name,
+        "scale": scale,
+        "undisturbed_mm": undisturbed,
+        "runs": runs,
+    }
 
 
 def disturbed(
     frames: Frames, begins: int, ends: int, disturbance: Disturbance, fps: float, *, first: int = 0
 ) -> list[tuple[int, Views] | None]:
-    """The frames with a disturbance from one index up to another; None where no frame comes.
+    """The frames with a disturbance from index `begins` up to `ends`; None = no frame arrives.
 
-    Cameras are disturbed from the `first` one on, in a circle.
+    The disturbed cameras are counted cyclically from camera number `first` on.
     """
     every = 1 if disturbance.keep_hz is None else max(1, round(fps / disturbance.keep_hz))
     out: list[tuple[int, Views] | None] = []
@@ -163,10 +171,10 @@ def disturbed(
 
 
 def frames_until(errors_mm: NDArray[np.float64], limit_mm: float) -> int | None:
-    """Frames (from 1) until the errors (n,) are within a limit and stay so for some frames."""
+    """Number (from 1) of the frame from which the errors (n,) stay within a limit, or None."""
     good = errors_mm <= limit_mm
-    for first in range(len(good) - _STAYS + 1):
-        if good[first : first + _STAYS].all():
+    for first in range(len(good) - _STABLE_FRAMES + 1):
+        if good[first : first + _STABLE_FRAMES].all():
             return first + 1
     return None
 
@@ -177,7 +185,7 @@ def _mean(errors_mm: NDArray[np.float64]) -> float | None:
 
 
 def _black(view: Observation) -> Observation:
-    """What the imaging makes of a black image: everything differs from the background."""
+    """The observation of a black image: every pixel differs from the background."""
     everywhere = pack_mask(np.ones((view.height, view.width), dtype=np.uint8))
     return replace(view, mask_words=everywhere)
 
@@ -187,7 +195,7 @@ def _errors(
     frames: Sequence[tuple[int, Views] | None],
     truth: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Mean error (n,) of each frame, mm; NaN without a frame, pose or truth."""
+    """Mean error (n,) of each frame, mm; NaN without a frame, pose or reference."""
     tracker.reset()
     errors = np.full(len(frames), np.nan)
     for index, frame in enumerate(frames):

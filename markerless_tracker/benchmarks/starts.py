@@ -1,8 +1,7 @@
-"""How well the tracker starts by itself: from many frames of recordings whose truth is known."""
+"""Automatic starts from many frames of recordings with reference markers."""
 
-import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean, median
@@ -11,30 +10,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.benchmarks.tables.accuracy import TRUTH
-from markerless_tracker.benchmarks.tables.evidence import Evidence, make_evidence
-from markerless_tracker.body import MARKER_NAMES
-from markerless_tracker.body.anatomy import heading, turned_by
-from markerless_tracker.datasets import MarkerTrack, open_recording, read_trc
+from markerless_tracker.benchmarks.with_truth import (
+    Report,
+    error_mm,
+    no_report,
+    open_with_truth,
+)
+from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.records import Observation, TrackResult
-from markerless_tracker.results.score import MM_PER_M, match_rows
+from markerless_tracker.records import Observation
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 from markerless_tracker.tracking.tracker import Tracker
 
-REACHED_MM = 80.0
-"""A start whose last frame has a greater mean error has failed."""
+SUCCESS_MM = 80.0
+"""A start has succeeded if the mean error of its last frame is at most this."""
 WRONG_HEADING_DEG = 90.0
+"""A heading further off than this counts as wrong."""
 
 
 @dataclass(frozen=True)
 class StartPlan:
-    """What is measured.
+    """Which starts are measured.
 
     Attributes:
-        config: every setting; the seed is overruled.
-        every: a start from each so many-th frame that has a truth.
-        frames: frames tracked from each; the last one is judged.
+        config: every setting; the seed is replaced.
+        every: start from every k-th frame.
+        frames: frames tracked from each start; the last one is scored.
         seeds: seeds 0 .. seeds - 1.
     """
 
@@ -50,9 +51,16 @@ def measure_starts(
     *,
     stature_m: float | None,
     scale: float = 1.0,
-    progress: Callable[[str, int, int | None], None] | None = None,
+    report: Report = no_report,
 ) -> dict[str, Any]:
-    """Start from many frames of a recording with a `ground_truth.trc`, which only judges.
+    """Start automatically from many frames of a recording with a `ground_truth.trc`.
+
+    Args:
+        source: the recording.
+        plan: which starts.
+        stature_m: stature given to the start, m; None = unknown.
+        scale: factor for the images.
+        report: receives progress.
 
     Returns:
         The recording's figures (see `summarise`), and `starts`: one entry each.
@@ -60,20 +68,8 @@ def measure_starts(
     Raises:
         TrackerError: the recording cannot be read, has no truth or is too short.
     """
-    report = progress or (lambda part, done, total: None)
-    recording = open_recording(source, scale=scale)
-    path = (source if source.is_dir() else source.parent) / TRUTH
-    if not path.is_file():
-        raise DatasetError(f"{source}: no {TRUTH}, expected one to judge by")
-    reference = read_trc(path).with_pelvis()
-    with tempfile.TemporaryDirectory(prefix="markerless_tracker_") as folder:
-        evidence = make_evidence(
-            recording,
-            plan.config,
-            Path(folder),
-            progress=lambda n: report(f"evidence of {recording.name}", n, recording.frame_count),
-        )
-        truth = true_markers(evidence, reference)
+    with open_with_truth(source, plan.config, scale=scale, report=report) as recording:
+        truth = recording.truth_m
         firsts = [
             k
             for k in range(0, len(truth) - plan.frames + 1, plan.every)
@@ -83,25 +79,23 @@ def measure_starts(
             raise DatasetError(
                 f"{source}: no {plan.frames} frames in a row with a truth, expected some"
             )
-        frames = list(evidence.frames(every=1))
+        frames = list(recording.evidence.frames(every=1))
         starts = []
-        total = len(firsts) * plan.seeds
         for seed in range(plan.seeds):
             config = replace(plan.config, seed=seed)
-            tracker = build_tracker(evidence.rig, config, stature=stature_m).tracker
+            tracker = build_tracker(recording.evidence.rig, config, stature=stature_m).tracker
             tracker.warm_up()
             for first in firsts:
-                figures = one_start(
-                    tracker, frames[first : first + plan.frames], truth[first : first + plan.frames]
-                )
+                span = slice(first, first + plan.frames)
+                figures = one_start(tracker, frames[span], truth[span])
                 starts.append({"frame": first, "seed": seed, **figures})
-                report(f"starts in {recording.name}", len(starts), total)
+                report(f"starts in {recording.name}", len(starts), len(firsts) * plan.seeds)
     return {
         "recording": recording.name,
         "source": str(source),
         "scale": scale,
         "stature_m": stature_m,
-        "cameras": len(evidence.rig),
+        "cameras": len(recording.evidence.rig),
         **summarise(starts),
         "starts": starts,
     }
@@ -112,17 +106,22 @@ def one_start(
     frames: Sequence[tuple[int, Mapping[str, Observation]]],
     truth: NDArray[np.float64],
 ) -> dict[str, Any]:
-    """Start in the first of some frames (stamp, views) whose true markers (n, 15, 3) are known.
+    """Start automatically in the first of some frames.
+
+    Args:
+        tracker: the tracker; it is reset.
+        frames: n frames, stamp (ns) and views.
+        truth: (n, 15, 3) their reference markers, m.
 
     Returns:
-        `frame_mm`: mean error per frame, None without a pose; `heading_deg`: how far the last
-        frame's heading is off; `turned`: whether it was turned round on the way; `first_pose_s`:
-        time of the first step that gave a pose.
+        `frame_mm`: mean error per frame, None without a pose; `heading_deg`: error of the last
+        frame's heading; `heading_corrected`: whether the tracker changed to the
+        opposite heading; `first_pose_s`: computing time of the first step that gave a pose.
     """
     tracker.reset()
     errors: list[float | None] = []
     off: float | None = None
-    turned, first_pose_s = False, None
+    corrected, first_pose_s = False, None
     for (stamp_ns, views), true in zip(frames, truth, strict=True):
         began = time.perf_counter()
         result = tracker.step(views, stamp_ns)
@@ -130,15 +129,15 @@ def one_start(
         if result.pose is not None and first_pose_s is None:
             first_pose_s = seconds
         errors.append(error_mm(result, true))
-        turned |= any("turned round" in warning for warning in result.warnings)
+        corrected |= any("turned round" in warning for warning in result.warnings)
         off = None
         if result.markers_m is not None:
-            angle = turned_by(heading(result.markers_m), heading(true))
+            angle = heading_difference(heading(result.markers_m), heading(true))
             off = float(np.rad2deg(angle)) if np.isfinite(angle) else None
     return {
         "frame_mm": errors,
         "heading_deg": off,
-        "turned": turned,
+        "heading_corrected": corrected,
         "first_pose_s": first_pose_s,
     }
 
@@ -146,10 +145,10 @@ def one_start(
 def summarise(starts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Figures over starts as `one_start` gives them.
 
-    `count`; shares `found` (a pose in the last frame), `reached` (mean error at most `REACHED_MM`
-    there), `wrong_heading` (more than `WRONG_HEADING_DEG` off there), `turned`; `mean_mm`,
-    `median_mm`, `worst_mm` of the last frame and `first_mm`, the median of the first; median and
-    greatest `first_pose_s`. None where no start gave a value.
+    `count`; fractions of the starts: `found` (a pose in the last frame), `succeeded` (its mean
+    error is at most `SUCCESS_MM`), `wrong_heading` (its heading is more than `WRONG_HEADING_DEG`
+    off), `heading_corrected`; `mean_mm`, `median_mm`, `worst_mm` of the last frame and `first_mm`,
+    the median of the first; median and maximum of `first_pose_s`. None where no start gave a value.
     """
     last = [start["frame_mm"][-1] for start in starts]
     known = [value for value in last if value is not None]
@@ -160,9 +159,9 @@ def summarise(starts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "count": count,
         "found": len(known) / count,
-        "reached": sum(value <= REACHED_MM for value in known) / count,
+        "succeeded": sum(value <= SUCCESS_MM for value in known) / count,
         "wrong_heading": sum(value > WRONG_HEADING_DEG for value in headings) / count,
-        "turned": sum(start["turned"] for start in starts) / count,
+        "heading_corrected": sum(start["heading_corrected"] for start in starts) / count,
         "first_mm": median(first) if first else None,
         "mean_mm": fmean(known) if known else None,
         "median_mm": median(known) if known else None,
@@ -170,24 +169,3 @@ def summarise(starts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "first_pose_s": median(seconds) if seconds else None,
         "first_pose_max_s": max(seconds) if seconds else None,
     }
-
-
-def true_markers(evidence: Evidence, reference: MarkerTrack) -> NDArray[np.float64]:
-    """True markers (n, 15, 3) of the evidence's frames, NaN where there are none."""
-    stamps = np.array(evidence.stamps_ns, dtype=np.int64)
-    out = np.full((len(stamps), len(MARKER_NAMES), 3), np.nan)
-    rows, of = match_rows(
-        MarkerTrack(("none",), stamps, np.full((len(stamps), 1, 3), np.nan)), reference
-    )
-    for i, name in enumerate(MARKER_NAMES):
-        if name in reference.names:
-            out[rows, i] = reference.positions_m[of, reference.names.index(name)]
-    return out
-
-
-def error_mm(result: TrackResult, true: NDArray[np.float64]) -> float | None:
-    """Mean distance (mm) of a result's markers from true ones (15, 3), over those there are."""
-    if result.markers_m is None:
-        return None
-    gaps = np.linalg.norm(result.markers_m - true, axis=1)
-    return float(np.nanmean(gaps)) * MM_PER_M if np.isfinite(gaps).any() else None

@@ -1,4 +1,4 @@
-"""Bodies: declarative descriptions, subjects, kinematics, constraints, start poses."""
+"""Body models: descriptions, subjects, forward kinematics, constraints, start poses."""
 
 from markerless_tracker.body.collision import RULES, Feasibility
 from markerless_tracker.body.kinematics import cone_transforms, markers, root_transform, transforms

@@ -1,4 +1,4 @@
-"""Postures in anatomical angles: flexion, bending and raising sideways are positive on both sides.
+"""Postures in anatomical angles: flexion, bending and abduction are positive on both sides.
 
 The parameters of the shipped bodies keep the published signs, which differ from joint to joint.
 """
@@ -25,7 +25,7 @@ def posture(body: BodyModel, angles_rad: Mapping[str, float]) -> FloatArray:
 
 
 def heading(markers_m: FloatArray) -> float:
-    """Where a body faces, rad about the world's vertical from its x axis.
+    """Heading of a body: angle about the world's vertical from its x axis, rad.
 
     Args:
         markers_m: (15, 3) in the order of `MARKER_NAMES`.
@@ -35,6 +35,6 @@ def heading(markers_m: FloatArray) -> float:
     return float(np.arctan2(-left[0], left[1]))
 
 
-def turned_by(angle_rad: float, other_rad: float) -> float:
-    """How far one heading lies from another, rad, 0 to pi."""
+def heading_difference(angle_rad: float, other_rad: float) -> float:
+    """Absolute angle between two headings, rad, 0 to pi."""
     return float(abs((angle_rad - other_rad + np.pi) % (2.0 * np.pi) - np.pi))

@@ -1,4 +1,4 @@
-"""From a body's description and a subject's sizes to the arrays of a `BodyModel`."""
+"""Builds the arrays of a `BodyModel` from a body's description and a subject's sizes."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,11 +12,12 @@ from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
 _AXES = "xyz"
-_SPREAD_RAD = 0.6
+_PRIOR_SD_RAD = 0.6
+"""Prior standard deviation of a joint for which the description states none."""
 
 
 class _Nodes:
-    """Grows the node arrays while chains are appended."""
+    """Node arrays, extended chain by chain."""
 
     def __init__(self, parameters: tuple[str, ...], lengths: Mapping[str, float]) -> None:
         self.parameters = parameters
@@ -28,7 +29,7 @@ class _Nodes:
         self.parameter: list[int] = []
 
     def append(self, parent: int, chain: tuple[Move, ...], where: str) -> int:
-        """Append a frame; its last node carries what is fixed behind the last moving joint."""
+        """Append a frame; its last node carries the fixed moves after the last joint."""
         fixed = np.eye(4)
         for move in chain:
             if isinstance(move.argument, str) and move.argument in self.parameters:
@@ -65,7 +66,7 @@ class _Nodes:
         if not isinstance(move.argument, float):
             raise BodyModelError(f"{where}: rotates by the length {move.argument!r}")
         i, j = (axis + 1) % 3, (axis + 2) % 3
-        # Quarter turns stay exact.
+        # Exact for multiples of 90 degrees.
         angle = move.factor * value
         cos, sin = np.round([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))], 15)
         result[i, i], result[i, j], result[j, i], result[j, j] = cos, -sin, sin, cos
@@ -84,8 +85,8 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
     """Build the model of a described body with a subject's sizes.
 
     Raises:
-        BodyModelError: the description refers to something undefined, or the subject lacks a
-            length or names a cone the body does not have.
+        BodyModelError: the description refers to an undefined name, or the subject lacks a length
+            or names a cone that the body does not have.
     """
     d = description
     lengths = fitted_lengths(d, subject)
@@ -156,7 +157,7 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
         ),
         prior_sd=np.array(
             [
-                np.inf if k in d.subspaces["root"] else float(v.get("prior_sd_rad", _SPREAD_RAD))
+                np.inf if k in d.subspaces["root"] else float(v.get("prior_sd_rad", _PRIOR_SD_RAD))
                 for k, v in d.parameters.items()
             ]
         ),

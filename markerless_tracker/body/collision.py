@@ -1,9 +1,9 @@
 """Inter-penetration of cones: the default rule and the published one.
 
 Both follow Balan, Sigal and Black (2005): the first cone of a pair is filled with equally spaced
-spheres. Published: so is the second, and the body is impossible if any two spheres overlap; the
-flat section of the torso is ignored, which refuses true poses with hanging arms. Default: the
-second cone keeps its elliptic section, and both are shrunk by a margin.
+spheres. Published rule: the second cone is, too, and a pose is infeasible if any two spheres
+overlap. It ignores the flat section of the torso and rejects true poses with hanging arms. Default
+rule: the second cone keeps its elliptic section, and both cones are reduced by a margin.
 """
 
 from collections.abc import Callable
@@ -20,19 +20,21 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import locked
 
 RULES = ("elliptic", "published", "none")
+"""Values of the setting `collision`."""
 MARGIN_M = 0.030
+"""Reduction of both cones by the default rule."""
 _MOST_SPHERES = 20
 _NONE = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
 class Spheres:
-    """Spheres that fill the cones taking part in a collision rule.
+    """Spheres that fill the cones of a body.
 
     Attributes:
-        first: (c + 1,) the spheres of cone i are first[i] .. first[i + 1].
-        centre: (s, 3) in the cone's base frame, m.
-        radius: (s,) m.
+        first: (c + 1,) cone i has the spheres first[i] .. first[i + 1] - 1.
+        centre: (s, 3) centres in the cone's base frame, m.
+        radius: (s,) radii, m.
     """
 
     first: IntArray
@@ -43,8 +45,8 @@ class Spheres:
 def fill_with_spheres(body: BodyModel) -> Spheres:
     """Fill every cone with n + 1 spheres, n = round(length / greatest radius / 2), 1 <= n <= 20.
 
-    The radius is interpolated between the ends' greater radii and divided by
-    sqrt(1 + (difference / length)²), which makes the sphere touch the cone's side.
+    The radius is interpolated between the greater radii of both ends and divided by
+    sqrt(1 + (difference / length)²), so that the sphere touches the cone's side.
     """
     first, centres, radii = [0], [], []
     for length, shape in zip(body.cone_length, body.cone_shape, strict=True):
@@ -64,7 +66,7 @@ def fill_with_spheres(body: BodyModel) -> Spheres:
 
 
 class Feasibility:
-    """Tests poses against limits and a collision rule, in one compiled pass over a batch.
+    """Tests batches of poses against joint limits and a collision rule (compiled).
 
     Args:
         body: the body.
@@ -85,21 +87,21 @@ class Feasibility:
         self._pairs = body.collisions if rule != "none" else np.empty((0, 2), dtype=np.int64)
 
     def __call__(self, poses: FloatArray) -> NDArray[np.bool_]:
-        """Mask (n,) of the poses (n, p) that keep the limits and do not inter-penetrate."""
+        """Mask (n,) of the poses (n, p) within the limits and without inter-penetration."""
         return self.around(np.arange(self.body.size), self.body.neutral)(poses)
 
     def around(
         self, active: IntArray, centre: FloatArray, *, forgive: bool = False
     ) -> Callable[[FloatArray], NDArray[np.bool_]]:
-        """The same test of points (n, d): values of some parameters, the others are at a centre.
+        """The same test for points (n, d): values of d parameters, the others fixed at a centre.
 
-        What the active parameters (d,) do not move is tested once, at the centre (p,).
+        Pairs of cones that the active parameters do not move are tested once, at the centre.
 
         Args:
-            active: (d,) the parameters that vary.
-            centre: (p,) values of the others.
-            forgive: leave out pairs of cones that inter-penetrate at the centre. For centres that
-                images speak for: there the sections are too wide, and would refuse every point.
+            active: (d,) indices of the parameters that vary.
+            centre: (p,) values of the other parameters.
+            forgive: ignore pairs of cones that inter-penetrate at the centre. For centres found in
+                images, where an inter-penetration means that the model's sections are too wide.
         """
         body, spheres, pairs = self.body, self._spheres, self._pairs
         moves = moving_nodes(body, active)
@@ -130,7 +132,7 @@ class Feasibility:
 
 
 def _apart(keeps: Callable[[IntArray], bool], pairs: IntArray) -> IntArray:
-    """Those of pairs (k, 2) that keep a rule."""
+    """The pairs (k, 2) that satisfy a rule."""
     if keeps(pairs):
         return pairs
     return pairs[[keeps(pairs[k : k + 1]) for k in range(len(pairs))]]
@@ -138,7 +140,7 @@ def _apart(keeps: Callable[[IntArray], bool], pairs: IntArray) -> IntArray:
 
 @kernel
 def _to_world(frame, x, y, z):  # type: ignore[no-untyped-def]
-    """A point of a frame (3, 4) in the world."""
+    """World coordinates of a point of a frame (3, 4)."""
     return (
         frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z + frame[0, 3],
         frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z + frame[1, 3],
@@ -148,7 +150,7 @@ def _to_world(frame, x, y, z):  # type: ignore[no-untyped-def]
 
 @kernel
 def _from_world(frame, x, y, z):  # type: ignore[no-untyped-def]
-    """A world point in a frame (3, 4)."""
+    """Coordinates of a world point in a frame (3, 4)."""
     x, y, z = x - frame[0, 3], y - frame[1, 3], z - frame[2, 3]
     return (
         frame[0, 0] * x + frame[1, 0] * y + frame[2, 0] * z,
@@ -159,7 +161,7 @@ def _from_world(frame, x, y, z):  # type: ignore[no-untyped-def]
 
 @kernel
 def _inside_cone(x, y, z, length, shape, grow):  # type: ignore[no-untyped-def]
-    """Whether a point of a cone's base frame lies inside it, its surface moved out by `grow`."""
+    """Whether a point in a cone's base frame lies inside the cone enlarged by `grow`."""
     if z < -grow or z > length + grow:
         return False
     t = min(max(z / length, 0.0), 1.0)

@@ -1,4 +1,4 @@
-"""Reading a body's declarative description: frames as chains of moves, lengths, cones, markers."""
+"""Body descriptions (YAML): frames as chains of moves, lengths, cones, markers."""
 
 import re
 from collections.abc import Mapping
@@ -7,8 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from markerless_tracker.body.files import read_yaml
 from markerless_tracker.body.schema import check_description
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.resources import config_dir
@@ -21,7 +20,7 @@ _MOVE = re.compile(
 
 @dataclass(frozen=True)
 class Move:
-    """One elementary move of a chain: ``tz(-0.4*torso)`` moves along z by -0.4 times 'torso'."""
+    """One elementary move of a chain: ``tz(-0.4*torso)`` translates along z by -0.4 'torso'."""
 
     kind: str
     factor: float
@@ -30,7 +29,7 @@ class Move:
 
 @dataclass(frozen=True)
 class BodyDescription:
-    """A body as its YAML file declares it; `BodyModel` is what it becomes for one subject."""
+    """A body as declared by its YAML file; `build_body` makes a `BodyModel` for a subject."""
 
     name: str
     lengths: Mapping[str, Mapping[str, Any]]
@@ -48,7 +47,7 @@ def parse_chain(text: str, where: str) -> tuple[Move, ...]:
     """Parse moves such as ``ry(180) ty(+l_hip) tz(0.4*torso) rx(-l_hip_x)``.
 
     Raises:
-        BodyModelError: something in the text is no move.
+        BodyModelError: a part of the text is no move.
     """
     if _MOVE.sub("", text).strip():
         raise BodyModelError(
@@ -67,14 +66,9 @@ def read_description(path: Path) -> BodyDescription:
     """Read a body description file.
 
     Raises:
-        BodyModelError: the file cannot be read, is not YAML, or does not have the shape that
-            `check_description` asks for.
+        BodyModelError: the file cannot be read, is no YAML, or fails `check_description`.
     """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        first = str(error).splitlines()[0]
-        raise BodyModelError(f"{path}: cannot read the body description: {first}") from error
+    data = read_yaml(path, "body description")
     check_description(data, str(path))
     return BodyDescription(
         name=data["name"],

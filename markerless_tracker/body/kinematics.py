@@ -1,4 +1,4 @@
-"""Forward kinematics of a `BodyModel`: poses to transforms, markers and cones."""
+"""Forward kinematics of a `BodyModel`: transforms, markers and cones at a pose."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +97,7 @@ def cone_transforms(body: BodyModel, pose: FloatArray) -> FloatArray:
 
 
 def carried(body: BodyModel, nodes: IntArray) -> FloatArray:
-    """(m, k) 1 where a node is, or hangs on, one of k nodes, else 0."""
+    """(m, k): 1 where node m is node k or a descendant of it, else 0."""
     count = body.node_parent.size
     above = np.zeros((count, count))
     for node, parent in enumerate(body.node_parent.tolist()):

@@ -1,4 +1,4 @@
-"""Finding body descriptions by name or file."""
+"""Loading of bodies and their descriptions by name or file."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ def load_description(name_or_file: str | Path) -> BodyDescription:
     """The description of a shipped body (by name) or of a YAML file.
 
     Raises:
-        BodyModelError: no such body; the message lists those there are.
+        BodyModelError: there is no such body; the message lists the shipped ones.
     """
     path = Path(name_or_file)
     if path.suffix in (".yaml", ".yml"):
@@ -33,7 +33,7 @@ def load_body(name_or_file: str | Path, subject: Subject | float = 1.72) -> Body
     """A body with a subject's sizes; a number is a stature in metres.
 
     Raises:
-        BodyModelError: no such body, it is malformed (the message names a file's path), or the
+        BodyModelError: there is no such body, it is malformed (the message names the file), or the
             subject does not fit it.
     """
     description = load_description(name_or_file)
@@ -42,7 +42,7 @@ def load_body(name_or_file: str | Path, subject: Subject | float = 1.72) -> Body
     try:
         return build_body(description, subject)
     except BodyModelError as error:
-        # What is wrong with the subject is not the description's fault.
+        # Errors of the subject do not name the description.
         if str(error).startswith("subject ") or str(name_or_file) == description.name:
             raise
         raise BodyModelError(f"{name_or_file}: {error}") from error

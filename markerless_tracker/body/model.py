@@ -25,39 +25,40 @@ LIMB_MARKERS = tuple(name for name in MARKER_NAMES if name not in ("Pelvis", "Ne
 
 @dataclass(frozen=True, eq=False)
 class BodyModel:
-    """A body of p parameters, m nodes, c cones, fitted with one subject's sizes. Metres, radians.
+    """A body of p parameters, m nodes and c cones with one subject's sizes; metres, radians.
 
-    A node is a fixed transform from its parent followed by at most one elementary move.
+    A node is a fixed transform from its parent followed by at most one elementary move (rotation
+    or translation by a parameter).
 
     Attributes:
         name: name of the description.
-        parameter_names: (p,) names in order; joint states carry those that are not in the root.
+        parameter_names: (p,) names in order; joint states contain those that are not in the root.
         node_parent: (m,) parent node, -1 for the world; parents come before children.
         node_fixed: (m, 3, 4) fixed transform from the parent, before the move.
         node_kind: (m,) 0..2 rotation about x, y, z; 3..5 translation along them; -1 no move.
         node_sign: (m,) factor of the parameter.
-        node_parameter: (m,) index of the parameter that moves it, -1 for none.
-        frames: name of each frame to its last node.
-        root_frame: name of the frame that carries the body.
+        node_parameter: (m,) index of its parameter, -1 for none.
+        frames: last node of each frame by name.
+        root_frame: name of the frame that all others descend from.
         sigma: (p,) greatest change between frames at 60 fps (SPPSO Eq 1).
-        neutral: (p,) standing, arms hanging; the root at the origin.
+        neutral: (p,) standing with hanging arms, the root at the origin.
         prior_mean: (p,) mean of people's poses: neutral, with slightly bent elbows.
-        prior_sd: (p,) how far they scatter about it, infinite for the root: a weak belief for
-            refinement, where the images do not tell.
+        prior_sd: (p,) standard deviation about that mean, infinite for the root: a weak prior of
+            the refinement for parameters that the images do not determine.
         limits: (2, p) anatomical lower and upper limits, infinite where free.
         walking_limits: (2, p) published limits, learned from one walk.
         marker_node, marker_offset: (15,) and (15, 3), markers in their nodes' frames.
         cone_names: (c,) names.
-        cone_node, cone_fixed: (c,) and (c, 3, 4), where each cone's base frame hangs.
+        cone_node, cone_fixed: (c,) and (c, 3, 4), each cone's node and its base frame there.
         cone_length: (c,) length along the base frame's +z.
         cone_shape: (c, 2, 4) start and end: radius x, radius y, offset x, offset y.
-        cone_edges: (c, 2) whether the sides, and whether the end's edge, count as edges.
+        cone_edges: (c, 2) whether the sides, and the contour of the end, count as edges.
         collisions: (k, 2) pairs of cones that must not inter-penetrate.
         subspaces: named groups of parameter indices.
-        hierarchies: named lists of steps in which a body may be searched; each step names the
-            subspace that varies, then those that join softly.
+        hierarchies: named lists of steps of a hierarchical search; each step names the subspace
+            that varies, then those that a soft partition adds.
         lengths_m: the subject's named lengths.
-        measured: whether these were measured on the person, not fitted or guessed.
+        measured: whether the lengths were measured on the person (not fitted or generic).
     """
 
     name: str
@@ -110,14 +111,14 @@ class BodyModel:
     def limbs(self) -> tuple[str, ...]:
         """Subspaces of the limbs: the steps of hierarchy 'six' after root, torso and head.
 
-        None where other hierarchies are declared, and 'six' is not.
+        Empty if hierarchies are declared, but not 'six'.
         """
         if self.hierarchies and "six" not in self.hierarchies:
             return ()
         return tuple(step[0] for step in self.steps("six")[2:])
 
     def steps(self, hierarchy: str) -> tuple[tuple[str, ...], ...]:
-        """The steps of a hierarchy; 'six' is the subspaces one by one where nothing is declared.
+        """The steps of a hierarchy; without any declared, 'six' has one step per subspace.
 
         Raises:
             BodyModelError: there is no such hierarchy.

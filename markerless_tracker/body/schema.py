@@ -1,4 +1,4 @@
-"""The shape of a body description: which keys each entry has, and what stands there."""
+"""Structure of a body description: keys of each entry and types of their values."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -51,7 +51,7 @@ def _edges(value: Any) -> bool:
     return _texts(value) and set(value) <= {"sides", "top"}
 
 
-# What a value must be, in words and as a test.
+# Requirements on a value, as text for messages and as a test.
 _POSITIVE = ("a number above 0", _positive)
 _NUMBER = ("a number", _number)
 _TEXT = ("text", _text)
@@ -60,7 +60,7 @@ _RANGE = ("two numbers, the lower one first", _range)
 _END = ("[radius x, radius y, offset x, offset y] with positive radii", _end)
 _EDGES = ("a list of 'sides' and 'top'", _edges)
 
-# Keys of the entries of each section; those in the first mapping are required.
+# Keys of the entries of each section: required ones, then optional ones.
 _ENTRIES: Mapping[str, tuple[Mapping[str, tuple[str, Check]], Mapping[str, tuple[str, Check]]]] = {
     "lengths": ({"stature": _POSITIVE}, {"markers": _PAIR}),
     "parameters": (
@@ -81,11 +81,13 @@ _ENTRIES: Mapping[str, tuple[Mapping[str, tuple[str, Check]], Mapping[str, tuple
     ),
 }
 OPTIONAL = ("hierarchies",)
+"""Sections that a description may have."""
 SECTIONS = ("name", *_ENTRIES, "root", "collisions", "subspaces")
+"""Sections that a description must have."""
 
 
 def check_description(data: Any, where: str) -> None:
-    """Check what a description file holds, so that building a body finds what it expects.
+    """Check the structure of a description file.
 
     Args:
         data: the parsed file.
@@ -124,7 +126,8 @@ def check_description(data: Any, where: str) -> None:
         here = f"{where}: hierarchies: {name}"
         if not isinstance(steps, list) or not steps or not all(_texts(s) and s for s in steps):
             raise BodyModelError(
-                f"{here} is {steps!r}, expected steps [subspace, subspaces that join softly ...]"
+                f"{here} is {steps!r}, expected steps [subspace, subspaces added by a soft "
+                "partition ...]"
             )
         for subspace in sum(steps, []):
             if subspace not in data["subspaces"]:

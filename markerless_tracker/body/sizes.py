@@ -1,4 +1,4 @@
-"""A described body in any size: its free lengths, and what is believed of a person's."""
+"""Sizes of a described body: its free lengths and their prior distribution."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,22 +11,23 @@ from markerless_tracker.body.model import BodyModel
 from markerless_tracker.body.subject import Subject, subject_from_stature
 from markerless_tracker.geometry import FloatArray
 
-USUAL_STATURE_M = 1.70
-UNUSUAL = 0.06
-"""How far adults' statures scatter, as a share of the usual one."""
-TOLD = 0.01
-"""How far a stature that somebody tells is off, as a share: shoes, rounding."""
-PROPORTIONS = 0.04
-"""How far a length scatters among people of one stature, as a share of it."""
+MEAN_STATURE_M = 1.70
+"""Mean stature of adults."""
+STATURE_SD = 0.06
+"""Relative standard deviation of adults' statures."""
+GIVEN_STATURE_SD = 0.01
+"""Relative standard deviation of a stature given by the user (shoes, rounding)."""
+PROPORTION_SD = 0.04
+"""Relative standard deviation of a segment length among persons of one stature."""
 
 
 @dataclass(frozen=True, eq=False)
-class LengthBelief:
-    """A Gaussian belief about the logarithms of k lengths.
+class LengthPrior:
+    """Gaussian prior of the logarithms of k lengths in m.
 
     Attributes:
-        mean: (k,).
-        precision: (k, k).
+        mean: (k,) mean.
+        precision: (k, k) inverse covariance.
     """
 
     mean: FloatArray
@@ -34,13 +35,13 @@ class LengthBelief:
 
 
 class Sizes:
-    """A described body in any size; lengths of the left and the right side are alike.
+    """A described body in any size; left and right lengths are equal.
 
     Args:
         description: the body.
 
     Attributes:
-        names: the k free lengths, without their side.
+        names: names of the k free lengths, without their side.
     """
 
     def __init__(self, description: BodyDescription) -> None:
@@ -51,17 +52,15 @@ class Sizes:
             fractions[_side_free(name)].append(float(entry["stature"]))
         self._fractions = np.array([np.mean(values) for values in fractions.values()])
 
-    def usual(self, stature_m: float | None) -> LengthBelief:
-        """What is believed of a person of that stature, of any adult if it is None."""
-        common = UNUSUAL if stature_m is None else TOLD
-        covariance = np.diag(np.full(len(self.names), PROPORTIONS**2)) + common**2
-        stature = USUAL_STATURE_M if stature_m is None else stature_m
-        return LengthBelief(
-            np.log(self._fractions * stature), np.asarray(np.linalg.inv(covariance))
-        )
+    def prior(self, stature_m: float | None) -> LengthPrior:
+        """Prior of the lengths of a person with that stature, of any adult if it is None."""
+        common = STATURE_SD if stature_m is None else GIVEN_STATURE_SD
+        covariance = np.diag(np.full(len(self.names), PROPORTION_SD**2)) + common**2
+        stature = MEAN_STATURE_M if stature_m is None else stature_m
+        return LengthPrior(np.log(self._fractions * stature), np.asarray(np.linalg.inv(covariance)))
 
     def of_stature(self, stature_m: float) -> BodyModel:
-        """The generic body of a person of that stature.
+        """The generic body of a person with that stature.
 
         Raises:
             BodyModelError: the stature is not between 0.5 and 2.6 m.
@@ -69,16 +68,16 @@ class Sizes:
         return build_body(self._description, subject_from_stature(self._description, stature_m))
 
     def of(self, body: BodyModel) -> FloatArray:
-        """The free lengths (k,) of a body, m: means of both sides."""
+        """The free lengths (k,) of a body, m: the mean of both sides."""
         known: dict[str, list[float]] = {name: [] for name in self.names}
         for name, value in body.lengths_m.items():
             known[_side_free(name)].append(value)
         return np.array([np.mean(values) for values in known.values()])
 
     def body(self, lengths_m: FloatArray, like: BodyModel | None = None) -> BodyModel:
-        """The body with free lengths (k,), with generic sections or those of another body.
+        """The body with free lengths (k,) in m.
 
-        Lengths count as measured if the other body's do.
+        Sections are generic, or those of the body `like`, which then also gives `measured`.
 
         Raises:
             BodyModelError: a length is not between 0 and 3 m.

@@ -1,4 +1,4 @@
-"""A start pose: from one row of named markers, or from a YAML file of named parameters."""
+"""Start poses from one row of named markers or from a YAML file of named parameters."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,26 +8,27 @@ import yaml
 from scipy.optimize import least_squares
 
 from markerless_tracker.body import kinematics
+from markerless_tracker.body.files import read_yaml
 from markerless_tracker.body.model import MARKER_NAMES, BodyModel
 from markerless_tracker.body.subject import complete_markers
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
-# Keeps what the markers do not determine (the twist of a straight limb) at neutral: one radian
-# away costs as much as 4 mm at one marker.
 _NEUTRAL_WEIGHT_M_PER_RAD = 0.004
+"""Weight of the distance from neutral, for angles that the markers do not determine (the axial
+rotation of a straight limb): one radian costs as much as 4 mm at one marker."""
 
 
 def pose_from_markers(
     body: BodyModel, markers_m: Mapping[str, FloatArray], *, limits: FloatArray | None = None
 ) -> FloatArray:
-    """The pose (p,) whose markers lie nearest to the named markers (3,), world frame, m.
+    """The pose (p,) with the least squared distances from named markers (3,), world frame, m.
 
-    Bounded least squares within the limits (2, p), the body's anatomical ones unless given;
-    markers may be missing, but not the hips and the neck that give the position and heading.
+    Bounded least squares within the limits (2, p), by default the body's anatomical ones. Markers
+    may be missing, except the hips and the neck, which give position and heading.
 
     Raises:
-        BodyModelError: LHip, RHip or Neck is missing, or they do not span a body.
+        BodyModelError: LHip, RHip or Neck is missing, or the three lie on one line.
     """
     known = complete_markers(markers_m)
     for needed in ("LHip", "RHip", "Neck"):
@@ -43,7 +44,7 @@ def pose_from_markers(
     angles = body.joints
 
     start = np.clip(_upright(body, known), bounds[0], bounds[1])
-    # Bounds of joints are finite; a margin keeps the start strictly inside, as the solver wants.
+    # The solver needs a start strictly inside the bounds.
     low, high = bounds[0] - 1e-9, bounds[1] + 1e-9
 
     def residuals(pose: FloatArray) -> FloatArray:
@@ -51,7 +52,7 @@ def pose_from_markers(
         neutral = _NEUTRAL_WEIGHT_M_PER_RAD * (pose - body.neutral)[angles]
         return np.concatenate([gap, neutral])
 
-    # From neutral a limb may get stuck at a limit; from the middle of its range it does not.
+    # A second fit from the middle of the ranges avoids local minima at a limit.
     bent = start.copy()
     ranged = np.isfinite(bounds).all(axis=0)
     bent[ranged] = bounds[:, ranged].mean(axis=0)
@@ -66,17 +67,13 @@ def pose_from_markers(
 def read_pose(path: Path, body: BodyModel) -> FloatArray:
     """Read a start pose (p,): a YAML mapping of parameter names to m or rad.
 
-    Parameters that are not named stay neutral; the root's six must be named.
+    Parameters that are not named are neutral; the root's six must be named.
 
     Raises:
-        BodyModelError: the file cannot be read, names an unknown parameter or holds no number.
+        BodyModelError: the file cannot be read, names an unknown parameter, or a value is no
+            number.
     """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        raise BodyModelError(
-            f"{path}: cannot read the pose: {str(error).splitlines()[0]}"
-        ) from error
+    data = read_yaml(path, "pose")
     if not isinstance(data, dict):
         raise BodyModelError(f"{path}: expected a mapping of parameter names to m or rad")
     pose = body.neutral.copy()
@@ -99,7 +96,7 @@ def write_pose(path: Path, body: BodyModel, pose: FloatArray) -> None:
 
 
 def _upright(body: BodyModel, known: Mapping[str, FloatArray]) -> FloatArray:
-    """The neutral pose put at the hips, turned to their heading and to the trunk's direction."""
+    """The neutral pose at the position of the hips, with their heading."""
     across = known["LHip"] - known["RHip"]
     trunk = known["Neck"] - known["Pelvis"]
     if np.linalg.norm(np.cross(across, trunk)) < 1e-4:

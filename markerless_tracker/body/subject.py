@@ -1,4 +1,4 @@
-"""One person's sizes: segment lengths and, where known, the sections of the cones."""
+"""Subjects: a person's segment lengths and, if known, the sections of the cones."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 
 from markerless_tracker.body.description import BodyDescription, shipped_lengths
+from markerless_tracker.body.files import read_yaml
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
@@ -18,11 +19,11 @@ class Subject:
     """Sizes in metres.
 
     Attributes:
-        name: shown in messages and results.
+        name: name in messages and results.
         lengths_m: segment lengths by the names of the body description.
-        cones_m: (2, 4) per cone, start and end: radius x, radius y, offset x, offset y. Cones
-            that are not named get the description's ratios to their length.
-        measured: whether the lengths were measured on the person, not fitted or guessed.
+        cones_m: (2, 4) per cone, start and end: radius x, radius y, offset x, offset y. Other
+            cones get the description's ratios to their length.
+        measured: whether the lengths were measured on the person (not fitted or generic).
     """
 
     name: str
@@ -51,7 +52,7 @@ class Subject:
 
 
 def subject_from_stature(description: BodyDescription, stature_m: float) -> Subject:
-    """A generic person of that height, by the description's fractions of stature.
+    """A generic person of a given stature, by the description's fractions of stature.
 
     Raises:
         BodyModelError: the stature is not between 0.5 and 2.6 m.
@@ -67,9 +68,9 @@ def subject_from_markers(
 ) -> Subject:
     """Segment lengths from one row of named markers (3,), in m, any frame.
 
-    Left and right (names that begin with ``l_`` and ``r_``) get their mean: people are more alike
-    on both sides than markers are placed. A missing Pelvis is the midpoint of the hips; a length
-    whose markers are missing is taken from the stature that the other lengths suggest.
+    Left and right lengths (names that begin with ``l_`` and ``r_``) are replaced by their mean,
+    since people's sides differ less than markers' positions. A missing Pelvis is the midpoint of
+    the hips. A length without markers follows from the stature that the other lengths imply.
 
     Raises:
         BodyModelError: fewer than half of the lengths can be measured.
@@ -86,7 +87,7 @@ def subject_from_markers(
 def measured_lengths(
     description: BodyDescription, markers_m: Mapping[str, FloatArray]
 ) -> dict[str, float]:
-    """The lengths (m) whose two markers (3,) are there, each side for itself."""
+    """The lengths (m) for which both markers (3,) are given, left and right separately."""
     known = complete_markers(markers_m)
     measured: dict[str, float] = {}
     for name, entry in description.lengths.items():
@@ -97,7 +98,7 @@ def measured_lengths(
 
 
 def _both_sides_alike(lengths: Mapping[str, float]) -> dict[str, float]:
-    """The lengths with those of `l_` and `r_` replaced by their mean where both are known."""
+    """The lengths, with `l_` and `r_` replaced by their mean where both are known."""
     alike = dict(lengths)
     for name in lengths:
         other = "r_" + name[2:]
@@ -109,20 +110,20 @@ def _both_sides_alike(lengths: Mapping[str, float]) -> dict[str, float]:
 def fitted_lengths(description: BodyDescription, subject: Subject) -> dict[str, float]:
     """A subject's lengths (m) for a body, in the body's order.
 
-    A subject measured for another body may lack lengths (hands, feet) or have some to spare: what
-    is missing is taken from the stature that the other lengths suggest.
+    A subject measured for another body may lack lengths (hands, feet) or have additional ones.
+    Missing lengths follow from the stature that the others imply.
 
     Raises:
         BodyModelError: the subject lacks more than half of the lengths, or has one that no body
-            knows.
+            has.
     """
     known = {name: float(v) for name, v in subject.lengths_m.items() if name in description.lengths}
     if len(known) < len(subject.lengths_m):
-        familiar = shipped_lengths()
-        strange = [str(n) for n in subject.lengths_m if n not in known and n not in familiar]
-        if strange:
+        shipped = shipped_lengths()
+        unknown = [str(n) for n in subject.lengths_m if n not in known and n not in shipped]
+        if unknown:
             raise BodyModelError(
-                f"subject {subject.name}: no body has a length {', '.join(strange)}, "
+                f"subject {subject.name}: no body has a length {', '.join(unknown)}, "
                 f"{description.name} has {', '.join(description.lengths)}"
             )
     missing = [name for name in description.lengths if name not in known]
@@ -135,7 +136,7 @@ def fitted_lengths(description: BodyDescription, subject: Subject) -> dict[str, 
 
 
 def _completed(description: BodyDescription, known: Mapping[str, float]) -> dict[str, float]:
-    """All lengths; the unknown ones from the median stature that the known ones suggest."""
+    """All lengths; the unknown ones from the median stature that the known ones imply."""
     fractions = {name: float(v["stature"]) for name, v in description.lengths.items()}
     if len(known) == len(fractions):
         return {name: known[name] for name in fractions}
@@ -144,7 +145,7 @@ def _completed(description: BodyDescription, known: Mapping[str, float]) -> dict
 
 
 def complete_markers(markers_m: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """The finite markers, with a missing Pelvis put midway between the hips."""
+    """The finite markers; a missing Pelvis is the midpoint of the hips."""
     known = {
         name: np.asarray(p, dtype=float) for name, p in markers_m.items() if np.isfinite(p).all()
     }
@@ -157,14 +158,9 @@ def read_subject(path: Path) -> Subject:
     """Read a subject file (YAML: name, lengths_m, optional cones_m and measured).
 
     Raises:
-        BodyModelError: it cannot be read, or holds unknown or impossible entries.
+        BodyModelError: it cannot be read, or has unknown or impossible entries.
     """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        raise BodyModelError(
-            f"{path}: cannot read the subject: {str(error).splitlines()[0]}"
-        ) from error
+    data = read_yaml(path, "subject")
     if not isinstance(data, dict) or not isinstance(data.get("lengths_m"), dict):
         raise BodyModelError(
             f"{path}: expected name, lengths_m and optionally cones_m and measured"

@@ -1,16 +1,18 @@
-"""A body as URDF: the same joints by the same names, for viewers and other ROS programs."""
+"""Bodies as URDF with the same joints and joint names, for viewers and other ROS programs."""
 
+import warnings
 import xml.etree.ElementTree as ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body.model import MARKER_NAMES, BodyModel
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
 _AXES = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-# Shown to programs that want them; nothing here limits effort or speed.
+# Required by URDF; the body has no limits of effort or speed.
 _EFFORT, _VELOCITY = "100", "20"
 
 
@@ -18,19 +20,19 @@ def urdf(body: BodyModel) -> str:
     """The URDF (text) of a body; its root link is the body's root frame.
 
     Every joint parameter is one joint with its name, axis and anatomical limits; joint values are
-    the parameters themselves (rad, m). A parameter that moves several joints names the first, which
-    the others mimic. The last link of a frame has the frame's name. The 15 markers are links on
-    fixed joints, cones are cylinders of their mean radius.
+    the parameters (rad, m). If a parameter moves several joints, the first has its name and the
+    others mimic it. The last link of a frame has the frame's name. The 15 markers are links on
+    fixed joints, cones are cylinders with their mean radius.
 
     Raises:
-        BodyModelError: a frame does not hang from the root frame, or two links would share a name.
+        BodyModelError: a frame is no descendant of the root frame, or two links have the same name.
     """
     robot = Element("robot", name=body.name)
     root = body.frames[body.root_frame]
     links = _link_names(body, root)
     if len(set(links.values()) | set(MARKER_NAMES)) != len(links) + len(MARKER_NAMES):
         raise BodyModelError(
-            f"body {body.name}: frames, parameters and markers must differ in name"
+            f"body {body.name}: names of frames, parameters and markers must be distinct"
         )
     for node, name in links.items():
         link = SubElement(robot, "link", name=name)
@@ -49,7 +51,7 @@ def urdf(body: BodyModel) -> str:
 
 
 def _link_names(body: BodyModel, root: int) -> dict[int, str]:
-    """Names of the links by node: of all nodes from the root frame's last one on."""
+    """Names of the links by node, for the root frame's last node and its descendants."""
     frames = {node: name for name, node in reversed(list(body.frames.items()))}
     above = {root}
     node = root
@@ -63,8 +65,8 @@ def _link_names(body: BodyModel, root: int) -> dict[int, str]:
         if int(body.node_parent[node]) not in names:
             frame = frames.get(node, f"node {node}")
             raise BodyModelError(
-                f"body {body.name}: frame {frame} does not hang from the root frame "
-                f"{body.root_frame}"
+                f"body {body.name}: frame {frame} is no descendant of the root "
+                f"frame {body.root_frame}"
             )
         parameter = int(body.node_parameter[node])
         inner = f"{body.parameter_names[parameter]}_link" if parameter >= 0 else f"node_{node}"
@@ -82,12 +84,12 @@ def _joint(
     name, sign = body.parameter_names[parameter], float(body.node_sign[node])
     low, high = body.limits[:, parameter]
     free = not np.isfinite([low, high]).all()
-    turning = "continuous" if free else "revolute"
+    rotating = "continuous" if free else "revolute"
     joint = SubElement(
         robot,
         "joint",
         name=f"{name}_{node}" if parameter in seen else name,
-        type=turning if kind < 3 else "prismatic",
+        type=rotating if kind < 3 else "prismatic",
     )
     _origin(joint, body.node_fixed[node])
     SubElement(joint, "parent", link=parent)
@@ -123,18 +125,12 @@ def _visual(link: Element, body: BodyModel, cone: int) -> None:
 
 
 def _origin(parent: Element, fixed: FloatArray) -> None:
-    SubElement(parent, "origin", xyz=_numbers(fixed[:, 3]), rpy=_numbers(_roll_pitch_yaw(fixed)))
-
-
-def _roll_pitch_yaw(fixed: FloatArray) -> FloatArray:
-    """Angles (3,) of Rz(yaw) Ry(pitch) Rx(roll)."""
-    r = fixed[:, :3]
-    level = float(np.hypot(r[0, 0], r[1, 0]))
-    pitch = np.arctan2(-r[2, 0], level)
-    if level < 1e-9:
-        # Looking straight up or down: roll and yaw turn about the same axis.
-        return np.array([np.arctan2(-r[1, 2], r[1, 1]), pitch, 0.0])
-    return np.array([np.arctan2(r[2, 1], r[2, 2]), pitch, np.arctan2(r[1, 0], r[0, 0])])
+    # Roll, pitch, yaw of URDF: Rz(yaw) Ry(pitch) Rx(roll), rotations about fixed axes.
+    with warnings.catch_warnings():
+        # At a pitch of 90 degrees SciPy sets one of roll and yaw to 0, which is correct here.
+        warnings.filterwarnings("ignore", "Gimbal lock detected")
+        rpy = Rotation.from_matrix(fixed[:, :3]).as_euler("xyz")
+    SubElement(parent, "origin", xyz=_numbers(fixed[:, 3]), rpy=_numbers(rpy))
 
 
 def _number(value: float) -> str:

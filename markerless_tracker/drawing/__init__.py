@@ -1,4 +1,4 @@
-"""A body over an image: outlines, silhouettes, overlays, evidence, sheets."""
+"""A body drawn over an image: outlines, silhouettes, overlays, evidence, contact sheets."""
 
 from markerless_tracker.drawing.evidence import draw_evidence
 from markerless_tracker.drawing.outline import outlines, silhouette

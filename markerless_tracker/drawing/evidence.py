@@ -1,4 +1,4 @@
-"""What a camera gave and what was made of it: input, mask, edges, body, side by side."""
+"""Input, mask, edges and body of one image, side by side."""
 
 import cv2
 import numpy as np
@@ -23,11 +23,9 @@ def draw_evidence(
 ) -> Image:
     """A picture (h, 4 w, 3) BGR: the input, the mask, the edges, the body over the input.
 
-    The background and the labels (h, w), 0 background, 127 shadow, 255 foreground, come second and
-    third if they are given.
-
-    Evidence outside the observation's region is dark grey; without a body or pose the last panel
-    shows the input alone.
+    The background and the labels (h, w; 0 background, 127 shadow, 255 foreground) are the second
+    and third panel if given. Pixels outside the observation's region are dark grey. Without a body
+    or pose the last panel is the input.
 
     Raises:
         ImageError: image or observation does not fit the camera.

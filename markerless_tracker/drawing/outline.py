@@ -1,4 +1,4 @@
-"""Where a body lies in an image: outline polygons, silhouette. Slow, obvious, exact."""
+"""Outline polygons and silhouette of a body in an image; slow and exact."""
 
 import cv2
 import numpy as np
@@ -9,18 +9,18 @@ from markerless_tracker.camera import CameraModel, project_camera
 from markerless_tracker.geometry import FloatArray
 
 END_POINTS = 72
-"""Points that sample an end's ellipse."""
+"""Number of points on the ellipse of an end."""
 SIDE_SECTIONS = 9
-"""Sections between the ends, which matter only where a lens bends the sides."""
+"""Sections between the ends, needed where lens distortion curves the sides."""
 
-# cv2.fillPoly takes integers with this many fractional bits.
 _SHIFT = 8
+"""Fractional bits of OpenCV's fixed-point coordinates."""
 
 
 def outlines(body: BodyModel, pose: FloatArray, camera: CameraModel) -> list[FloatArray]:
     """Outline (n, 2) in px of each cone at a pose (p,), through the lens.
 
-    The convex hull of the projected cone; empty (0, 2) if part of it is not in front of the camera.
+    The convex hull of the projected cone; empty (0, 2) if a part of it is behind the camera.
     """
     result = []
     for T, length, shape in zip(
@@ -50,9 +50,9 @@ def silhouette(
         body: the body.
         pose: (p,) pose.
         camera: the camera.
-        samples: with 1 a pixel belongs to the mask if its centre lies inside an outline; with more,
-            if at least half of samples x samples points within it do.
-        cones: (c,) the cones to draw, all unless given.
+        samples: 1: a pixel belongs to the mask if its centre lies inside an outline; more: if at
+            least half of its samples x samples points do.
+        cones: (c,) mask of the cones to draw, None = all.
     """
     width, height = camera.size_px
     columns, rows = np.meshgrid(np.arange(width * samples), np.arange(height * samples))
@@ -66,18 +66,18 @@ def silhouette(
         last = np.clip(np.ceil((high + 0.5) * samples + 0.5), 0, covered.shape[::-1]).astype(int)
         region = np.s_[first[1] : last[1], first[0] : last[0]]
         inside = np.ones(u[region].shape, dtype=np.bool_)
-        # A convex polygon is where one side of every edge meets; hulls may turn either way.
-        turn = np.sign(_area(polygon))
+        # Intersection of half-planes; hulls can be clockwise or counter-clockwise.
+        orientation = np.sign(_area(polygon))
         for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
             cross = (b[0] - a[0]) * (v[region] - a[1]) - (b[1] - a[1]) * (u[region] - a[0])
-            inside &= turn * cross >= 0.0
+            inside &= orientation * cross >= 0.0
         covered[region] |= inside
-    share = covered.reshape(height, samples, width, samples).mean(axis=(1, 3))
-    return np.asarray(share >= 0.5)
+    fraction = covered.reshape(height, samples, width, samples).mean(axis=(1, 3))
+    return np.asarray(fraction >= 0.5)
 
 
 def fixed_point(points_px: FloatArray) -> tuple[NDArray[np.int32], int]:
-    """Points (n, 2) as OpenCV's drawing functions take them with sub-pixels, and the shift."""
+    """Points (n, 2) in OpenCV's fixed-point coordinates, and their fractional bits."""
     limited = np.clip(points_px, -4.0e6, 4.0e6)
     return np.rint(limited * (1 << _SHIFT)).astype(np.int32), _SHIFT
 
@@ -85,11 +85,11 @@ def fixed_point(points_px: FloatArray) -> tuple[NDArray[np.int32], int]:
 def _surface(length: float, shape: FloatArray) -> FloatArray:
     """Points (n, 3) on a cone in its base frame.
 
-    The point of an end's ellipse with normal n is r² n / |r n|; points of both ends with the same
-    normal span the side.
+    The point of an end's ellipse with normal n is r² n / |r n|. Points of both ends with the same
+    normal are joined by a line of the side.
     """
     angle = 2.0 * np.pi * np.arange(END_POINTS) / END_POINTS
-    # Normals of evenly spaced points on the mean section: even ones leave flat sides to few points.
+    # Normals at evenly spaced points of the mean section: equal angles undersample flat sides.
     normal = np.column_stack([np.cos(angle), np.sin(angle)]) / shape[:, :2].mean(axis=0)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     start, end = (

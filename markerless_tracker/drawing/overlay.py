@@ -1,4 +1,4 @@
-"""The body drawn over an image: outlines coloured by side, joints as dots."""
+"""Body drawn over an image: outlines coloured by side, markers as dots."""
 
 import cv2
 import numpy as np
@@ -13,13 +13,13 @@ from markerless_tracker.geometry import FloatArray
 Image = NDArray[np.uint8]
 
 LEFT_BGR, RIGHT_BGR, CENTRE_BGR = (60, 200, 60), (50, 80, 255), (255, 190, 40)
-"""Colours of the left side (green), the right side (red) and the middle (blue), BGR."""
+"""Colours of the left side (green), the right side (red) and the rest (blue), BGR."""
 _MASK_BGR = (255, 0, 255)
 _PLANES: tuple[tuple[int, ...], ...] = ((), (1,), (3,))
 
 
 def side_colour(name: str) -> tuple[int, int, int]:
-    """Colour of a cone (`l_thigh`) or marker (`LKnee`) by its name's side."""
+    """Colour of a cone (`l_thigh`) or marker (`LKnee`), by the side in its name."""
     if name.startswith("l_") or (name in MARKER_NAMES and name.startswith("L")):
         return LEFT_BGR
     if name.startswith("r_") or (name in MARKER_NAMES and name.startswith("R")):
@@ -31,7 +31,7 @@ def as_colour(image: Image, camera: CameraModel) -> Image:
     """A copy (h, w, 3) of a BGR or grey image.
 
     Raises:
-        ImageError: its size is not the camera's, or it is no 8-bit grey or BGR image.
+        ImageError: its size differs from the camera's, or it is no 8-bit grey or BGR image.
     """
     width, height = camera.size_px
     if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in _PLANES:
@@ -58,8 +58,8 @@ def draw_overlay(
 ) -> Image:
     """A copy (h, w, 3) BGR of an image with the body at a pose (p,) drawn over it.
 
-    Cones are outlined, the 15 markers are dots; a mask (h, w) is tinted if given. What does not lie
-    in front of the camera is left out.
+    Cones are outlined, the 15 markers are dots, a given mask (h, w) is tinted. Parts behind the
+    camera are left out.
 
     Raises:
         ImageError: the image or mask does not fit the camera.

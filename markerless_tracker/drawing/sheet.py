@@ -1,4 +1,4 @@
-"""Several named pictures on one sheet."""
+"""Contact sheet of several named pictures."""
 
 from collections.abc import Mapping
 
@@ -17,14 +17,15 @@ def overlay_sheet(
 ) -> Image:
     """A mosaic (h, w, 3) BGR of named pictures, each under a bar with its name.
 
-    Pictures (h, w, 3) or (h, w) keep their proportions and share the height of the tallest; as
-    many columns as rows unless given; the sheet is shrunk to the width allowed.
+    Pictures (h, w, 3) or (h, w) keep their aspect ratio and are scaled to the height of the
+    tallest. By default there are as many columns as rows. The sheet is scaled down to the maximum
+    width.
 
     Raises:
         ImageError: there is no picture, or one of them is empty.
     """
     if not images:
-        raise ImageError("overlay sheet: no picture was given, expected at least one")
+        raise ImageError("overlay sheet: got no picture, expected at least one")
     for name, image in images.items():
         if image.ndim not in (2, 3) or image.size == 0:
             raise ImageError(

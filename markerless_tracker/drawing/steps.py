@@ -1,4 +1,4 @@
-"""The steps from an image to the body in one picture."""
+"""All steps from an image to the body in one picture."""
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
@@ -16,14 +16,14 @@ def draw_steps(
     pose: FloatArray | None,
     segmenter: Segmenter | None,
 ) -> Image:
-    """All that was made of an image, side by side (h, 6 w, 3) BGR: see `draw_evidence`.
+    """The steps side by side (h, 6 w, 3) BGR, see `draw_evidence`.
 
     Args:
-        image: what the camera saw.
-        observation: what the tracker used of it.
+        image: the input image.
+        observation: the evidence that the tracker used.
         camera: its camera.
-        body, pose: what the tracker found, None if nobody.
-        segmenter: what segmented the image; without one background and foreground are left out.
+        body, pose: the tracked body and its pose (p,), None without an estimate.
+        segmenter: the camera's segmenter; without it background and labels are left out.
 
     Raises:
         ImageError: image or observation does not fit the camera.

@@ -18,7 +18,7 @@ from markerless_tracker.body import (
 )
 from markerless_tracker.body.build import build_body
 from markerless_tracker.body.description import BodyDescription
-from markerless_tracker.body.sizes import USUAL_STATURE_M, Sizes
+from markerless_tracker.body.sizes import MEAN_STATURE_M, Sizes
 from markerless_tracker.body.subject import complete_markers, measured_lengths
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import read_trc
@@ -97,7 +97,7 @@ def build_tracker(
     elif start is not None:
         subject = subject_from_markers(description, start.markers_m)
     elif start_file is None:
-        subject = subject_from_stature(description, USUAL_STATURE_M)
+        subject = subject_from_stature(description, MEAN_STATURE_M)
         person = Unmeasured(Sizes(description), None)
     else:
         raise ConfigError(

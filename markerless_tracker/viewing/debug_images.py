@@ -1,4 +1,4 @@
-"""One picture per frame and camera: the input, the evidence, the body over it."""
+"""One picture per frame and camera: the input, the evidence, the body over the input."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,10 +15,10 @@ from markerless_tracker.records import TrackResult
 
 
 class DebugImages:
-    """Writes ``FOLDER/CAMERA/FFFFFF.jpg``, FFFFFF being the frame's number in its source.
+    """Writes ``FOLDER/CAMERA/FFFFFF.jpg``; FFFFFF is the frame's number in its source.
 
     Raises:
-        DatasetError: the folder cannot be made or a picture not written.
+        DatasetError: the folder cannot be made, or a picture cannot be written.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -39,11 +39,11 @@ class DebugImages:
         """Write the pictures of one frame.
 
         Args:
-            images: what the tracker saw.
-            result: what it found.
-            rig: its cameras.
-            body: its body.
-            segmenter: what segmented a camera's images, to show the steps before the silhouette.
+            images: the images of the frame.
+            result: the tracker's result.
+            rig: the tracker's cameras.
+            body: the tracked body.
+            segmenter: returns the segmenter of a camera, None = without its background and labels.
         """
         for name, observation in result.observations.items():
             picture = draw_steps(

@@ -1,12 +1,12 @@
-"""Runs with fewer cameras."""
+"""Whole runs with subsets of the cameras."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from markerless_tracker.benchmarks.cameras import judge, measure_cameras
-from markerless_tracker.benchmarks.judged import Beginning
+from markerless_tracker.benchmarks.cameras import measure_cameras, score_run
+from markerless_tracker.benchmarks.with_truth import RunStart
 from markerless_tracker.cli.synthesize import synthesize
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.synthesis import SyntheticScene
@@ -24,8 +24,8 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_every_choice_is_run_beside_all(walk) -> None:
-    row = measure_cameras(walk, CONFIG, beginnings=[Beginning()], counts=(2,))
+def test_every_subset_is_run_after_all_cameras(walk) -> None:
+    row = measure_cameras(walk, CONFIG, starts=[RunStart()], counts=(2,))
     names = [run["cameras"] for run in row["runs"]]
     assert names == [
         ["cam01", "cam02", "cam03"],
@@ -38,12 +38,12 @@ def test_every_choice_is_run_beside_all(walk) -> None:
 
 
 @pytest.mark.parametrize("counts", [(3,), (2, 4), (0,)])
-def test_as_many_cameras_as_there_are_is_no_choice(walk, counts) -> None:
+def test_a_subset_must_be_smaller_than_the_rig(walk, counts) -> None:
     with pytest.raises(ConfigError, match="of 3 cameras, expected fewer than 3"):
-        measure_cameras(walk, CONFIG, beginnings=[Beginning()], counts=counts)
+        measure_cameras(walk, CONFIG, starts=[RunStart()], counts=counts)
 
 
-def test_figures_by_hand() -> None:
+def test_score_of_known_offsets() -> None:
     truth = np.zeros((4, 15, 3))
     truth[3] = np.nan
     points = truth.copy()
@@ -51,14 +51,14 @@ def test_figures_by_hand() -> None:
     points[1, :, 0] = 0.030
     points[1, 4, 0] = 0.180
     points[2] = np.nan
-    figures = judge(points, truth)
+    figures = score_run(points, truth)
     assert figures["max_mm"] == pytest.approx(40.0)
     assert figures["mean_mm"] == pytest.approx(25.0)
     assert figures["worst_joint_mm"] == pytest.approx(180.0)
     assert figures["lost_run"] == 1 and figures["found"] == pytest.approx(2.0 / 3.0)
 
 
-def test_nobody_found_at_all() -> None:
+def test_score_without_any_pose() -> None:
     truth = np.zeros((4, 15, 3))
-    figures = judge(np.full_like(truth, np.nan), truth)
+    figures = score_run(np.full_like(truth, np.nan), truth)
     assert figures["mean_mm"] is None and figures["found"] == 0.0

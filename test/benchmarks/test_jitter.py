@@ -1,4 +1,4 @@
-"""Jitter and lag of tracks made by hand, and of a made-up stander."""
+"""Jitter and lag of computed tracks, and of a made-up standing person."""
 
 from pathlib import Path
 
@@ -8,10 +8,10 @@ import pytest
 from markerless_tracker.benchmarks.jitter import (
     jitter_mm,
     lag_frames,
-    longest_whole,
+    longest_true_run,
     measure_jitter,
 )
-from markerless_tracker.benchmarks.judged import Beginning
+from markerless_tracker.benchmarks.with_truth import RunStart
 from markerless_tracker.cli.synthesize import synthesize
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.synthesis import SyntheticScene
@@ -25,7 +25,7 @@ def track(*coordinates) -> np.ndarray:
     return np.stack([np.broadcast_to(c, TIMES.shape) for c in coordinates], axis=1)[:, None, :]
 
 
-def test_jitter_is_the_rms_of_what_is_quick() -> None:
+def test_jitter_is_the_rms_of_the_fast_motion() -> None:
     flicker = 0.003 * (-1.0) ** np.arange(180)
     assert jitter_mm(track(flicker, 0.0, 0.0), 60)[0] == pytest.approx(3.0, rel=0.03)
     both = jitter_mm(track(flicker, flicker, 0.0), 60)[0]
@@ -39,7 +39,7 @@ def test_offsets_and_steady_motion_are_no_jitter() -> None:
     assert jitter_mm(sway, 60)[0] < 2.0
 
 
-def test_each_joint_has_its_own() -> None:
+def test_jitter_is_per_joint() -> None:
     rng = np.random.default_rng(0)
     points = rng.normal(size=(2000, 2, 3)) * np.array([0.001, 0.004])[:, None]
     expected = np.array([1.0, 4.0]) * np.sqrt(3.0)
@@ -59,14 +59,14 @@ def test_the_lag_of_a_shifted_sine(shift) -> None:
 
 def test_the_longest_run() -> None:
     flags = np.array([1, 1, 0, 1, 1, 1, 0, 1], bool)
-    assert longest_whole(flags) == slice(3, 6)
-    assert longest_whole(np.zeros(4, bool)) == slice(0, 0)
-    assert longest_whole(np.ones(4, bool)) == slice(0, 4)
+    assert longest_true_run(flags) == slice(3, 6)
+    assert longest_true_run(np.zeros(4, bool)) == slice(0, 0)
+    assert longest_true_run(np.ones(4, bool)) == slice(0, 4)
 
 
 @pytest.fixture(scope="module")
 def stand(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A made-up stander before noisy cameras, small, at 60 frames/s."""
+    """A made-up standing person, noisy small images, 60 frames/s."""
     scene = SyntheticScene(
         body="person31", motion="stand", size_px=(200, 152), samples=1, noise=8.0, seed=1
     )
@@ -75,9 +75,9 @@ def stand(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_filter_calms_who_stands(stand) -> None:
+def test_the_filter_reduces_the_jitter_of_a_standing_person(stand) -> None:
     config = TrackerConfig.from_mapping({"threads": 1})
-    row = measure_jitter(stand, config, beginning=Beginning())
+    row = measure_jitter(stand, config, start=RunStart())
     plain, filtered = row["none"], row["one_euro"]
     assert row["frames"] == 40 and row["fps"] == 60.0 and row["start"] == "measured"
     assert plain["lag_frames"] == pytest.approx(0.0, abs=0.01)
@@ -89,5 +89,5 @@ def test_a_recording_without_truth_is_refused(stand, tmp_path: Path) -> None:
     for file in stand.iterdir():
         if file.name != "ground_truth.trc":
             (tmp_path / file.name).symlink_to(file)
-    with pytest.raises(DatasetError, match=r"no ground_truth\.trc, expected one to judge by"):
-        measure_jitter(tmp_path, TrackerConfig(), beginning=Beginning())
+    with pytest.raises(DatasetError, match=r"no ground_truth\.trc, expected one as the reference"):
+        measure_jitter(tmp_path, TrackerConfig(), start=RunStart())

@@ -1,4 +1,4 @@
-"""Disturbed frames, and when a track is back."""
+"""Disturbed frames, and the frame from which a track has recovered."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def frames(count: int):
 
 
 @pytest.mark.parametrize(("blind", "names"), [(None, "abc"), (2, "ab"), (0, "")])
-def test_black_views_are_silhouette_all_over(blind, names) -> None:
+def test_black_views_have_a_silhouette_of_all_pixels(blind, names) -> None:
     out = disturbed(frames(10), 3, 6, Disturbance("x", 0.1, blind), 30.0)
     for index, frame in enumerate(out):
         assert frame is not None
@@ -27,7 +27,7 @@ def test_black_views_are_silhouette_all_over(blind, names) -> None:
 
 
 @pytest.mark.parametrize(("first", "left"), [(0, "bc"), (2, "ab"), (4, "ac")])
-def test_a_camera_that_stops_sends_nothing(first, left) -> None:
+def test_a_stopped_camera_has_no_view(first, left) -> None:
     out = disturbed(frames(6), 2, 4, Disturbance("x", 0.1, stopped=1), 30.0, first=first)
     for index, frame in enumerate(out):
         assert frame is not None
@@ -35,13 +35,13 @@ def test_a_camera_that_stops_sends_nothing(first, left) -> None:
         assert all(view.mask.sum() == 1 for view in frame[1].values())
 
 
-def test_cameras_are_blinded_from_another_one_on() -> None:
+def test_black_cameras_are_counted_from_the_first_one() -> None:
     out = disturbed(frames(2), 0, 2, Disturbance("x", 0.1, 2), 30.0, first=2)
     black = [name for name, view in out[0][1].items() if view.mask.sum() > 1]
     assert black == ["a", "c"]
 
 
-def test_frames_of_a_lower_rate() -> None:
+def test_a_lower_rate_leaves_out_frames() -> None:
     out = disturbed(frames(40), 10, 34, Disturbance("x", 0.4, 0, 10.0), 60.0)
     assert [i for i, frame in enumerate(out) if frame is None] == [
         i for i in range(10, 34) if (i - 9) % 6
@@ -59,5 +59,5 @@ def test_frames_of_a_lower_rate() -> None:
         ([10.0] * 4, None),
     ],
 )
-def test_back_is_to_stay(errors, expected) -> None:
+def test_recovered_means_that_the_error_stays_low(errors, expected) -> None:
     assert frames_until(np.array(errors), 50.0) == expected

@@ -3,42 +3,43 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.benchmarks.starts import error_mm, one_start, summarise
+from markerless_tracker.benchmarks.starts import one_start, summarise
+from markerless_tracker.benchmarks.with_truth import error_mm
 from markerless_tracker.body import load_body, markers
 from markerless_tracker.records import TrackResult, TrackState
 
 BODY = load_body("balan31", 1.7)
 
 
-def start(last: float | None, *, heading: float | None = 5.0, turned: bool = False, first=40.0):
+def start(last: float | None, *, heading: float | None = 5.0, corrected: bool = False, first=40.0):
     return {
         "frame_mm": [first, last],
         "heading_deg": heading,
-        "turned": turned,
+        "heading_corrected": corrected,
         "first_pose_s": None if first is None else 1.5,
     }
 
 
-def test_shares_are_of_all_starts() -> None:
+def test_fractions_refer_to_all_starts() -> None:
     figures = summarise(
-        [start(30.0), start(80.0, turned=True), start(300.0, heading=170.0),
+        [start(30.0), start(80.0, corrected=True), start(300.0, heading=170.0),
          start(None, heading=None, first=None)]
     )  # fmt: skip
     assert figures["count"] == 4 and figures["found"] == 0.75
-    assert figures["reached"] == 0.5 and figures["wrong_heading"] == 0.25
-    assert figures["turned"] == 0.25
+    assert figures["succeeded"] == 0.5 and figures["wrong_heading"] == 0.25
+    assert figures["heading_corrected"] == 0.25
     assert figures["median_mm"] == 80.0 and figures["worst_mm"] == 300.0
     assert figures["first_mm"] == 40.0 and figures["first_pose_max_s"] == 1.5
 
 
-def test_no_start_at_all_succeeds() -> None:
+def test_figures_without_any_success() -> None:
     figures = summarise([start(None, heading=None, first=None)])
-    assert figures["found"] == figures["reached"] == 0.0
+    assert figures["found"] == figures["succeeded"] == 0.0
     assert figures["mean_mm"] is None and figures["first_pose_s"] is None
 
 
 class Script:
-    """A tracker that gives what it was told."""
+    """A tracker that returns given poses."""
 
     def __init__(self, poses, warnings=()):
         self.poses, self.warnings, self.at = poses, warnings, 0
@@ -56,19 +57,19 @@ class Script:
         )  # fmt: skip
 
 
-@pytest.mark.parametrize(("turn_deg", "expected"), [(0.0, 0.0), (170.0, 170.0), (-90.0, 90.0)])
-def test_heading_and_error_are_the_last_frames(turn_deg, expected) -> None:
+@pytest.mark.parametrize(("rotation_deg", "expected"), [(0.0, 0.0), (170.0, 170.0), (-90.0, 90.0)])
+def test_heading_and_error_are_the_last_frames(rotation_deg, expected) -> None:
     pose = BODY.neutral.copy()
-    turned = pose.copy()
-    turned[BODY.index("pelvis_rz")] += np.deg2rad(turn_deg)
+    rotated = pose.copy()
+    rotated[BODY.index("pelvis_rz")] += np.deg2rad(rotation_deg)
     truth = np.array([markers(BODY, pose)] * 3)
     figures = one_start(
-        Script([None, pose, turned], ("start: turned round",)), [(i, {}) for i in range(3)], truth
+        Script([None, pose, rotated], ("start: turned round",)), [(i, {}) for i in range(3)], truth
     )
     assert figures["frame_mm"][0] is None
     assert figures["frame_mm"][1] == pytest.approx(0.0, abs=1e-9)
     assert figures["heading_deg"] == pytest.approx(expected, abs=1e-6)
-    assert figures["turned"] and figures["first_pose_s"] >= 0.0
+    assert figures["heading_corrected"] and figures["first_pose_s"] >= 0.0
 
 
 def test_markers_without_truth_do_not_count() -> None:

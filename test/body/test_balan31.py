@@ -81,12 +81,12 @@ def test_default_limits_are_anatomical() -> None:
         np.testing.assert_allclose(degrees(name), [-50, 50])
 
 
-def test_neutral_keeps_every_default_rule() -> None:
+def test_neutral_is_feasible_by_default() -> None:
     for rule in ("elliptic", "published"):
         assert Feasibility(BODY, BODY.limits, rule)(BODY.neutral[None]).all()
 
 
-def test_subspaces_share_out_the_parameters() -> None:
+def test_subspaces_partition_the_parameters() -> None:
     parts = {step[0]: BODY.subspaces[step[0]] for step in BODY.steps("six")}
     assert sorted(np.concatenate(list(parts.values()))) == list(range(31))
     sizes = {name: len(part) for name, part in parts.items()}
@@ -114,7 +114,7 @@ def test_cones_have_the_sample_subjects_proportions() -> None:
         assert not BODY.cone_shape[i, :, 2:].any()
 
 
-def test_edges_leave_the_head_out() -> None:
+def test_the_head_has_no_edges() -> None:
     """Sides of every cone but the head's, and the upper edge of the torso."""
     for name, (sides, top) in zip(BODY.cone_names, BODY.cone_edges, strict=True):
         assert sides == (name != "head") and top == (name == "torso")

@@ -1,4 +1,4 @@
-"""Limits and the rules against inter-penetration."""
+"""Joint limits and collision rules."""
 
 import dataclasses
 
@@ -36,14 +36,14 @@ def spheres_of(body, name):
     return spheres.centre[part], spheres.radius[part]
 
 
-def test_spheres_of_a_straight_cone_by_hand() -> None:
+def test_spheres_of_a_straight_cone_of_known_sizes() -> None:
     # round(0.9 / 0.1 / 2) = round(4.5) = 4, five spheres; the flat section (0.05) is ignored.
     centre, radius = spheres_of(with_cone(0.9, [0.05, 0.1, 0, 0], [0.05, 0.1, 0, 0]), "torso")
     np.testing.assert_allclose(centre, [[0, 0, z] for z in (0, 0.225, 0.45, 0.675, 0.9)])
     np.testing.assert_allclose(radius, 0.1)
 
 
-def test_spheres_of_a_tapered_leaning_cone_by_hand() -> None:
+def test_spheres_of_a_tapered_leaning_cone_of_known_sizes() -> None:
     # round(0.4 / 0.1 / 2) = 2, three spheres; radii shrink by sqrt(1 + (0.03 / 0.4)²).
     body = with_cone(0.4, [0.1, 0.1, 0, 0], [0.07, 0.07, 0.02, -0.04])
     centre, radius = spheres_of(body, "torso")
@@ -106,13 +106,13 @@ def crowded_poses(seed, count):
 @pytest.mark.parametrize(
     ("rule", "twin"), [("published", slow_published), ("elliptic", slow_elliptic)]
 )
-def test_rules_agree_with_their_slow_twins(rule, twin, seed) -> None:
+def test_rules_agree_with_numpy_references(rule, twin, seed) -> None:
     poses = crowded_poses(seed, 8)
     expected = [twin(BODY, pose) for pose in poses]
     np.testing.assert_array_equal(Feasibility(BODY, FREE, rule)(poses), expected)
 
 
-def test_crowded_poses_are_told_apart() -> None:
+def test_the_rules_differ_on_crowded_poses() -> None:
     """Otherwise the comparison with the twins would prove nothing."""
     poses = crowded_poses(0, 400)
     shares = {r: Feasibility(BODY, FREE, r)(poses).mean() for r in ("published", "elliptic")}
@@ -176,7 +176,7 @@ def test_limits_are_kept_including_the_ends() -> None:
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_poses_that_are_no_numbers_are_infeasible(value) -> None:
+def test_poses_that_are_not_finite_are_infeasible(value) -> None:
     pose = BODY.neutral.copy()
     pose[BODY.index("l_elbow")] = value
     assert not Feasibility(BODY, BODY.limits, "elliptic")(pose[None]).any()
@@ -197,7 +197,7 @@ def test_unknown_rule() -> None:
     st.sampled_from(sorted(BODY.subspaces)),
     st.sampled_from(["elliptic", "published", "none"]),
 )
-def test_points_around_a_centre_are_tested_as_whole_poses_are(seed, part, rule) -> None:
+def test_points_around_a_centre_are_tested_like_whole_poses(seed, part, rule) -> None:
     rng = np.random.default_rng(seed)
     centre = BODY.neutral + rng.choice([0.0, 0.3]) * rng.standard_normal(BODY.size)
     active = BODY.subspaces[part]
@@ -208,7 +208,7 @@ def test_points_around_a_centre_are_tested_as_whole_poses_are(seed, part, rule) 
     np.testing.assert_array_equal(feasible.around(active, centre)(points), feasible(poses))
 
 
-def test_a_pair_that_inter_penetrates_at_the_centre_may_be_forgiven() -> None:
+def test_a_pair_that_inter_penetrates_at_the_centre_may_be_ignored() -> None:
     """An arm inside the belly, as images have it: it may stay there, the other arm may not go."""
     rng = np.random.default_rng(1)
     feasible = Feasibility(BODY, BODY.limits, "elliptic")

@@ -1,4 +1,4 @@
-"""Body descriptions: what a file may say, and what is said about one that is wrong."""
+"""Body descriptions: valid files, and the errors of malformed ones."""
 
 import copy
 
@@ -52,7 +52,7 @@ def test_shipped_bodies_load_by_name_and_by_file(path) -> None:
     assert by_name.parameter_names == by_file.parameter_names
 
 
-def test_unknown_body_lists_those_there_are() -> None:
+def test_an_unknown_body_lists_the_shipped_ones() -> None:
     with pytest.raises(BodyModelError, match="body 'spider' is unknown, expected balan31, .*yaml"):
         load_description("spider")
 
@@ -128,7 +128,7 @@ def test_missing_and_binary_files(tmp_path) -> None:
         [GONE, None, "x", "rx(zz)", 1, -1.0, float("nan"), True, [], {}, [1, 2], ["x"], {"x": 1}]
     ),
 )
-def test_any_single_change_loads_or_is_explained(tmp_path, path, value) -> None:
+def test_any_single_change_loads_or_is_an_error(tmp_path, path, value) -> None:
     try:
         load(tmp_path, changed(path, value))
     except BodyModelError as error:
@@ -166,7 +166,7 @@ def test_anything_else_is_no_description(data) -> None:
         )
     )
 )
-def test_chains_are_read_as_they_are_written(moves) -> None:
+def test_chains_are_parsed(moves) -> None:
     text = " ".join(f"{kind}({sign}{factor}{value})" for kind, sign, factor, value in moves)
     parsed = parse_chain(text, "here")
     assert len(parsed) == len(moves)
@@ -178,6 +178,6 @@ def test_chains_are_read_as_they_are_written(moves) -> None:
 
 
 @pytest.mark.parametrize("text", ["rx", "rx()", "rx(1e3)", "rx(90", "qx(90)", "rx(--a)", "rx(a b)"])
-def test_what_is_no_move(text) -> None:
+def test_text_that_is_no_move_is_an_error(text) -> None:
     with pytest.raises(BodyModelError, match="here: chain .*, expected moves such as"):
         parse_chain(f"ty(1) {text}", "here")

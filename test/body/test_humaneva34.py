@@ -1,4 +1,4 @@
-"""The bodies of 34 parameters: published names and counts, signs, sizes as the smaller bodies."""
+"""The bodies of 34 parameters: published names and counts, signs, sizes."""
 
 import xml.etree.ElementTree as ElementTree
 
@@ -64,7 +64,7 @@ def test_parts(name) -> None:
         assert found == set(PEERS[name].cone_names) and limbs < found
 
 
-def test_hierarchies_share_out_the_parameters(name) -> None:
+def test_hierarchies_partition_the_parameters(name) -> None:
     body = BODIES[name]
     sizes = {step[0]: body.subspaces[step[0]].size for step in body.steps("six")}
     assert sizes == {"root": 6, "torso_head": 4, "l_arm": 7, "r_arm": 7, "l_leg": 5, "r_leg": 5}
@@ -74,7 +74,7 @@ def test_hierarchies_share_out_the_parameters(name) -> None:
     assert body.limbs == ("l_arm", "r_arm", "l_leg", "r_leg")
 
 
-def test_neutral_stands_where_the_31_parameters_stand(name) -> None:
+def test_neutral_equals_that_of_31_parameters(name) -> None:
     body, peer = BODIES[name], PEERS[name]
     np.testing.assert_allclose(markers(body, body.neutral), markers(peer, peer.neutral), atol=1e-12)
     # The published spheres are wider than a person's legs.
@@ -129,7 +129,7 @@ def test_feet_point_forward_and_hands_down(name) -> None:
 
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_markers_of_any_pose_are_found_again(name, seed) -> None:
+def test_poses_are_recovered_from_their_markers(name, seed) -> None:
     """A pose of the 31-parameter body, near enough to neutral; wrists and feet stay at zero."""
     body, peer = BODIES[name], PEERS[name]
     pose = peer.neutral.copy()
@@ -141,8 +141,8 @@ def test_markers_of_any_pose_are_found_again(name, seed) -> None:
     fitted = pose_from_markers(body, shown)
     gap = np.linalg.norm(markers(body, fitted) - markers(peer, pose), axis=1)
     assert gap.max() < 0.02
-    still = [body.index(f"{side}_{joint}") for side in "lr" for joint in ("wrist", "foot")]
-    np.testing.assert_allclose(fitted[still], 0.0, atol=1e-9)
+    undetermined = [body.index(f"{side}_{joint}") for side in "lr" for joint in ("wrist", "foot")]
+    np.testing.assert_allclose(fitted[undetermined], 0.0, atol=1e-9)
 
 
 def test_a_urdf_with_the_same_joints(name) -> None:

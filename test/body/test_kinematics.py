@@ -1,4 +1,4 @@
-"""Forward kinematics against the formulas written out, and against a slow twin on any tree."""
+"""Forward kinematics against published formulas, and against NumPy on random trees."""
 
 import numpy as np
 import pytest
@@ -188,7 +188,7 @@ def slow_transforms(pose, parent, fixed, kind, sign, parameter):
 
 @settings(max_examples=100, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12), st.integers(1, 6))
-def test_any_tree_moves_as_its_slow_twin(seed, nodes, parameters) -> None:
+def test_any_tree_agrees_with_the_numpy_reference(seed, nodes, parameters) -> None:
     rng = np.random.default_rng(seed)
     parent = np.array([rng.integers(-1, n) for n in range(nodes)])
     kind = rng.integers(-1, 6, nodes)
@@ -219,7 +219,7 @@ def test_moving_nodes_are_those_whose_transforms_change(part) -> None:
     moved = pose.copy()
     moved[active] += 0.3
     changes = np.abs(transforms(body, moved) - transforms(body, pose)).max(axis=(1, 2)) > 1e-9
-    # A joint at a node turns what hangs on it; the mask may not miss any.
+    # A joint at a node moves its descendants; the mask must contain all of them.
     assert (moving_nodes(body, active) | ~changes).all()
     assert moving_nodes(body, active).sum() < len(changes) or part == "root"
     assert not moving_nodes(body, np.empty(0, dtype=int)).any()

@@ -1,4 +1,4 @@
-"""The shipped body that looks like a person, beside the published one."""
+"""The shipped body with the shape of a person, compared with the published one."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def cone(name) -> int:
 # --- the same skeleton as the published body -----------------------------------------------------
 
 
-def test_elbows_are_usually_bent_and_all_else_is_neutral() -> None:
+def test_the_prior_mean_has_bent_elbows_and_is_neutral_elsewhere() -> None:
     for name in ("person31", "person34", "person35"):
         body = load_body(name, 1.72)
         elbows = [body.index("l_elbow"), body.index("r_elbow")]
@@ -75,7 +75,7 @@ def test_markers_are_the_published_bodys_at_equal_lengths_and_pose(seed) -> None
     np.testing.assert_allclose(markers(mine, pose), markers(published, pose), atol=1e-12)
 
 
-def test_the_spread_of_poses_about_neutral() -> None:
+def test_the_prior_sd_of_poses() -> None:
     """Weak beliefs of refinement: none about the root, tight ones for clavicles and thorax."""
 
     def of(name):
@@ -151,7 +151,7 @@ def test_it_stands_upright_and_has_a_front() -> None:
     assert at["face"].mean(axis=0)[0] - points["Neck"][0] > 0.01
 
 
-def test_pieces_of_a_limb_follow_on_each_other() -> None:
+def test_cones_of_a_limb_are_joined() -> None:
     """Where a calf ends its shin begins, with the same section."""
     for side in "lr":
         calf, shin = cone(f"{side}_calf"), cone(f"{side}_shin")
@@ -173,7 +173,7 @@ def test_stature_scales_everything() -> None:
     np.testing.assert_allclose(2 * small.marker_offset, tall.marker_offset)
 
 
-def test_it_is_the_tuned_presets_body_and_the_published_one_the_papers() -> None:
+def test_bodies_of_the_presets() -> None:
     assert TrackerConfig.from_mapping({}).body == "person31"
     assert TrackerConfig.from_mapping({}, preset="paper").body == "balan31"
 
@@ -188,7 +188,7 @@ def test_neutral_is_feasible() -> None:
 WITHOUT_LIMITS = np.tile([[-np.inf], [np.inf]], (1, 31))
 
 
-def test_crossed_legs_are_not() -> None:
+def test_crossed_legs_are_infeasible() -> None:
     """Legs swung inwards: 30 mm of margin a side lets ankles touch, not pass."""
     rule = Feasibility(BODY, WITHOUT_LIMITS, "elliptic")
     crossed = clear = 0
@@ -207,7 +207,7 @@ def test_crossed_legs_are_not() -> None:
 
 
 @pytest.mark.parametrize("side", "lr")
-def test_a_forearm_inside_the_trunk_is_not(side) -> None:
+def test_a_forearm_inside_the_trunk_is_infeasible(side) -> None:
     rng = np.random.default_rng(3)
     poses = np.tile(BODY.neutral, (6000, 1))
     arm = BODY.subspaces[f"{side}_arm"]
@@ -245,16 +245,16 @@ def test_fitted_reference_poses_are_feasible(name, request) -> None:
 # --- subject files --------------------------------------------------------------------------------
 
 
-def test_a_subject_file_with_cones_brings_the_same_body_back(tmp_path) -> None:
+def test_a_subject_file_with_cones_gives_the_same_body(tmp_path) -> None:
     rng = np.random.default_rng(0)
     lengths = subject_from_stature(DESCRIPTION, 1.81).lengths_m
     generic = load_body("person31", 1.81)
     shapes = {
         name: generic.cone_shape[c] * rng.uniform(0.8, 1.2, (2, 4)) for c, name in enumerate(NAMES)
     }
-    subject = Subject("somebody", lengths, shapes)
-    write_subject(tmp_path / "somebody.yaml", subject)
-    body = load_body("person31", read_subject(tmp_path / "somebody.yaml"))
+    subject = Subject("me", lengths, shapes)
+    write_subject(tmp_path / "me.yaml", subject)
+    body = load_body("person31", read_subject(tmp_path / "me.yaml"))
     written = load_body("person31", subject)
     np.testing.assert_array_equal(body.cone_shape, written.cone_shape)
     np.testing.assert_array_equal(body.cone_length, written.cone_length)
@@ -262,7 +262,7 @@ def test_a_subject_file_with_cones_brings_the_same_body_back(tmp_path) -> None:
         np.testing.assert_array_equal(body.cone_shape[c], shapes[name])
 
 
-def test_hands_and_feet_follow_the_stature_that_markers_suggest() -> None:
+def test_hands_and_feet_follow_the_stature_that_markers_imply() -> None:
     tall = load_body("person31", 1.9)
     points = dict(zip(MARKER_NAMES, markers(tall, tall.neutral), strict=True))
     lengths = subject_from_markers(DESCRIPTION, points).lengths_m

@@ -42,7 +42,7 @@ def test_a_positive_ankle_lifts_the_toes_and_moves_no_marker(bodies, side) -> No
 
 
 @pytest.mark.parametrize("side", ["l", "r"])
-def test_a_positive_wrist_turns_the_palm_inwards(bodies, side) -> None:
+def test_a_positive_wrist_flexes_the_palm_inwards(bodies, side) -> None:
     body = bodies[1]
     bent = body.neutral.copy()
     bent[body.index(f"{side}_wrist")] = 0.3

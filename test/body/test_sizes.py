@@ -1,16 +1,22 @@
-"""A body in any size, and what is believed of a person's lengths."""
+"""Bodies of any size, and the prior of segment lengths."""
 
 import numpy as np
 import pytest
 
 from markerless_tracker.body import load_body, load_description
-from markerless_tracker.body.sizes import PROPORTIONS, TOLD, UNUSUAL, USUAL_STATURE_M, Sizes
+from markerless_tracker.body.sizes import (
+    GIVEN_STATURE_SD,
+    MEAN_STATURE_M,
+    PROPORTION_SD,
+    STATURE_SD,
+    Sizes,
+)
 from markerless_tracker.errors import BodyModelError
 
 SIZES = Sizes(load_description("person31"))
 
 
-def test_both_sides_share_their_lengths() -> None:
+def test_both_sides_have_the_same_lengths() -> None:
     assert SIZES.names == (
         "torso", "head", "clavicle", "upper_arm", "forearm", "hip_offset", "thigh", "calf",
         "hand", "foot",
@@ -23,14 +29,14 @@ def test_a_generic_body_is_that_of_its_stature() -> None:
     np.testing.assert_array_equal(body.cone_shape, same.cone_shape)
 
 
-def test_lengths_are_taken_and_put_back() -> None:
+def test_lengths_of_a_body_give_the_same_body() -> None:
     lengths = SIZES.of(SIZES.of_stature(1.7)) * np.linspace(0.9, 1.1, len(SIZES.names))
     body = SIZES.body(lengths)
     np.testing.assert_allclose(SIZES.of(body), lengths, rtol=1e-15)
     assert body.lengths_m["l_thigh"] == body.lengths_m["r_thigh"] == lengths[6]
 
 
-def test_generic_sections_grow_with_their_length_and_others_are_kept() -> None:
+def test_generic_sections_scale_with_length_and_given_ones_do_not() -> None:
     small, tall = SIZES.of_stature(1.5), SIZES.of_stature(1.8)
     np.testing.assert_allclose(tall.cone_shape, small.cone_shape * 1.2, rtol=1e-12)
     kept = SIZES.body(SIZES.of(tall), small)
@@ -43,13 +49,13 @@ def test_an_impossible_length_is_named() -> None:
         SIZES.body(np.full(len(SIZES.names), -1.0))
 
 
-@pytest.mark.parametrize(("stature", "common"), [(None, UNUSUAL), (1.9, TOLD)])
-def test_beliefs_scatter_by_stature_and_by_proportions(stature, common) -> None:
+@pytest.mark.parametrize(("stature", "common"), [(None, STATURE_SD), (1.9, GIVEN_STATURE_SD)])
+def test_the_prior_has_the_variance_of_stature_and_proportions(stature, common) -> None:
     """One length alone may be off by both; the ratio of two only by their own parts."""
-    belief = SIZES.usual(stature)
-    covariance = np.linalg.inv(belief.precision)
-    generic = SIZES.of(SIZES.of_stature(stature or USUAL_STATURE_M))
-    np.testing.assert_allclose(np.exp(belief.mean), generic)
-    assert covariance[0, 0] == pytest.approx(PROPORTIONS**2 + common**2)
+    prior = SIZES.prior(stature)
+    covariance = np.linalg.inv(prior.precision)
+    generic = SIZES.of(SIZES.of_stature(stature or MEAN_STATURE_M))
+    np.testing.assert_allclose(np.exp(prior.mean), generic)
+    assert covariance[0, 0] == pytest.approx(PROPORTION_SD**2 + common**2)
     ratio = covariance[0, 0] + covariance[1, 1] - 2.0 * covariance[0, 1]
-    assert ratio == pytest.approx(2.0 * PROPORTIONS**2)
+    assert ratio == pytest.approx(2.0 * PROPORTION_SD**2)

@@ -51,7 +51,7 @@ def random_pose(seed):
 @settings(max_examples=12, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 @example(1274)
-def test_exact_markers_are_met_within_a_millimetre(seed) -> None:
+def test_exact_markers_are_fitted_within_a_millimetre(seed) -> None:
     points = markers(BODY, random_pose(seed))
     fitted = pose_from_markers(BODY, named(points))
     assert error_mm(BODY, fitted, points) < 1.0
@@ -80,7 +80,7 @@ def test_narrower_limits_are_kept() -> None:
 
 
 @pytest.mark.parametrize("missing", ["LHip", "RHip", "Neck"])
-def test_markers_that_give_no_heading_are_named(missing) -> None:
+def test_missing_markers_of_the_heading_are_named(missing) -> None:
     points = named(markers(BODY, BODY.neutral))
     del points[missing]
     with pytest.raises(BodyModelError, match=f"start pose: marker {missing} is missing, expected"):
@@ -148,7 +148,7 @@ def test_a_pose_file_is_read_back_exactly(tmp_path, seed) -> None:
 ROOT = "\n".join(f"pelvis_{name}: 0.5" for name in ("rx", "ry", "rz", "tx", "ty", "tz"))
 
 
-def test_parameters_that_are_not_named_stay_neutral(tmp_path) -> None:
+def test_parameters_that_are_not_named_are_neutral(tmp_path) -> None:
     file = tmp_path / "start.yaml"
     file.write_text(ROOT + "\nl_knee: -1\n")
     expected = BODY.neutral.copy()

@@ -66,7 +66,7 @@ def test_lengths_are_measured_between_markers_of_any_pose(seed) -> None:
         assert alike[name] == pytest.approx((length + sizes.lengths_m[other]) / 2.0)
 
 
-def test_missing_markers_are_guessed_from_the_others() -> None:
+def test_lengths_without_markers_follow_from_the_others() -> None:
     points = named(markers(load_body("balan31", 1.9), np.zeros(31)))
     for name in ("Pelvis", "Head", "LWrist", "RAnkle"):
         del points[name]
@@ -186,7 +186,7 @@ def test_missing_and_binary_subject_files(tmp_path) -> None:
 # --- subject and body ------------------------------------------------------------------------
 
 
-def test_a_subject_serves_every_shipped_body() -> None:
+def test_a_subject_fits_every_shipped_body() -> None:
     """Hands and feet that a smaller body lacks come from the stature, and may be to spare."""
     small, large = (load_description(name) for name in ("balan31", "person31"))
     person = subject_from_stature(large, 1.9)
@@ -227,7 +227,7 @@ def test_a_cone_of_another_body_is_named() -> None:
 
 
 @pytest.mark.parametrize("measured", [True, False])
-def test_a_file_tells_whether_its_lengths_were_measured(tmp_path, measured) -> None:
+def test_a_file_states_whether_its_lengths_were_measured(tmp_path, measured) -> None:
     lengths = subject_from_stature(DESCRIPTION, 1.7).lengths_m
     subject = Subject("one", lengths, measured=measured)
     write_subject(tmp_path / "one.yaml", subject)

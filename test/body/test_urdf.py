@@ -1,4 +1,4 @@
-"""The URDF moves as the body does."""
+"""The kinematics of the URDF are those of the body."""
 
 import dataclasses
 import xml.etree.ElementTree as ElementTree
@@ -15,7 +15,7 @@ from markerless_tracker.errors import BodyModelError
 BODY = load_body("balan31", 1.8)
 
 
-def turn(axis, angle):
+def rotation(axis, angle):
     x, y, z = axis
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
@@ -25,7 +25,9 @@ def origin(element):
     at = element.find("origin")
     roll, pitch, yaw = map(float, at.get("rpy").split())
     result = np.eye(4)
-    result[:3, :3] = turn((0, 0, 1), yaw) @ turn((0, 1, 0), pitch) @ turn((1, 0, 0), roll)
+    result[:3, :3] = (
+        rotation((0, 0, 1), yaw) @ rotation((0, 1, 0), pitch) @ rotation((1, 0, 0), roll)
+    )
     result[:3, 3] = list(map(float, at.get("xyz").split()))
     return result
 
@@ -46,14 +48,14 @@ def link_transforms(text, values, T_world_root):
             if joint.get("type") in ("revolute", "continuous"):
                 axis = np.array(list(map(float, joint.find("axis").get("xyz").split())))
                 assert np.linalg.norm(axis) == pytest.approx(1)
-                move[:3, :3] = turn(axis, values[joint.get("name")])
+                move[:3, :3] = rotation(axis, values[joint.get("name")])
             known[child] = known[parent] @ origin(joint) @ move
     return root, known
 
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_links_and_markers_lie_where_the_body_has_them(seed) -> None:
+def test_links_and_markers_agree_with_the_body(seed) -> None:
     pose = np.random.default_rng(seed).uniform(-3, 3, BODY.size)
     values = dict(zip(BODY.parameter_names, pose, strict=True))
     root, links = link_transforms(urdf(BODY), values, root_transform(BODY, pose))
@@ -66,7 +68,7 @@ def test_links_and_markers_lie_where_the_body_has_them(seed) -> None:
         np.testing.assert_allclose(links[frame][:3], nodes[node], atol=1e-9)
 
 
-def test_joints_carry_the_joint_names_and_limits() -> None:
+def test_joints_have_names_and_limits() -> None:
     robot = ElementTree.fromstring(urdf(BODY))
     moving = [joint for joint in robot.findall("joint") if joint.get("type") != "fixed"]
     assert sorted(joint.get("name") for joint in moving) == sorted(BODY.joint_names)
@@ -107,14 +109,14 @@ def test_a_parameter_of_two_joints_is_mimicked() -> None:
     assert len({joint.get("name") for joint in joints}) == len(joints)
 
 
-def test_a_frame_beside_the_root_is_an_error() -> None:
+def test_a_frame_that_does_not_descend_from_the_root_is_an_error() -> None:
     parents = BODY.node_parent.copy()
     parents[BODY.frames["head"] - 2] = -1
-    with pytest.raises(BodyModelError, match="does not hang from the root frame pelvis"):
+    with pytest.raises(BodyModelError, match="is no descendant of the root frame pelvis"):
         urdf(dataclasses.replace(BODY, node_parent=parents))
 
 
-def test_links_of_one_name_are_an_error() -> None:
+def test_links_with_the_same_name_are_an_error() -> None:
     frames = {("LKnee" if name == "l_knee" else name): node for name, node in BODY.frames.items()}
-    with pytest.raises(BodyModelError, match="must differ in name"):
+    with pytest.raises(BodyModelError, match="must be distinct"):
         urdf(dataclasses.replace(BODY, frames=frames))

@@ -1,4 +1,4 @@
-"""The verb `benchmark`, as a user calls it."""
+"""The verb `benchmark` from the command line."""
 
 import csv
 import json
@@ -31,12 +31,12 @@ def test_the_same_figures_as_track_and_evaluate(walk, tmp_path: Path, capsys) ->
     )
     capsys.readouterr()
     assert main(["evaluate", f"{result}.trc", truth, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    scored = json.loads(capsys.readouterr().out)
     # Marker files hold µm.
     for key in ("mean_mm", "max_mm", "worst_joint_mm", "limbs_mm"):
-        assert row[key] == pytest.approx(told[key], abs=2e-3)
-    assert row["joints"] == pytest.approx(told["joints"], abs=2e-3)
-    assert row["frames"] == told["frames"] == 2
+        assert row[key] == pytest.approx(scored[key], abs=2e-3)
+    assert row["joints"] == pytest.approx(scored["joints"], abs=2e-3)
+    assert row["frames"] == scored["frames"] == 2
     frames = json.loads(Path(f"{result}.json").read_text())["frames"]
     assert row["evaluations"] == sum(frame["evaluations"] for frame in frames) / 2
 
@@ -66,7 +66,7 @@ def test_tables_for_people_and_on_disk(walk, tmp_path: Path, capsys) -> None:
     assert len(list((tmp_path / "out" / "runs").glob("walk-*.json"))) == 4
 
 
-def test_both_presets_unless_named(walk, capsys) -> None:
+def test_both_presets_by_default(walk, capsys) -> None:
     words = ["tables", walk, "--seeds", "1", "--frames", "1", "--jobs", "1", "--json"]
     assert main(["benchmark", *words]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
@@ -77,7 +77,7 @@ def test_both_presets_unless_named(walk, capsys) -> None:
     assert rows[2]["evaluations"] == 1000
 
 
-def test_a_row_per_optimizer_and_nothing_is_repeated(walk, tmp_path: Path, capsys) -> None:
+def test_stored_runs_are_not_repeated(walk, tmp_path: Path, capsys) -> None:
     words = [
         "tables", walk, "--preset", "paper", "--optimizer", "sppso,apf,hmcpso", "--seeds", "1",
         "--frames", "1", "--fps", "60", "-o", str(tmp_path), "--jobs", "1",
@@ -116,7 +116,7 @@ def test_a_papers_table_with_its_figures_beside_ours(walk, tmp_path: Path, capsy
     assert rows[5]["variant"] == "partition=hard" and float(rows[5]["ms_per_evaluation"]) > 0
 
 
-def test_pictures_lie_beside_the_table(walk, tmp_path: Path, capsys) -> None:
+def test_plots_are_written_beside_the_table(walk, tmp_path: Path, capsys) -> None:
     pytest.importorskip("matplotlib", reason="matplotlib is not installed (extra [plots])")
     words = [
         "tables", walk, "--preset", "paper", "--vary", "partition=soft,hard", "--vary",
@@ -194,14 +194,14 @@ def test_the_table_of_speed(capsys) -> None:
         ([], "required: KIND", 2),
         (["tables"], "required: SOURCE", 2),
         (["tables", "x", "--seeds", "0"], "expected a whole number from 1", 2),
-        (["tables", "x", "--fps", "60,,20"], "no list with commas", 2),
+        (["tables", "x", "--fps", "60,,20"], "expected values with commas", 2),
         (["tables", "x", "--fps", "0"], "expected a number above 0", 2),
         (["tables", "x", "--start-noise", "nan"], "expected a number from 0", 2),
         (["tables", "x", "--vary", "partition"], "expected KEY=VALUE,VALUE...", 2),
         (["tables", "x", "--vary", "a={"], "a value cannot be read", 2),
         (["tables", "x", "--vary", "partitions=soft"], "did you mean 'partition'?", 1),
         (["tables", "x", "--vary", "apf.layer=5"], "did you mean 'apf.layers'?", 1),
-        (["tables", "x", "--vary", "seed=1", "--vary", "seed=2"], "seed stands twice", 1),
+        (["tables", "x", "--vary", "seed=1", "--vary", "seed=2"], "seed is given twice", 1),
         (["tables", "x", "--table", "hmcpso_1"], "table 'hmcpso_1' is unknown", 1),
         (["tables", "x", "--table", "all", "--optimizer", "apf"], "does not go with", 1),
         (["tables", "nowhere"], "nowhere: no such file or folder", 1),
@@ -211,7 +211,7 @@ def test_the_table_of_speed(capsys) -> None:
         (["speed", "--threads", "-1", "--frames", "1"], "threads: got -1", 1),
     ],
 )
-def test_what_cannot_be_done_says_so_in_one_line(words, said, status, capsys) -> None:
+def test_errors_are_one_line(words, said, status, capsys) -> None:
     try:
         code = main(["benchmark", *words])
     except SystemExit as stop:
@@ -233,13 +233,13 @@ def test_silhouettes_of_a_recording(walk, tmp_path: Path, capsys) -> None:
     assert capsys.readouterr().out.count("OpenCV MOG2") == 2
 
 
-def test_starts_without_a_start(walk, capsys) -> None:
+def test_automatic_starts(walk, capsys) -> None:
     words = ["start", walk, "--stature", "1.72", "--every", "2", "--frames", "2", "--threads", "1"]
     assert main(["benchmark", *words, "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
     assert row["count"] == len(row["starts"]) == 2 and row["found"] == 1.0
     assert [start["frame"] for start in row["starts"]] == [0, 2]
-    assert row["reached"] == 1.0 and row["wrong_heading"] == 0.0
+    assert row["succeeded"] == 1.0 and row["wrong_heading"] == 0.0
 
 
 def test_values_for_each_recording(walk, capsys) -> None:
@@ -247,11 +247,11 @@ def test_values_for_each_recording(walk, capsys) -> None:
     assert "--stature: 2 values for 1 recordings" in capsys.readouterr().err
 
 
-def test_what_a_recording_is_too_short_for_is_left_out(walk, capsys) -> None:
+def test_disturbances_longer_than_the_recording_are_left_out(walk, capsys) -> None:
     words = ["recovery", walk, "--stature", "1.72", "--seeds", "1", "--threads", "1", "--json"]
     assert main(["benchmark", *words]) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
-    assert row["runs"] == [] and len(row["usual_mm"]) == 1
+    assert row["runs"] == [] and len(row["undisturbed_mm"]) == 1
 
 
 def test_fewer_cameras(walk, capsys) -> None:
@@ -266,7 +266,7 @@ def test_fewer_cameras(walk, capsys) -> None:
     assert "--start: guessed, expected some of measured, automatic" in capsys.readouterr().err
 
 
-def test_jitter_needs_some_frames(walk, capsys) -> None:
+def test_jitter_of_too_few_frames_is_an_error(walk, capsys) -> None:
     assert main(["benchmark", "jitter", walk, "--threads", "1"]) == 1
     last = capsys.readouterr().err.strip().splitlines()[-1]
     assert "tracked for 4 frames in a row" in last and "expected 32 frames" in last

@@ -1,4 +1,4 @@
-"""How tables are printed: the papers' figures only where they hold."""
+"""Layout of the tables."""
 
 import io
 
@@ -36,7 +36,7 @@ def test_a_papers_figures_in_a_cell(figures, text) -> None:
     assert printed(figures) == text
 
 
-def test_a_papers_figures_stand_beside_the_rate_they_hold_for() -> None:
+def test_a_papers_figures_are_shown_at_their_rate_only() -> None:
     table = read_papers()["hmcpso_3"]
     rows = [(table.rows[0], {**ROW, "fps": fps}) for fps in (20.0, 60.0)]
     lines = [line for line in shown(
@@ -47,7 +47,7 @@ def test_a_papers_figures_stand_beside_the_rate_they_hold_for() -> None:
     assert "48 ± 4" not in slow and "│  20 │" in slow
 
 
-def test_columns_appear_when_something_differs() -> None:
+def test_columns_appear_for_differences_only() -> None:
     table = read_papers()["hmcpso_4"]
     ours = (table.rows[0], ROW)
     plain = shown(paper_table("walk", table, [ours], truth_score=False))

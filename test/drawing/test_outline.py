@@ -37,7 +37,7 @@ def inside(polygon, points, slack_px):
 
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([LENS, (0.0,) * 5]))
-def test_outlines_hold_their_cones_and_no_more(seed, lens) -> None:
+def test_outlines_enclose_their_cones_tightly(seed, lens) -> None:
     """Points sampled inside each cone project inside its outline; every corner lies on the cone."""
     rng = np.random.default_rng(seed)
     camera = ring_rig(4, (400, 300), distortion=lens).cameras[rng.integers(4)]
@@ -64,7 +64,7 @@ def test_outlines_hold_their_cones_and_no_more(seed, lens) -> None:
         assert all(inside(hull, polygon, 0.3 if any(lens) else 0.01))
 
 
-def test_an_upright_cylinder_by_hand() -> None:
+def test_an_upright_cylinder_of_known_size() -> None:
     """A cylinder 0.1 m in radius and 0.5 m high, 2 m in front of a camera at half its height."""
     camera = CameraModel(
         "c", (400, 400), np.array([[500.0, 0, 200], [0, 500, 200], [0, 0, 1]]), np.zeros(5),
@@ -117,7 +117,7 @@ def test_samples_converge() -> None:
         assert (mask ^ fine).sum() <= most * fine.sum()
 
 
-def test_chosen_cones_alone_are_drawn() -> None:
+def test_only_selected_cones_are_drawn() -> None:
     camera = ring_rig(4, (328, 246)).cameras[0]
     every = silhouette(BODY, standing(), camera)
     parts = np.zeros_like(every)
@@ -128,7 +128,7 @@ def test_chosen_cones_alone_are_drawn() -> None:
     np.testing.assert_array_equal(parts, every)
 
 
-def test_a_body_beside_or_behind_the_camera_leaves_nothing() -> None:
+def test_a_body_outside_the_view_has_no_silhouette() -> None:
     camera = ring_rig(1, (120, 90)).cameras[0]
     behind = standing()
     eye = camera.T_world_cam[:3, 3]

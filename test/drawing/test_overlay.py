@@ -20,7 +20,7 @@ def blank(*, colour=True):
     return np.full((246, 328, 3) if colour else (246, 328), 90, dtype=np.uint8)
 
 
-def test_the_image_is_left_as_it_was() -> None:
+def test_the_input_image_is_not_changed() -> None:
     image = blank()
     drawn = draw_overlay(image, CAMERA, BODY, POSE)
     assert (image == 90).all() and (drawn != 90).any()
@@ -67,7 +67,7 @@ def test_a_body_behind_the_camera_draws_nothing() -> None:
     assert (draw_overlay(blank(), CAMERA, BODY, pose) == 90).all()
 
 
-def test_a_body_that_fills_the_view_does_no_harm() -> None:
+def test_a_body_larger_than_the_view() -> None:
     for distance in (0.2, 0.31, 0.5):
         pose = POSE.copy()
         eye, forward = CAMERA.T_world_cam[:3, 3], CAMERA.T_world_cam[:3, 2]
@@ -84,11 +84,11 @@ def test_a_body_that_fills_the_view_does_no_harm() -> None:
         (np.zeros(10, np.uint8), r"cam01: image of shape \(10,\)"),
     ],
 )
-def test_images_that_do_not_fit(image, words) -> None:
+def test_images_of_another_size_or_type_are_errors(image, words) -> None:
     with pytest.raises(ImageError, match=words):
         draw_overlay(image, CAMERA, BODY, POSE)
 
 
-def test_a_mask_that_does_not_fit() -> None:
+def test_a_mask_of_another_size_is_an_error() -> None:
     with pytest.raises(ImageError, match=r"cam01: mask of shape \(3, 3\), expected \(246, 328\)"):
         draw_overlay(blank(), CAMERA, BODY, POSE, mask=np.ones((3, 3), dtype=np.bool_))

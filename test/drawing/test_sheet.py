@@ -1,4 +1,4 @@
-"""Mosaics of named pictures."""
+"""Contact sheets of named pictures."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_grey_pictures() -> None:
 
 
 def test_no_pictures_and_empty_pictures() -> None:
-    with pytest.raises(ImageError, match="no picture was given"):
+    with pytest.raises(ImageError, match="got no picture"):
         overlay_sheet({})
     with pytest.raises(ImageError, match=r"cam01: picture of shape \(0, 5\)"):
         overlay_sheet({"cam01": np.zeros((0, 5), np.uint8)})

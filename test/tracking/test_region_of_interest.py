@@ -51,6 +51,8 @@ def test_the_pose_is_that_of_whole_images(
             np.testing.assert_array_equal(seen.mask, a.observations[name].mask[cut])
             assert a.observations[name].mask.sum() == seen.mask.sum()
         sizes.append([seen.edges.size for seen in b.observations.values()])
+    moved_m = np.linalg.norm(b.markers_m - frames[0].markers_m, axis=1).mean()
+    assert moved_m > 0.03, "the start pose itself would pass"
     full = 256 * 192
     # The first frame looks everywhere, later ones but for the cameras whose turn it is do not.
     assert sizes[0] == [full] * 4

@@ -67,7 +67,7 @@ def test_input_evidence_and_body_side_by_side(tmp_path, body, rig):
     )
     assert with_body.shape == (60, 4 * 80, 3)
     panels = np.split(with_body, 4, axis=1)
-    # JPEG blurs noise: means tell.
+    # JPEG blurs noise, so means are compared.
     assert abs(panels[0].mean() - images.images["cam01"].mean()) < 3.0
     assert panels[1][25:35, 35:45].mean() > 245
     assert panels[1][:10].mean() < 10
@@ -77,7 +77,7 @@ def test_input_evidence_and_body_side_by_side(tmp_path, body, rig):
     assert np.abs(panels[0] - np.split(without, 4, axis=1)[0]).max() < 10
 
 
-def test_the_steps_before_the_silhouette_where_they_are_known(tmp_path, body, rig):
+def test_background_and_labels_are_shown_with_a_segmenter(tmp_path, body, rig):
     images = frame(4)
     empty = np.full((60, 80, 3), 90, np.uint8)
     segmenter = Segmenter("cam01", learn_background([empty]))
@@ -93,7 +93,7 @@ def test_the_steps_before_the_silhouette_where_they_are_known(tmp_path, body, ri
     assert abs(panels[2].mean() - labels.mean()) < 5.0
 
 
-def test_folders_that_cannot_be_made(tmp_path, body, rig):
+def test_a_folder_that_cannot_be_made_is_an_error(tmp_path, body, rig):
     taken = tmp_path / "file"
     taken.write_text("a file", encoding="utf-8")
     with pytest.raises(DatasetError, match="file: cannot be made: "):
@@ -104,7 +104,7 @@ def test_folders_that_cannot_be_made(tmp_path, body, rig):
         debug.write(frame(0), result(body), rig, body)
 
 
-def test_a_picture_that_cannot_be_written(tmp_path, body, rig):
+def test_a_picture_that_cannot_be_written_is_an_error(tmp_path, body, rig):
     debug = DebugImages(tmp_path)
     (tmp_path / "cam01" / "000000.jpg").mkdir(parents=True)
     with pytest.raises(DatasetError, match="000000.jpg: cannot be written"):

@@ -16,7 +16,13 @@ from markerless_tracker.body import (
 )
 from markerless_tracker.body.build import build_body
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.datasets import FolderRecording, Recording, open_recording, read_trc
+from markerless_tracker.datasets import (
+    FolderRecording,
+    Recording,
+    open_recording,
+    read_trc,
+    truth_path,
+)
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.errors import DatasetError
@@ -108,7 +114,7 @@ def recorded_scene(
         body = load_body(BODY)
         known = sorted(set().union(*exact.values()))
     else:
-        truth = (source if source.is_dir() else source.parent) / "ground_truth.trc"
+        truth = truth_path(source)
         if not truth.is_file():
             raise DatasetError(f"{source}: neither masks/ nor {truth.name}, expected one of them")
         body, poses = _posed(recording, truth)

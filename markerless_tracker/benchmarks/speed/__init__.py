@@ -1,4 +1,4 @@
-"""Time of each part, as ratios to a fixed reference.
+"""Computing time of each part, and its ratio to a fixed reference.
 
-The reference evaluation and the frames that are measured on.
+The measurements, the reference evaluation and the frames used.
 """

@@ -1,9 +1,10 @@
-"""How fast each part is, against a fixed reference timed in between.
+"""Computing time of each part, and its ratio to a fixed reference timed alternately.
 
-Every figure is taken several times, the parts taking turns, so that a busy moment of the machine
-meets all of them. View-evaluations and refinement: the least of the repeats. Frames: the least of
-the repeats of each frame, then median and 95th percentile over the frames; the ratio of the whole
-fit to 1000 evaluations, whose work hardly differs between frames, is one of least times.
+Every figure is measured several times. The parts alternate, so that other load on the machine
+affects all of them alike. View-evaluations and refinement: minimum over the repeats. Frames:
+minimum over the repeats of each frame, then median and 95th percentile over the frames. The ratio
+of the whole fit to 1000 evaluations uses the minimum over the frames as well, since both do nearly
+the same work in every frame.
 """
 
 import time
@@ -37,12 +38,12 @@ SWARMS: Mapping[str, Mapping[str, Any]] = {
     "hmcpso_3600": {"optimizer": "hmcpso", "evaluations": 3600},
     "hmcpso_3600_hard": {"optimizer": "hmcpso", "evaluations": 3600, "partition": "hard"},
 }
-"""Swarms alone whose time per frame is told, all with the published body."""
+"""Searches without refinement whose time per frame is measured, all with the published body."""
 _REFERENCE_POSES, _POSES = 16, 256
 _SHORT, _LONG = 2, 42
 _HARD = ("l_clavicle_x", "l_clavicle_y", "l_shoulder_x", "l_shoulder_y", "l_shoulder_z", "l_elbow")
 _ARM = {"limb": _HARD, "limb_soft": ("thorax_y", "thorax_z", *_HARD)}
-"""An arm alone, and with the torso's joint, as a hard and a soft partition vary it."""
+"""Parameters of an arm stage with a hard partition, and with a soft one (torso's joint added)."""
 
 Report = Callable[[str, int, int], None]
 
@@ -54,13 +55,14 @@ def measure(
     repeats: int = 5,
     progress: Report = lambda part, done, total: None,
 ) -> dict[str, Any]:
-    """Time everything on a scene; keys as `benchmark speed --json` prints them.
+    """Time all parts on a scene; keys as in `benchmark speed --json`.
 
     Args:
-        scene: images and a start.
-        threads: of fitness, search and imaging; 0 = one per core. View-evaluations use one.
-        repeats: how often each figure is taken.
-        progress: told the part and how far it is.
+        scene: images and a start pose.
+        threads: threads of fitness, search and imaging; 0 = one per core. View-evaluations always
+            use one.
+        repeats: number of repeats of each measurement.
+        progress: receives the part, its steps done and its steps in total.
 
     Raises:
         TrackerError: the scene does not fit its rig or start.
@@ -111,8 +113,8 @@ def measure(
     }
 
 
-def scattered(body: BodyModel, pose: FloatArray, count: int) -> FloatArray:
-    """Poses (count, p) with the published spreads around one; always the same."""
+def poses_around(body: BodyModel, pose: FloatArray, count: int) -> FloatArray:
+    """Poses (count, p) drawn around one with the published sigma; the same in every call."""
     rng = keyed_generator(0, 0, "speed")
     return pose + body.sigma * rng.standard_normal((count, body.size))
 
@@ -120,7 +122,7 @@ def scattered(body: BodyModel, pose: FloatArray, count: int) -> FloatArray:
 def _view_evaluations(
     scene: SpeedScene, observations: Mapping[str, Observation], repeats: int, progress: Report
 ) -> dict[str, float]:
-    """µs per pose and view on one thread, kinematics, silhouettes and edges included."""
+    """Time in µs per pose and view on one thread: kinematics, silhouettes and edges."""
     timed: dict[str, tuple[Callable[[FloatArray], Any], FloatArray]] = {}
     views = len(scene.rig)
     for key, name in (("full", "balan31"), ("person31", "person31")):
@@ -129,8 +131,8 @@ def _view_evaluations(
         config = TrackerConfig.from_mapping({"body": name, "refinement": "none"})
         fitness = _fitness(scene, body, config, threads=1)
         seen = fitness.lay_out(observations)
-        poses = scattered(body, pose, _POSES)
-        # The swarm's second stage: every parameter, every cone.
+        poses = poses_around(body, pose, _POSES)
+        # The second stage of SPPSO: all parameters, all cones.
         stage = replace(frame_stages(body, config, pose, body.sigma)[-1], edge_weight=1.0)
         timed[key] = (fitness.prepare(seen, stage), poses)
         if key != "full":
@@ -138,19 +140,19 @@ def _view_evaluations(
         reference = ReferenceFitness(
             body, scene.rig.cameras, observations, pose, spacing_px=config.edges.spacing_px
         )
-        timed["reference"] = (reference, scattered(body, pose, _REFERENCE_POSES))
+        timed["reference"] = (reference, poses_around(body, pose, _REFERENCE_POSES))
         for part, active in _ARM.items():
             indices = np.sort([body.index(parameter) for parameter in active])
             limb = fitness.prepare(seen, replace(stage, active=indices))
             timed[part] = (limb, np.ascontiguousarray(poses[:, indices]))
     best = dict.fromkeys(timed, np.inf)
-    for turn in range(repeats + 1):
+    for repeat in range(repeats + 1):
         for key, (evaluate, poses) in timed.items():
             seconds = _seconds(lambda e=evaluate, p=poses: e(p))  # type: ignore[misc]
-            # The first turn compiles.
-            if turn:
+            # The first repeat compiles.
+            if repeat:
                 best[key] = min(best[key], seconds / (len(poses) * views) * 1e6)
-        progress("view-evaluations", turn + 1, repeats + 1)
+        progress("view-evaluations", repeat + 1, repeats + 1)
     return best
 
 
@@ -162,20 +164,20 @@ def _swarm(
     progress: Report,
     name: str,
 ) -> FloatArray:
-    """ms of fitness and swarm per frame (n,): the evidence is ready, the pose is found."""
+    """Time in ms per frame (n,) from evidence to pose."""
     body = scene.body(config.body)
     with _searcher(scene, body, config) as searcher:
         best = np.full(len(observed), np.inf)
-        for turn in range(repeats + 1):
+        for repeat in range(repeats + 1):
             pose = scene.pose(body)
             for i, observations in enumerate(observed):
                 stages = frame_stages(body, config, pose, body.sigma)
                 started = time.perf_counter()
                 search = searcher.frame(observations, scene.frames[i].stamp_ns, pose)
                 pose = search.run(stages)
-                if turn:
+                if repeat:
                     best[i] = min(best[i], (time.perf_counter() - started) * 1e3)
-            progress(f"swarm {name}", turn + 1, repeats + 1)
+            progress(f"swarm {name}", repeat + 1, repeats + 1)
     return best
 
 
@@ -186,7 +188,7 @@ def _refinement(
     repeats: int,
     progress: Report,
 ) -> tuple[float, float]:
-    """ms of one iteration of contour refinement, and of preparing a frame's contours."""
+    """Time in ms of one iteration of contour refinement, and of preparing a frame's contours."""
     body = scene.body(config.body)
     pose = scene.pose(body)
     stamp_ns = scene.frames[0].stamp_ns
@@ -194,19 +196,19 @@ def _refinement(
     best = {_SHORT: np.inf, _LONG: np.inf}
     setup = np.inf
     with _searcher(scene, body, config) as searcher:
-        for turn in range(2 * repeats + 1):
+        for repeat in range(2 * repeats + 1):
             search = searcher.frame(observations, stamp_ns, pose)
             seconds = _seconds(lambda s=search: s.contours)  # type: ignore[misc]
-            if turn:
+            if repeat:
                 setup = min(setup, seconds)
             for iterations in best:
                 search.pose = pose
                 stages = (replace(stage, iterations=iterations),)
                 seconds = _seconds(lambda s=search, st=stages: s.run(st))  # type: ignore[misc]
-                if turn:
+                if repeat:
                     best[iterations] = min(best[iterations], seconds)
-            progress("refinement", turn + 1, 2 * repeats + 1)
-    # What both share, two evaluations, falls out.
+            progress("refinement", repeat + 1, 2 * repeats + 1)
+    # The difference cancels the two evaluations that both runs contain.
     return (best[_LONG] - best[_SHORT]) / (_LONG - _SHORT) * 1e3, setup * 1e3
 
 
@@ -218,12 +220,12 @@ def _frames(
     repeats: int,
     progress: Report,
 ) -> dict[str, FloatArray]:
-    """ms per frame (n - 1,) of each part; the first frame, which fits the shape, is left out.
+    """Time in ms per frame (n - 1,) of each part; without the first frame, which fits the shape.
 
-    background: labels, shadows, repair; edges: the edge maps; imaging: both and their packing, as
-    the tracker has it done; all three around the body of the frame before, as while tracking.
-    fitness: from evidence to pose; total: images to pose; thousand: as many evaluations of the same
-    body on the same threads.
+    background: labels, shadows and morphology; edges: the edge maps; imaging: both and their
+    packing. These three use the region around the previous frame's body, as in tracking. fitness:
+    evidence to pose; total: images to pose; thousand: 1000 evaluations of the same body on the same
+    threads.
     """
     whole = _tracker(scene, config, backgrounds)
     fit = _tracker(scene, config, {})
@@ -233,7 +235,7 @@ def _frames(
     with ThreadPoolExecutor(max_workers=min(config.threads, len(segmenters))) as pool:
         whole.warm_up()
         fit.warm_up()
-        for turn in range(repeats):
+        for repeat in range(repeats):
             whole.reset()
             fit.reset()
             for i, frame in enumerate(scene.frames):
@@ -268,16 +270,16 @@ def _frames(
                 taken["thousand"] = thousand(observed[i])
                 for name, seconds in taken.items():
                     best[name][i] = min(best[name][i], seconds * 1e3)
-                progress("frames", turn * len(observed) + i + 1, repeats * len(observed))
+                progress("frames", repeat * len(observed) + i + 1, repeats * len(observed))
     return {name: values[1:] for name, values in best.items()}
 
 
 def _thousand(
     scene: SpeedScene, body: BodyModel, config: TrackerConfig
 ) -> Callable[[Mapping[str, Observation]], float]:
-    """Seconds that 1000 evaluations of a body take on a frame's evidence."""
+    """A function that returns the time in s of 1000 evaluations of a body on a frame's evidence."""
     fitness = _fitness(scene, body, config, threads=config.threads)
-    poses = scattered(body, scene.pose(body), THOUSAND)
+    poses = poses_around(body, scene.pose(body), THOUSAND)
     every = np.ones(len(body.cone_names), dtype=np.bool_)
 
     def run(observations: Mapping[str, Observation]) -> float:

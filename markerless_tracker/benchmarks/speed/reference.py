@@ -1,12 +1,13 @@
-"""The fixed yardstick of speed: the fitness as one would write it with NumPy and OpenCV.
+"""Reference for speed: the fitness written with NumPy and OpenCV.
 
-Machines differ and are shared, so the compiled fitness is timed against this, interleaved in one
-process, and told as a ratio. It is written once and not made faster or slower afterwards:
-kinematics and projection vectorised in NumPy over all poses of a batch, every cone's outline the
-convex hull of 16 points (8 on each end's ellipse) filled by `cv2.fillConvexPoly` into one reused
-mask per view, `cv2.bitwise_and` and `cv2.countNonZero` for the pixels in both and in one, edge
-samples on the sides of the cone's quadrilateral gathered with NumPy indexing (all of them: hidden
-ones too).
+Machines and their loads differ, so the compiled fitness is timed alternately with this reference in
+one process and reported as a ratio. The reference must stay as it is, or ratios of different
+versions cannot be compared.
+
+Kinematics and projection are vectorised in NumPy over all poses of a batch. The outline of a cone
+is the convex hull of 16 points (8 on each end's ellipse), filled by `cv2.fillConvexPoly` into one
+mask per view. `cv2.bitwise_and` and `cv2.countNonZero` count the pixels. Edge samples on the two
+sides of each cone's outline are gathered with NumPy indexing, hidden ones included.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,15 +28,15 @@ _FEWEST_SAMPLES = 4
 
 
 class ReferenceFitness:
-    """f = f_s + f_e, both averaged over the views; see the module.
+    """f = f_s + f_e, both averaged over the views (see the module).
 
     Args:
         body: the body.
         cameras: the cameras.
-        observations: full-frame evidence of every camera, by name.
-        pose: (p,) a pose near those to come: how long each cone's side is there decides the number
-            of its edge samples.
-        spacing_px: distance of edge samples along a side.
+        observations: full-frame observations of every camera by name.
+        pose: (p,) a pose near those evaluated later; the length of a cone's side at this pose sets
+            its number of edge samples.
+        spacing_px: distance of edge samples along a side, px.
     """
 
     def __init__(
@@ -66,7 +67,7 @@ class ReferenceFitness:
 
     @property
     def edge_samples(self) -> float:
-        """Edge samples per view, on average over the views."""
+        """Mean number of edge samples per view."""
         return float(np.mean([2 * cone.size for cone, _ in self._samples]))
 
     def __call__(self, poses: FloatArray) -> FloatArray:
@@ -108,10 +109,10 @@ class ReferenceFitness:
         return np.where(count > 0, 1.0 - squared / np.maximum(count, 1), 0.0)
 
     def _outlines(self, poses: FloatArray, camera: CameraModel) -> FloatArray:
-        """Points (n, c, 16, 2) px on the cones' ends, 8 on each; NaN behind the camera."""
+        """Points (n, c, 16, 2) in px on the cones' ends, 8 on each; NaN behind the camera."""
         body = self.body
         nodes = _transforms(body, poses)[:, body.cone_node]
-        turn = nodes[..., :3] @ body.cone_fixed[None, :, :, :3]
+        rotation = nodes[..., :3] @ body.cone_fixed[None, :, :, :3]
         origin = nodes[..., :3] @ body.cone_fixed[None, :, :, 3:]
         origin = origin[..., 0] + nodes[..., 3]
         angle = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
@@ -122,7 +123,7 @@ class ReferenceFitness:
         local[:, 0, :, 2] = 0.0
         local[:, 1, :, 2] = body.cone_length[:, None]
         flat = local.reshape(len(body.cone_names), 2 * _AROUND, 3)
-        world = np.einsum("ncij,ckj->ncki", turn, flat, optimize=True) + origin[:, :, None]
+        world = np.einsum("ncij,ckj->ncki", rotation, flat, optimize=True) + origin[:, :, None]
         pixels = project_camera(world.reshape(-1, 3), camera).reshape(*world.shape[:3], 2)
         behind = ~np.isfinite(pixels[..., 0]).all(axis=2)
         pixels[behind] = np.nan
@@ -157,8 +158,8 @@ def _transforms(body: BodyModel, poses: FloatArray) -> FloatArray:
 def _sides(outlines: FloatArray) -> NDArray[np.float64]:
     """Sides (n, c, 2, 2, 2) of the cones' quadrilaterals: side, end, (u, v).
 
-    Corners are the points of each end's ellipse that lie farthest to either side of the line
-    between the ends' middles.
+    The corners are the points of each end's ellipse with the greatest distance from the line
+    through the centres of both ends, one on each side of it.
     """
     ends = outlines.reshape(*outlines.shape[:2], 2, _AROUND, 2)
     axis = ends[:, :, 1].mean(axis=2) - ends[:, :, 0].mean(axis=2)

@@ -1,4 +1,4 @@
-"""What speed is measured on: a few frames in memory, with markers to start from."""
+"""Input of the speed measurement: a few frames in memory, with markers for the start pose."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from markerless_tracker.body import (
 )
 from markerless_tracker.body.build import build_body
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.datasets import FrameSet, open_recording
+from markerless_tracker.datasets import FrameSet, existing_truth, open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
@@ -22,6 +22,7 @@ from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking.setup import first_row
 
 SIZE_PX = (644, 488)
+"""Image size of the made-up scene: width, height."""
 _EMPTY_IMAGES = 5
 
 
@@ -30,11 +31,11 @@ class SpeedScene:
     """Frames of a recording, in memory.
 
     Attributes:
-        name: of the recording.
+        name: name of the recording.
         rig: its cameras.
-        frames: the sets of images, in order.
+        frames: the frame sets in order.
         empty: empty-scene images by camera.
-        markers_m: named markers (3,) of the first frame, world frame.
+        markers_m: markers (3,) of the first frame by name, m, world frame.
     """
 
     name: str
@@ -44,26 +45,29 @@ class SpeedScene:
     markers_m: Mapping[str, FloatArray]
 
     def body(self, name: str) -> BodyModel:
-        """A body with the lengths of the first frame's markers."""
+        """A body with segment lengths from the markers of the first frame."""
         description = load_description(name)
         return build_body(description, subject_from_markers(description, self.markers_m))
 
     def pose(self, body: BodyModel) -> FloatArray:
-        """The pose (p,) of the first frame's markers."""
+        """The pose (p,) fitted to the markers of the first frame."""
         return pose_from_markers(body, self.markers_m)
 
 
 def recorded_scene(source: Path, *, frames: int, scale: float = 1.0) -> SpeedScene:
-    """The first frames of a recording, from the first row of its `ground_truth.trc` on.
+    """Frames of a recording, from the first row of its `ground_truth.trc` on.
+
+    Args:
+        source: the recording.
+        frames: number of frames at most.
+        scale: factor for the images.
 
     Raises:
-        TrackerError: it has none, cannot be read, or ends before the second frame.
+        TrackerError: the recording cannot be read, has no `ground_truth.trc`, or ends before the
+            second frame.
     """
     recording = open_recording(source, scale=scale)
-    truth = (source if source.is_dir() else source.parent) / "ground_truth.trc"
-    if not truth.is_file():
-        raise DatasetError(f"{source}: no {truth.name}, expected one to start from")
-    row = first_row(truth)
+    row = first_row(existing_truth(source))
     sets = []
     for images in recording.frames(start=recording.start_index(row.stamp_ns)):
         sets.append(images)

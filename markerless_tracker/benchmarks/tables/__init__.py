@@ -1,4 +1,4 @@
-"""Tables of accuracy: configurations, frame rates and seeds on recordings with a truth.
+"""Tables of accuracy: configurations, frame rates and seeds on recordings with reference markers.
 
-Runs in several processes or on a Dask cluster.
+The runs are spread over processes or over a Dask cluster.
 """

@@ -1,4 +1,4 @@
-"""Tables of accuracy: configurations x rates x seeds on recordings whose truth is known."""
+"""Tables of accuracy: configurations x rates x seeds on recordings with reference markers."""
 
 import csv
 import json
@@ -18,13 +18,16 @@ from markerless_tracker.benchmarks.tables.pool import run_all
 from markerless_tracker.benchmarks.tables.runs import Run, describe
 from markerless_tracker.benchmarks.tables.variants import variants
 from markerless_tracker.body import load_description
-from markerless_tracker.datasets import Recording, every_for_fps, open_recording
-from markerless_tracker.errors import DatasetError
+from markerless_tracker.datasets import (
+    Recording,
+    every_for_fps,
+    existing_truth,
+    open_recording,
+)
 from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.setup import first_row
 
-TRUTH = "ground_truth.trc"
 COLUMNS = (
     "recording", "optimizer", "preset", "body", "refinement", "variant", "fps",
     "start_noise_mm", "seeds", "evaluations", "refinements", "mean_mm", "sd_mm", "max_mm",
@@ -35,19 +38,19 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Plan:
-    """What a table holds.
+    """Content of a table.
 
     Attributes:
-        configs: one per row and rate; their seeds and threads are overruled.
-        rates: frames per second, each a whole part of the recordings' rates; () = 60 and 20 as
-            far as a recording has them, else its own.
+        configs: one per row and rate; their seeds and threads are replaced.
+        rates: frames per second; each must divide the recordings' rates. () = those of 60 and 20
+            that a recording allows, otherwise its own rate.
         seeds: seeds 0 .. seeds - 1.
         scale: factor for the images.
-        start_noise_mm: noise on the first row of markers.
-        truth_score: also f(truth) - f(result).
-        frames: only that many frames of a recording from its start on; None = all.
-        jobs: processes side by side.
-        scheduler: address of a Dask scheduler whose workers run everything; None = here.
+        start_noise_mm: sd of the noise on the first row of markers.
+        truth_score: also compute f(truth) - f(result).
+        frames: number of frames of a recording, from its start on; None = all.
+        jobs: number of parallel processes.
+        scheduler: address of a Dask scheduler whose workers do the runs; None = this machine.
     """
 
     configs: tuple[TrackerConfig, ...]
@@ -62,16 +65,16 @@ class Plan:
 
 
 class Progress:
-    """What `make_table` reports; the base class keeps quiet."""
+    """Receives the progress of `make_table`; the base class ignores it."""
 
     def observing(self, recording: str, done: int, total: int | None) -> None:
-        """That many sets of a recording have evidence."""
+        """Receives the number of frame sets of a recording that have been segmented."""
 
     def running(self, done: int, total: int) -> None:
-        """That many runs of all are done, those found in the store included."""
+        """Receives the number of completed runs, stored ones included."""
 
     def warn(self, message: str) -> None:
-        """Something that the user should know, one line."""
+        """Receives a warning for the user, one line."""
 
 
 def make_table(
@@ -87,7 +90,7 @@ def make_table(
         sources: recordings, each with a `ground_truth.trc`.
         plan: what to run.
         store: folder for one small file per run; runs found there are not repeated.
-        progress: told how far it is.
+        progress: receives the progress.
 
     Returns:
         Rows as `summarise` makes them.
@@ -97,7 +100,7 @@ def make_table(
     """
     progress = progress or Progress()
     for config in plan.configs:
-        # What cannot run says so before anything long begins.
+        # Unknown bodies fail before the first long computation.
         load_description(config.body)
     pieces = [_Piece(source, plan) for source in sources]
     total = sum(len(piece.runs) for piece in pieces)
@@ -134,10 +137,8 @@ class _Piece:
         self.plan = plan
         self.source = source
         self.recording: Recording = open_recording(source, scale=plan.scale)
-        folder = source if source.is_dir() else source.parent
-        self.reference = folder.resolve() / TRUTH
-        if not self.reference.is_file():
-            raise DatasetError(f"{source}: no {TRUTH}, expected one to judge by")
+        # Workers have another working directory.
+        self.reference = existing_truth(source).resolve()
         self.start = self.recording.start_index(first_row(self.reference).stamp_ns)
         self.rates = _rates(self.recording.fps, plan.rates)
         self.runs = [
@@ -168,7 +169,7 @@ class _Piece:
         ]
 
     def groups(self) -> Iterable[list[int]]:
-        """Numbers of the runs that share evidence."""
+        """Numbers of the runs that use the same evidence."""
         groups: dict[tuple[Any, ...], list[int]] = {}
         for number, run in enumerate(self.runs):
             groups.setdefault(_imaging(run.config), []).append(number)
@@ -177,10 +178,10 @@ class _Piece:
     def run(
         self, numbers: Sequence[int], progress: Progress
     ) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Places in `numbers` and figures of runs that share evidence, as they finish."""
+        """Index in `numbers` and figures of runs on the same evidence, in order of completion."""
         runs = [self.runs[number] for number in numbers]
         order = EvidenceOrder(
-            # Workers have working folders of their own.
+            # A worker has another working directory.
             self.source.resolve(),
             self.plan.scale,
             runs[0].config,
@@ -206,7 +207,7 @@ class _Piece:
 
     def rows(self, found: Mapping[int, dict[str, Any]]) -> Iterator[dict[str, Any]]:
         numbers = iter(range(len(self.runs)))
-        told = variants(self.plan.configs)
+        names = variants(self.plan.configs)
         for place, config in enumerate(self.plan.configs):
             for rate in self.rates:
                 figures = [found[next(numbers)] for _ in range(self.plan.seeds)]
@@ -218,7 +219,7 @@ class _Piece:
                     "preset": config.preset,
                     "body": config.body,
                     "refinement": config.refinement,
-                    "variant": told[place],
+                    "variant": names[place],
                     "configuration": place,
                     "fps": rate,
                     "start_noise_mm": self.plan.start_noise_mm,
@@ -230,11 +231,11 @@ def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """One row from the runs of its seeds.
 
     Means over the seeds: `mean_mm`, `limbs_mm` (with the sd between seeds, None for one seed),
-    `evaluations`, `refinements`, `truth_difference`, `joints`. Worst of the seeds: `max_mm`
+    `evaluations`, `refinements`, `truth_difference`, `joints`. Maxima over the seeds: `max_mm`
     (largest frame mean), `worst_joint_mm`, `last_joint_mm`, `lost_run`, `lost_frames`.
-    `frames_per_s` is the median, and `ms_per_evaluation` what that makes of a swarm alone (None
-    beside refinement). `runs` holds each seed's `mean_mm`, `curve` the error over time: the stamps
-    that all seeds share (s) and the mean over the seeds (mm).
+    `frames_per_s` is the median over the seeds; `ms_per_evaluation` follows from it for runs
+    without refinement (None with refinement). `runs` holds each seed's `mean_mm`, `curve` the error
+    over time: the stamps common to all seeds (s) and the mean over the seeds (mm).
     """
     row: dict[str, Any] = {"seeds": len(runs)}
     for name in ("evaluations", "refinements", "mean_mm", "limbs_mm", "truth_difference"):
@@ -311,8 +312,8 @@ def _store(store: Path | None, piece: _Piece, number: int, figures: Mapping[str,
         return
     path = _file(store, piece.recording.name, piece.keys[number])
     path.parent.mkdir(parents=True, exist_ok=True)
-    told = {"source": str(piece.source), **describe(piece.runs[number]), "figures": figures}
+    record = {"source": str(piece.source), **describe(piece.runs[number]), "figures": figures}
     part = path.with_suffix(".part")
-    part.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-    # A run is there as a whole or not at all.
+    part.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    # An interrupted write leaves no incomplete file.
     os.replace(part, path)

@@ -1,7 +1,7 @@
 """Runs on the workers of a Dask cluster.
 
-Every worker process makes a recording's evidence once for itself, from the recording at the same
-path as here, so that images do not travel and the figures are those of a run here, times apart.
+Every worker process segments a recording once, from the same path as on this machine, so that no
+images are sent. Apart from the times, the figures are those of a local run.
 """
 
 import socket
@@ -18,8 +18,9 @@ from markerless_tracker.errors import ConfigError, DatasetError, SearchError
 from markerless_tracker.results.result import versions
 
 ANSWER_S = 10.0
-"""How long a scheduler may take to answer."""
+"""Timeout for the scheduler's answer, s."""
 _KEPT = 2
+"""Recordings whose evidence a worker keeps."""
 
 _lock = threading.Lock()
 _made: dict[EvidenceOrder, tuple[Evidence, "tempfile.TemporaryDirectory[str]"]] = {}
@@ -28,16 +29,16 @@ _made: dict[EvidenceOrder, tuple[Evidence, "tempfile.TemporaryDirectory[str]"]] 
 def run_all_on(
     scheduler: str, runs: Sequence[Run], order: EvidenceOrder
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Numbers and figures (see `execute`) of runs on one recording, in the order they finish.
+    """Numbers and figures (see `execute`) of runs on one recording, in order of completion.
 
     Args:
         scheduler: address, such as tcp://host:8786.
-        runs: what to run; one each to a worker's thread at a time.
-        order: the evidence they share.
+        runs: the runs; each worker thread does one at a time.
+        order: their common evidence.
 
     Raises:
-        ConfigError: Dask is not installed, nobody answers, no worker is there, or a worker has
-            other code or versions.
+        ConfigError: Dask is not installed, the scheduler does not answer or has no worker, or a
+            worker has other code or versions.
         TrackerError: a run failed.
     """
     try:
@@ -51,11 +52,11 @@ def run_all_on(
         client = Client(scheduler, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise ConfigError(
-            f"scheduler {scheduler}: nobody answers there: {' '.join(str(error).split())}"
+            f"scheduler {scheduler}: no answer: {' '.join(str(error).split())}"
         ) from error
     with client:
         if not client.nthreads():
-            raise ConfigError(f"scheduler {scheduler}: it has no worker")
+            raise ConfigError(f"scheduler {scheduler}: it has no worker, expected at least one")
         same = code_and_versions()
         futures = {
             client.submit(execute_there, run, order, same, pure=False): number
@@ -66,28 +67,27 @@ def run_all_on(
                 yield futures[future], future.result()
         except KilledWorker as error:
             raise SearchError(
-                f"scheduler {scheduler}: a run ended several workers before their time: "
-                "killed, or out of memory"
+                f"scheduler {scheduler}: several workers died in a run: killed, or out of memory"
             ) from error
         finally:
             client.cancel(list(futures))
 
 
 def code_and_versions() -> dict[str, str]:
-    """What must not differ between machines: this package's code, and versions by name."""
+    """What must be equal on all machines: key of this package's code, and versions by name."""
     return {"code": code_key(), **{name: str(value) for name, value in versions().items()}}
 
 
 def execute_there(run: Run, order: EvidenceOrder, same: Mapping[str, str]) -> dict[str, Any]:
-    """What a worker does: see `execute`.
+    """Do a run on a worker: see `execute`.
 
     Args:
-        run: what to run.
-        order: the evidence.
-        same: code and versions that the worker must share with whoever asks.
+        run: the run.
+        order: its evidence.
+        same: required code and versions (`code_and_versions`).
 
     Raises:
-        ConfigError: it does not share them.
+        ConfigError: the worker has others.
         TrackerError: the run failed.
     """
     host = socket.gethostname()
@@ -95,8 +95,8 @@ def execute_there(run: Run, order: EvidenceOrder, same: Mapping[str, str]) -> di
     differing = [name for name, value in same.items() if here.get(name) != value]
     if differing:
         raise ConfigError(
-            f"worker {host}: not the same {', '.join(differing)} as where the table is made, the "
-            "figures would not be the same"
+            f"worker {host}: {', '.join(differing)} differ from those of the machine that makes "
+            "the table, expected the same"
         )
     try:
         evidence = _evidence(order)
@@ -106,12 +106,12 @@ def execute_there(run: Run, order: EvidenceOrder, same: Mapping[str, str]) -> di
 
 
 def _evidence(order: EvidenceOrder) -> Evidence:
-    """The evidence ordered, made when first asked for; the latest orders are kept."""
+    """The evidence of an order, made at its first use; the latest ones are kept."""
     with _lock:
         if order not in _made:
             folder = tempfile.TemporaryDirectory(prefix="markerless_tracker_")
             _made[order] = (order.make(Path(folder.name)), folder)
             while len(_made) > _KEPT:
-                # Whoever still reads its files has them open.
+                # Runs that read its files hold them open.
                 _made.pop(next(iter(_made)))[1].cleanup()
         return _made[order][0]

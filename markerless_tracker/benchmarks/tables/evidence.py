@@ -1,8 +1,8 @@
-"""A recording's evidence, made once and read by many runs, in other processes too.
+"""A recording's evidence, computed once and read by many runs, also in other processes.
 
-Decoding and segmenting do not depend on body, seed or search, and cost more than either. The
-observations that `Tracker.step` would make are written to plain files, which the runs map into
-memory: a run fed with them gives the same numbers as one fed with the images.
+Decoding and segmentation do not depend on body, seed or search. The observations that
+`Tracker.step` would make are written to plain files, which the runs map into memory. A run on them
+gives the same numbers as a run on the images.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,7 +26,7 @@ class Evidence:
     """Observations of one recording under one set of imaging settings.
 
     Attributes:
-        folder: where the files lie; whoever made it removes it.
+        folder: folder of the files; the caller of `make_evidence` removes it.
         rig: the cameras, scaled as the images were.
         every: frames of the recording from one stored set to the next.
         stamps_ns: one per stored set.
@@ -45,7 +45,7 @@ class Evidence:
         """
         if every < 1 or every % self.every:
             raise DatasetError(
-                f"every {every}th frame was asked for, every {self.every}th has evidence"
+                f"every {every}th frame requested, expected a multiple of {self.every}"
             )
         count = len(self.stamps_ns)
         masks, edges = {}, {}
@@ -76,12 +76,12 @@ class Evidence:
 
 @dataclass(frozen=True)
 class EvidenceOrder:
-    """Which evidence to make, as a value that may travel to another machine.
+    """Arguments of `make_evidence` as a value that can be sent to another machine.
 
     Attributes:
         source: the recording.
         scale: factor for its images.
-        settings: of the imaging.
+        settings: settings of the imaging.
         start, every, frames: as for `make_evidence`.
     """
 
@@ -99,10 +99,10 @@ class EvidenceOrder:
         recording: Recording | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> Evidence:
-        """Make it in an existing, empty folder; the recording is opened unless it is given.
+        """Make the evidence in an existing, empty folder; opens the recording unless it is given.
 
         Raises:
-            TrackerError: as `make_evidence`, or there is no such recording.
+            TrackerError: as `make_evidence`, or the recording does not exist.
         """
         return make_evidence(
             recording or open_recording(self.source, scale=self.scale),
@@ -129,11 +129,11 @@ def make_evidence(
 
     Args:
         recording: the images.
-        settings: of the imaging.
+        settings: settings of the imaging.
         folder: an existing, empty folder.
         start: first frame.
         every: keep every k-th frame from there on.
-        frames: stop before this many frames (of the recording, not of those kept) are exceeded.
+        frames: use this many frames of the recording at most, counted before `every`.
         progress: called with the number of sets stored so far.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The papers' tables: which settings make each row, and the figures that their authors print."""
+"""The papers' tables: settings of each row, and the figures that the papers print."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,18 +11,18 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.resources import config_file
 
 FIGURES = ("mean_mm", "sd_mm", "max_mm", "s_per_frame", "ms_per_evaluation")
-"""What a paper may print of a row; as in `tables.summarise`."""
+"""Figures that a paper may print for a row; keys as in `accuracy.summarise`."""
 
 Figures = Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class PaperRow:
-    """A row: what to run, and what the paper prints for it.
+    """A row of a paper's table.
 
     Attributes:
-        settings: on top of a preset.
-        theirs: the paper's recordings to its figures on them.
+        settings: settings of the row, added to a preset.
+        theirs: printed figures by the paper's recordings.
     """
 
     settings: Mapping[str, Any]
@@ -35,11 +35,11 @@ class PaperTable:
 
     Attributes:
         name: short name.
-        title: what it compares.
-        source: paper and data that its figures are from.
-        note: what the paper says in words; '' = nothing.
+        title: title for people.
+        source: paper and data of the figures.
+        note: remark from the paper's text; '' = none.
         rates: frames per second for which the figures hold.
-        rows: in order.
+        rows: the rows in order.
     """
 
     name: str
@@ -51,7 +51,7 @@ class PaperTable:
 
     @property
     def recordings(self) -> tuple[str, ...]:
-        """The paper's recordings, in the order in which rows name them."""
+        """The paper's recordings, in the order of the rows."""
         return tuple(dict.fromkeys(name for row in self.rows for name in row.theirs))
 
 
@@ -59,7 +59,7 @@ def read_papers(path: Path | None = None) -> Mapping[str, PaperTable]:
     """The tables of a file by name; of the shipped `papers.yaml` unless one is given.
 
     Raises:
-        ConfigError: the file does not hold such tables; names the file and the place.
+        ConfigError: the file cannot be read or has another structure; names file and place.
     """
     path = path or config_file("papers.yaml")
     try:
@@ -73,7 +73,7 @@ def read_papers(path: Path | None = None) -> Mapping[str, PaperTable]:
 
 
 def choose(tables: Mapping[str, PaperTable], names: Sequence[str]) -> tuple[PaperTable, ...]:
-    """The tables of those names, each once; 'all' stands for all.
+    """The named tables, each once; 'all' selects every table.
 
     Raises:
         ConfigError: a name is unknown.

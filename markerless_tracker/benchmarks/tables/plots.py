@@ -1,4 +1,4 @@
-"""Error over time as pictures, one per recording and rate, a line per row of a table."""
+"""Plots of the error over time: one per recording and rate, with a line per row of a table."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,8 +12,8 @@ def write_plot(path: Path, title: str, lines: Sequence[tuple[str, Mapping[str, A
 
     Args:
         path: the file; its folder is made.
-        title: above the picture.
-        lines: legend and row (as `tables.summarise` makes it) of each line.
+        title: title of the plot.
+        lines: legend and row (as returned by `accuracy.summarise`) of each line.
 
     Raises:
         ConfigError: matplotlib is not installed.

@@ -1,4 +1,4 @@
-"""Runs side by side in processes of their own, each with one thread."""
+"""Parallel runs in separate processes, each with one thread."""
 
 import multiprocessing
 import signal
@@ -17,12 +17,13 @@ from markerless_tracker.errors import SearchError
 def run_all(
     runs: Sequence[Run], evidence: Evidence, *, processes: int
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Numbers and figures (see `execute`) of runs on one recording, in the order they finish.
+    """Numbers and figures (see `execute`) of runs on one recording, in order of completion.
 
-    With one process they run in this one, in order. The figures do not depend on it, times apart.
+    With `processes` = 1 they run in this process, in order. Apart from the times, the figures do
+    not depend on the number of processes.
 
     Raises:
-        TrackerError: a run failed, or its process was killed (no memory left, perhaps).
+        TrackerError: a run failed, or its process died.
     """
     if min(processes, len(runs)) <= 1:
         for number, run in enumerate(runs):
@@ -42,13 +43,13 @@ def run_all(
             yield futures[future], future.result()
     except BrokenProcessPool as error:
         raise SearchError(
-            "a run's process ended before its time: killed, or out of memory; try fewer jobs"
+            "the process of a run died: killed, or out of memory; try fewer jobs"
         ) from error
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
 
 
 def _settle() -> None:
-    """One thread for OpenCV, and an interrupt ends the process without a word."""
+    """One thread for OpenCV; an interrupt ends the process without a traceback."""
     cv2.setNumThreads(1)
     signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -1,4 +1,4 @@
-"""One run of a table: a configuration on one recording's evidence, scored against its truth."""
+"""One run of a table: a configuration on a recording's evidence, scored by its reference."""
 
 import tempfile
 import time
@@ -21,20 +21,20 @@ from markerless_tracker.results.score import MM_PER_M, Score, score
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 
 LOST_LIMB_MM = 150.0
-"""A joint farther off than this is a limb lost."""
+"""A joint with a larger error counts as a lost limb."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What to run.
+    """Arguments of a run.
 
     Attributes:
         config: every setting, the seed included.
         every: every k-th frame of the recording is tracked.
-        reference: marker file: its first row is the start and gives the lengths, all its rows
-            are the truth.
+        reference: marker file; its first row gives the start pose and the segment lengths, all its
+            rows are the reference.
         start_noise_mm: sd of normal noise on each coordinate of that first row.
-        truth_score: also compare f at the truth with f at the result.
+        truth_score: also compare f at the reference pose with f at the result.
     """
 
     config: TrackerConfig
@@ -50,12 +50,11 @@ def execute(run: Run, evidence: Evidence) -> dict[str, Any]:
     Keys: those of `Score.as_dict`, and `stamps_s` (of `frame_mm`), `last_joint_mm` (largest joint
     error in the last frame), `lost_run` (longest run of frames with any joint more than
     `LOST_LIMB_MM` off), `lost_frames` (frames in the state LOST), `evaluations` and `refinements`
-    (means per frame), `frames_per_s`
-    (of `Tracker.step` with the evidence ready, without the first frame, which fits the shape),
-    `truth_difference` (None unless asked for).
+    (means per frame), `frames_per_s` (of `Tracker.step` on given evidence, without the first frame,
+    which fits the shape), `truth_difference` (None without `truth_score`).
 
     Raises:
-        TrackerError: the start does not fit, or nothing can be compared.
+        TrackerError: the start does not fit the body, or no frame has a reference.
     """
     reference = read_trc(run.reference)
     with tempfile.TemporaryDirectory(prefix="markerless_tracker_") as folder:
@@ -93,14 +92,14 @@ def execute(run: Run, evidence: Evidence) -> dict[str, Any]:
 
 
 def disturbed_start(reference: MarkerTrack, noise_mm: float, seed: int) -> MarkerTrack:
-    """The first row that holds markers, with normal noise of that sd on each coordinate.
+    """The first row with markers, with normal noise of sd `noise_mm` on each coordinate.
 
     Raises:
-        DatasetError: no row holds any marker.
+        DatasetError: no row has any marker.
     """
     rows = np.flatnonzero(reference.tracked)
     if rows.size == 0:
-        raise DatasetError("the reference holds no marker in any row")
+        raise DatasetError("the reference has no marker in any row, expected at least one")
     first = reference.rows(rows[:1])
     rng = keyed_generator(seed, int(first.stamps_ns[0]), "start noise")
     noise_m = noise_mm / MM_PER_M * rng.standard_normal(first.positions_m.shape)
@@ -132,7 +131,7 @@ def _track(results: list[TrackResult]) -> MarkerTrack:
 
 
 def describe(run: Run) -> Mapping[str, Any]:
-    """Everything in a run that its numbers depend on, as JSON values."""
+    """All arguments that a run's numbers depend on, as JSON values."""
     return {
         "settings": run.config.as_mapping(),
         "every": run.every,

@@ -1,4 +1,4 @@
-"""How well the truth itself explains the images, next to what a search found."""
+"""Objective at the reference pose compared with the objective at the result."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,16 @@ from markerless_tracker.tracking import Tracker
 
 
 class TruthScore:
-    """Compares f at the reference's pose with f at a result's, frame by frame.
+    """Compares f at the reference pose with f at the result, frame by frame.
 
-    f is what the search maximises: the mean over the views of f_s + edge_weight f_e, both poses
-    with the tracked body. Negative differences mean that the model prefers a wrong pose; positive
-    ones that the search missed a better pose. A lost tracker may score above the truth as well, so
-    the difference is read together with the error.
+    f is the objective that the search maximises: the mean over the views of f_s + edge_weight f_e,
+    for both poses with the tracked body. A negative difference means that the model prefers a wrong
+    pose, a positive one that the search missed a better pose. A lost tracker may also score above
+    the truth, so the difference has to be read together with the error.
 
     Args:
         tracker: the tracker whose results are compared.
-        reference: true markers; rows are taken by time.
+        reference: reference markers; rows are matched by time.
         stamps_ns: (n,) the stamps of all results to come, in order.
     """
 
@@ -38,7 +38,7 @@ class TruthScore:
         self.differences: list[float] = []
 
     def add(self, result: TrackResult) -> None:
-        """Take the newest result; frames without a reference or an estimate are left out."""
+        """Add the next result; frames without a reference or a pose are left out."""
         row = self._row.get(result.stamp_ns)
         if row is None or result.pose is None:
             return

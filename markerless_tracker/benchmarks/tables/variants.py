@@ -1,17 +1,17 @@
-"""What tells configurations apart, in words for a column."""
+"""Differences between configurations, as text for a column."""
 
 from collections.abc import Sequence
 
 from markerless_tracker.tracking import TrackerConfig
 
 SHOWN = ("preset", "optimizer", "body", "refinement", "evaluations", "seed", "threads")
-"""Settings with columns of their own, or overruled."""
+"""Settings that have columns of their own or are replaced by the table."""
 
 
 def variants(configs: Sequence[TrackerConfig]) -> list[str]:
-    """For each configuration the settings in which it leaves its preset: 'partition=hard'.
+    """For each configuration the settings that differ from its preset: 'partition=hard'.
 
-    What all of them share is left out.
+    Differences common to all configurations are left out.
     """
     changed = [_changes(config) for config in configs]
     common = set.intersection(*map(set, changed)) if len(changed) > 1 else set()
@@ -19,11 +19,11 @@ def variants(configs: Sequence[TrackerConfig]) -> list[str]:
 
 
 def _changes(config: TrackerConfig) -> list[str]:
-    usual = TrackerConfig.from_mapping(
+    preset = TrackerConfig.from_mapping(
         {"preset": config.preset, "optimizer": config.optimizer}
     ).by_name()
     return [
         f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"
         for name, value in config.by_name().items()
-        if name not in SHOWN and value != usual[name]
+        if name not in SHOWN and value != preset[name]
     ]

@@ -14,9 +14,9 @@ from markerless_tracker.cli.benchmark import (
 
 HELP = (
     "Measure accuracy (tables), fewer cameras (cameras), automatic starts (start), recovery, "
-    "jitter and lag (jitter), silhouettes or speed (speed). "
-    "Recordings have a ground_truth.trc: in tables its first row is the start and gives the "
-    "lengths; its rows are the truth."
+    "jitter and lag (jitter), silhouettes or speed. "
+    "Recordings need a ground_truth.trc; in tables its first row gives the start pose and the "
+    "segment lengths, all its rows are the reference."
 )
 EXAMPLE = "markerless_tracker benchmark tables RECORDING --fps 60,20 --seeds 6 -o out/tables"
 

@@ -1,4 +1,4 @@
-"""What the kinds of benchmark share: bars, and values of arguments."""
+"""Progress bars and argument types common to all benchmarks."""
 
 import argparse
 import math
@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 def progress_bars() -> Progress:
-    """Bars on standard error."""
+    """Progress bars on standard error."""
     return Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
         TimeElapsedColumn(), TimeRemainingColumn(), console=Console(stderr=True),
@@ -27,12 +27,12 @@ def progress_bars() -> Progress:
 
 
 def list_of(kind: Callable[[str], T]) -> Callable[[str], tuple[T, ...]]:
-    """Parser of a list with commas; a value that stands twice counts once."""
+    """Parser of a comma-separated list; repeated values count once."""
 
     def parse(text: str) -> tuple[T, ...]:
         words = [word.strip() for word in text.split(",")]
         if not all(words):
-            raise argparse.ArgumentTypeError(f"{text!r} is no list with commas between")
+            raise argparse.ArgumentTypeError(f"{text!r} expected values with commas between them")
         return tuple(dict.fromkeys(kind(word) for word in words))
 
     return parse

@@ -1,4 +1,4 @@
-"""`benchmark cameras`: the error with every choice of fewer cameras."""
+"""`benchmark cameras`: the error with every subset of the cameras."""
 
 import argparse
 import sys
@@ -11,17 +11,10 @@ from rich.console import Console
 from rich.table import Table
 
 from markerless_tracker.benchmarks import cameras
-from markerless_tracker.benchmarks.judged import Beginning
 from markerless_tracker.benchmarks.tables.runs import LOST_LIMB_MM
+from markerless_tracker.benchmarks.with_truth import Report, RunStart
 from markerless_tracker.cli.benchmark.arguments import count, list_of
-from markerless_tracker.cli.benchmark.recordings import (
-    Report,
-    Row,
-    add_recordings,
-    measure_each,
-    print_json,
-)
-from markerless_tracker.cli.track import read_config
+from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
 
 _STARTS = ("measured", "automatic")
 
@@ -30,21 +23,21 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
     parser = kinds.add_parser(
         "cameras",
-        help="error with every choice of fewer cameras, and how many times that of all it is",
-        description="Whole runs with all cameras and with every choice of some of them.",
+        help="error with every subset of the cameras, and its ratio to that of all cameras",
+        description="Whole runs with all cameras and with every subset of the given sizes.",
         epilog="example: markerless_tracker benchmark cameras WALK --stature 1.72",
     )
     add_recordings(parser)
     parser.add_argument(
         "--each", type=list_of(count), default=(3, 2), metavar="LIST",
-        help="numbers of cameras; every choice of as many is run (3,2)",
+        help="sizes of the subsets (3,2)",
     )  # fmt: skip
     parser.add_argument(
         "--start", type=list_of(str), default=_STARTS, metavar="LIST",
-        help="measured: start and lengths from the first row of the truth; automatic: nothing is "
-        f"told but --stature, judged after {cameras.SETTLED_FRAMES} frames (both)",
+        help="measured: start and lengths from the first row of ground_truth.trc; automatic: only "
+        f"--stature is given, scored after {cameras.SETTLED_FRAMES} frames (both)",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all draws (0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all random draws (0)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -56,32 +49,29 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return 1
-    flags = {"seed": args.seed, **({} if args.threads is None else {"threads": args.threads})}
-    config = read_config(args.config, flags)
+    config = settings(args, "seed")
 
     def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:
         return cameras.measure_cameras(
             source,
             config,
-            beginnings=[Beginning(name == "measured", stature_m) for name in args.start],
+            starts=[RunStart(name == "measured", stature_m) for name in args.start],
             counts=args.each,
             scale=scale,
             report=report,
         )
 
-    rows = measure_each(args, measure)
-    if args.json:
-        print_json(rows)
-        return 0
-    console = Console(width=None if sys.stdout.isatty() else 150)
+    return run_each(args, measure, _show, width=150)
+
+
+def _show(console: Console, rows: list[Row]) -> None:
     for row in rows:
-        console.print(_rendered(row))
+        console.print(_table(row))
         for line in _summary(row):
             console.print(line, highlight=False, markup=False)
-    return 0
 
 
-def _rendered(row: dict[str, Any]) -> Table:
+def _table(row: Row) -> Table:
     table = Table(title=f"{row['recording']}, scale {row['scale']:g}: fewer cameras")
     for title in ("start", "cameras"):
         table.add_column(title)
@@ -102,8 +92,8 @@ def _rendered(row: dict[str, Any]) -> Table:
     return table
 
 
-def _summary(row: dict[str, Any]) -> Iterator[str]:
-    """A line per start and number of cameras: mean, best and worst choice."""
+def _summary(row: Row) -> Iterator[str]:
+    """A line per start and size of the subsets: mean, best and worst."""
 
     def key(one: dict[str, Any]) -> tuple[str, int]:
         return one["start"], len(one["cameras"])

@@ -1,4 +1,4 @@
-"""`benchmark tables`: the configurations that lists of choices, or the papers' tables, name."""
+"""`benchmark tables`: configurations from the options' values or from the papers' tables."""
 
 import argparse
 import itertools
@@ -20,7 +20,7 @@ class Group:
     """Rows that are printed together.
 
     Attributes:
-        table: the paper's table they remake; None = what the lists of choices make.
+        table: the paper's table that is reproduced; None = combinations of the options' values.
         rows: the paper's row, if any, and the configuration.
     """
 
@@ -34,7 +34,7 @@ class Group:
 
 
 def varied(text: str) -> tuple[str, tuple[Any, ...]]:
-    """Parser of KEY=V,V...; values as in YAML."""
+    """Parser of KEY=V,V..., with values as in YAML."""
     key, equals, values = text.partition("=")
     words = [word.strip() for word in values.split(",")]
     if not (key.strip() and equals and all(words)):
@@ -46,9 +46,9 @@ def varied(text: str) -> tuple[str, tuple[Any, ...]]:
 
 
 def groups(args: argparse.Namespace, papers: Sequence[PaperTable]) -> tuple[Group, ...]:
-    """The papers' tables that were asked for, else one group of all choices' combinations.
+    """The requested papers' tables, otherwise one group with all combinations of the options.
 
-    What the command line names is put in place of a table's own settings.
+    Options replace a table's own settings.
 
     Raises:
         ConfigError: an unknown setting or an impossible value.
@@ -56,7 +56,7 @@ def groups(args: argparse.Namespace, papers: Sequence[PaperTable]) -> tuple[Grou
     vary: dict[str, tuple[Any, ...]] = {}
     for key, values in args.vary:
         if key in vary:
-            raise ConfigError(f"--vary: {key} stands twice")
+            raise ConfigError(f"--vary: {key} is given twice")
         vary[key] = values
     named: dict[str, Sequence[Any] | None] = {
         "preset": args.preset,
@@ -72,7 +72,7 @@ def groups(args: argparse.Namespace, papers: Sequence[PaperTable]) -> tuple[Grou
             choices = {"preset": tuple(PRESETS), **choices}
         return (Group(None, tuple((None, c) for c in _configs(args.config, {}, choices))),)
     if "optimizer" in choices:
-        raise ConfigError("--table names the optimizers itself, it does not go with --optimizer")
+        raise ConfigError("--table sets the optimizers, it does not go with --optimizer")
     if args.config is None:
         choices = {"preset": ("paper",), **choices}
     return tuple(

@@ -1,7 +1,6 @@
-"""`benchmark jitter`: what the filter of the results takes from jitter and costs in time."""
+"""`benchmark jitter`: jitter and lag without and with the filter of the results."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,57 +8,45 @@ from rich.console import Console
 from rich.table import Table
 
 from markerless_tracker.benchmarks import jitter
-from markerless_tracker.benchmarks.judged import Beginning
-from markerless_tracker.cli.benchmark.recordings import (
-    Report,
-    Row,
-    add_recordings,
-    measure_each,
-    print_json,
-)
-from markerless_tracker.cli.track import read_config
+from markerless_tracker.benchmarks.with_truth import Report, RunStart
+from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
     parser = kinds.add_parser(
         "jitter",
-        help="jitter of who stands and lag of who moves, without and with the filter",
+        help="jitter of a standing person and lag of a moving one, without and with the filter",
         description="Jitter, lag and error, without and with smoothing: one_euro.",
         epilog="example: markerless_tracker synthesize STAND --motion stand --seconds 3 && "
         "markerless_tracker benchmark jitter STAND WALK",
     )
-    add_recordings(parser, without="start and lengths from the first row of the truth")
+    add_recordings(parser, without="start and lengths from the first row of ground_truth.trc")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status."""
-    flags = {} if args.threads is None else {"threads": args.threads}
-    config = read_config(args.config, flags)
+    config = settings(args)
 
     def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:
-        beginning = Beginning(stature_m is None, stature_m)
-        return jitter.measure_jitter(
-            source, config, beginning=beginning, scale=scale, report=report
-        )
+        start = RunStart(stature_m is None, stature_m)
+        return jitter.measure_jitter(source, config, start=start, scale=scale, report=report)
 
-    rows = measure_each(args, measure)
-    if args.json:
-        print_json(rows)
-        return 0
-    console = Console(width=None if sys.stdout.isatty() else 150)
-    console.print(_rendered(rows))
+    return run_each(args, measure, _show, width=150)
+
+
+def _show(console: Console, rows: list[Row]) -> None:
+    console.print(_table(rows))
     console.print(
-        "Jitter: rms of what a joint centre does faster than its mean over "
-        f"{jitter.SLOW_S:g} s, the true motion taken off; mean over the joints. Lag: behind the "
-        "unfiltered track, frames; worst: of one joint.",
+        "Jitter: rms of a joint centre's motion about its mean over "
+        f"{jitter.SLOW_S:g} s, the true motion subtracted; mean over the joints. Lag: behind the "
+        "unfiltered track, frames; worst: largest of one joint.",
         highlight=False,
     )
-    return 0
 
 
-def _rendered(rows: list[dict[str, Any]]) -> Table:
-    table = Table(title="Calm and in time")
+def _table(rows: list[Row]) -> Table:
+    table = Table(title="Jitter and lag")
     for title in ("recording", "start", "smoothing"):
         table.add_column(title)
     for title in (

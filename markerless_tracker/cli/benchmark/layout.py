@@ -1,4 +1,4 @@
-"""`benchmark tables`: rows as people read them, the papers' figures beside ours."""
+"""`benchmark tables`: tables for people, with the papers' figures beside ours."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -14,13 +14,13 @@ Row = Mapping[str, Any]
 LEGEND = (
     "mm; mean and limbs: mean ± sd over the seeds; largest frame mean, worst joint, worst "
     "joint of the last frame and frames in a row with a joint more than "
-    f"{LOST_LIMB_MM:g} mm off: the worst seed's. Evaluations of the swarm and "
-    "iterations of refinement are per frame; frames/s, ms/eval.: one thread, evidence ready."
+    f"{LOST_LIMB_MM:g} mm off: maximum over the seeds. Evaluations of the swarm and "
+    "iterations of refinement are per frame; frames/s, ms/eval.: one thread, evidence given."
 )
 
 
 def full_table(title: str, rows: Sequence[Row], *, truth_score: bool) -> Table:
-    """Every figure of rows of one recording."""
+    """A table with all figures of rows of one recording."""
     table = Table(title=title)
     headings = ["preset", "optimizer", "body", "refinement"]
     if any(row["variant"] for row in rows):
@@ -59,8 +59,8 @@ def paper_table(
     *,
     truth_score: bool,
 ) -> Table:
-    """Rows in a paper's layout: ours, then the figures that the paper prints of its own data."""
-    # As in the papers, the algorithms of one rate stand together.
+    """Rows in a paper's layout: our figures, then those that the paper prints for its own data."""
+    # Sorted by rate, as in the papers.
     found = sorted(rows, key=lambda pair: -pair[1]["fps"])
     table = Table(title=f"{paper.title}\n{title}", caption=_caption(paper))
     headings = ["optimizer", "body", "refinement"]
@@ -94,7 +94,7 @@ def paper_table(
 
 
 def printed(figures: Mapping[str, float]) -> str:
-    """A paper's figures for one cell; '' without any."""
+    """A paper's figures as the text of one cell; '' without any."""
     words = []
     if "mean_mm" in figures:
         spread = f" ± {figures['sd_mm']:g}" if "sd_mm" in figures else ""
@@ -109,7 +109,7 @@ def printed(figures: Mapping[str, float]) -> str:
 
 
 def legend_of(row: Row) -> str:
-    """Name of a row's line in a picture."""
+    """Legend of a row's line in a plot."""
     words = [row["optimizer"], row["variant"], f"{row['evaluations']:.0f} eval."]
     return " ".join(
         [*filter(None, words), Path(row["body"]).stem, row["refinement"], f"({row['preset']})"]

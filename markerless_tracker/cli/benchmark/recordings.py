@@ -1,4 +1,4 @@
-"""Recordings on the command line, with values that differ from one to the other."""
+"""Arguments and output common to the benchmarks that run on recordings one by one."""
 
 import argparse
 import json
@@ -7,24 +7,29 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+from rich.console import Console
+
 from markerless_tracker.benchmarks.machine import machine
+from markerless_tracker.benchmarks.with_truth import Report
 from markerless_tracker.cli.benchmark.arguments import list_of, positive, progress_bars
+from markerless_tracker.cli.track import read_config
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.results.result import versions
+from markerless_tracker.tracking import TrackerConfig
 
 T = TypeVar("T")
 Row = dict[str, Any]
-Report = Callable[[str, int, int | None], None]
 Measure = Callable[[Path, float | None, float, Report], Row]
-"""Figures of a recording, from its stature (m, None = not told), scale and who is told of them."""
+"""Returns the figures of a recording. Arguments: source, stature in m (None = unknown), scale of
+the images, receiver of the progress."""
 
 
 def add_recordings(parser: argparse.ArgumentParser, *, without: str = "unknown") -> None:
-    """Declare the recordings, the persons' statures, the images' scales, and what all runs share.
+    """Declare the recordings, the statures, the scales of the images, and the common options.
 
     Args:
-        parser: takes the arguments.
-        without: what holds without a stature, for the help.
+        parser: receives the arguments.
+        without: for the help: what holds without `--stature`.
     """
     parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
     parser.add_argument(
@@ -40,11 +45,36 @@ def add_recordings(parser: argparse.ArgumentParser, *, without: str = "unknown")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
-def measure_each(args: argparse.Namespace, measure: Measure) -> list[Row]:
-    """Measure one recording after the other, with a progress bar.
+def settings(args: argparse.Namespace, *names: str) -> TrackerConfig:
+    """Settings of `--config`, overridden by `--threads` and the named options if given.
 
     Raises:
-        ConfigError: neither one value nor one per recording.
+        ConfigError: a setting is unknown or has an impossible value.
+    """
+    given = {name: getattr(args, name) for name in ("threads", *names)}
+    return read_config(args.config, {k: v for k, v in given.items() if v is not None})
+
+
+def run_each(
+    args: argparse.Namespace,
+    measure: Measure,
+    show: Callable[[Console, list[Row]], None],
+    *,
+    width: int,
+) -> int:
+    """Measure the recordings one after the other, with a progress bar, and print the figures.
+
+    Args:
+        args: parsed arguments, see `add_recordings`.
+        measure: measures one recording.
+        show: prints the figures for people; not called with `--json`.
+        width: columns of the output if standard output is no terminal.
+
+    Returns:
+        The exit status.
+
+    Raises:
+        ConfigError: `--stature` or `--scale` has neither one value nor one per recording.
     """
     statures = each(args.stature or (None,), args.sources, "--stature")
     scales = each(args.scale, args.sources, "--scale")
@@ -54,21 +84,21 @@ def measure_each(args: argparse.Namespace, measure: Measure) -> list[Row]:
         def report(part: str, done: int, total: int | None) -> None:
             bars.update(task, description=part, completed=done, total=total)
 
-        return [
+        rows = [
             measure(source, stature_m, scale, report)
             for source, stature_m, scale in zip(args.sources, statures, scales, strict=True)
         ]
-
-
-def print_json(rows: list[Row]) -> None:
-    """The figures for machines, on standard output."""
-    table = {"machine": machine(), "versions": versions(), "rows": rows}
-    json.dump(table, sys.stdout, indent=2, allow_nan=False)
-    sys.stdout.write("\n")
+    if args.json:
+        table = {"machine": machine(), "versions": versions(), "rows": rows}
+        json.dump(table, sys.stdout, indent=2, allow_nan=False)
+        sys.stdout.write("\n")
+    else:
+        show(Console(width=None if sys.stdout.isatty() else width), rows)
+    return 0
 
 
 def list_of_each(kind: Callable[[str], T]) -> Callable[[str], tuple[T, ...]]:
-    """Parser of a list with commas that keeps values standing twice."""
+    """Parser of a comma-separated list that keeps repeated values."""
 
     def parse(text: str) -> tuple[T, ...]:
         return tuple(list_of(kind)(word)[0] for word in text.split(","))
@@ -77,10 +107,10 @@ def list_of_each(kind: Callable[[str], T]) -> Callable[[str], tuple[T, ...]]:
 
 
 def each(values: tuple[T, ...], sources: Sequence[Path], option: str) -> tuple[T, ...]:
-    """A value per source, from one for all or one each.
+    """One value per source, from one value for all or one each.
 
     Raises:
-        ConfigError: neither.
+        ConfigError: there is another number of values; names the option.
     """
     if len(values) == 1:
         return values * len(sources)

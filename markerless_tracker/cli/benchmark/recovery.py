@@ -1,7 +1,6 @@
-"""`benchmark recovery`: how soon the tracker is back after it saw nothing."""
+"""`benchmark recovery`: frames until the person is tracked again after a disturbance."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,23 +8,17 @@ from rich.console import Console
 from rich.table import Table
 
 from markerless_tracker.benchmarks import recovery
+from markerless_tracker.benchmarks.with_truth import Report
 from markerless_tracker.cli.benchmark.arguments import count
-from markerless_tracker.cli.benchmark.recordings import (
-    Report,
-    Row,
-    add_recordings,
-    measure_each,
-    print_json,
-)
-from markerless_tracker.cli.track import read_config
+from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
     parser = kinds.add_parser(
         "recovery",
-        help="how soon the person is tracked again after black views or missing frames",
-        description="Black views and missing frames, and how soon the person is tracked again.",
+        help="frames until the person is tracked again after black views or missing frames",
+        description="Black views, missing frames, and frames until the person is tracked again.",
         epilog="example: markerless_tracker benchmark recovery WALK --stature 1.72",
     )
     add_recordings(parser)
@@ -34,37 +27,41 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status."""
-    flags = {} if args.threads is None else {"threads": args.threads}
-    config = read_config(args.config, flags)
+    config = settings(args)
 
     def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:
         return recovery.measure_recovery(
-            source, config, stature_m=stature_m, scale=scale, seeds=args.seeds, progress=report
+            source, config, stature_m=stature_m, scale=scale, seeds=args.seeds, report=report
         )
 
-    rows = measure_each(args, measure)
-    if args.json:
-        print_json(rows)
-        return 0
-    console = Console(width=None if sys.stdout.isatty() else 120)
-    console.print(_rendered(rows))
+    return run_each(args, measure, _show, width=120)
+
+
+def _show(console: Console, rows: list[Row]) -> None:
+    console.print(_table(rows))
     console.print(
-        "Mean error, mm: usual: undisturbed; meanwhile: of the disturbed frames that have a pose. "
-        f"Back: the error is at most the undisturbed run's mean + {recovery.OVER_USUAL_MM:g} mm, "
-        f"within {recovery.WITHIN_FRAMES} frames.",
+        "Mean error, mm: undisturbed: of the undisturbed run; meanwhile: of the disturbed frames "
+        "that have a pose. Back: the error is at most the undisturbed mean + "
+        f"{recovery.TOLERANCE_MM:g} mm, within {recovery.WITHIN_FRAMES} frames.",
         highlight=False,
     )
-    return 0
 
 
-def _rendered(rows: list[dict[str, Any]]) -> Table:
+def _table(rows: list[Row]) -> Table:
     table = Table(title="Recovery")
     for title in ("recording", "disturbance"):
         table.add_column(title)
-    for title in ("usual mm", "runs", "meanwhile", "back", "frames until back", "worst after"):
+    for title in (
+        "undisturbed mm",
+        "runs",
+        "meanwhile",
+        "back",
+        "frames until back",
+        "worst after",
+    ):
         table.add_column(title, justify="right")
     for row in rows:
-        usual = sum(row["usual_mm"]) / len(row["usual_mm"])
+        undisturbed = sum(row["undisturbed_mm"]) / len(row["undisturbed_mm"])
         for disturbance in recovery.DISTURBANCES:
             runs = [run for run in row["runs"] if run["disturbance"] == disturbance.name]
             if not runs:
@@ -74,7 +71,7 @@ def _rendered(rows: list[dict[str, Any]]) -> Table:
             table.add_row(
                 row["recording"],
                 disturbance.name,
-                f"{usual:.1f}",
+                f"{undisturbed:.1f}",
                 str(len(runs)),
                 f"{sum(meanwhile) / len(meanwhile):.1f}" if meanwhile else "-",
                 str(sum(run["back"] for run in runs)),

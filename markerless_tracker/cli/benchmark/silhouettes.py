@@ -1,4 +1,4 @@
-"""`benchmark silhouettes`: masks against exact ones, beside OpenCV's subtractors."""
+"""`benchmark silhouettes`: masks against exact ones, compared with OpenCV's subtractors."""
 
 import argparse
 import json
@@ -21,11 +21,11 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
     parser = kinds.add_parser(
         "silhouettes",
-        help="masks against exact ones, beside OpenCV's MOG2 and KNN",
+        help="masks against exact ones, compared with OpenCV's MOG2 and KNN",
         description=(
-            "Silhouettes against a recording's masks/ or, without any, against the body posed at "
-            "its ground_truth.trc; beside OpenCV's MOG2 and KNN on the same frames, with the same "
-            "repairs, one thread each."
+            "Silhouettes against a recording's masks/ or, without masks, against the body posed at "
+            "its ground_truth.trc; compared with OpenCV's MOG2 and KNN on the same frames, with "
+            "the same morphology, one thread each."
         ),
         epilog="example: markerless_tracker benchmark silhouettes RECORDING --pictures out/masks",
     )
@@ -50,7 +50,8 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     )
     parser.add_argument(
         "--pictures", type=Path, metavar="DIR",
-        help="write RECORDING-CAMERA-FRAME.png: too much red, missing blue, the rest green",
+        help="write RECORDING-CAMERA-FRAME.png: false positives red, false negatives blue, the "
+        "rest green",
     )  # fmt: skip
     parser.add_argument(
         "--json", action="store_true", help="print JSON (a list for several recordings)"
@@ -59,7 +60,7 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status."""
-    # Takes a moment to import; `--help` does without.
+    # Imported late, since `--help` does not need it.
     from markerless_tracker.benchmarks.silhouettes.masks import measure
     from markerless_tracker.benchmarks.silhouettes.scene import made_up_scene, recorded_scene
     from markerless_tracker.datasets import write_image
@@ -154,7 +155,7 @@ def generated_table(figures: Mapping[str, Any]) -> Table:
 
 
 def silhouette_table(figures: Mapping[str, Any]) -> Table:
-    """The figures of `evaluation.silhouettes.measure` for people."""
+    """The figures of `benchmarks.silhouettes.masks.measure` for people."""
     width, height = figures["image_size"]
     frames = len(figures["frames"])
     title = f"{figures['recording']}, {width}x{height} px, {frames} frames"

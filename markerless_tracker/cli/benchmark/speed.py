@@ -1,4 +1,4 @@
-"""`benchmark speed`: time of each part."""
+"""`benchmark speed`: computing time of each part."""
 
 import argparse
 import json
@@ -17,8 +17,8 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
     parser = kinds.add_parser(
         "speed",
-        help="time of each part, and ratios to a fixed reference timed in between",
-        description="Time of each part, and ratios to a fixed reference timed in between.",
+        help="time of each part, and ratios to a fixed reference timed alternately",
+        description="Time of each part, and ratios to a fixed reference timed alternately.",
         epilog="example: markerless_tracker benchmark speed --threads 2",
     )
     parser.add_argument(
@@ -30,13 +30,13 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     )
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="0 = one per core")
     parser.add_argument("--frames", type=count, default=30, metavar="N", help="frames timed (30)")
-    parser.add_argument("--repeats", type=count, default=5, metavar="N", help="least of N (5)")
+    parser.add_argument("--repeats", type=count, default=5, metavar="N", help="minimum of N (5)")
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status."""
-    # Takes a moment to import; `--help` does without.
+    # Imported late, since `--help` does not need it.
     from markerless_tracker.benchmarks.speed.parts import measure
     from markerless_tracker.benchmarks.speed.scene import made_up_scene, recorded_scene
 
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def speed_table(figures: Mapping[str, Any]) -> Table:
-    """The figures of `evaluation.speed.measure` for people."""
+    """The figures of `benchmarks.speed.parts.measure` for people."""
     table = Table()
     table.add_column("part")
     table.add_column("unit")

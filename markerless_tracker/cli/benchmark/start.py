@@ -1,7 +1,6 @@
-"""`benchmark start`: how well the tracker starts by itself."""
+"""`benchmark start`: success and error of automatic starts."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,31 +8,25 @@ from rich.console import Console
 from rich.table import Table
 
 from markerless_tracker.benchmarks import starts
+from markerless_tracker.benchmarks.with_truth import Report
 from markerless_tracker.cli.benchmark.arguments import count
-from markerless_tracker.cli.benchmark.recordings import (
-    Report,
-    Row,
-    add_recordings,
-    measure_each,
-    print_json,
-)
-from markerless_tracker.cli.track import read_config
+from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
     parser = kinds.add_parser(
         "start",
-        help="starts without any start pose, from many frames of recordings",
-        description="Starts without a start pose, judged by the truth after some frames.",
+        help="automatic starts from many frames of recordings",
+        description="Automatic starts, scored by the ground_truth.trc after some frames.",
         epilog="example: markerless_tracker benchmark start WALK BALANCE --stature 1.72,1.70",
     )
     add_recordings(parser)
     parser.add_argument(
-        "--every", type=count, default=10, metavar="N", help="a start from each N-th frame (10)"
+        "--every", type=count, default=10, metavar="N", help="start from every N-th frame (10)"
     )
     parser.add_argument(
-        "--frames", type=count, default=10, metavar="N", help="judged in the N-th frame (10)"
+        "--frames", type=count, default=10, metavar="N", help="scored in the N-th frame (10)"
     )
     parser.add_argument("--seeds", type=count, default=1, metavar="N", help="seeds 0..N-1 (1)")
     parser.add_argument("--preset", metavar="NAME", help="tuned (default) or paper")
@@ -42,36 +35,30 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status."""
-    flags = {key: getattr(args, key) for key in ("preset", "body", "threads")}
-    config = read_config(args.config, {k: v for k, v in flags.items() if v is not None})
+    config = settings(args, "preset", "body")
     plan = starts.StartPlan(config, every=args.every, frames=args.frames, seeds=args.seeds)
 
     def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:
-        return starts.measure_starts(
-            source, plan, stature_m=stature_m, scale=scale, progress=report
+        return starts.measure_starts(source, plan, stature_m=stature_m, scale=scale, report=report)
+
+    def show(console: Console, rows: list[Row]) -> None:
+        console.print(_table(rows, args.frames))
+        console.print(
+            f"Error, heading: in frame {args.frames} of each start; succeeded: mean error of at "
+            f"most {starts.SUCCESS_MM:g} mm; wrong heading: more than "
+            f"{starts.WRONG_HEADING_DEG:g}° off; corrected: changed to the opposite heading.",
+            highlight=False,
         )
 
-    rows = measure_each(args, measure)
-    if args.json:
-        print_json(rows)
-        return 0
-    console = Console(width=None if sys.stdout.isatty() else 160)
-    console.print(_rendered(rows, args.frames))
-    console.print(
-        f"Error, heading: in frame {args.frames} of each start; reached: mean error of at most "
-        f"{starts.REACHED_MM:g} mm; wrong heading: more than {starts.WRONG_HEADING_DEG:g}° off; "
-        "turned: changed to the opposite heading on the way.",
-        highlight=False,
-    )
-    return 0
+    return run_each(args, measure, show, width=160)
 
 
-def _rendered(rows: list[dict[str, Any]], frames: int) -> Table:
-    table = Table(title=f"Starts without a start pose, judged in frame {frames}")
+def _table(rows: list[Row], frames: int) -> Table:
+    table = Table(title=f"Automatic starts, scored in frame {frames}")
     table.add_column("recording")
     for title in (
-        "stature", "starts", "found", "reached", "mean mm", "median", "worst", "first frame",
-        "wrong heading", "turned", "first pose s", "max",
+        "stature", "starts", "found", "succeeded", "mean mm", "median", "worst", "first frame",
+        "wrong heading", "corrected", "first pose s", "max",
     ):  # fmt: skip
         table.add_column(title, justify="right")
     for row in rows:
@@ -80,10 +67,10 @@ def _rendered(rows: list[dict[str, Any]], frames: int) -> Table:
             "unknown" if row["stature_m"] is None else f"{row['stature_m']:g} m",
             str(row["count"]),
             f"{row['found']:.1%}",
-            f"{row['reached']:.1%}",
+            f"{row['succeeded']:.1%}",
             *(_mm(row[key]) for key in ("mean_mm", "median_mm", "worst_mm", "first_mm")),
             f"{row['wrong_heading']:.1%}",
-            f"{row['turned']:.1%}",
+            f"{row['heading_corrected']:.1%}",
             _seconds(row["first_pose_s"]),
             _seconds(row["first_pose_max_s"]),
         )

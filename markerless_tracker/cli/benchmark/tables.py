@@ -1,4 +1,4 @@
-"""`benchmark tables`: error in mm on recordings whose truth is known."""
+"""`benchmark tables`: error in mm on recordings with reference markers."""
 
 import argparse
 import json
@@ -34,14 +34,14 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     parser = kinds.add_parser(
         "tables",
         help="error in mm: presets x optimizers x bodies x refinements x rates x seeds",
-        description="Error on recordings whose truth is known, mean and sd over seeds.",
+        description="Error on recordings with a ground_truth.trc, mean and sd over seeds.",
         epilog="examples: markerless_tracker benchmark tables RECORDING --truth-score -o out/all; "
         "markerless_tracker benchmark tables RECORDING --table all -o out/papers",
     )
     parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
     parser.add_argument(
         "--table", type=list_of(str), default=(), metavar="LIST",
-        help="tables of the papers, with their figures beside ours: all, or names of "
+        help="tables of the papers, with their figures beside ours: all, or names in "
         "config/papers.yaml: sppso_2, sppso_apf, sppso_ablation, hmcpso_2 .. hmcpso_6, "
         "hmcpso_spread",
     )  # fmt: skip
@@ -63,7 +63,7 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     )
     parser.add_argument(
         "--fps", type=list_of(positive), default=(), metavar="LIST",
-        help="rates; default: 60,20 as far as the recording has them",
+        help="rates; default: those of 60,20 that the recording allows",
     )  # fmt: skip
     parser.add_argument("--seeds", type=count, default=6, metavar="N", help="seeds 0..N-1 (6)")
     parser.add_argument(
@@ -74,7 +74,7 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     )
     parser.add_argument(
         "--vary", type=varied, action="append", default=[], metavar="KEY=LIST",
-        help="rows for several values of any setting; may be given again",
+        help="rows for several values of any setting; can be repeated",
     )  # fmt: skip
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
     parser.add_argument(
@@ -92,17 +92,17 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     )
     parser.add_argument(
         "--jobs", type=count, default=usable_cores(), metavar="N",
-        help="runs side by side (default: one per core)",
+        help="parallel runs (default: one per core)",
     )  # fmt: skip
     parser.add_argument(
         "--scheduler", metavar="ADDRESS",
         help="run on the workers of a Dask cluster, such as tcp://host:8786 (extra [cluster]); the "
-        "recordings must lie at the same paths there",
+        "workers need the recordings at the same paths",
     )  # fmt: skip
     parser.add_argument(
         "-o", dest="out", type=Path, metavar="DIR",
         help="write table.csv, table.json, plots of the error over time (extra [plots]) and a file "
-        "per run, which is not repeated next time",
+        "per run; stored runs are not repeated",
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
 
@@ -152,7 +152,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _plot(folder: Path, parts: Sequence[tuple[str, "_Part"]]) -> None:
-    """Pictures, if they can be drawn: tables are complete without."""
+    """Write the plots; a warning if matplotlib is missing."""
     try:
         for title, part in parts:
             part.plot(folder, title)
@@ -161,7 +161,7 @@ def _plot(folder: Path, parts: Sequence[tuple[str, "_Part"]]) -> None:
 
 
 def _published(group: Group) -> dict[str, Any]:
-    """A paper's table as it is written beside our rows."""
+    """A paper's table for table.json."""
     table = group.table
     assert table is not None
     return {
@@ -187,7 +187,7 @@ class _Part:
         return paper_table(title, self.group.table, self.rows, truth_score=truth_score)
 
     def plot(self, folder: Path, title: str) -> None:
-        """A picture per rate into a folder."""
+        """Write a plot per rate into a folder."""
         table = self.group.table
         for rate in dict.fromkeys(row["fps"] for _, row in self.rows):
             own = [row for _, row in self.rows if row["fps"] == rate]
@@ -218,10 +218,10 @@ def _pieces(
         noise = f", start disturbed by {args.start_noise:g} mm" if args.start_noise else ""
         seeds = f"{args.seeds} seed{'s' if args.seeds > 1 else ''}"
         for group in chosen:
-            told = variants(group.configs)
+            names = variants(group.configs)
             own = [
                 (paper, {**row, "variant": words})
-                for (paper, config), words in zip(group.rows, told, strict=True)
+                for (paper, config), words in zip(group.rows, names, strict=True)
                 for row in found[places[config]]
             ]
             yield f"{name}{size}, {seeds}{noise}", _Part(group, own)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from markerless_tracker.body import BodyModel
-from markerless_tracker.body.sizes import LengthBelief, Sizes
+from markerless_tracker.body.sizes import LengthPrior, Sizes
 from markerless_tracker.fitness.contour import (
     ContourFrame,
     eliminated,
@@ -52,7 +52,7 @@ class BodyFit:
     """
 
     def __init__(
-        self, sizes: Sizes, body: BodyModel, belief: LengthBelief, limits: FloatArray
+        self, sizes: Sizes, body: BodyModel, belief: LengthPrior, limits: FloatArray
     ) -> None:
         self._sizes = sizes
         self._belief = belief

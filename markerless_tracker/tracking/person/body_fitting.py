@@ -77,7 +77,7 @@ class BodyFitting:
         """
         if self._fit is None:
             sizes = self._person.sizes
-            belief = sizes.usual(self._person.stature_m)
+            belief = sizes.prior(self._person.stature_m)
             self._fit = BodyFit(sizes, body, belief, self._limits)
         self._seen += 1
         if self._seen <= EVERY * FRAMES:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
-from markerless_tracker.body.anatomy import heading, turned_by
+from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
@@ -50,7 +50,9 @@ class Population:
 
     def facing(self, heading_rad: float) -> "Population":
         """Those that face within a right angle of a heading; may be empty."""
-        near = np.array([turned_by(h, heading_rad) < 0.5 * np.pi for h in self.headings], bool)
+        near = np.array(
+            [heading_difference(h, heading_rad) < 0.5 * np.pi for h in self.headings], bool
+        )
         return Population(self.poses[near], self.costs[near], self.headings[near])
 
     def __len__(self) -> int:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
-from markerless_tracker.body.anatomy import turned_by
-from markerless_tracker.body.sizes import USUAL_STATURE_M
+from markerless_tracker.body.anatomy import heading_difference
+from markerless_tracker.body.sizes import MEAN_STATURE_M
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.fitness.shape import fit_shape
@@ -221,7 +221,7 @@ class Starter:
     ) -> tuple[FramePopulation, Population] | None:
         height_m = float(np.clip(hull.height_m, *_STATURE_RANGE_M))
         if height_m < STANDING_M:
-            height_m = USUAL_STATURE_M
+            height_m = MEAN_STATURE_M
         body = self._body if self._sized is None else self._sized(height_m)
         self._searcher = self._searcher_for(body)
         near = body.neutral.copy()
@@ -290,7 +290,9 @@ class Starter:
         seconds = (stamp_ns - self._begun_ns) * 1e-9
         way = float(np.hypot(moved[0], moved[1]))
         if way > _WALKED_M and seconds > 0.0 and way / seconds > _WALK_M_S:
-            off = turned_by(float(np.arctan2(moved[1], moved[0])), self._way + other * np.pi)
+            off = heading_difference(
+                float(np.arctan2(moved[1], moved[0])), self._way + other * np.pi
+            )
             gain += 2.0 * _WALK_BONUS * float(np.cos(off))
         over = len(self._seen[0]) >= SETTLING_FRAMES
         if gain <= (0.0 if over else _FLIP_MARGIN):
@@ -321,4 +323,4 @@ class Starter:
 
 def _unusual(stature_m: float) -> float:
     """What a stature costs for being unusual, in units of f_s."""
-    return _STATURE_BELIEF * ((stature_m - USUAL_STATURE_M) / _STATURE_SD_M) ** 2
+    return _STATURE_BELIEF * ((stature_m - MEAN_STATURE_M) / _STATURE_SD_M) ** 2

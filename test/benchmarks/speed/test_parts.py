@@ -1,4 +1,4 @@
-"""The yardstick is honest, and speed's figures are all there. Nothing here judges a time."""
+"""The reference computes the same fitness; all figures of speed are there. No time is tested."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.benchmarks.machine import machine, processor, usable_cores
-from markerless_tracker.benchmarks.speed.parts import measure, scattered
+from markerless_tracker.benchmarks.speed.parts import measure, poses_around
 from markerless_tracker.benchmarks.speed.reference import ReferenceFitness
 from markerless_tracker.benchmarks.speed.scene import SpeedScene, made_up_scene, recorded_scene
 from markerless_tracker.cli.synthesize import synthesize
@@ -42,15 +42,15 @@ def test_the_reference_computes_the_same_fitness(scene, name) -> None:
     views = fitness.lay_out(observations)
     reference = ReferenceFitness(body, scene.rig.cameras, observations, pose)
     # Its outlines are polygons of 16 points, its samples as many as at the first pose.
-    for one in scattered(body, pose, 5):
+    for one in poses_around(body, pose, 5):
         terms = fitness.terms(views, one).values()
         f = np.mean([t.silhouette + t.edges for t in terms])
         assert 2.0 - reference(one[None])[0] == pytest.approx(f, abs=0.03)
 
 
-def test_the_reference_evaluates_a_batch_as_it_does_one_by_one(scene) -> None:
+def test_the_reference_gives_the_same_costs_one_by_one(scene) -> None:
     body = scene.body("balan31")
-    poses = scattered(body, scene.pose(body), 4)
+    poses = poses_around(body, scene.pose(body), 4)
     reference = ReferenceFitness(body, scene.rig.cameras, evidence(scene), poses[0])
     assert reference(poses) == pytest.approx([reference(one[None])[0] for one in poses], abs=1e-9)
     assert 20 <= reference.edge_samples <= 400
@@ -113,9 +113,9 @@ def test_a_recording_as_the_scene(tmp_path: Path, make_recording) -> None:
         recorded_scene(tmp_path / "walk", frames=1)
 
 
-def test_the_machine_tells_its_name(tmp_path: Path) -> None:
-    told = tmp_path / "cpuinfo"
-    told.write_text("processor\t: 0\nmodel name\t: Some CPU @ 2.45GHz\nflags: a b\n")
-    assert processor(told) == "Some CPU @ 2.45GHz"
+def test_the_name_of_the_processor(tmp_path: Path) -> None:
+    cpuinfo = tmp_path / "cpuinfo"
+    cpuinfo.write_text("processor\t: 0\nmodel name\t: Some CPU @ 2.45GHz\nflags: a b\n")
+    assert processor(cpuinfo) == "Some CPU @ 2.45GHz"
     assert processor(tmp_path / "none") != ""
     assert machine()["cores"] == usable_cores() >= 1

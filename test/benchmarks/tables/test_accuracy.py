@@ -1,4 +1,4 @@
-"""Tables of accuracy: evidence made once, runs that resume, rows worked by hand."""
+"""Tables of accuracy: evidence, continued runs, rows computed from known runs."""
 
 import json
 from dataclasses import replace
@@ -42,7 +42,7 @@ def evidence(walk, tmp_path_factory):
     return make_evidence(open_recording(walk), SWARM, folder)
 
 
-def test_evidence_is_what_the_live_path_sees(walk, evidence) -> None:
+def test_evidence_equals_that_of_the_tracker(walk, evidence) -> None:
     recording = open_recording(walk)
     start = walk / "ground_truth.trc"
     live = build_tracker(
@@ -66,7 +66,7 @@ def test_evidence_of_every_second_frame(walk, evidence, tmp_path) -> None:
     assert stamps == list(evidence.stamps_ns[::2]) and len(stamps) == 3
     thinned = make_evidence(open_recording(walk), SWARM, tmp_path, start=1, every=2, frames=3)
     assert thinned.stamps_ns == evidence.stamps_ns[1:4:2]
-    with pytest.raises(DatasetError, match="every 3th frame was asked for, every 2th"):
+    with pytest.raises(DatasetError, match="every 3th frame requested, expected a multiple of 2"):
         next(thinned.frames(every=3))
 
 
@@ -80,7 +80,7 @@ def test_a_run_scores_what_it_tracked(walk, evidence) -> None:
     json.dumps(figures, allow_nan=False)
 
 
-def test_truth_score_is_none_at_the_truth_and_positive_beside_it(walk, evidence) -> None:
+def test_truth_score_is_zero_at_the_truth_and_positive_elsewhere(walk, evidence) -> None:
     truth = walk / "ground_truth.trc"
     reference = read_trc(truth)
     tracker = build_tracker(evidence.rig, SWARM, start_file=truth).tracker
@@ -112,11 +112,11 @@ def test_start_noise_is_keyed_by_seed_and_scaled(walk) -> None:
     assert np.std(np.array(drawn) - reference.positions_m[0]) == pytest.approx(0.010, rel=0.1)
 
 
-def test_start_noise_reaches_start_and_lengths(walk, evidence) -> None:
+def test_start_noise_affects_pose_and_lengths(walk, evidence) -> None:
     truth = walk / "ground_truth.trc"
-    still = replace(SWARM, fit_shape=False)
-    clean = execute(Run(still, 1, truth), evidence)
-    noisy = execute(Run(still, 1, truth, start_noise_mm=40.0), evidence)
+    fixed = replace(SWARM, fit_shape=False)
+    clean = execute(Run(fixed, 1, truth), evidence)
+    noisy = execute(Run(fixed, 1, truth, start_noise_mm=40.0), evidence)
     assert noisy["mean_mm"] > clean["mean_mm"]
 
 
@@ -142,7 +142,7 @@ def figures(**changed) -> dict:
     }  # fmt: skip
 
 
-def test_a_row_by_hand() -> None:
+def test_a_row_of_known_runs() -> None:
     row = summarise(
         [
             figures(),
@@ -159,12 +159,12 @@ def test_a_row_by_hand() -> None:
     assert summarise([figures()])["sd_mm"] is None
 
 
-def test_time_per_evaluation_is_that_of_a_swarm_alone() -> None:
+def test_time_per_evaluation_is_stated_without_refinement_only() -> None:
     assert summarise([figures(refinements=0.0)])["ms_per_evaluation"] == pytest.approx(1 / 6)
     assert summarise([figures()])["ms_per_evaluation"] is None
 
 
-def test_error_over_time_is_that_of_the_frames_all_seeds_have() -> None:
+def test_error_over_time_covers_the_frames_of_all_seeds() -> None:
     row = summarise([figures(), figures(stamps_s=[0.5, 1.0], frame_mm=[20.0, 99.0])])
     assert row["curve"] == {"s": [0.5], "mean_mm": [18.0]}
 
@@ -213,7 +213,7 @@ def test_rates_a_recording_has(walk) -> None:
         make_table([walk], Plan(configs=(SWARM,), rates=(25.0,)))
 
 
-def test_what_cannot_be_judged_says_so(walk, make_recording) -> None:
+def test_a_recording_that_cannot_be_scored_is_an_error(walk, make_recording) -> None:
     plan = Plan(configs=(SWARM,), seeds=1)
     with pytest.raises(DatasetError, match=r"small: no ground_truth\.trc"):
         make_table([make_recording()], plan)
@@ -226,7 +226,7 @@ def test_what_cannot_be_judged_says_so(walk, make_recording) -> None:
             make_table([walk], replace(impossible, jobs=jobs))
 
 
-def test_keys_follow_what_they_name(walk, tmp_path) -> None:
+def test_keys_depend_on_their_content(walk, tmp_path) -> None:
     assert run_key({"a": 1}) == run_key({"a": 1}) != run_key({"a": 2})
     copy = tmp_path / "copy"
     copy.mkdir()

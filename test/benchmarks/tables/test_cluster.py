@@ -1,4 +1,4 @@
-"""The same table from the workers of a cluster; what can go wrong there is named."""
+"""The same table from the workers of a cluster; errors on a worker name the worker."""
 
 import sys
 from dataclasses import replace
@@ -57,7 +57,7 @@ def test_a_cluster_makes_the_same_table(walk, scheduler, tmp_path, monkeypatch) 
         seeds=2,
     )
     here = make_table([walk], plan)
-    # A path that only means something from here.
+    # A path relative to this process.
     monkeypatch.chdir(walk.parent)
     there = make_table([Path("walk")], replace(plan, scheduler=scheduler), store=tmp_path)
     assert [row.pop("source") for row in there] == ["walk"] * 4
@@ -67,7 +67,7 @@ def test_a_cluster_makes_the_same_table(walk, scheduler, tmp_path, monkeypatch) 
     assert len(list((tmp_path / "runs").iterdir())) == 8
 
 
-def test_what_goes_wrong_on_a_worker_is_told_here(walk, scheduler) -> None:
+def test_an_error_on_a_worker_is_raised_here(walk, scheduler) -> None:
     plan = Plan(configs=(replace(SWARM, evaluations=7),), rates=(60.0,), seeds=2)
     with pytest.raises(TrackerError, match="evaluations is 7"):
         make_table([walk], replace(plan, scheduler=scheduler))
@@ -78,11 +78,11 @@ def test_a_scheduler_that_does_not_answer(walk, monkeypatch) -> None:
     monkeypatch.setattr(cluster, "ANSWER_S", 0.5)
     plan = Plan(configs=(SWARM,), seeds=1)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
-        with pytest.raises(ConfigError, match=f"scheduler {address}: nobody answers there"):
+        with pytest.raises(ConfigError, match=f"scheduler {address}: no answer"):
             make_table([walk], replace(plan, scheduler=address))
 
 
-def test_without_dask_the_extra_is_named(walk, monkeypatch) -> None:
+def test_without_dask_the_message_names_the_extra(walk, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ConfigError, match=r"distributed is not installed.*\[cluster\]"):
         make_table([walk], Plan(configs=(SWARM,), seeds=1, scheduler="tcp://x:1"))
@@ -111,12 +111,14 @@ class TestAWorker:
         assert [folder.exists() for folder in folders] == [False, True, True]
 
     @pytest.mark.parametrize("name", ["code", "numpy"])
-    def test_of_another_version_refuses(self, order, run, name) -> None:
+    def test_of_another_version_is_refused(self, order, run, name) -> None:
         same = {**cluster.code_and_versions(), name: "another"}
-        with pytest.raises(ConfigError, match=f"worker .*: not the same {name} as where"):
+        with pytest.raises(
+            ConfigError, match=f"worker .*: {name} differ from those of the machine"
+        ):
             cluster.execute_there(run, order, same)
 
-    def test_without_the_recording_says_who_and_which(self, order, run, tmp_path) -> None:
+    def test_without_the_recording_names_worker_and_recording(self, order, run, tmp_path) -> None:
         lost = replace(order, source=tmp_path / "lost")
         with pytest.raises(DatasetError, match="worker .*lost: no such file or folder"):
             cluster.execute_there(run, lost, cluster.code_and_versions())

@@ -1,4 +1,4 @@
-"""The papers' tables: what is shipped can run, and what does not fit is named."""
+"""The papers' tables: shipped rows can run, errors in a file name the place."""
 
 import pytest
 
@@ -18,7 +18,7 @@ def test_every_row_can_run_as_published(name) -> None:
     assert set(table.rates) <= {60.0, 20.0} and table.title and table.source
 
 
-def test_the_papers_counts() -> None:
+def test_evaluations_are_those_of_the_papers() -> None:
     """To the unit: 1000, 2000, 4000; 3600, 7200, 10800."""
 
     def counts(name: str) -> list[int]:
@@ -39,7 +39,7 @@ def test_figures_as_the_papers_print_them() -> None:
     first = SHIPPED["sppso_2"].rows[0].theirs
     assert first == {"Lee walk": {"mean_mm": 38.0, "max_mm": 86.4}}
     assert SHIPPED["hmcpso_2"].recordings == tuple(
-        f"{who} {what}" for who in ("S2", "S4") for what in ("walk", "jog", "balance")
+        f"{subject} {motion}" for subject in ("S2", "S4") for motion in ("walk", "jog", "balance")
     )
     # The same row of three tables, and time per frame against time per evaluation.
     ours = [SHIPPED[name].rows[at].theirs for name, at in (("hmcpso_3", 0), ("hmcpso_4", 2))]
@@ -75,7 +75,7 @@ def test_tables_by_name() -> None:
         ),
     ],
 )
-def test_another_file_that_does_not_fit_is_named(tmp_path, text, said) -> None:
+def test_a_malformed_file_is_named(tmp_path, text, said) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     with pytest.raises(ConfigError, match=said) as caught:

@@ -23,7 +23,7 @@ def test_a_picture_with_a_line_per_row(tmp_path: Path) -> None:
     assert not np.array_equal(*images)
 
 
-def test_without_matplotlib_the_extra_is_named(tmp_path: Path, monkeypatch) -> None:
+def test_without_matplotlib_the_message_names_the_extra(tmp_path: Path, monkeypatch) -> None:
     import sys
 
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)

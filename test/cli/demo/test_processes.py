@@ -41,7 +41,7 @@ def start(module: str, folder: Path) -> NodeProcess:
 def test_a_failure_gives_the_last_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module = write_module(tmp_path, monkeypatch, "import sys\nprint('a')\nsys.exit('no camera')")
     with start(module, tmp_path) as node:
-        node.wait(20.0)
+        node.wait(120.0)
         with pytest.raises(NodeError, match="made_up ended with status 1: no camera"):
             node.check()
 
@@ -49,7 +49,7 @@ def test_a_failure_gives_the_last_line(tmp_path: Path, monkeypatch: pytest.Monke
 def test_its_warnings_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = "print('[INFO] [1.5] [player]: playing')\nprint('[WARN] [2.5] [player]: lens[1]: late')"
     with start(write_module(tmp_path, monkeypatch, log), tmp_path) as node:
-        assert node.wait(20.0)
+        assert node.wait(120.0)
         assert node.warnings() == ["lens[1]: late"]
 
 

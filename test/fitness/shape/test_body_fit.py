@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import load_description, markers
-from markerless_tracker.body.sizes import PROPORTIONS, Sizes
+from markerless_tracker.body.sizes import PROPORTION_SD, Sizes
 from markerless_tracker.fitness.shape.body_fit import BodyFit
 from markerless_tracker.fitness.shape.sections import RADIUS_RANGE
 from markerless_tracker.synthesis import ring_rig
@@ -22,7 +22,7 @@ def person(seed):
     """A person of 1.80 m with longer and shorter parts, stouter or slimmer."""
     rng = np.random.default_rng(seed)
     lengths = SIZES.of(SIZES.of_stature(1.80))
-    own = SIZES.body(lengths * np.exp(PROPORTIONS * rng.uniform(-1.5, 1.5, lengths.size)))
+    own = SIZES.body(lengths * np.exp(PROPORTION_SD * rng.uniform(-1.5, 1.5, lengths.size)))
     shape = own.cone_shape.copy()
     shape[:, :, :2] *= rng.uniform(0.85, 1.2)
     return replace(own, cone_shape=shape)
@@ -48,7 +48,7 @@ def fit(request, contours_of):
     """The person, the poses, and the fit after twelve iterations from disturbed poses."""
     true, moves = person(request.param), poses(request.param)
     rng = np.random.default_rng(request.param)
-    fit = BodyFit(SIZES, GENERIC, SIZES.usual(None), LIMITS)
+    fit = BodyFit(SIZES, GENERIC, SIZES.prior(None), LIMITS)
     for pose in moves:
         about = pose.copy()
         about[GENERIC.joints] += rng.normal(0.0, 0.08, GENERIC.joints.size)
@@ -94,7 +94,7 @@ def test_both_sides_stay_equal_and_all_bounds_are_kept(fit) -> None:
 
 def test_without_evidence_the_prior_remains(contours_of) -> None:
     """Without evidence the lengths move to the prior mean, the sections stay generic."""
-    fit = BodyFit(SIZES, SIZES.of_stature(1.9), SIZES.usual(None), LIMITS)
+    fit = BodyFit(SIZES, SIZES.of_stature(1.9), SIZES.prior(None), LIMITS)
     fit.iterate(0.1)
     fit.iterate(0.1)
     np.testing.assert_allclose(SIZES.of(fit.body), SIZES.of(GENERIC), rtol=1e-3)
@@ -105,7 +105,7 @@ def test_a_frame_without_silhouettes_changes_nothing(contours_of) -> None:
     pose = poses(0)[0]
     away = pose.copy()
     away[GENERIC.index("pelvis_tx")] = 500.0
-    fit = BodyFit(SIZES, GENERIC, SIZES.usual(None), LIMITS)
+    fit = BodyFit(SIZES, GENERIC, SIZES.prior(None), LIMITS)
     fit.add(contours_of(GENERIC, away, RIG, GENERIC), pose)
     for _ in range(3):
         fit.iterate(0.1)
@@ -114,7 +114,7 @@ def test_a_frame_without_silhouettes_changes_nothing(contours_of) -> None:
 
 
 def test_equations_that_are_not_finite_change_nothing(contours_of) -> None:
-    fit = BodyFit(SIZES, GENERIC, SIZES.usual(None), LIMITS)
+    fit = BodyFit(SIZES, GENERIC, SIZES.prior(None), LIMITS)
     pose = poses(0)[0]
     frame = contours_of(GENERIC, pose, RIG, GENERIC)
     fit.add(frame, np.where(np.arange(pose.size) == 3, np.nan, pose))
@@ -128,7 +128,7 @@ def test_a_given_stature_restrains_the_lengths(contours_of) -> None:
     true, moves = person(0), poses(0)[:2]
     sizes = []
     for stature in (1.60, None):
-        fit = BodyFit(SIZES, SIZES.of_stature(1.60), SIZES.usual(stature), LIMITS)
+        fit = BodyFit(SIZES, SIZES.of_stature(1.60), SIZES.prior(stature), LIMITS)
         for pose in moves:
             fit.add(contours_of(true, pose, RIG, GENERIC), pose)
         for truncation_m in np.geomspace(0.10, 0.035, 6):

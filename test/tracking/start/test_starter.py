@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import markers
-from markerless_tracker.body.anatomy import heading, turned_by
+from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig, build_tracker
@@ -43,7 +43,7 @@ def test_a_walking_person_is_found_and_tracked(walk) -> None:
     assert all(result.state is TrackState.TRACKING for result in results)
     assert error_mm(results[0], taken[0][2]) < 120.0
     assert error_mm(results[-1], taken[-1][2]) < 60.0
-    assert turned_by(heading(results[-1].markers_m), heading(taken[-1][2])) < 0.5
+    assert heading_difference(heading(results[-1].markers_m), heading(taken[-1][2])) < 0.5
 
 
 def test_the_stature_need_not_be_known(walk) -> None:
