@@ -4,15 +4,19 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numpy as np
+
 from markerless_tracker.fitness import ViewTerms
 from markerless_tracker.records import TrackState
+from markerless_tracker.tracking.states import Event
 
-LOST_BELOW = 0.40
-REGAINED_ABOVE = 0.55
-LOST_SHARE, REGAINED_SHARE = 0.75, 0.85
-"""The same as shares of the overlap that this track usually has."""
-PATIENCE_NS = 100_000_000
-"""How long a body may be lost before it is looked for anew."""
+LOST_BELOW, REGAINED_ABOVE = 0.40, 0.55
+"""Overlap (IoU) below which a track is lost, and from which on it is regained."""
+LOST_FRACTION, REGAINED_FRACTION = 0.75, 0.85
+"""The same relative to the mean overlap of the track."""
+LEAST_FIT = 0.62
+"""f_s from which on silhouettes are a person's in that pose: objects score lower. Bodies are only
+found in, and fitted to, frames that reach it."""
 LIMB_LOST_BELOW = 0.55
 LIMB_REGAINED_ABOVE = 0.75
 """Shares of a limb's axis inside the silhouettes, mean over the views."""
@@ -32,21 +36,26 @@ def shared_overlap(views: Iterable[ViewTerms]) -> float:
     return sum(view.overlap * view.pixels for view in seen) / pixels if pixels > 0.0 else 1.0
 
 
-def next_state(state: TrackState, overlap: float, usual: float = 0.0) -> TrackState:
-    """State after a frame whose mean overlap (IoU of body and silhouettes) is given.
+def silhouette_fit(views: Iterable[ViewTerms]) -> float:
+    """f_s of a pose, mean over some views; compare with `LEAST_FIT`."""
+    return float(np.mean([view.silhouette for view in views]))
 
-    One threshold to lose the track and a higher one to regain it, so that it does not flicker.
+
+def event_of(overlap: float, mean_overlap: float = 0.0) -> Event:
+    """What a frame with some overlap (IoU of body and silhouettes) says about the body.
+
+    Two thresholds give hysteresis: a track is lost below the lower one and regained above the
+    upper one.
 
     Args:
-        state: before the frame.
-        overlap: of the frame; 0 if no view could be used.
-        usual: the overlap that this track usually has, 0 if unknown.
+        overlap: of the frame; NaN disagrees.
+        mean_overlap: of the track's frames so far, 0 if unknown: one that fits well is lost sooner.
     """
-    regained = max(REGAINED_ABOVE, REGAINED_SHARE * usual)
-    lost = max(LOST_BELOW, LOST_SHARE * usual)
-    if overlap >= regained or (overlap >= lost and state is not TrackState.LOST):
-        return TrackState.TRACKING
-    return TrackState.LOST
+    if overlap >= max(REGAINED_ABOVE, REGAINED_FRACTION * mean_overlap):
+        return Event.AGREES
+    if overlap >= max(LOST_BELOW, LOST_FRACTION * mean_overlap):
+        return Event.UNCERTAIN
+    return Event.DISAGREES
 
 
 def next_limb_state(
@@ -97,33 +106,3 @@ class LimbTrack:
                 else particle_sd_ratio
             )
         return self.state
-
-
-@dataclass
-class Track:
-    """What a track's frames were like: for `next_state`, and for how long it has been lost.
-
-    Attributes:
-        state: after the last frame.
-        usual: mean overlap of the tracked frames, recent ones counting more; 0 before the first.
-        lost_since_ns: stamp of the first frame in a row that was lost, None while tracked.
-    """
-
-    state: TrackState = TrackState.SEARCHING
-    usual: float = 0.0
-    lost_since_ns: int | None = None
-
-    def note(self, overlap: float, stamp_ns: int) -> TrackState:
-        """Take a frame's overlap; returns the state after it."""
-        self.state = next_state(self.state, overlap, self.usual)
-        if self.state is TrackState.TRACKING:
-            self.lost_since_ns = None
-            rate = _MEMORY if self.usual else 1.0
-            self.usual += rate * (overlap - self.usual)
-        elif self.lost_since_ns is None:
-            self.lost_since_ns = stamp_ns
-        return self.state
-
-    def given_up(self, stamp_ns: int) -> bool:
-        """Whether it has been lost for too long to be found near where it was."""
-        return self.lost_since_ns is not None and stamp_ns - self.lost_since_ns >= PATIENCE_NS

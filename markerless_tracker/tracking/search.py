@@ -22,6 +22,7 @@ from markerless_tracker.optim import (
 )
 from markerless_tracker.records import CONTOUR, Observation, Stage
 from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.limits import joint_limits
 
 _NEAREST_M = 0.5
 
@@ -77,6 +78,19 @@ class Searcher:
     ) -> "FrameSearch":
         """The search of one frame, around a predicted pose (p,)."""
         return FrameSearch(self, observations, stamp_ns, predicted)
+
+
+def make_searcher(
+    body: BodyModel,
+    *,
+    rig: CameraRig,
+    config: TrackerConfig,
+    threads: int,
+    mapper: Callable[..., object] = map,
+) -> Searcher:
+    """A searcher with the joint limits that the configuration asks for; arguments as there."""
+    limits = joint_limits(body, config)
+    return Searcher(rig, body, config, limits=limits, threads=threads, mapper=mapper)
 
 
 class FrameSearch:

@@ -45,10 +45,10 @@ class LimbWatch:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Limbs that were lost when last judged."""
+        """Limbs that were lost when last assessed."""
         return tuple(n for n, track in self._tracks.items() if track.state is TrackState.LOST)
 
-    def judge(
+    def assess(
         self,
         body: BodyModel,
         pose: FloatArray,
@@ -81,7 +81,7 @@ class LimbWatch:
         stamp_ns: int,
         pose: FloatArray,
     ) -> tuple[FloatArray, tuple[str, ...]]:
-        """Look for limbs that `judge` called lost, and for the one whose turn it is.
+        """Look for limbs that `assess` found lost, and for the one whose turn it is.
 
         A limb is taken from elsewhere if f_s rises as clearly as a swarm's result must
         (`min_improvement`).

@@ -13,6 +13,7 @@ from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.shape.section_fit import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
+from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull, find_hulls, hulls_part
 from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
@@ -30,8 +31,6 @@ _STATURE_RANGE_M = (1.2, 2.1)
 _STATURE_SD_M = 0.10
 _STATURE_BELIEF = 0.002
 """A stature one standard deviation from the usual one must raise f_s by this much more."""
-LEAST_FIT = 0.62
-"""f_s that a pose needs at least to be somebody's: other things than people reach less."""
 _FLIP_MARGIN = 0.005
 """How much better, on average, the other way must explain the views before the settling ends."""
 _WALKED_M, _WALK_M_S, _WALK_BONUS = 0.05, 0.25, 0.01

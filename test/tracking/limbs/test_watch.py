@@ -75,7 +75,7 @@ def test_states_name_the_limb_that_is_off(standing) -> None:
     watch = LimbWatch(scene.rig)
     particle_sd_ratio = np.full(scene.body.size, 0.25)
     for at, expected in ((pose, TRACKING), (raised, LOST), (pose, TRACKING)):
-        states = watch.judge(scene.body, at, seen, particle_sd_ratio)
+        states = watch.assess(scene.body, at, seen, particle_sd_ratio)
         assert states.pop("l_arm").state is expected
         assert {limb.state for limb in states.values()} == {TRACKING}
         assert watch.lost == (("l_arm",) if expected is LOST else ())
@@ -86,7 +86,7 @@ def test_a_lost_arm_is_found_alone(standing) -> None:
     scene, seen, pose, raised = standing
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
-    watch.judge(scene.body, raised, seen, np.full(scene.body.size, np.nan))
+    watch.assess(scene.body, raised, seen, np.full(scene.body.size, np.nan))
     found, names = watch.recover(searcher, contours_of(searcher, seen, raised), seen, 0, raised)
     assert names == ("l_arm",)
     assert gaps(scene.body, raised, pose)[ARM].min() > 0.3
@@ -99,7 +99,7 @@ def test_an_arm_that_is_wrong_inside_the_silhouettes_is_found_at_its_turn(balanc
     assert gaps(body, hidden, pose)[ARM].max() > 0.3
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
-    states = watch.judge(body, hidden, seen, np.full(body.size, np.nan))
+    states = watch.assess(body, hidden, seen, np.full(body.size, np.nan))
     assert states["l_arm"].state is TRACKING
     at, taken = hidden, []
     for stamp_ns in range(0, 8 * TURN_NS, TURN_NS):
@@ -123,7 +123,7 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
     body = replace(scene.body, hierarchies={"twelve": scene.body.hierarchies["twelve"]})
     searcher = Searcher(scene.rig, body, TrackerConfig(threads=1), limits=body.limits, threads=1)
     watch = LimbWatch(scene.rig)
-    assert watch.judge(body, pose, seen, np.zeros(body.size)) == {}
+    assert watch.assess(body, pose, seen, np.zeros(body.size)) == {}
     contours = contours_of(searcher, seen, pose)
     assert watch.recover(searcher, contours, seen, 0, pose) == (pose, ())
 
