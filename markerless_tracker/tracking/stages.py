@@ -1,12 +1,10 @@
 """Which searches a frame is made of: an optimiser's stages, and refinement around them."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import CONTOUR, Stage
+from markerless_tracker.records import CONTOUR, Comparison, SearchPlan, Stage
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.partitions import STAGES
 from markerless_tracker.tracking.partitions.sppso import translations
@@ -39,7 +37,7 @@ def frame_stages(
         return swarm
     return (
         contour_stage("align", body, config, centre, sigma),
-        *(replace(stage, min_improvement=config.min_improvement) for stage in swarm),
+        *(stage.planned(min_improvement=config.min_improvement) for stage in swarm),
         *limb_stages(body, config, centre, sigma),
         contour_stage("polish", body, config, centre, sigma),
     )
@@ -51,7 +49,7 @@ def limb_stages(
     """A small, wide swarm for each limb alone: finds one that the refinement has lost."""
     particles, iterations = LIMB_SWARM
     budget = (max(1, particles * config.evaluations // 1000), iterations)
-    return tuple(
+    stages = (
         swarm_stage(
             body,
             config,
@@ -61,10 +59,10 @@ def limb_stages(
             centre,
             config.limb_spread * sigma,
             budget,
-            min_improvement=config.min_improvement,
-        )  # fmt: skip
+        )
         for name in body.limbs
     )
+    return tuple(stage.planned(min_improvement=config.min_improvement) for stage in stages)
 
 
 def swarm_sigma(body: BodyModel, config: TrackerConfig, sigma: FloatArray) -> FloatArray:
@@ -84,17 +82,8 @@ def contour_stage(
     name: str, body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> Stage:
     """A contour refinement of all parameters."""
-    every_cone = np.ones(len(body.cone_names), dtype=np.bool_)
     return Stage(
-        name=name,
-        algorithm=CONTOUR,
-        active=np.arange(body.size),
-        centre=centre,
-        sigma=config.refine_prior * sigma,
-        particles=0,
-        iterations=config.refine_iterations,
-        silhouette_weight=1.0,
-        edge_weight=config.edge_weight,
-        silhouette_cones=every_cone,
-        edge_cones=every_cone,
+        name,
+        Comparison.whole(centre, len(body.cone_names), edge_weight=config.edge_weight),
+        SearchPlan(CONTOUR, config.refine_prior * sigma, 0, config.refine_iterations),
     )

@@ -12,16 +12,13 @@ from markerless_tracker.errors import ConfigError, ImageError
 from markerless_tracker.fitness import COSTS, EDGE_RULES, EDGE_TERMS, Fitness
 from markerless_tracker.fitness.raster import kernels
 from markerless_tracker.geometry import rotation_from_rodrigues, transform
-from markerless_tracker.records import Observation, Stage
+from markerless_tracker.records import Comparison, Observation
 
 FAR_M = 1000.0
 
 
-def stage(body: BodyModel, centre, **changes) -> Stage:
-    every = np.ones(len(body.cone_names), dtype=bool)
-    default = Stage(
-        "s", "sppso", np.arange(body.size), centre, body.sigma, 3, 2, 1.0, 1.0, every, every
-    )
+def whole(body: BodyModel, centre, **changes) -> Comparison:
+    default = Comparison.whole(centre, len(body.cone_names), edge_weight=1.0)
     return replace(default, **changes)
 
 
@@ -56,7 +53,7 @@ def test_the_cost_is_the_weights_sum_minus_the_mean_of_the_terms(body, rig, pose
     assert 0.1 < f_e < 0.99
     for silhouette, edges in ((1.0, 1.0), (1.0, 0.5), (0.0, 1.0), (2.0, 0.0)):
         evaluate = fitness.prepare(
-            views, stage(body, pose, silhouette_weight=silhouette, edge_weight=edges)
+            views, whole(body, pose, silhouette_weight=silhouette, edge_weight=edges)
         )
         expected = silhouette + edges - silhouette * f_s - edges * f_e
         assert evaluate(pose[None])[0] == pytest.approx(expected, abs=1e-12)
@@ -69,7 +66,7 @@ def test_the_pose_that_made_the_silhouettes_costs_least(
     fitness = Fitness(body, rig.cameras)
     views = fitness.lay_out(seen)
     assert min(t.silhouette for t in fitness.terms(views, pose).values()) > 0.98
-    evaluate = fitness.prepare(views, stage(body, pose, edge_weight=0.0))
+    evaluate = fitness.prepare(views, whole(body, pose, edge_weight=0.0))
     rng = np.random.default_rng(0)
     others = pose + 3.0 * body.sigma * rng.standard_normal((20, body.size))
     costs = evaluate(np.concatenate([pose[None], others]))
@@ -79,14 +76,14 @@ def test_the_pose_that_made_the_silhouettes_costs_least(
 def test_only_active_parameters_leave_the_centre(body, rig, pose, observations):
     active = np.array([3, 5, 9])
     fitness = Fitness(body, rig.cameras)
-    evaluate = fitness.prepare(fitness.lay_out(observations), stage(body, pose, active=active))
+    evaluate = fitness.prepare(fitness.lay_out(observations), whole(body, pose, active=active))
     points = np.array([[0.1, 0.9, -0.2], [-0.1, 1.0, 0.0]])
     poses = evaluate.poses(points)
     np.testing.assert_array_equal(poses[:, active], points)
     still = np.setdiff1d(np.arange(body.size), active)
     np.testing.assert_array_equal(poses[:, still], np.tile(pose[still], (2, 1)))
-    whole = fitness.prepare(fitness.lay_out(observations), stage(body, pose))
-    np.testing.assert_array_equal(evaluate(points), whole(poses))
+    of_all = fitness.prepare(fitness.lay_out(observations), whole(body, pose))
+    np.testing.assert_array_equal(evaluate(points), of_all(poses))
 
 
 def test_a_black_view_is_not_explained_by_a_body_in_it(make_observation, body, rig, pose):
@@ -114,7 +111,7 @@ def test_an_observed_silhouette_is_not_explained_by_a_body_outside(body, rig, po
     for name, terms in fitness.terms(views, away).items():
         assert (terms.silhouette, terms.edges, terms.overlap) == (0.0, 0.0, 0.0)
         assert terms.pixels == observations[name].mask.sum()
-    assert fitness.prepare(views, stage(body, away))(away[None])[0] == 2.0
+    assert fitness.prepare(views, whole(body, away))(away[None])[0] == 2.0
 
 
 def test_a_body_behind_a_camera_is_not_in_its_view(make_observation, body, pose):
@@ -140,7 +137,7 @@ def test_without_edge_samples_f_e_is_zero(body, rig, pose, observations, rule, t
     views = fitness.lay_out(observations)
     none = np.zeros(len(body.cone_names), dtype=bool)
     f_s = np.mean([t.silhouette for t in fitness.terms(views, pose).values()])
-    cost = fitness.prepare(views, stage(body, pose, edge_cones=none))(pose[None])[0]
+    cost = fitness.prepare(views, whole(body, pose, edge_cones=none))(pose[None])[0]
     assert cost == pytest.approx(2.0 - f_s, abs=1e-12)
 
 
@@ -172,7 +169,7 @@ def test_the_two_edge_terms_on_a_uniform_map(make_observation, body, rig, pose):
 
 def test_points_that_are_not_finite_cost_nan_and_spoil_no_other(body, rig, pose, observations):
     fitness = Fitness(body, rig.cameras)
-    evaluate = fitness.prepare(fitness.lay_out(observations), stage(body, pose))
+    evaluate = fitness.prepare(fitness.lay_out(observations), whole(body, pose))
     good = evaluate(np.tile(pose, (2, 1)))
     batch = np.tile(pose, (5, 1))
     batch[1, 0], batch[2, 7], batch[3, 30] = np.nan, np.inf, -np.inf
@@ -191,7 +188,7 @@ def test_finite_poses_cost_something_finite_however_far(
         for c in shown
     }
     fitness = Fitness(body, shown.cameras)
-    evaluate = fitness.prepare(fitness.lay_out(seen), stage(body, pose))
+    evaluate = fitness.prepare(fitness.lay_out(seen), whole(body, pose))
     rng = np.random.default_rng(1)
     poses = np.concatenate(
         [
@@ -221,7 +218,7 @@ def test_the_same_costs_with_any_number_of_threads(body, lens_rig, pose, make_ob
     for threads in (1, 2, 7):
         fitness = Fitness(body, lens_rig.cameras, threads=threads, edge_rule=rule)
         assert fitness.threads <= numba.config.NUMBA_NUM_THREADS
-        evaluate = fitness.prepare(fitness.lay_out(seen), stage(body, pose))
+        evaluate = fitness.prepare(fitness.lay_out(seen), whole(body, pose))
         costs[threads] = evaluate(poses).tobytes()
         singles = np.concatenate([evaluate(one[None]) for one in poses])
         assert singles.tobytes() == costs[threads]
@@ -245,7 +242,7 @@ def test_a_region_costs_the_same_as_the_full_frame(body, rig, pose, observations
     fitness = Fitness(body, rig.cameras)
     poses = pose + body.sigma * np.random.default_rng(3).standard_normal((5, body.size))
     evaluate = [
-        fitness.prepare(fitness.lay_out(seen), stage(body, pose))
+        fitness.prepare(fitness.lay_out(seen), whole(body, pose))
         for seen in (observations, regions)
     ]
     assert evaluate[0](poses).tobytes() == evaluate[1](poses).tobytes()
@@ -259,7 +256,7 @@ def test_a_missing_camera_leaves_the_mean_of_the_others(body, rig, pose, observa
     views = fitness.lay_out(observations)
     terms = fitness.terms(views, pose)
     assert terms == {name: full[name] for name in rig.names if name != missing}
-    cost = fitness.prepare(views, stage(body, pose))(pose[None])[0]
+    cost = fitness.prepare(views, whole(body, pose))(pose[None])[0]
     mean = np.mean([t.silhouette + t.edges for t in terms.values()])
     assert cost == pytest.approx(2.0 - mean, abs=1e-12)
 
@@ -324,7 +321,7 @@ def test_h_mcpsos_costs_by_counted_pixels(body, rig, pose, observations):
     for cost in COSTS:
         fitness = Fitness(body, rig.cameras, cost=cost, edge_term="mean")
         views = fitness.lay_out(observations)
-        costs[cost] = fitness.prepare(views, stage(body, pose, edge_weight=0.5))(pose[None])[0]
+        costs[cost] = fitness.prepare(views, whole(body, pose, edge_weight=0.5))(pose[None])[0]
     plain = Fitness(body, rig.cameras)
     counts = plain.count(views, pose[None], every, every)[0]
     projected, overlap = counts[:, kernels.PROJECTED], counts[:, kernels.OVERLAP]
@@ -335,7 +332,7 @@ def test_h_mcpsos_costs_by_counted_pixels(body, rig, pose, observations):
     assert costs["one_sided"] == pytest.approx(one_sided, abs=1e-12)
     assert costs["bidirectional"] == pytest.approx(both, abs=1e-12)
     # SPPSO's cost with the squared edge term is the bidirectional one; with another it is not.
-    squared = plain.prepare(views, stage(body, pose, edge_weight=0.5))(pose[None])[0]
+    squared = plain.prepare(views, whole(body, pose, edge_weight=0.5))(pose[None])[0]
     assert squared == pytest.approx(both, abs=1e-12)
     assert abs(costs["overlap"] - both) > 1e-3
 
@@ -347,7 +344,7 @@ def test_one_sided_a_body_within_the_observed_costs_nothing_outside_everything(
     full = {c.name: make_observation(c, np.ones(c.size_px[::-1], dtype=bool)) for c in rig}
     away = pose.copy()
     away[body.index("pelvis_tx")] = FAR_M
-    silhouettes = stage(body, pose, edge_weight=0.0)
+    silhouettes = whole(body, pose, edge_weight=0.0)
     inside = fitness.prepare(fitness.lay_out(full), silhouettes)
     assert inside(np.stack([pose, away])).tolist() == [0.0, 1.0]
     nothing = fitness.prepare(fitness.lay_out(black(rig, make_observation)), silhouettes)

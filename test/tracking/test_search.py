@@ -291,10 +291,13 @@ def test_scatter_is_that_of_the_last_swarm_that_varied_a_parameter(person) -> No
     limb = next(s for s in stages(person, config) if s.name == "l_arm")
     alone = searched(person, config, (root,)).particle_sd_ratio
     varied = np.zeros(person.body.size, dtype=bool)
-    varied[root.active] = True
+    varied[root.comparison.active] = True
     assert np.isnan(alone[~varied]).all() and (alone[varied] > 0.0).all()
     whole = searched(person, config, (root, body)).particle_sd_ratio
     assert np.isfinite(whole).all()
     both = searched(person, config, (root, body, limb)).particle_sd_ratio
     changed = both != whole
-    assert changed[limb.active].all() and not np.delete(changed, limb.active).any()
+    assert (
+        changed[limb.comparison.active].all()
+        and not np.delete(changed, limb.comparison.active).any()
+    )

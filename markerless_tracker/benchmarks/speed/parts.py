@@ -25,7 +25,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Segmenter, learn_background
 from markerless_tracker.imaging.edges import edge_map
 from markerless_tracker.optim import keyed_generator
-from markerless_tracker.records import Observation
+from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.results.result import versions
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.search import Searcher
@@ -131,9 +131,8 @@ def _view_evaluations(
         fitness = _fitness(scene, body, config, threads=1)
         seen = fitness.lay_out(observations)
         poses = scattered(body, pose, _POSES)
-        # The swarm's second stage: every parameter, every cone.
-        stage = replace(frame_stages(body, config, pose, body.sigma)[-1], edge_weight=1.0)
-        timed[key] = (fitness.prepare(seen, stage), poses)
+        whole = Comparison.whole(pose, len(body.cone_names), edge_weight=1.0)
+        timed[key] = (fitness.prepare(seen, whole), poses)
         if key != "full":
             continue
         reference = ReferenceFitness(
@@ -142,7 +141,7 @@ def _view_evaluations(
         timed["reference"] = (reference, scattered(body, pose, _REFERENCE_POSES))
         for part, active in _ARM.items():
             indices = np.sort([body.index(parameter) for parameter in active])
-            limb = fitness.prepare(seen, replace(stage, active=indices))
+            limb = fitness.prepare(seen, replace(whole, active=indices))
             timed[part] = (limb, np.ascontiguousarray(poses[:, indices]))
     best = dict.fromkeys(timed, np.inf)
     for turn in range(repeats + 1):
@@ -202,7 +201,7 @@ def _refinement(
                 setup = min(setup, seconds)
             for iterations in best:
                 search.pose = pose
-                stages = (replace(stage, iterations=iterations),)
+                stages = (stage.planned(iterations=iterations),)
                 seconds = _seconds(lambda s=search, st=stages: s.run(st))  # type: ignore[misc]
                 if turn:
                     best[iterations] = min(best[iterations], seconds)

@@ -35,7 +35,7 @@ def hmcpso_stages(
     stages = hierarchical_stages(
         body, config, centre, sigma, algorithm="mcpso", budget=STEP, soft=config.partition == "soft"
     )
-    check_swarms(stages[0].particles, config)
+    check_swarms(stages[0].plan.particles, config)
     return stages
 
 

@@ -63,12 +63,12 @@ def sppso_stages(
     ):
         active = own if config.partition == "hard" else np.union1d(earlier, own)
         budget = (count, iterations)
-        changes = {"edge_cones": trunk} if name == "root" else {}
         stages.append(
             swarm_stage(
-                body, config, name, "sppso", active, centre, spread.copy(), budget, **changes
+                body, config, name, "sppso", active, centre, spread.copy(), budget,
+                edge_cones=trunk if name == "root" else None,
             )
-        )
+        )  # fmt: skip
         settled = translations(body) if name == "root" else own
         spread[settled] /= config.soft_factor
         earlier = active

@@ -11,7 +11,7 @@ from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, keyed_generator, refine
-from markerless_tracker.records import CONTOUR, Observation, Stage
+from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.postures import first_guesses
@@ -80,13 +80,9 @@ class FramePopulation:
         self._searcher = searcher
         self._stamp_ns = stamp_ns
         self.contours = contours or searcher.frame(observations, stamp_ns, near).contours
-        every = np.ones(len(searcher.body.cone_names), dtype=np.bool_)
-        stage = Stage(
-            name="start", algorithm=CONTOUR, active=np.arange(near.size), centre=near,
-            sigma=searcher.body.sigma, particles=0, iterations=1, silhouette_weight=1.0,
-            edge_weight=0.0, silhouette_cones=every, edge_cones=every,
-        )  # fmt: skip
-        self._costs = searcher.fitness.prepare(self.contours.views, stage)
+        self._costs = searcher.fitness.prepare(
+            self.contours.views, Comparison.whole(near, len(searcher.body.cone_names))
+        )
         self._recombiner = Recombiner(searcher.body, searcher.limits)
 
     def initialised(self, hull: Hull, hints: FloatArray | None = None) -> Population:
