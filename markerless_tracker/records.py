@@ -93,6 +93,25 @@ class Observation:
         """The silhouette of the region, unpacked: (h, w)."""
         return unpack_mask(self.mask_words, self.width)
 
+    def in_full_frame(self, part: NDArray[Any]) -> NDArray[Any]:
+        """An array (h, w) of the region as one of the full frame, 0 outside the region.
+
+        The very same if the region is the full frame.
+        """
+        width, height = self.size_px
+        if part.shape == (height, width):
+            return part
+        u, v = self.offset_px
+        frame = np.zeros((height, width), dtype=part.dtype)
+        frame[v : v + self.height, u : u + self.width] = part
+        return frame
+
+    def words_in_full_frame(self, words: MaskWords) -> MaskWords:
+        """As `in_full_frame`, of a packed mask of the region."""
+        if self.edges.shape == self.size_px[::-1]:
+            return words
+        return pack_mask(self.in_full_frame(unpack_mask(words, self.width)))
+
     @classmethod
     def from_mask(
         cls,

@@ -87,6 +87,22 @@ def test_observations_give_back_what_they_hold(
     assert seen.stamp_ns == 5 and not seen.edges.flags.writeable
 
 
+@given(masks, st.integers(0, 70), st.integers(0, 9), st.integers(0, 70), st.integers(0, 9))
+def test_a_region_in_the_full_frame(
+    mask: np.ndarray, u: int, v: int, right: int, below: int
+) -> None:
+    height, width = mask.shape
+    edges = np.full(mask.shape, 7, np.uint8)
+    size = (u + width + right, v + height + below)
+    seen = Observation.from_mask("cam01", 5, mask, edges, size_px=size, offset_px=(u, v))
+    frame = seen.in_full_frame(seen.mask)
+    np.testing.assert_array_equal(frame, np.pad(mask, ((v, below), (u, right))))
+    np.testing.assert_array_equal(seen.words_in_full_frame(seen.mask_words), pack_mask(frame))
+    assert seen.in_full_frame(edges).sum() == 7 * mask.size
+    if size == (width, height):
+        assert seen.in_full_frame(edges) is edges
+
+
 def test_the_region_is_the_frame_unless_given() -> None:
     seen = Observation.from_mask("cam01", 0, np.ones((4, 7)), np.zeros((4, 7), np.uint8))
     assert seen.size_px == (7, 4) and seen.offset_px == (0, 0)

@@ -13,7 +13,7 @@ from markerless_tracker.errors import BodyModelError, ImageError
 from markerless_tracker.fitness.raster.bits import count_bits
 from markerless_tracker.fitness.raster.outline import LANES
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation, pack_mask
+from markerless_tracker.records import Observation
 
 
 class BodyArrays(NamedTuple):
@@ -109,9 +109,8 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
                 f"{camera.name}: observation of a {_size(observation.size_px)} frame, "
                 f"its calibration says {_size(camera.size_px)}"
             )
-        mask, edge = _full_frame(observation)
-        masks.append(mask)
-        edges.append(edge)
+        masks.append(observation.words_in_full_frame(observation.mask_words))
+        edges.append(observation.in_full_frame(observation.edges))
     k = np.array([camera.matrix for camera in seen])
     arrays = ViewArrays(
         rotation=np.ascontiguousarray([camera.T_cam_world[:3, :3] for camera in seen]),
@@ -127,19 +126,6 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
         observed=np.array([count_bits(mask) for mask in masks], dtype=np.int64),
     )
     return Views(tuple(camera.name for camera in seen), arrays)
-
-
-def _full_frame(observation: Observation) -> tuple[NDArray[np.uint64], NDArray[np.uint8]]:
-    width, height = observation.size_px
-    if observation.edges.shape == (height, width):
-        return observation.mask_words, observation.edges
-    u, v = observation.offset_px
-    window = np.s_[v : v + observation.height, u : u + observation.width]
-    mask = np.zeros((height, width), dtype=np.bool_)
-    edges = np.zeros((height, width), dtype=np.uint8)
-    mask[window] = observation.mask
-    edges[window] = observation.edges
-    return pack_mask(mask), edges
 
 
 def _starts(arrays: Sequence[NDArray[np.generic]]) -> NDArray[np.int64]:

@@ -12,11 +12,10 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel, CameraRig
-from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim import Prior, refine
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
 from markerless_tracker.tracking.search import Searcher
 
 DISAGREES_M = 0.030
@@ -153,19 +152,14 @@ def _refined(
     """The result's pose (p,) as these views alone would have it."""
     assert result.pose is not None
     contours = searcher.frame(observations, result.stamp_ns, result.pose).contours
-    scale = 1.0 / (CORRELATION_M * searcher.config.refine_sigma_m**2)
-
-    def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
-        sums = contours.equations(pose, truncation_m)
-        return sums.hessian * scale, sums.slope * scale
-
-    return refine(
-        equations,
+    return refined_on_contours(
+        contours,
         result.pose,
-        priors=(Prior(searcher.body.prior_mean, 1.0 / searcher.body.prior_sd**2),),
-        bounds=searcher.limits,
+        searcher.config,
+        priors=(pose_prior(searcher.body),),
+        limits=searcher.limits,
         iterations=_ITERATIONS,
-        truncation=_TRUNCATION_M,
+        truncation_m=_TRUNCATION_M,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers, transforms
 from markerless_tracker.body.kinematics import carried
+from markerless_tracker.body.model import FIRST_TRANSLATION
 from markerless_tracker.errors import SearchError
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.contour.outline_rows import OutlineRows, outline_rows
@@ -31,8 +32,6 @@ _LEVER_M = 0.25
 """Errors of joints' centres turn limbs about as long as this."""
 _TRUNCATION_M = 0.06
 _LEAST_SIGMA_M = 0.002
-_SLIDES = 3
-"""Kinds of nodes from here on are translations."""
 
 
 def confidence_of(
@@ -67,9 +66,8 @@ def confidence_of(
     of_markers = np.einsum("ij,jk,ik->i", by_marker, covariance, by_marker)
     of_root = by_root @ covariance @ by_root.T
     of_root[np.diag_indices(6)] += np.repeat([floor**2, (floor / _LEVER_M) ** 2], 3)
-    moving = body.node_kind[[int(np.flatnonzero(body.node_parameter == k)[0])
-                             for k in range(body.size)]] >= _SLIDES  # fmt: skip
-    floors = np.where(moving, floor, floor / _LEVER_M)
+    floors = np.full(body.size, floor / _LEVER_M)
+    floors[body.translations] = floor
     return Confidence(
         pose_sd=np.sqrt(np.diag(covariance) + floors**2),
         markers_sd_m=np.sqrt(of_markers + floor**2).reshape(-1, 3),
@@ -113,10 +111,10 @@ def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     kind, parameter = body.node_kind[moved], body.node_parameter[moved]
     axes = body.node_sign[moved, None] * nodes[moved, :, kind % 3]
     turned = np.cross(axes, points[:, None] - nodes[moved, :, 3])
-    moves = np.where((kind >= _SLIDES)[:, None], axes, turned)
+    moves = np.where((kind >= FIRST_TRANSLATION)[:, None], axes, turned)
     hang = carried(body, moved)[[*body.marker_node, root]]
     moves *= hang[:, :, None]
-    turning = axes * (hang[-1] * (kind < _SLIDES))[:, None]
+    turning = axes * (hang[-1] * (kind < FIRST_TRANSLATION))[:, None]
     slopes, turns = np.zeros((len(points), body.size, 3)), np.zeros((body.size, 3))
     for n, k in enumerate(parameter.tolist()):
         slopes[:, k] += moves[:, n]

@@ -9,7 +9,6 @@ from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.evaluator import ViewTerms
-from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import (
     ALGORITHMS,
@@ -17,13 +16,29 @@ from markerless_tracker.optim import (
     Prior,
     Problem,
     keyed_generator,
-    refine,
 )
 from markerless_tracker.records import CONTOUR, Observation, SearchPlan, Stage
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limits import joint_limits
+from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
 
 _NEAREST_M = 0.5
+
+
+def make_fitness(
+    body: BodyModel, rig: CameraRig, config: TrackerConfig, *, threads: int = 1
+) -> Fitness:
+    """The fitness of a body in a rig's views, with the terms that a configuration asks for."""
+    return Fitness(
+        body,
+        rig.cameras,
+        threads=threads,
+        edge_rule=config.edge_rule,
+        edge_term=config.edge_term,
+        edge_spacing_px=config.edge_spacing_px,
+        edge_step_px=config.edge_step_px,
+        cost=config.cost,
+    )
 
 
 class Searcher:
@@ -55,16 +70,7 @@ class Searcher:
         self.mapper = mapper
         self.cameras: Mapping[str, CameraModel] = {camera.name: camera for camera in rig}
         self.feasible = Feasibility(body, limits, config.collision)
-        self.fitness = Fitness(
-            body,
-            rig.cameras,
-            threads=threads,
-            edge_rule=config.edge_rule,
-            edge_term=config.edge_term,
-            edge_spacing_px=config.edge_spacing_px,
-            edge_step_px=config.edge_step_px,
-            cost=config.cost,
-        )
+        self.fitness = make_fitness(body, rig, config, threads=threads)
         self.particle_sets: dict[str, ParticleSet] = {}
         """What each stage left in the last frame, where its algorithm goes on from that."""
 
@@ -196,24 +202,15 @@ class FrameSearch:
 
     def _refine(self, plan: SearchPlan) -> FloatArray:
         searcher, config = self._searcher, self._searcher.config
-        scale = 1.0 / (CORRELATION_M * config.refine_sigma_m**2)
-        contours = self.contours
-
-        def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
-            sums = contours.equations(pose, truncation_m)
-            return sums.hessian * scale, sums.slope * scale
-
         self.refinements += plan.iterations
-        return refine(
-            equations,
+        return refined_on_contours(
+            self.contours,
             self.pose,
-            priors=(
-                Prior(self._predicted, 1.0 / plan.sigma**2),
-                Prior(searcher.body.prior_mean, 1.0 / searcher.body.prior_sd**2),
-            ),
-            bounds=searcher.limits,
+            config,
+            priors=(Prior(self._predicted, 1.0 / plan.sigma**2), pose_prior(searcher.body)),
+            limits=searcher.limits,
             iterations=plan.iterations,
-            truncation=(config.refine_truncation_m, config.refine_truncation_end_m),
+            truncation_m=(config.refine_truncation_m, config.refine_truncation_end_m),
         )
 
     def _pixels_per_m(self) -> dict[str, float]:

@@ -10,7 +10,6 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.partitions.sppso import translations
 
 CUTOFF_HZ = 8.0
 """Cutoff of what stands still: lower ones trail a swaying stander by more than a frame at 60 Hz."""
@@ -33,7 +32,7 @@ class OneEuro:
     def __init__(self, body: BodyModel) -> None:
         self._body = body
         self._rise = np.full(body.size, RISE_ANGLE)
-        self._rise[translations(body)] = RISE_PLACE
+        self._rise[body.translations] = RISE_PLACE
         self.reset()
 
     def reset(self) -> None:

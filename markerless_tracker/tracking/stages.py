@@ -7,7 +7,6 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import CONTOUR, Comparison, SearchPlan, Stage
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.partitions import STAGES
-from markerless_tracker.tracking.partitions.sppso import translations
 from markerless_tracker.tracking.partitions.stage import swarm_stage
 
 LIMB_SWARM = (6, 4)
@@ -73,7 +72,7 @@ def swarm_sigma(body: BodyModel, config: TrackerConfig, sigma: FloatArray) -> Fl
     stands at every rate, until a joint's own spread, which grows with the time, exceeds it.
     """
     spread = config.sigma_scale * sigma
-    angles = np.setdiff1d(np.arange(body.size), translations(body))
+    angles = np.setdiff1d(np.arange(body.size), body.translations)
     spread[angles] = np.maximum(spread[angles], config.angle_sigma)
     return spread
 

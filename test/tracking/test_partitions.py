@@ -154,7 +154,9 @@ def test_spreads_grow_with_the_time_between_frames():
 
     def sigmas(**settings):
         config = TrackerConfig.from_mapping({"preset": "paper", "optimizer": "pso", **settings})
-        return [frame_stages(body, config, body.neutral, k * body.sigma)[0].plan.sigma for k in (1, 3)]
+        return [
+            frame_stages(body, config, body.neutral, k * body.sigma)[0].plan.sigma for k in (1, 3)
+        ]
 
     one, three = sigmas(angle_sigma=0.0)
     np.testing.assert_allclose(three, 3.0 * one)

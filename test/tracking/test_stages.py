@@ -11,7 +11,7 @@ from markerless_tracker.records import CONTOUR
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.partitions import STAGES
 from markerless_tracker.tracking.partitions.budget import SWARM_SHARE, scaled_particles
-from markerless_tracker.tracking.partitions.sppso import SPPSO_STAGES, sppso_stages, translations
+from markerless_tracker.tracking.partitions.sppso import SPPSO_STAGES, sppso_stages
 from markerless_tracker.tracking.stages import LIMB_SWARM, frame_stages
 
 
@@ -84,11 +84,6 @@ def test_stage_1_moves_the_root_stage_2_everything(body, swarm_settings):
     expected = sigma.copy()
     expected[3:6] /= 10.0
     np.testing.assert_allclose(second.plan.sigma, expected, rtol=1e-15)
-
-
-def test_translations_are_the_pelvis_position(body):
-    names = [body.parameter_names[i] for i in translations(body)]
-    assert names == ["pelvis_tx", "pelvis_ty", "pelvis_tz"]
 
 
 def test_edges_of_stage_1_lie_on_every_cone_that_is_rigid_with_the_root(swarm_settings):

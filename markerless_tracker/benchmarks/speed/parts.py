@@ -20,7 +20,6 @@ from markerless_tracker.benchmarks.machine import machine, usable_cores
 from markerless_tracker.benchmarks.speed.reference import ReferenceFitness
 from markerless_tracker.benchmarks.speed.scene import SpeedScene
 from markerless_tracker.body import BodyModel
-from markerless_tracker.fitness import Fitness
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Segmenter, learn_background
 from markerless_tracker.imaging.edges import edge_map
@@ -28,7 +27,7 @@ from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.results.result import versions
 from markerless_tracker.tracking import Tracker, TrackerConfig
-from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.search import Searcher, make_fitness
 from markerless_tracker.tracking.stages import contour_stage, frame_stages
 
 THOUSAND = 1000
@@ -128,7 +127,7 @@ def _view_evaluations(
         body = scene.body(name)
         pose = scene.pose(body)
         config = TrackerConfig.from_mapping({"body": name, "refinement": "none"})
-        fitness = _fitness(scene, body, config, threads=1)
+        fitness = make_fitness(body, scene.rig, config)
         seen = fitness.lay_out(observations)
         poses = scattered(body, pose, _POSES)
         whole = Comparison.whole(pose, len(body.cone_names), edge_weight=1.0)
@@ -276,7 +275,7 @@ def _thousand(
     scene: SpeedScene, body: BodyModel, config: TrackerConfig
 ) -> Callable[[Mapping[str, Observation]], float]:
     """Seconds that 1000 evaluations of a body take on a frame's evidence."""
-    fitness = _fitness(scene, body, config, threads=config.threads)
+    fitness = make_fitness(body, scene.rig, config, threads=config.threads)
     poses = scattered(body, scene.pose(body), THOUSAND)
     every = np.ones(len(body.cone_names), dtype=np.bool_)
 
@@ -285,18 +284,6 @@ def _thousand(
         return _seconds(lambda: fitness.count(views, poses, every, every))
 
     return run
-
-
-def _fitness(scene: SpeedScene, body: BodyModel, config: TrackerConfig, *, threads: int) -> Fitness:
-    return Fitness(
-        body,
-        scene.rig.cameras,
-        threads=threads,
-        edge_rule=config.edge_rule,
-        edge_term=config.edge_term,
-        edge_spacing_px=config.edge_spacing_px,
-        edge_step_px=config.edge_step_px,
-    )
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import TrackResult
 from markerless_tracker.results.score import match_rows
 from markerless_tracker.tracking import Tracker
+from markerless_tracker.tracking.search import make_fitness
 
 
 class TruthScore:
@@ -61,13 +62,5 @@ class TruthScore:
 
     def _fitness_of(self, body: BodyModel) -> Fitness:
         if self._fitness is None or self._fitness.body is not body:
-            config = self._tracker.config
-            self._fitness = Fitness(
-                body,
-                self._tracker.rig.cameras,
-                edge_rule=config.edge_rule,
-                edge_term=config.edge_term,
-                edge_spacing_px=config.edge_spacing_px,
-                edge_step_px=config.edge_step_px,
-            )
+            self._fitness = make_fitness(body, self._tracker.rig, self._tracker.config)
         return self._fitness

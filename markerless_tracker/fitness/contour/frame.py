@@ -56,7 +56,7 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
     runs midway between pixels inside and outside; where the silhouette leaves the frame, and
     around specks, there are no points.
     """
-    mask = _full_frame(observation)
+    mask = observation.in_full_frame(observation.mask.view(np.uint8))
     height, width = mask.shape
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if rows.size == 0:
@@ -97,18 +97,6 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
         normal,
         np.concatenate(spacing)[inner],
     )
-
-
-def _full_frame(observation: Observation) -> NDArray[np.uint8]:
-    """The mask (h, w) of the whole frame: outside the observation's region there is no body."""
-    mask = observation.mask.view(np.uint8)
-    width, height = observation.size_px
-    if mask.shape == (height, width):
-        return mask
-    u, v = observation.offset_px
-    frame = np.zeros((height, width), dtype=np.uint8)
-    frame[v : v + observation.height, u : u + observation.width] = mask
-    return frame
 
 
 def join_edges(edges: Sequence[SilhouetteContour]) -> ContourViews:

@@ -33,7 +33,6 @@ RESCUE_STAGES: Mapping[str, tuple[tuple[int, int], ...]] = {
     "global": ((100, 10),),
 }
 """The same evaluations beside contour refinement: it homes in, so the swarm may look widely."""
-_TRANSLATION = 3
 
 
 def sppso_stages(
@@ -69,7 +68,7 @@ def sppso_stages(
                 edge_cones=trunk if name == "root" else None,
             )
         )  # fmt: skip
-        settled = translations(body) if name == "root" else own
+        settled = body.translations if name == "root" else own
         spread[settled] /= config.soft_factor
         earlier = active
     return tuple(stages)
@@ -87,9 +86,3 @@ def _parts(body: BodyModel, stages: str) -> dict[str, IntArray]:
         )
     trunk = body.subspaces["torso_head"]
     return {"root": body.root, "trunk": trunk, "body": np.setdiff1d(body.joints, trunk)}
-
-
-def translations(body: BodyModel) -> IntArray:
-    """Indices of the parameters that are translations."""
-    moving = body.node_kind >= _TRANSLATION
-    return np.sort(body.node_parameter[moving])

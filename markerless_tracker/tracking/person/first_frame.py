@@ -16,10 +16,11 @@ from markerless_tracker.body.sizes import Sizes
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.contour.outline_rows import outline_rows, surface
 from markerless_tracker.fitness.contour.row_kernels import normal_equations
-from markerless_tracker.fitness.shape.section_fit import CORRELATION_M, fit_shape
+from markerless_tracker.fitness.shape.section_fit import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.refinement import data_precision
 
 TRUSTED_M = 0.003
 """Start markers at most this far off are taken as they are."""
@@ -98,7 +99,7 @@ def _settled(
     limits: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Free lengths (k,) and pose (p,) that fit contours and markers."""
-    scale = 1.0 / (CORRELATION_M * config.refine_sigma_m**2)
+    scale = data_precision(config)
     begin = start.sizes.of(body)
     seen = np.isfinite(start.positions_m).all(axis=1)
     p = body.size

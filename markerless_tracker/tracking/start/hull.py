@@ -172,10 +172,7 @@ class _View:
     @classmethod
     def of(cls, camera: CameraModel, observation: Observation, middle: FloatArray) -> "_View":
         """The view, its silhouette grown by half a grid spacing at the room's middle."""
-        width, height = observation.size_px
-        u, v = observation.offset_px
-        mask = np.zeros((height, width), dtype=np.uint8)
-        mask[v : v + observation.height, u : u + observation.width] = observation.mask
+        mask = observation.in_full_frame(observation.mask.view(np.uint8))
         depth = float(camera.T_cam_world[2, :3] @ middle + camera.T_cam_world[2, 3])
         scale = float(camera.matrix[0, 0]) / max(depth, 1.0)
         masks = {}

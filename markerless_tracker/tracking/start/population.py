@@ -8,10 +8,10 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.anatomy import heading, turned_by
 from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim import Prior, keyed_generator, refine
+from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
+from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.postures import first_guesses
@@ -25,8 +25,8 @@ _CHILDREN = 480
 _REFINED = 10
 _ALIKE_M = 0.07
 """Poses whose markers lie nearer to each other than this, on average, are the same."""
-_PRIOR = 4.0
-"""Weight of the belief in usual poses: a generic body's outline fits by some centimetres only."""
+_PRIOR_WEIGHT = 4.0
+"""Weight of the pose prior: a generic body's outline fits within some centimetres only."""
 _INITIALISE = (6, (0.25, 0.08))
 _RECOMBINE = (5, (0.15, 0.05))
 _PROPAGATE = (3, (0.12, 0.05))
@@ -131,18 +131,12 @@ class FramePopulation:
     ) -> FloatArray:
         """Poses (n, p), each refined on the contours."""
         searcher = self._searcher
-        scale = 1.0 / (CORRELATION_M * searcher.config.refine_sigma_m**2)
-        usual = Prior(searcher.body.prior_mean, _PRIOR / searcher.body.prior_sd**2)
-
-        def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
-            sums = self.contours.equations(pose, truncation_m)
-            return sums.hessian * scale, sums.slope * scale
-
+        prior = pose_prior(searcher.body, _PRIOR_WEIGHT)
         return np.array(
             [
-                refine(
-                    equations, pose, priors=(usual,), bounds=searcher.limits,
-                    iterations=iterations, truncation=truncation,
+                refined_on_contours(
+                    self.contours, pose, searcher.config, priors=(prior,),
+                    limits=searcher.limits, iterations=iterations, truncation_m=truncation,
                 )
                 for pose in poses
             ]

@@ -119,7 +119,7 @@ def test_a_swarm_that_stops_evaluations_early_finds_the_same(scene, body, rig, p
             )
         )  # fmt: skip
         best = optimizer.run(fitness.prepare(views, comparison), early=early)
-        return best, optimizer.best_cost, optimizer.evaluations, optimizer._best_costs
+        return best, optimizer.best_cost, optimizer.evaluations, optimizer._swarm.best_costs
 
     for ours, theirs in zip(found(True), found(False), strict=True):
         np.testing.assert_array_equal(ours, theirs)
