@@ -174,7 +174,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
-    """Settings of a YAML file, overruled by flags that were given.
+    """Settings of a YAML file, overruled by flags that were given, by dotted name.
 
     Raises:
         ConfigError: the file cannot be read, or a setting is unknown or impossible.
@@ -190,8 +190,8 @@ def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
             raise ConfigError(
                 f"{path}: expected a mapping of settings, got {type(loaded).__name__}"
             )
-        values = {str(key): value for key, value in (loaded or {}).items()}
-    return TrackerConfig.from_mapping({**values, **flags})
+        values = TrackerConfig.dotted(loaded or {})
+    return TrackerConfig.from_mapping({**values, **TrackerConfig.dotted(flags)})
 
 
 def _cameras(shifts: Mapping[str, Shift]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import BodyModelError, ImageError
 from markerless_tracker.fitness.raster.bits import count_bits
-from markerless_tracker.fitness.raster.outline import LANES
+from markerless_tracker.fitness.raster.outline_arrays import LANES
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 

@@ -13,7 +13,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.fitness.arrays import Views, body_arrays, lay_out_views
 from markerless_tracker.fitness.raster import kernels
 from markerless_tracker.fitness.raster.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule
-from markerless_tracker.fitness.raster.outline import make_outlines
+from markerless_tracker.fitness.raster.outline_arrays import make_outlines
 from markerless_tracker.fitness.raster.static_layer import Drawing, split_static
 from markerless_tracker.fitness.terms import OVERLAP, PROJECTED, CostRule, view_terms
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking

@@ -11,7 +11,7 @@ from markerless_tracker.imaging.settings import ImagingSettings
 
 def edge_reach(settings: ImagingSettings) -> int:
     """How far from a pixel its edge strength looks at the mask and the image, px."""
-    return settings.edge_margin_px + settings.edge_blur_px // 2 + 1
+    return settings.edges.margin_px + settings.edges.blur_px // 2 + 1
 
 
 def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
@@ -32,8 +32,8 @@ def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
     left, top, w, h = cv2.boundingRect(mask)
     if w == 0 or h == 0:
         return edges
-    margin = settings.edge_margin_px
-    reach = margin + settings.edge_blur_px + 1
+    margin = settings.edges.margin_px
+    reach = margin + settings.edges.blur_px + 1
     u0, v0 = max(left - reach, 0), max(top - reach, 0)
     u1, v1 = min(left + w + reach, width), min(top + h + reach, height)
     strength = _gradient_strength(grey_of(image[v0:v1, u0:u1]), settings)
@@ -42,7 +42,7 @@ def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
         brush = np.ones((2 * margin + 1, 2 * margin + 1), dtype=np.uint8)
         near = np.asarray(cv2.dilate(near, brush), dtype=np.uint8)
     cv2.bitwise_and(strength, near, dst=strength)
-    side = settings.edge_blur_px
+    side = settings.edges.blur_px
     if side > 1:
         border = cv2.BORDER_REPLICATE
         cv2.GaussianBlur(strength, (side, side), 0.0, dst=strength, borderType=border)
@@ -51,10 +51,10 @@ def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
 
 
 def _gradient_strength(grey: Image, settings: ImagingSettings) -> Image:
-    """Sobel gradient of a grey image (h, w), thresholded as `edge_form` says, 0..255."""
+    """Sobel gradient of a grey image (h, w), thresholded as `edges.form` says, 0..255."""
     strength = np.empty_like(grey)
-    threshold = 8.0 * settings.edge_gradient
-    if settings.edge_form == "published":
+    threshold = 8.0 * settings.edges.gradient
+    if settings.edges.form == "published":
         # From just below the threshold so steep that there is nothing between 0 and 255.
         low = np.float32(threshold * (1.0 - 1e-6))
         gradient_strength(grey, low, np.float32(np.inf), strength)

@@ -3,48 +3,53 @@
 from dataclasses import dataclass
 
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.settings import check_settings, setting
+from markerless_tracker.settings import GroupedSettings, SettingsGroup, group, setting
 
 
 @dataclass(frozen=True, kw_only=True)
-class ImagingSettings:
-    """Settings of the imaging room; fields have metadata ``doc``, ``min``, ``max``, ``choices``.
+class BackgroundSettings(SettingsGroup):
+    """Learning the empty scene, and comparing an image with it."""
 
-    Lengths ending in ``_px`` are pixels of the image as the segmenter gets it, areas are shares of
-    that image, sigmas and gradients are grey levels of 0..255.
+    NAME = "background"
 
-    Raises:
-        ConfigError: a value of the wrong type, out of its range or not among its choices.
-    """
-
-    background_risk: float = setting(
+    risk: float = setting(
         8.0,
         "log10 of the risk factor of the foreground test for three channels: a pixel is foreground "
         "where its background density is below 1 / (256^3 * 10^risk); higher means less foreground",
         least=-6.0,
         most=200.0,
     )
-    background_risks: str = setting(
+    risks: str = setting(
         "same",
-        "same: background_risk for every camera; humaneva: that dataset's own for cameras 1 to 4 "
+        "same: risk for every camera; humaneva: that dataset's own for cameras 1 to 4 "
         "(80, 60, 30, 80), by the number at the end of the name",
         choices=("same", "humaneva"),
     )
-    background_modes: int = setting(
+    modes: int = setting(
         1,
         "Gaussians per pixel of a background learned from several images: 1 = mean and variance, "
         "more = a mixture, for scenes that show things by turns",
         least=1,
         most=8,
     )
-    background_sigma_min: float = setting(
+    sigma_min: float = setting(
         2.0, "smallest noise believed of a background pixel, grey levels", least=0.1, most=50.0
     )
-    background_sigma_still: float = setting(
+    sigma_still: float = setting(
         4.0,
         "noise assumed where the background is a single still, grey levels",
         least=0.1,
         most=50.0,
+    )
+    follow_s: float = setting(
+        0.0,
+        "time constant with which the background follows slow changes of light away from the "
+        "silhouette; 0 = never: evidence then depends on each image alone",
+        least=0.0,
+        most=1e6,
+    )
+    follow_margin_px: int = setting(
+        12, "distance from the silhouette that does not follow", least=0, most=500
     )
     denoise_sigma: float = setting(
         5.0,
@@ -57,142 +62,189 @@ class ImagingSettings:
         "find in every image how much brighter it is than the background (exposure steps, "
         "flicker), by channel, and compare with the background as bright",
     )
-    background_follow_s: float = setting(
-        0.0,
-        "time constant with which the background follows slow changes of light away from the "
-        "silhouette; 0 = never: evidence then depends on each image alone",
-        least=0.0,
-        most=1e6,
-    )
-    background_follow_margin_px: int = setting(
-        12, "distance from the silhouette that does not follow", least=0, most=500
-    )
-    shadow_removal: bool = setting(True, "take pixels that look like a shadow for background")
-    shadow_value_min: float = setting(
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShadowSettings(SettingsGroup):
+    """What counts as a shadow: hue, saturation and value against the background's."""
+
+    NAME = "shadow"
+
+    removal: bool = setting(True, "take pixels that look like a shadow for background")
+    value_min: float = setting(
         0.5, "darkest shadow, as a ratio of its brightness to the background's", least=0.0, most=1.0
     )
-    shadow_value_max: float = setting(
+    value_max: float = setting(
         1.0,
         "faintest shadow, as a ratio of its brightness to the background's",
         least=0.0,
         most=2.0,
     )
-    shadow_saturation_max: float = setting(
+    saturation_max: float = setting(
         0.05,
         "a shadow's saturation exceeds the background's by no more than this",
         least=-1.0,
         most=1.0,
     )
-    shadow_hue_max_deg: float = setting(
+    hue_max_deg: float = setting(
         40.0,
         "a shadow's hue differs from the background's by no more than this",
         least=0.0,
         most=180.0,
     )
-    shadow_chroma_min: float = setting(
+    chroma_min: float = setting(
         12.0,
         "hue is compared only where the background, darkened as much as the pixel, would have this "
         "much colour (largest minus smallest channel, grey levels); below it hue is noise",
         least=0.0,
         most=255.0,
     )
-    shadow_blob_share: float = setting(
+    blob_share: float = setting(
         2e-4,
         "shadow patches below this share of the image belong to the person, colour cameras",
         least=0.0,
         most=1.0,
     )
-    shadow_grey_value_min: float = setting(
+    grey_value_min: float = setting(
         0.75,
-        "shadow_value_min of grey cameras, where no colour protects clothes",
+        "value_min of grey cameras, where no colour protects clothes",
         least=0.0,
         most=1.0,
     )
-    shadow_grey_value_max: float = setting(
-        0.95, "shadow_value_max of grey cameras", least=0.0, most=2.0
-    )
-    shadow_grey_blob_share: float = setting(
+    grey_value_max: float = setting(0.95, "value_max of grey cameras", least=0.0, most=2.0)
+    grey_blob_share: float = setting(
         1e-3,
-        "shadow_blob_share of grey cameras; the patches are opened first",
+        "blob_share of grey cameras; the patches are opened first",
         least=0.0,
         most=1.0,
     )
-    texture_radius_px: int = setting(
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for least, most in (("value_min", "value_max"), ("grey_value_min", "grey_value_max")):
+            low, high = getattr(self, least), getattr(self, most)
+            if low > high:
+                raise ConfigError(f"shadow.{least}: got {low}, expected at most {most} ({high})")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextureSettings(SettingsGroup):
+    """Shadows found by the background's pattern."""
+
+    NAME = "texture"
+
+    radius_px: int = setting(
         3,
         "radius of the windows in which the background's pattern is looked for: what shows it in "
         "any light is shadow, what hides it is none; 0 = do not look",
         least=0,
         most=6,
     )
-    texture_light_min: float = setting(
+    light_min: float = setting(
         0.15,
         "darkest shadow that its pattern can give away, as a ratio of its brightness to the "
         "background's",
         least=0.0,
         most=1.0,
     )
-    texture_reveal: bool = setting(
+    reveal: bool = setting(
         True,
         "grey cameras: what is as bright as the background but hides its pattern is foreground",
     )
-    mask_open_px: int = setting(
+
+
+@dataclass(frozen=True, kw_only=True)
+class MaskSettings(SettingsGroup):
+    """Cleaning the silhouette: morphology, holes, blobs, border."""
+
+    NAME = "mask"
+
+    open_px: int = setting(
         3, "side of the opening that removes specks; 0 or 1 = none", least=0, most=101
     )
-    mask_close_px: int = setting(
+    close_px: int = setting(
         5,
         "side of the closing that closes cracks, in images of 640x480 or more; in smaller ones it "
         "is as much smaller as they are; 0 or 1 = none",
         least=0,
         most=101,
     )
-    mask_trim_px: int = setting(
+    trim_px: int = setting(
         1,
         "layers of pixels that may be taken from the silhouette's border where the body, by the "
         "colours beside them, covers less than half of them; 0 = none",
         least=0,
         most=20,
     )
-    level_set_iterations: int = setting(
+    hole_share: float = setting(
+        2e-4, "holes up to this share of the image are filled", least=0.0, most=1.0
+    )
+    blob_share: float = setting(
+        3e-4, "blobs below this share of the image are dropped", least=0.0, most=1.0
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class LevelSetSettings(SettingsGroup):
+    """Localised active contour on the silhouette's border."""
+
+    NAME = "level_set"
+
+    iterations: int = setting(
         0,
         "steps of a pixel by which the silhouette's contour may move to where the colours beside "
         "it change (localised active contour); 0 = leave it where the foreground test puts it",
         least=0,
         most=20,
     )
-    level_set_radius_px: int = setting(
+    radius_px: int = setting(
         5, "distance within which those colours are compared", least=1, most=100
     )
-    mask_hole_share: float = setting(
-        2e-4, "holes up to this share of the image are filled", least=0.0, most=1.0
-    )
-    mask_blob_share: float = setting(
-        3e-4, "blobs below this share of the image are dropped", least=0.0, most=1.0
-    )
-    edge_form: str = setting(
+
+
+@dataclass(frozen=True, kw_only=True)
+class EdgeMapSettings(SettingsGroup):
+    """The edge map of an image."""
+
+    NAME = "edges"
+
+    form: str = setting(
         "soft",
         "soft: gradient rising from 0 at half the threshold to 1 at twice it, then blurred; "
         "published: 1 at and above the threshold, else 0, then blurred",
         choices=("soft", "published"),
     )
-    edge_gradient: float = setting(
+    gradient: float = setting(
         4.0,
         "gradient (Sobel / 8, grey levels per pixel) that counts as an edge",
         least=0.01,
         most=255.0,
     )
-    edge_blur_px: int = setting(7, "side of the edge map's blur, odd", least=1, most=101)
-    edge_margin_px: int = setting(
+    blur_px: int = setting(7, "side of the edge map's blur, odd", least=1, most=101)
+    margin_px: int = setting(
         6, "edges count up to this far outside the silhouette", least=0, most=200
     )
 
     def __post_init__(self) -> None:
-        check_settings(self)
-        for least, most in (
-            ("shadow_value_min", "shadow_value_max"),
-            ("shadow_grey_value_min", "shadow_grey_value_max"),
-        ):
-            low, high = getattr(self, least), getattr(self, most)
-            if low > high:
-                raise ConfigError(f"{least}: got {low}, expected at most {most} ({high})")
-        if self.edge_blur_px % 2 == 0:
-            raise ConfigError(f"edge_blur_px: got {self.edge_blur_px}, expected an odd number")
+        super().__post_init__()
+        if self.blur_px % 2 == 0:
+            raise ConfigError(f"edges.blur_px: got {self.blur_px}, expected an odd number")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImagingSettings(GroupedSettings):
+    """Settings of the imaging room, in groups.
+
+    Lengths ending in ``_px`` are pixels of the image as the segmenter gets it, areas are shares of
+    that image, sigmas and gradients are grey levels of 0..255.
+
+    Raises:
+        ConfigError: a value of the wrong type, out of its range or not among its choices.
+    """
+
+    background: BackgroundSettings = group(BackgroundSettings)
+    shadow: ShadowSettings = group(ShadowSettings)
+    texture: TextureSettings = group(TextureSettings)
+    mask: MaskSettings = group(MaskSettings)
+    level_set: LevelSetSettings = group(LevelSetSettings)
+    edges: EdgeMapSettings = group(EdgeMapSettings)

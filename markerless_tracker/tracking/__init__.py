@@ -1,13 +1,12 @@
 """The tracker: configuration, stages of a frame, state, `Tracker.step`."""
 
-from markerless_tracker.tracking.config import OPTIMIZERS, PRESETS, Setting, TrackerConfig
+from markerless_tracker.tracking.config import OPTIMIZERS, PRESETS, TrackerConfig
 from markerless_tracker.tracking.setup import TrackerSetup, build_tracker
 from markerless_tracker.tracking.tracker import Tracker
 
 __all__ = [
     "OPTIMIZERS",
     "PRESETS",
-    "Setting",
     "Tracker",
     "TrackerConfig",
     "TrackerSetup",

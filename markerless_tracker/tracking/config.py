@@ -1,34 +1,44 @@
-"""All settings of a tracker, in one flat frozen record; and the presets."""
+"""All settings of a tracker, in one frozen record; and the presets."""
 
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Self
 
 from markerless_tracker.body import RULES
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.fitness import COSTS, EDGE_RULES, EDGE_TERMS
+from markerless_tracker.fitness import COSTS
 from markerless_tracker.imaging import ImagingSettings
-from markerless_tracker.optim import ESTIMATES, MASTER_TERMS, UPDATES
-from markerless_tracker.settings import setting
+from markerless_tracker.settings import group, setting
+from markerless_tracker.tracking.groups import (
+    ApfSettings,
+    EdgeSettings,
+    HmcpsoSettings,
+    PfSettings,
+    PsoSettings,
+    RefineSettings,
+    RegionSettings,
+    SigmaSettings,
+    SppsoSettings,
+)
 
 PRESETS: Mapping[str, Mapping[str, Any]] = {
     "tuned": {},
     "paper": {
         "body": "balan31",
-        "edge_form": "published",
-        "edge_rule": "visible",
+        "edges.form": "published",
+        "edges.rule": "visible",
         "edge_weight": 1.0,
         "fit_lengths": False,
         "fit_shape": False,
         "prediction": 0.0,
         "refinement": "none",
         "search_again": False,
-        "sigma_scale": 1.0,
+        "sigma.scale": 1.0,
     },
 }
 """What each preset sets; everything else keeps its default."""
 
-_SAINI: Mapping[str, Any] = {"body": "humaneva34", "cost": "bidirectional", "angle_sigma": 0.1}
+_SAINI: Mapping[str, Any] = {"body": "humaneva34", "cost": "bidirectional", "sigma.angle": 0.1}
 PAPERS: Mapping[str, Mapping[str, Any]] = {
     "sppso": {},
     "hmcpso": _SAINI,
@@ -36,8 +46,8 @@ PAPERS: Mapping[str, Mapping[str, Any]] = {
     "mcpso": _SAINI,
     "pso": _SAINI,
     "glpso": _SAINI,
-    "apf": {**_SAINI, "angle_sigma": 0.0},
-    "pf": {**_SAINI, "angle_sigma": 0.0},
+    "apf": {**_SAINI, "sigma.angle": 0.0},
+    "pf": {**_SAINI, "sigma.angle": 0.0},
 }
 """What the preset 'paper' sets besides for each optimiser: what is not SPPSO is set as in the
 comparison of Saini et al. (2015), whose swarms start with a variance of 0.01 rad² [R]. Of the
@@ -50,17 +60,6 @@ OPTIMIZERS = tuple(PAPERS)
 def own_evaluations(optimizer: str) -> int:
     """Evaluations per frame that an optimiser was published with."""
     return 1000 if optimizer == "sppso" else 3600
-
-
-@dataclass(frozen=True)
-class Setting:
-    """One setting as users meet it: key of `--config`, and parameter of the node."""
-
-    name: str
-    type: type
-    default: Any
-    doc: str
-    choices: tuple[str, ...] | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,33 +89,6 @@ class TrackerConfig(ImagingSettings):
         "contour",
         "contour: align with the silhouettes' edges before and after the swarm; none: swarm alone",
         choices=("contour", "none"),
-    )
-    refine_iterations: int = setting(
-        4, "iterations of each of the two contour refinements", least=1, most=1000
-    )
-    refine_truncation_m: float = setting(
-        0.10,
-        "outline farther than this from a silhouette's edge is an outlier, at first",
-        least=0.001,
-        most=10.0,
-    )
-    refine_truncation_end_m: float = setting(
-        0.035, "the same, in the last iteration", least=0.001, most=10.0
-    )
-    refine_sigma_m: float = setting(
-        0.01, "noise believed of a silhouette's edge, for refinement", least=1e-4, most=1.0
-    )
-    refine_prior: float = setting(
-        4.0,
-        "spread of the belief about the predicted pose, in published spreads",
-        least=0.01,
-        most=1e6,
-    )
-    limb_spread: float = setting(
-        4.0,
-        "with refinement: spread of each limb's own small swarm, in published spreads",
-        least=0.01,
-        most=100.0,
     )
     min_improvement: float = setting(
         0.001,
@@ -162,76 +134,11 @@ class TrackerConfig(ImagingSettings):
         "none",
         choices=RULES,
     )
-    update: str = setting(
-        "iteration",
-        "when a swarm's best is updated; particle: as printed in SPPSO",
-        choices=UPDATES,
-    )
-    sigma_scale: float = setting(
-        0.5, "factor of the published spreads of the search", least=0.01, most=100.0
-    )
-    sigma_rate_max: float = setting(
-        6.0,
-        "spreads grow with the time between frames up to this many 60ths of a second",
-        least=1.0,
-        most=1000.0,
-    )
-    angle_sigma: float = setting(
-        0.0,
-        "least spread of every angle, rad, at any rate; 0: each angle has its own, of the body",
-        least=0.0,
-        most=3.0,
-    )
     partition: str = setting(
         "soft",
         "of sppso's and hmcpso's steps; soft: what earlier steps found joins with a small spread; "
         "hard: it stays",
         choices=("soft", "hard"),
-    )
-    sppso_stages: str = setting(
-        "two",
-        "steps of sppso: two (root, then everything, as published), three (root; torso and head; "
-        "everything) or global (everything at once)",
-        choices=("two", "three", "global"),
-    )
-    hierarchy: str = setting(
-        "six",
-        "steps of hpso and hmcpso: six (root, torso and head, limbs), or twelve as HPSO's own",
-        choices=("six", "twelve"),
-    )
-    soft_factor: float = setting(
-        10.0, "soft partition: spreads of what joins are divided by this", least=1.0, most=1e6
-    )
-    sub_swarms: int = setting(3, "hmcpso, mcpso: sub-swarms beside the master", least=1, most=1000)
-    inertia_max: float = setting(
-        2.0, "inertia of the first move, of every swarm but sppso's", least=0.01, most=10.0
-    )
-    inertia_min: float = setting(0.1, "inertia of the last move", least=0.001, most=10.0)
-    acceleration: float = setting(
-        2.05, "pull of a particle's own best and of its swarm's best", least=0.0, most=10.0
-    )
-    migration: float = setting(
-        2.0, "hmcpso, mcpso: pull of the sub-swarms' best on the master", least=0.0, most=10.0
-    )
-    master_term: str = setting(
-        "printed",
-        "hmcpso, mcpso: pull of the master's best; weighted: times the migration factor",
-        choices=MASTER_TERMS,
-    )
-    layers: int = setting(
-        0, "apf: layers; 0: six if they share the budget out evenly, else five", least=0, most=100
-    )
-    survival: float = setting(
-        0.5, "apf: share of the particles that survives a layer", least=0.01, most=1.0
-    )
-    layer_shrink: float = setting(
-        0.5, "apf: factor of the noise's variance from layer to layer", least=0.01, most=1.0
-    )
-    sharpness: float = setting(
-        200.0, "pf: likelihood is exp(-sharpness cost)", least=0.01, most=1e6
-    )
-    estimate: str = setting(
-        "mean", "apf, pf: weighted mean of the particles, or the best one", choices=ESTIMATES
     )
     cost: str = setting(
         "overlap",
@@ -240,75 +147,26 @@ class TrackerConfig(ImagingSettings):
         choices=COSTS,
     )
     edge_weight: float = setting(0.0, "weight of f_e beside f_s", least=0.0, most=100.0)
-    edge_rule: str = setting(
-        "outline",
-        "model edges that are sampled: sides: all; visible: those no nearer part hides; outline: "
-        "those on the outline of the whole body",
-        choices=tuple(EDGE_RULES),
-    )
-    edge_term: str = setting(
-        "ssd", "f_e from edge strengths M: 1 - mean (1 - M)², or mean M", choices=EDGE_TERMS
-    )
-    edge_spacing_px: float = setting(
-        5.0, "distance of edge samples along a side", least=0.5, most=100.0
-    )
-    edge_step_px: float = setting(
-        2.0, "outline: how far outside a sample must be free of the body", least=0.5, most=50.0
-    )
-    full_frame_every: int = setting(
-        30,
-        "while the person is tracked, images are looked at around the predicted body only, and "
-        "each camera's whole image every so many frames (it does not change the pose); 1 = always",
-        least=1,
-        most=100000,
-    )
-    region_margin_m: float = setting(
-        0.15,
-        "how far around the predicted body images are looked at, at the body; more where frames "
-        "are further apart",
-        least=0.0,
-        most=100.0,
-    )
-    component_margin_px: int = setting(
-        0,
-        "silhouette components that come no nearer to the predicted body than this are left out",
-        least=0,
-        most=10000,
-    )
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.inertia_min > self.inertia_max:
-            raise ConfigError(
-                f"inertia_min: got {self.inertia_min:g}, expected at most inertia_max, "
-                f"{self.inertia_max:g}"
-            )
+    refine: RefineSettings = group(RefineSettings)
+    sigma: SigmaSettings = group(SigmaSettings)
+    edges: EdgeSettings = group(EdgeSettings)
+    region: RegionSettings = group(RegionSettings)
+    sppso: SppsoSettings = group(SppsoSettings)
+    pso: PsoSettings = group(PsoSettings)
+    hmcpso: HmcpsoSettings = group(HmcpsoSettings)
+    apf: ApfSettings = group(ApfSettings)
+    pf: PfSettings = group(PfSettings)
 
     @classmethod
-    def settings(cls) -> tuple[Setting, ...]:
-        """All settings, in order."""
-        return tuple(
-            Setting(
-                f.name,
-                type(f.default),
-                f.default if f.default is not MISSING else None,
-                f.metadata.get("doc", ""),
-                f.metadata.get("choices"),
-            )
-            for f in fields(cls)
-        )
-
-    @classmethod
-    def from_mapping(cls, values: Mapping[str, Any], preset: str | None = None) -> Self:
+    def from_mapping(cls, values: Mapping[Any, Any], preset: str | None = None) -> Self:
         """A configuration of a preset (named in the values or given) and the values given.
+
+        Groups may be nested (``{"apf": {"layers": 5}}``) or dotted (``{"apf.layers": 5}``).
 
         Raises:
             ConfigError: an unknown key, naming the nearest known one, or an impossible value.
         """
-        known = {f.name for f in fields(cls)}
-        for key in values:
-            if key not in known:
-                raise ConfigError(f"unknown setting {key!r}{nearest(str(key), known)}")
+        values = cls.dotted(values)
         name = values.get("preset", preset or "tuned")
         if not isinstance(name, str) or name not in PRESETS:
             raise ConfigError(f"preset is {name!r}, expected one of {', '.join(PRESETS)}")
@@ -319,16 +177,4 @@ class TrackerConfig(ImagingSettings):
             own = {"evaluations": own_evaluations(optimizer)}
             if name == "paper":
                 own.update(PAPERS[optimizer])
-        return cls(**{**PRESETS[name], **own, **values, "preset": name})
-
-    def as_mapping(self) -> dict[str, Any]:
-        """All settings by name, as `from_mapping` takes them."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
-
-
-def nearest(name: str, known: "set[str] | frozenset[str]") -> str:
-    """', did you mean ...?' if a known name is near enough, else nothing."""
-    from difflib import get_close_matches
-
-    close = get_close_matches(name, sorted(known), n=1)
-    return f", did you mean {close[0]!r}?" if close else ""
+        return super().from_mapping({**PRESETS[name], **own, **values, "preset": name})

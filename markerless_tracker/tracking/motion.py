@@ -17,7 +17,7 @@ class MotionModel:
 
     Args:
         start: (p,) pose before the first frame.
-        config: `prediction`, `sigma_rate_max` and `region_margin_m`.
+        config: `prediction`, `sigma.rate_max` and `region.margin_m`.
 
     Attributes:
         start: (p,) the same.
@@ -43,7 +43,7 @@ class MotionModel:
         elapsed_ns = self._elapsed_ns(stamp_ns)
         if elapsed_ns == 0:
             return self.pose
-        bounded_ns = min(elapsed_ns, self._config.sigma_rate_max / TRAINING_RATE_HZ * 1e9)
+        bounded_ns = min(elapsed_ns, self._config.sigma.rate_max / TRAINING_RATE_HZ * 1e9)
         moved = self.pose + self._config.prediction * bounded_ns * self.velocity_per_ns
         return np.asarray(np.clip(moved, *limits))
 
@@ -52,14 +52,14 @@ class MotionModel:
         elapsed_ns = self._elapsed_ns(stamp_ns)
         if elapsed_ns == 0:
             return 1.0
-        return min(elapsed_ns * 1e-9 * TRAINING_RATE_HZ, self._config.sigma_rate_max)
+        return min(elapsed_ns * 1e-9 * TRAINING_RATE_HZ, self._config.sigma.rate_max)
 
     def region_margin_m(self, stamp_ns: int) -> float | None:
         """Margin around the predicted body that holds the person, m; None while not tracked."""
         elapsed_ns = self._elapsed_ns(stamp_ns)
         if elapsed_ns == 0 or not self._tracked:
             return None
-        return self._config.region_margin_m + LIMB_SPEED_M_S * (elapsed_ns * 1e-9)
+        return self._config.region.margin_m + LIMB_SPEED_M_S * (elapsed_ns * 1e-9)
 
     def update(
         self, pose: FloatArray, stamp_ns: int, *, tracked: bool, jumped: IntArray | None = None

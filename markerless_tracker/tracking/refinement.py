@@ -10,7 +10,7 @@ from markerless_tracker.tracking.config import TrackerConfig
 
 def data_precision(config: TrackerConfig) -> float:
     """Factor (1 / m³) that turns sums of squared residuals over outline length into -2 log p."""
-    return 1.0 / (CORRELATION_M * config.refine_sigma_m**2)
+    return 1.0 / (CORRELATION_M * config.refine.sigma_m**2)
 
 
 def pose_prior(body: BodyModel, weight: float = 1.0) -> Prior:
@@ -33,7 +33,7 @@ def refined_on_contours(
     Args:
         contours: the evidence.
         start: (p,) where to begin.
-        config: `refine_sigma_m`, the standard deviation of a residual.
+        config: `refine.sigma_m`, the standard deviation of a residual.
         priors: added to the data.
         limits: (2, p), kept.
         iterations: Gauss-Newton steps.

@@ -33,10 +33,10 @@ def make_fitness(
         body,
         rig.cameras,
         threads=threads,
-        edge_rule=config.edge_rule,
-        edge_term=config.edge_term,
-        edge_spacing_px=config.edge_spacing_px,
-        edge_step_px=config.edge_step_px,
+        edge_rule=config.edges.rule,
+        edge_term=config.edges.term,
+        edge_spacing_px=config.edges.spacing_px,
+        edge_step_px=config.edges.step_px,
         cost=config.cost,
     )
 
@@ -138,7 +138,7 @@ class FrameSearch:
                 self._views,
                 pixels_per_m=self._pixels_per_m(),
                 threads=searcher.threads,
-                step_px=searcher.config.edge_step_px,
+                step_px=searcher.config.edges.step_px,
                 mapper=searcher.mapper,
             )
         return self._contours
@@ -210,7 +210,7 @@ class FrameSearch:
             priors=(Prior(self._predicted, 1.0 / plan.sigma**2), pose_prior(searcher.body)),
             limits=searcher.limits,
             iterations=plan.iterations,
-            truncation_m=(config.refine_truncation_m, config.refine_truncation_end_m),
+            truncation_m=(config.refine.truncation_m, config.refine.truncation_end_m),
         )
 
     def _pixels_per_m(self) -> dict[str, float]:

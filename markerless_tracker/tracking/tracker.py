@@ -19,11 +19,11 @@ from markerless_tracker.tracking.evidence.gather import EvidenceMaker
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
 from markerless_tracker.tracking.limits import check_pose
 from markerless_tracker.tracking.motion import MotionModel
+from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.person.estimate import BodyEstimate
 from markerless_tracker.tracking.person.first_frame import ContourMaker, StartMarkers
 from markerless_tracker.tracking.search import make_searcher
-from markerless_tracker.tracking.stages import frame_stages
 from markerless_tracker.tracking.start.starter import Starter
 from markerless_tracker.tracking.states import Phase, Track
 
@@ -135,7 +135,7 @@ class Tracker:
     def regions(self, stamp_ns: int) -> dict[str, Region | None]:
         """Region of each camera's image that `step` would use at a time; None for all of it.
 
-        Besides, each camera's whole image is used once in `full_frame_every` steps.
+        Besides, each camera's whole image is used once in `region.full_frame_every` steps.
         """
         predicted = self._motion.predict(stamp_ns, self._body.limits)
         return self._evidence.regions(self.body, predicted, self._motion.region_margin_m(stamp_ns))

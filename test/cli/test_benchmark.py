@@ -43,7 +43,7 @@ def test_the_same_figures_as_track_and_evaluate(walk, tmp_path: Path, capsys) ->
 
 def test_tables_for_people_and_on_disk(walk, tmp_path: Path, capsys) -> None:
     config = tmp_path / "settings.yaml"
-    config.write_text("fit_shape: false\nrefine_iterations: 2\n")
+    config.write_text("fit_shape: false\nrefine:\n  iterations: 2\n")
     words = [
         "tables", walk, "--config", str(config), "--body", "balan31,person31", "--refinement",
         "contour,none", "--seeds", "1", "--frames", "1", "--evaluations", "1000", "--fps", "60",
@@ -104,7 +104,7 @@ def test_a_papers_table_with_its_figures_beside_ours(walk, tmp_path: Path, capsy
     shown = " ".join(capsys.readouterr().out.split())
     assert "SPPSO, Table 2" in shown and "theirs:" in shown and "Lee walk" in shown
     assert "38, max 86.4" in shown and "ACIVS 2012" in shown and "f truth-result" in shown
-    assert "sppso_stages=global" in shown and "partition=hard" in shown
+    assert "sppso.stages=global" in shown and "partition=hard" in shown
     table = json.loads((tmp_path / "table.json").read_text())
     # The published row is in both tables and runs once.
     assert [row["evaluations"] for row in table["rows"]] == [1000, 2000, 4000] + [1000] * 4
@@ -120,11 +120,17 @@ def test_pictures_lie_beside_the_table(walk, tmp_path: Path, capsys) -> None:
     pytest.importorskip("matplotlib", reason="matplotlib is not installed (extra [plots])")
     words = [
         "tables", walk, "--preset", "paper", "--vary", "partition=soft,hard", "--vary",
-        "prediction=0.5", "--seeds", "1", "--frames", "4", "--jobs", "1", "-o", str(tmp_path),
+        "prediction=0.5", "--vary", "sigma.scale=0.4", "--seeds", "1",
+        "--frames", "4", "--jobs", "1", "-o", str(tmp_path),
     ]  # fmt: skip
     assert main(["benchmark", *words]) == 0
     out = capsys.readouterr().out
-    assert "variant" in out and "partition=hard" in out and "prediction" not in out
+    assert (
+        "variant" in out
+        and "partition=hard" in out
+        and "prediction" not in out
+        and "sigma" not in out
+    )
     found = sorted(path.name for path in (tmp_path / "plots").iterdir())
     assert found == ["walk_20fps.png", "walk_60fps.png"]
 
@@ -194,6 +200,7 @@ def test_the_table_of_speed(capsys) -> None:
         (["tables", "x", "--vary", "partition"], "expected KEY=VALUE,VALUE...", 2),
         (["tables", "x", "--vary", "a={"], "a value cannot be read", 2),
         (["tables", "x", "--vary", "partitions=soft"], "did you mean 'partition'?", 1),
+        (["tables", "x", "--vary", "apf.layer=5"], "did you mean 'apf.layers'?", 1),
         (["tables", "x", "--vary", "seed=1", "--vary", "seed=2"], "seed stands twice", 1),
         (["tables", "x", "--table", "hmcpso_1"], "table 'hmcpso_1' is unknown", 1),
         (["tables", "x", "--table", "all", "--optimizer", "apf"], "does not go with", 1),

@@ -52,7 +52,7 @@ def test_columns_appear_when_something_differs() -> None:
     ours = (table.rows[0], ROW)
     plain = shown(paper_table("walk", table, [ours], truth_score=False))
     assert "preset" not in plain and "variant" not in plain and "f truth" not in plain
-    both = [ours, (table.rows[0], {**ROW, "preset": "tuned", "variant": "sub_swarms=5"})]
+    both = [ours, (table.rows[0], {**ROW, "preset": "tuned", "variant": "hmcpso.sub_swarms=5"})]
     other = shown(paper_table("walk", table, both, truth_score=True))
-    assert "preset" in other and "sub_swarms=5" in other and "f truth-result" in other
+    assert "preset" in other and "hmcpso.sub_swarms=5" in other and "f truth-result" in other
     assert "variant" not in shown(full_table("walk", [ROW], truth_score=False))

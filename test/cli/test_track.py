@@ -22,7 +22,8 @@ SEARCH: dict[str, Any] = {
     "evaluations": 200,
     "refinement": "none",
     "fit_shape": False,
-    "sigma_scale": 0.5,
+    "sigma": {"scale": 0.5},
+    "edges.spacing_px": 4.0,
     "edge_weight": 0.5,
     "limits": "anatomical",
     "collision": "elliptic",
@@ -113,9 +114,9 @@ def test_flags_overrule_the_settings_file(track, walk, tmp_path):
     assert status == 0
     used = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["settings"]
     assert (used["evaluations"], used["seed"], used["threads"]) == (100, 8, 2)
-    assert (used["preset"], used["edge_rule"]) == ("paper", "visible")
+    assert (used["preset"], used["edges"]["rule"]) == ("paper", "visible")
     # What the file says stands above the preset.
-    assert used["sigma_scale"] == SEARCH["sigma_scale"]
+    assert used["sigma"]["scale"] == SEARCH["sigma"]["scale"]
 
 
 def test_fps_scale_and_background(track, walk, tmp_path):

@@ -14,7 +14,7 @@ from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation
+from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.synthesis import ring_rig
 
 Mask = NDArray[np.bool_]
@@ -275,5 +275,42 @@ def contours_of() -> Callable[..., ContourFrame]:
             Fitness(body, rig.cameras).lay_out(observations),
             pixels_per_m={camera.name: camera.matrix[0, 0] / 4.5 for camera in rig},
         )
+
+    return make
+
+
+@pytest.fixture
+def pose(body: BodyModel) -> FloatArray:
+    """Standing upright."""
+    standing = body.neutral.copy()
+    standing[body.index("pelvis_tz")] = 0.95
+    return standing
+
+
+@pytest.fixture
+def observations(
+    twin: type[Twin],
+    smooth_edges: Callable[..., NDArray[np.uint8]],
+    make_observation: Callable[..., Observation],
+    body: BodyModel,
+    rig: CameraRig,
+    pose: FloatArray,
+) -> dict[str, Observation]:
+    """Silhouettes of a body 50 mm beside `pose`, and smooth edge maps."""
+    moved = pose.copy()
+    moved[body.index("pelvis_tx")] += 0.05
+    return {
+        c.name: make_observation(c, twin(body, c, moved).silhouette(), smooth_edges(c, i))
+        for i, c in enumerate(rig)
+    }
+
+
+@pytest.fixture(scope="session")
+def make_comparison() -> Callable[..., Comparison]:
+    """`make_comparison(body, centre, **changes)`: compares everything."""
+
+    def make(body: BodyModel, centre: FloatArray, **changes: object) -> Comparison:
+        default = Comparison.whole(centre, len(body.cone_names), edge_weight=1.0)
+        return replace(default, **changes)  # type: ignore[arg-type]
 
     return make

@@ -9,7 +9,7 @@ from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.errors import BodyModelError, ImageError
 from markerless_tracker.fitness import lay_out_views
 from markerless_tracker.fitness.arrays import body_arrays
-from markerless_tracker.fitness.raster.outline import LANES
+from markerless_tracker.fitness.raster.outline_arrays import LANES
 from markerless_tracker.records import Observation, pack_mask, unpack_mask
 
 

@@ -14,14 +14,14 @@ def twin(image: np.ndarray, mask: np.ndarray, options: ImagingSettings) -> np.nd
     windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3))
     across, down = (windows * kernel).sum(axis=(2, 3)), (windows * kernel.T).sum(axis=(2, 3))
     gradient = np.hypot(across, down) / 8.0
-    if options.edge_form == "published":
-        strength = (gradient**2 >= options.edge_gradient**2).astype(float)
+    if options.edges.form == "published":
+        strength = (gradient**2 >= options.edges.gradient**2).astype(float)
     else:
-        low = 0.5 * options.edge_gradient
+        low = 0.5 * options.edges.gradient
         strength = np.clip((gradient - low) / (3.0 * low), 0.0, 1.0)
-    side = 2 * options.edge_margin_px + 1
+    side = 2 * options.edges.margin_px + 1
     strength *= cv2.dilate(mask, np.ones((side, side), np.uint8)) > 0
-    size = options.edge_blur_px
+    size = options.edges.blur_px
     return cv2.GaussianBlur(strength, (size, size), 0.0, borderType=cv2.BORDER_REPLICATE)
 
 
@@ -38,7 +38,7 @@ def picture(*, colour: bool) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("form", ["published", "soft"])
 @pytest.mark.parametrize("margin", [0, 6])
 def test_the_window_agrees_with_the_whole_frame(colour: bool, form: str, margin: int) -> None:
-    options = ImagingSettings(edge_form=form, edge_margin_px=margin)
+    options = ImagingSettings.from_mapping({"edges.form": form, "edges.margin_px": margin})
     image, mask = picture(colour=colour)
     edges = edge_map(image, mask, options)
     expected = 255.0 * twin(image, mask, options)

@@ -13,7 +13,9 @@ from markerless_tracker.imaging import ImagingSettings, Region, Segmenter, learn
 from markerless_tracker.synthesis import SyntheticScene
 
 SIZE_PX = (240, 180)
-WIDE = ImagingSettings(mask_close_px=9, mask_blob_share=0.02, mask_hole_share=0.01)
+WIDE = ImagingSettings.from_mapping(
+    {"mask.close_px": 9, "mask.blob_share": 0.02, "mask.hole_share": 0.01}
+)
 
 
 def cluttered(seed: int, channels: int) -> tuple[list[np.ndarray], np.ndarray]:
@@ -63,8 +65,10 @@ def compare(
         [
             ImagingSettings(),
             WIDE,
-            ImagingSettings(denoise_sigma=0.0, shadow_blob_share=0.01),
-            ImagingSettings(texture_radius_px=0, mask_open_px=0),
+            ImagingSettings.from_mapping(
+                {"background.denoise_sigma": 0.0, "shadow.blob_share": 0.01}
+            ),
+            ImagingSettings.from_mapping({"texture.radius_px": 0, "mask.open_px": 0}),
         ]
     ),
 )

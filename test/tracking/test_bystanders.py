@@ -44,10 +44,12 @@ def crossing(frames, gap_px: int) -> Iterator[tuple[object, np.ndarray]]:
 def test_a_second_person_crossing_a_view_changes_nothing(
     make_tracker, frames, refined_settings, every
 ) -> None:
-    settings = dict(refined_settings, evaluations=250, fit_shape=False, full_frame_every=every)
+    settings = dict(
+        refined_settings, evaluations=250, fit_shape=False, **{"region.full_frame_every": every}
+    )
     alone = make_tracker(settings, edge_weight=0.0)
     beside = make_tracker(settings, edge_weight=0.0)
-    gap = beside.config.component_margin_px + 6
+    gap = beside.config.region.component_margin_px + 6
     told = []
     for frame, (crossed, double) in zip(frames, crossing(frames, gap), strict=True):
         expected = alone.step(frame.images, frame.stamp_ns)

@@ -12,7 +12,9 @@ FREE = np.array([[-np.inf] * 3, [np.inf] * 3])
 
 @pytest.fixture
 def motion() -> MotionModel:
-    config = TrackerConfig(prediction=0.5, sigma_rate_max=6.0, region_margin_m=0.2)
+    config = TrackerConfig.from_mapping(
+        {"prediction": 0.5, "sigma.rate_max": 6.0, "region.margin_m": 0.2}
+    )
     return MotionModel(np.array([1.0, 2.0, 3.0]), config)
 
 

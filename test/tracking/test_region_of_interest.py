@@ -38,8 +38,8 @@ def test_the_pose_is_that_of_whole_images(
 ) -> None:
     frames = with_things(frames, scene) if things else frames
     small = dict(evaluations=200, edge_weight=0.0)
-    whole = make_tracker(swarm_settings, full_frame_every=1, **small)
-    part = make_tracker(swarm_settings, full_frame_every=4, **small)
+    whole = make_tracker(swarm_settings, **{"region.full_frame_every": 1}, **small)
+    part = make_tracker(swarm_settings, **{"region.full_frame_every": 4}, **small)
     sizes = []
     for frame in frames:
         a, b = (tracker.step(frame.images, frame.stamp_ns) for tracker in (whole, part))

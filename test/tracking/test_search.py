@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from markerless_tracker.tracking.partitions.frame import contour_stage, frame_stages
 
 from markerless_tracker.body import BodyModel, load_body, markers
 from markerless_tracker.camera import CameraRig
@@ -16,7 +17,6 @@ from markerless_tracker.synthesis import ring_rig
 from markerless_tracker.tracking import TrackerConfig, refinement
 from markerless_tracker.tracking.partitions.sppso import sppso_stages
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.stages import contour_stage, frame_stages
 
 BODY = load_body("person31", 1.75)
 RIG = ring_rig(4, (320, 240))
@@ -25,8 +25,8 @@ STAMP_NS = 1_000_000_000
 
 def settings(**changes) -> TrackerConfig:
     return TrackerConfig.from_mapping(
-        {"body": "person31", "evaluations": 500, "refinement": "contour", "refine_iterations": 3,
-         "sigma_scale": 0.5, "edge_weight": 0.5, "seed": 3, "threads": 1, **changes}
+        {"body": "person31", "evaluations": 500, "refinement": "contour", "refine.iterations": 3,
+         "sigma.scale": 0.5, "edge_weight": 0.5, "seed": 3, "threads": 1, **changes}
     )  # fmt: skip
 
 
@@ -46,8 +46,8 @@ class Person:
     def f(self, pose, config) -> float:
         """f_s + edge weight f_e over the views, by a fitness of its own."""
         fitness = Fitness(
-            self.body, self.rig.cameras, edge_rule=config.edge_rule, edge_term=config.edge_term,
-            edge_spacing_px=config.edge_spacing_px, edge_step_px=config.edge_step_px,
+            self.body, self.rig.cameras, edge_rule=config.edges.rule, edge_term=config.edges.term,
+            edge_spacing_px=config.edges.spacing_px, edge_step_px=config.edges.step_px,
         )  # fmt: skip
         terms = fitness.terms(fitness.lay_out(self.observations), pose).values()
         return float(np.mean([t.silhouette + config.edge_weight * t.edges for t in terms]))
@@ -201,7 +201,9 @@ def test_each_stage_starts_from_the_estimate_so_far(person, monkeypatch) -> None
 
 
 def test_refinement_is_told_limits_beliefs_and_reach(person, monkeypatch) -> None:
-    config = settings(refine_truncation_m=0.2, refine_truncation_end_m=0.05, refine_prior=3.0)
+    config = settings(
+        **{"refine.truncation_m": 0.2, "refine.truncation_end_m": 0.05, "refine.prior": 3.0}
+    )
     told = []
 
     def refine(equations, start, **kwargs):
@@ -224,7 +226,7 @@ def test_refinement_is_told_limits_beliefs_and_reach(person, monkeypatch) -> Non
 
 
 def test_what_was_spent_with_refinement(person) -> None:
-    config = settings(evaluations=1000, refine_iterations=5)
+    config = settings(evaluations=1000, **{"refine.iterations": 5})
     frame = searched(person, config)
     assert (frame.evaluations, frame.refinements) == (200 + 4 * 24, 10)
 
@@ -260,7 +262,7 @@ def test_contours_are_made_once(person) -> None:
 
 def test_swarms_alone_give_the_last_ones_best_as_published(person, found) -> None:
     """Even where the prediction, here the truth, explains the views better."""
-    config = settings(refinement="none", evaluations=100, sigma_scale=2.0)
+    config = settings(refinement="none", evaluations=100, **{"sigma.scale": 2.0})
     frame = searched(replace(person, predicted=person.pose), config)
     assert [kind for kind, _ in found] == ["sppso", "sppso"]
     np.testing.assert_array_equal(frame.pose, found[-1][1])

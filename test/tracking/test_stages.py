@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from markerless_tracker.tracking.partitions.frame import LIMB_SWARM, frame_stages
 
 from markerless_tracker.body import load_body
 from markerless_tracker.errors import ConfigError
@@ -12,7 +13,6 @@ from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.partitions import STAGES
 from markerless_tracker.tracking.partitions.budget import SWARM_SHARE, scaled_particles
 from markerless_tracker.tracking.partitions.sppso import SPPSO_STAGES, sppso_stages
-from markerless_tracker.tracking.stages import LIMB_SWARM, frame_stages
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_edges_of_stage_1_lie_on_every_cone_that_is_rigid_with_the_root(swarm_se
 
 
 def test_the_swarm_alone_searches_with_scaled_spreads(body, swarm_settings):
-    config = swarm(swarm_settings, sigma_scale=0.25)
+    config = swarm(swarm_settings, **{"sigma.scale": 0.25})
     stages = frame_stages(body, config, body.neutral, body.sigma)
     assert [s.plan.algorithm for s in stages] == ["sppso", "sppso"]
     np.testing.assert_allclose(stages[0].plan.sigma, 0.25 * body.sigma, rtol=1e-15)
@@ -105,7 +105,7 @@ def test_the_swarm_alone_searches_with_scaled_spreads(body, swarm_settings):
 
 
 def test_refinement_stands_before_and_after_a_smaller_swarm(body, refined_settings):
-    config = swarm(refined_settings, refine_iterations=7)
+    config = swarm(refined_settings, **{"refine.iterations": 7})
     stages = frame_stages(body, config, body.neutral, body.sigma)
     assert [s.plan.algorithm for s in stages] == [CONTOUR, *["sppso"] * 6, CONTOUR]
     assert len({s.name for s in stages}) == 8
@@ -114,7 +114,7 @@ def test_refinement_stands_before_and_after_a_smaller_swarm(body, refined_settin
 
 
 def test_each_limb_has_a_small_wide_swarm_of_its_own(body, refined_settings):
-    config = swarm(refined_settings, limb_spread=3.0)
+    config = swarm(refined_settings, **{"refine.limb_spread": 3.0})
     limbs = {s.name: s for s in frame_stages(body, config, body.neutral, body.sigma)[3:7]}
     assert list(limbs) == ["l_arm", "r_arm", "l_leg", "r_leg"]
     for name, stage in limbs.items():

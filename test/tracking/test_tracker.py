@@ -60,14 +60,16 @@ class TestFollowing:
 
     @pytest.mark.parametrize("update", ["iteration", "particle"])
     def test_both_updates_track(self, make_tracker, frames, swarm_settings, update):
-        result = make_tracker(swarm_settings, update=update).step(frames[0].observations, 0)
+        result = make_tracker(swarm_settings, **{"sppso.update": update}).step(
+            frames[0].observations, 0
+        )
         assert errors_mm(result, frames[0]).mean() < 20.0
         assert result.evaluations == 1000
 
     def test_estimates_keep_the_limits_and_do_not_inter_penetrate(
         self, make_tracker, frames, swarm_settings
     ):
-        tracker = make_tracker(swarm_settings, sigma_scale=3.0)
+        tracker = make_tracker(swarm_settings, **{"sigma.scale": 3.0})
         for frame in frames[:3]:
             pose = tracker.step(frame.images, frame.stamp_ns).pose
             assert tracker._searcher.feasible(pose[None])[0]
@@ -176,7 +178,7 @@ class TestTime:
     def test_spreads_follow_the_time_between_frames(
         self, make_tracker, frames, swarm_settings, spreads
     ):
-        tracker = make_tracker(swarm_settings, evaluations=100, sigma_rate_max=6.0)
+        tracker = make_tracker(swarm_settings, evaluations=100, **{"sigma.rate_max": 6.0})
         spreads.clear()
         stamps_s = [5.0, 5.0 + 1 / 60, 5.0 + 4 / 60, 5.0 + 4.5 / 60, 6.0, 1e5, 1e5, 3.0]
         for stamp_s in stamps_s:
@@ -189,7 +191,7 @@ class TestTime:
         assert spreads[-1] == 1.0
 
     def test_the_cap_is_a_setting(self, make_tracker, frames, swarm_settings, spreads):
-        tracker = make_tracker(swarm_settings, evaluations=100, sigma_rate_max=2.0)
+        tracker = make_tracker(swarm_settings, evaluations=100, **{"sigma.rate_max": 2.0})
         for stamp_s in (0.0, 1.0):
             tracker.step(frames[0].observations, round(stamp_s * 1e9))
         assert spreads[-1] == 2.0

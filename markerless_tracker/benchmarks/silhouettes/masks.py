@@ -220,7 +220,7 @@ def _selected(
     assert views.pose is not None
     nothing = np.zeros(mask.shape, dtype=np.uint8)
     observation = Observation.from_mask(camera, 0, mask, nothing)
-    margin_px = config.component_margin_px
+    margin_px = config.region.component_margin_px
     return explained_part(observation, scene.rig[camera], scene.body, views.pose, margin_px)[0].mask
 
 

@@ -27,8 +27,8 @@ from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.results.result import versions
 from markerless_tracker.tracking import Tracker, TrackerConfig
+from markerless_tracker.tracking.partitions.frame import contour_stage, frame_stages
 from markerless_tracker.tracking.search import Searcher, make_fitness
-from markerless_tracker.tracking.stages import contour_stage, frame_stages
 
 THOUSAND = 1000
 _ALONE = {"body": "balan31", "refinement": "none", "fit_shape": False, "edge_weight": 1.0}
@@ -135,7 +135,7 @@ def _view_evaluations(
         if key != "full":
             continue
         reference = ReferenceFitness(
-            body, scene.rig.cameras, observations, pose, spacing_px=config.edge_spacing_px
+            body, scene.rig.cameras, observations, pose, spacing_px=config.edges.spacing_px
         )
         timed["reference"] = (reference, scattered(body, pose, _REFERENCE_POSES))
         for part, active in _ARM.items():

@@ -6,7 +6,7 @@ import math
 import os
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean, median, stdev
 from typing import Any
@@ -288,7 +288,8 @@ def _rates(fps: float, wanted: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _imaging(config: TrackerConfig) -> tuple[Any, ...]:
-    return tuple(getattr(config, entry.name) for entry in fields(ImagingSettings))
+    values = config.by_name()
+    return tuple(values[entry.name] for entry in ImagingSettings.settings())
 
 
 def _file(store: Path, recording: str, key: str) -> Path:

@@ -21,9 +21,9 @@ def variants(configs: Sequence[TrackerConfig]) -> list[str]:
 def _changes(config: TrackerConfig) -> list[str]:
     usual = TrackerConfig.from_mapping(
         {"preset": config.preset, "optimizer": config.optimizer}
-    ).as_mapping()
+    ).by_name()
     return [
         f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"
-        for name, value in config.as_mapping().items()
+        for name, value in config.by_name().items()
         if name not in SHOWN and value != usual[name]
     ]

@@ -96,6 +96,7 @@ def every_config(found: Iterable[Group]) -> tuple[TrackerConfig, ...]:
 def _configs(
     file: Path | None, base: Mapping[str, Any], choices: Mapping[str, Sequence[Any]]
 ) -> list[TrackerConfig]:
+    base = TrackerConfig.dotted(base)
     found = [
         read_config(file, {**base, **dict(zip(choices, values, strict=True))})
         for values in itertools.product(*choices.values())

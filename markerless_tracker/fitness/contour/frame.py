@@ -1,21 +1,27 @@
 """Contour evidence of a frame, and the normal equations that contour refinement solves."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
-import cv2
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.fitness.arrays import BodyArrays, Views, body_arrays
-from markerless_tracker.fitness.contour import kernels
-from markerless_tracker.fitness.contour.kernels import ContourViews, Residuals
+from markerless_tracker.fitness.contour.equations import (
+    equations_parallel,
+    equations_serial,
+    make_contour_scratch,
+)
 from markerless_tracker.fitness.contour.outline_samples import Samples, make_samples
-from markerless_tracker.fitness.raster.outline import Outlines, make_outlines
+from markerless_tracker.fitness.contour.residuals import Residuals, make_residuals
+from markerless_tracker.fitness.contour.silhouette_contour import (
+    SilhouetteContour,
+    edge_of_mask,
+    join_edges,
+)
+from markerless_tracker.fitness.raster.outline_arrays import Outlines, make_outlines
 from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
@@ -24,94 +30,8 @@ SPACING_M = 0.02
 """Distance of outline points along the body's outline."""
 _VIEW_S = 0.07e-3
 """About how long the equations of one view take one thread."""
-_SMALLEST_EDGE_PX = 12
-_LEAST_MARGIN_PX = 24
 
 Mapper = Callable[..., "object"]
-
-
-@dataclass(frozen=True, eq=False)
-class SilhouetteContour:
-    """The edge of one silhouette.
-
-    Attributes:
-        distance: (h, w) float32 signed distance to the edge, px, positive outside, of a window.
-        left, top: the window's first column and row in the frame.
-        points, normals: (n, 2) px, points of the edge and the outward directions there.
-        spacing: (n,) px of edge that each point stands for.
-    """
-
-    distance: NDArray[np.float32]
-    left: int
-    top: int
-    points: FloatArray
-    normals: FloatArray
-    spacing: FloatArray
-
-
-def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteContour:
-    """Signed distances around a silhouette, and points along its edge.
-
-    The window is the silhouette's bounding box and a margin of a sixth of its height. The edge
-    runs midway between pixels inside and outside; where the silhouette leaves the frame, and
-    around specks, there are no points.
-    """
-    mask = observation.in_full_frame(observation.mask.view(np.uint8))
-    height, width = mask.shape
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if rows.size == 0:
-        nothing = np.empty((0, 2))
-        return SilhouetteContour(np.empty((0, 0), np.float32), 0, 0, nothing, nothing, np.empty(0))
-    margin = max(_LEAST_MARGIN_PX, (rows[-1] - rows[0]) // 6)
-    top, bottom = max(0, rows[0] - margin), min(height, rows[-1] + margin + 1)
-    left, right = max(0, columns[0] - margin), min(width, columns[-1] + margin + 1)
-    window = np.ascontiguousarray(mask[top:bottom, left:right])
-    inside = cv2.distanceTransform(window, cv2.DIST_L2, 5)
-    distance = np.asarray(cv2.distanceTransform(1 - window, cv2.DIST_L2, 5), np.float32)
-    # The edge runs midway between pixels inside and outside.
-    distance -= inside
-    distance += window
-    distance -= 0.5
-    contours, _ = cv2.findContours(window, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    chains: list[NDArray[Any]] = [np.empty((0, 2), dtype=np.int32)]
-    spacing = [np.empty(0)]
-    for contour in contours:
-        if len(contour) < _SMALLEST_EDGE_PX:
-            continue
-        whole = cv2.arcLength(contour, closed=True)
-        kept = contour[:: max(1, round(spacing_px * len(contour) / whole)), 0]
-        chains.append(kept)
-        spacing.append(np.full(len(kept), whole / len(kept)))
-    chain = np.concatenate(chains)
-    at = chain + (left, top)
-    normal = np.empty(at.shape)
-    kernels.steepest(distance, chain, normal)
-    length = np.linalg.norm(normal, axis=1)
-    inner = (at > 0).all(axis=1) & (at < (width - 1, height - 1)).all(axis=1) & (length > 0)
-    normal = normal[inner] / length[inner, None]
-    return SilhouetteContour(
-        distance,
-        int(left),
-        int(top),
-        at[inner] + 0.5 * normal,
-        normal,
-        np.concatenate(spacing)[inner],
-    )
-
-
-def join_edges(edges: Sequence[SilhouetteContour]) -> ContourViews:
-    """The edges of several views as the kernels read them."""
-    sizes = [edge.distance.size for edge in edges]
-    counts = [len(edge.points) for edge in edges]
-    return ContourViews(
-        distance=np.concatenate([edge.distance.ravel() for edge in edges]),
-        distance_start=np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64),
-        window=np.array([[e.left, e.top, *e.distance.shape[::-1]] for e in edges], dtype=np.int64),
-        points=np.concatenate([edge.points for edge in edges]),
-        normals=np.concatenate([edge.normals for edge in edges]),
-        spacing=np.concatenate([edge.spacing for edge in edges]),
-        point_start=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,10 +88,10 @@ class ContourFrame:
         count = len(views.names)
         most = int(np.diff(self.contours.point_start).max())
         self.samples: Samples = make_samples(count)
-        self.residuals: Residuals = kernels.make_residuals(count, most)
+        self.residuals: Residuals = make_residuals(count, most)
         height = int(views.arrays.size[:, 1].max())
         self._outlines: Outlines = make_outlines(count, height)
-        self._scratch = kernels.make_contour_scratch(
+        self._scratch = make_contour_scratch(
             count,
             body.node_parent.size,
             body.size,
@@ -194,8 +114,8 @@ class ContourFrame:
             self._outlines,
         )  # fmt: skip
         if not worth_waking(len(self.views.names) * _VIEW_S, self._threads):
-            kernels.equations_serial(*args)
+            equations_serial(*args)
             return
         with ONE_CALLER:
             numba.set_num_threads(self._threads)
-            kernels.equations_parallel(*args)
+            equations_parallel(*args)

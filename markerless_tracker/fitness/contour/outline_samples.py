@@ -8,17 +8,16 @@ from numpy.typing import NDArray
 from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.raster.bits import is_set
 from markerless_tracker.fitness.raster.fill import clear_used, fill_outline, wipe
-from markerless_tracker.fitness.raster.outline import (
+from markerless_tracker.fitness.raster.lens import distorts, lens
+from markerless_tracker.fitness.raster.outline import find_outlines
+from markerless_tracker.fitness.raster.outline_arrays import (
     HIDDEN,
     LANES,
     ONLY_END,
     TAPERED,
-    arc_sweep,
-    distorts,
-    find_outlines,
-    lens,
     outlines_of,
 )
+from markerless_tracker.fitness.raster.tangents import arc_sweep
 from markerless_tracker.geometry import FloatArray
 
 MAX_SAMPLES = 2048

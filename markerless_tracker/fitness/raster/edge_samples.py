@@ -6,7 +6,7 @@ import numpy as np
 
 from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.raster.bits import is_set
-from markerless_tracker.fitness.raster.outline import ARC_POINTS, LANES, TAPERED
+from markerless_tracker.fitness.raster.outline_arrays import ARC_POINTS, LANES, TAPERED
 
 SIDES, VISIBLE, OUTLINE = 0, 1, 2
 """Which model edges are sampled: all sides; those no nearer cone hides; the body's outline only."""

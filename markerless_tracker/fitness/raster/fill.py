@@ -8,7 +8,7 @@ import numpy as np
 
 from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.raster.bits import ALL, popcount
-from markerless_tracker.fitness.raster.outline import LANES
+from markerless_tracker.fitness.raster.outline_arrays import LANES
 
 
 @kernel

@@ -26,7 +26,8 @@ from markerless_tracker.fitness.raster.fill import (
     count_beside_and_wipe,
     fill_outline,
 )
-from markerless_tracker.fitness.raster.outline import HIDDEN, LANES, find_outlines, outlines_of
+from markerless_tracker.fitness.raster.outline import find_outlines
+from markerless_tracker.fitness.raster.outline_arrays import HIDDEN, LANES, outlines_of
 from markerless_tracker.fitness.terms import EDGE_COUNT, EDGE_SUM, OVERLAP, PROJECTED, view_cost
 from markerless_tracker.geometry import FloatArray
 

@@ -15,12 +15,8 @@ from markerless_tracker.fitness.raster.bits import popcount
 from markerless_tracker.fitness.raster.edge_samples import OUTLINE, VISIBLE, EdgeRule, sample_cone
 from markerless_tracker.fitness.raster.fill import clear_used, fill_outline
 from markerless_tracker.fitness.raster.kernels import Scratch, StaticLayer, cone_ends
-from markerless_tracker.fitness.raster.outline import (
-    HIDDEN,
-    Outlines,
-    find_outlines,
-    outlines_of,
-)
+from markerless_tracker.fitness.raster.outline import find_outlines
+from markerless_tracker.fitness.raster.outline_arrays import HIDDEN, Outlines, outlines_of
 from markerless_tracker.fitness.terms import (
     EDGE_COUNT,
     EDGE_SUM,

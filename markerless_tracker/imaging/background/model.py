@@ -118,11 +118,11 @@ def learn_background(
     """The empty scene from frames of it, in one pass: mean and variance per pixel, or a mixture.
 
     A few frames say little about one pixel's variance, so the image's median variance counts as
-    four more of them. A single still says nothing: `background_sigma_still` is assumed.
+    four more of them. A single still says nothing: `background.sigma_still` is assumed.
 
     Args:
         frames: one or more images of the same size and channels.
-        settings: `background_modes`, `background_sigma_min` and `background_sigma_still`.
+        settings: `background.modes`, `background.sigma_min` and `background.sigma_still`.
         camera: name for error messages.
         note: what the model's note says, instead of how many frames it was learned from.
 
@@ -131,7 +131,7 @@ def learn_background(
     """
     settings = settings or ImagingSettings()
     values = _checked(frames, camera)
-    if settings.background_modes > 1:
+    if settings.background.modes > 1:
         return _mixture(values, settings, note)
     count = 0
     mean = moment = np.zeros(0, dtype=np.float32)
@@ -167,13 +167,13 @@ def _checked(frames: Iterable[Image], camera: str) -> Iterator[Image]:
 def _mixture(
     frames: Iterator[Image], settings: ImagingSettings, note: str | None
 ) -> BackgroundModel:
-    total, counts, means, moments = learn_modes(frames, settings.background_modes)
+    total, counts, means, moments = learn_modes(frames, settings.background.modes)
     if total == 1:
         return model_from_moments(means[0], moments[0], 1, settings, note=note)
     # What the most frequent modes vary by is the sensor's noise; it holds for the others too.
     free = np.maximum(counts[0] - 1.0, 1.0)[..., None]
     typical = np.median(moments[0] / free, axis=(0, 1))
-    least = settings.background_sigma_min**2
+    least = settings.background.sigma_min**2
     free = np.maximum(counts - 1.0, 0.0)[..., None]
     pooled = (moments + _PRIOR_FRAMES * typical) / (free + _PRIOR_FRAMES)
     variances = np.maximum(pooled, least).astype(np.float32)
@@ -196,7 +196,7 @@ def model_from_moments(
 ) -> BackgroundModel:
     """A model from the mean and summed squared deviations (h, w, c) of ``count`` frames."""
     if count == 1:
-        sigma = settings.background_sigma_still
+        sigma = settings.background.sigma_still
         variance = np.full_like(mean, sigma**2)
         how = f"one still image; a sensor noise of {sigma:g} grey levels is assumed"
     else:
@@ -204,7 +204,7 @@ def model_from_moments(
         pooled = (moment + _PRIOR_FRAMES * typical) / (count - 1 + _PRIOR_FRAMES)
         variance = pooled.astype(np.float32)
         how = f"mean and variance of {count} frames"
-    np.maximum(variance, settings.background_sigma_min**2, out=variance)
+    np.maximum(variance, settings.background.sigma_min**2, out=variance)
     return BackgroundModel(mean, variance, note if note is not None else how)
 
 
@@ -237,12 +237,12 @@ def foreground_limit(
 def risk_of(camera: str, settings: ImagingSettings) -> float:
     """log10 of the risk factor for a camera.
 
-    `background_risk`, or with `background_risks` = humaneva the published 80, 60, 30 and 80 of its
+    `background.risk`, or with `background.risks` = humaneva the published 80, 60, 30 and 80 of its
     colour cameras C1 to C4, told apart by the number at the end of the camera's name.
     """
-    if settings.background_risks == "humaneva":
+    if settings.background.risks == "humaneva":
         digits = re.search(r"(\d+)\D*$", camera)
         found = HUMANEVA_RISKS.get(int(digits.group(1))) if digits else None
         if found is not None:
             return found
-    return settings.background_risk
+    return settings.background.risk

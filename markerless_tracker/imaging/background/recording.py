@@ -28,7 +28,7 @@ def learn_from_recording(
 
     Args:
         frames: frames in the order of time, any number; read once, a few dozen are kept.
-        settings: `background_sigma_min` and, for a single frame, `background_sigma_still`.
+        settings: `background.sigma_min` and, for a single frame, `background.sigma_still`.
         camera: name for error messages.
 
     Raises:
@@ -48,7 +48,7 @@ def learn_from_recording(
     first = chosen[0]
     stack = np.stack(chosen).reshape(len(chosen), first.shape[0], first.shape[1], -1)
     mean, variance = steady_image(stack, share=ALONE_SHARE)
-    least = settings.background_sigma_still if len(chosen) == 1 else settings.background_sigma_min
+    least = settings.background.sigma_still if len(chosen) == 1 else settings.background.sigma_min
     note = (
         f"the most steady value of {len(chosen)} frames of the recording itself: places that the "
         "person covers for most of the time are learned as the person"

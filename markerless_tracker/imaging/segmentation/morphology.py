@@ -25,7 +25,7 @@ def disc(side_px: int) -> Mask:
 
 def patch_reach(settings: ImagingSettings, *, grey: bool) -> int:
     """How far from a pixel `foreground_mask` looks, px, but for the size of its patch."""
-    share = settings.shadow_grey_blob_share if grey else settings.shadow_blob_share
+    share = settings.shadow.grey_blob_share if grey else settings.shadow.blob_share
     return 2 if grey and share > 0.0 else 0
 
 
@@ -66,20 +66,20 @@ def foreground_mask(
 
 
 def closing_px(settings: ImagingSettings, frame_px: int) -> int:
-    """Side of the closing in a frame of that many pixels, odd; `mask_close_px` says how."""
-    side = settings.mask_close_px * min(1.0, math.sqrt(frame_px / _FULL_FRAME_PX))
+    """Side of the closing in a frame of that many pixels, odd; `mask.close_px` says how."""
+    side = settings.mask.close_px * min(1.0, math.sqrt(frame_px / _FULL_FRAME_PX))
     return 2 * round((side - 1.0) / 2.0) + 1 if side > 1.0 else 1
 
 
 def repair_reach(settings: ImagingSettings, frame_px: int) -> int:
     """How far from a pixel opening and closing look, px."""
-    return 2 * (settings.mask_open_px // 2) + 2 * (closing_px(settings, frame_px) // 2)
+    return 2 * (settings.mask.open_px // 2) + 2 * (closing_px(settings, frame_px) // 2)
 
 
 def open_and_close(mask: Mask, settings: ImagingSettings, frame_px: int) -> None:
     """Remove specks and close cracks of a mask (h, w) of a frame of that many pixels, in place."""
-    if settings.mask_open_px > 1:
-        cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc(settings.mask_open_px), dst=mask)
+    if settings.mask.open_px > 1:
+        cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc(settings.mask.open_px), dst=mask)
     side = closing_px(settings, frame_px)
     if side > 1:
         cv2.morphologyEx(mask, cv2.MORPH_CLOSE, disc(side), dst=mask)
@@ -88,8 +88,8 @@ def open_and_close(mask: Mask, settings: ImagingSettings, frame_px: int) -> None
 def clean_mask(mask: Mask, settings: ImagingSettings) -> Mask:
     """Open, close, drop small blobs, fill small holes: mask (h, w), 0 or 255, in place."""
     open_and_close(mask, settings, mask.size)
-    drop_blobs(mask, settings.mask_blob_share * mask.size)
-    fill_holes(mask, settings.mask_hole_share * mask.size)
+    drop_blobs(mask, settings.mask.blob_share * mask.size)
+    fill_holes(mask, settings.mask.hole_share * mask.size)
     return mask
 
 

@@ -19,12 +19,12 @@ def shadow_rule(settings: ImagingSettings, *, grey: bool = False) -> tuple[np.fl
 
     With shadow removal off no ratio passes.
     """
-    if not settings.shadow_removal:
+    if not settings.shadow.removal:
         return tuple(np.float32(x) for x in (2.0, -1.0, 0.0, 0.0, 0.0))
     return (
-        np.float32(settings.shadow_grey_value_min if grey else settings.shadow_value_min),
-        np.float32(settings.shadow_grey_value_max if grey else settings.shadow_value_max),
-        np.float32(settings.shadow_saturation_max),
-        np.float32(settings.shadow_hue_max_deg),
-        np.float32(settings.shadow_chroma_min),
+        np.float32(settings.shadow.grey_value_min if grey else settings.shadow.value_min),
+        np.float32(settings.shadow.grey_value_max if grey else settings.shadow.value_max),
+        np.float32(settings.shadow.saturation_max),
+        np.float32(settings.shadow.hue_max_deg),
+        np.float32(settings.shadow.chroma_min),
     )

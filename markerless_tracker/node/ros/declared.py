@@ -4,10 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
 from markerless_tracker.errors import ConfigError
+from markerless_tracker.settings import Setting
 
 ROS_OWN = ("use_sim_time", "start_type_description_service")
 """Parameters that every ROS node has."""
@@ -22,20 +23,29 @@ def given_parameters(node: Node) -> dict[str, Any]:
     }
 
 
-def declare_effective(node: Node, values: Mapping[str, Any], lines: Mapping[str, str]) -> None:
+def declare_effective(
+    node: Node,
+    values: Mapping[str, Any],
+    lines: Mapping[str, str],
+    settings: Iterable[Setting] = (),
+) -> None:
     """Replace what was given by what is in effect, with a description each, fixed from here on.
 
     Args:
         node: the node.
         values: every parameter's value; None where there is none.
         lines: a line about each.
+        settings: whose ranges and choices the descriptors have.
     """
+    held = {setting.name: setting for setting in settings}
     for name in given_parameters(node):
         node.undeclare_parameter(name)
     for name, value in values.items():
         descriptor = ParameterDescriptor(
             description=lines.get(name, ""), read_only=True, dynamic_typing=value is None
         )
+        if name in held:
+            _hold(descriptor, held[name])
         node.declare_parameter(name, value, descriptor, ignore_override=True)
 
 
@@ -62,6 +72,21 @@ def attribute_lines(owner: type) -> dict[str, str]:
     attributes = (owner.__doc__ or "").partition("Attributes:")[2]
     pairs = (line.strip().partition(": ") for line in attributes.splitlines())
     return {name: said for name, colon, said in pairs if colon and name.isidentifier()}
+
+
+def _hold(descriptor: ParameterDescriptor, setting: Setting) -> None:
+    """Put a setting's range and choices into its parameter's descriptor."""
+    if setting.choices:
+        descriptor.additional_constraints = f"one of {', '.join(setting.choices)}"
+    if setting.min is None or setting.max is None:
+        return
+    if setting.type is int:
+        bounds = (int(setting.min), int(setting.max))
+        descriptor.integer_range = [IntegerRange(from_value=bounds[0], to_value=bounds[1], step=1)]
+    else:
+        descriptor.floating_point_range = [
+            FloatingPointRange(from_value=float(setting.min), to_value=float(setting.max))
+        ]
 
 
 def text(name: str, value: Any) -> str:

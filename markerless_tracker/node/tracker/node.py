@@ -32,6 +32,7 @@ from markerless_tracker.node.tracker.setup import RigSource, build
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, TrackWorker
+from markerless_tracker.tracking import TrackerConfig
 
 STATE_PERIOD_S = 0.5
 _TURN_S = 0.002
@@ -68,7 +69,10 @@ class TrackerNode(Node):
         )
         self._settings = parameters.read_settings(given_parameters(self))
         declare_effective(
-            self, parameters.effective_values(self._settings), parameters.descriptions()
+            self,
+            parameters.effective_values(self._settings),
+            parameters.descriptions(),
+            TrackerConfig.settings(),
         )
         self._seconds: Callable[[], float] = time.monotonic
         self._source = RigSource(self._settings)

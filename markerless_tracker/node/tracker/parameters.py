@@ -86,7 +86,7 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
 def effective_values(settings: NodeSettings) -> dict[str, Any]:
     """What every parameter is now, as ROS can hold it (None where there is no value)."""
     own = {name: getattr(settings, name) for name in _OWN}
-    chosen = {s.name: getattr(settings.config, s.name) for s in TrackerConfig.settings()}
+    chosen = settings.config.by_name()
     return {name: _as_parameter(value) for name, value in {**chosen, **own}.items()}
 
 

@@ -42,9 +42,9 @@ class EvidenceMaker:
     ) -> None:
         self._rig = rig
         self._config = config
-        self._margin_px = config.component_margin_px
-        self._clear_px = edge_reach(config) + config.component_margin_px
-        self._every = config.full_frame_every
+        self._margin_px = config.region.component_margin_px
+        self._clear_px = edge_reach(config) + config.region.component_margin_px
+        self._every = config.region.full_frame_every
         self._turn = 0
         self._pool = pool
         self.segmenters: dict[str, Segmenter] = {}
@@ -129,7 +129,7 @@ class EvidenceMaker:
 
         With a margin around the body at the predicted pose, images are looked at there alone,
         except where that would change what stays, and each camera's whole frame every
-        `full_frame_every` calls.
+        `region.full_frame_every` calls.
 
         Raises:
             ImageError, CalibrationError: as `observe`.

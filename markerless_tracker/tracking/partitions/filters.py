@@ -39,4 +39,4 @@ def filter_stages(
 
 def layers_for(config: TrackerConfig) -> int:
     """Layers of APF: those asked for, else six where the budget is a multiple of six, else five."""
-    return config.layers or (6 if config.evaluations % 6 == 0 else 5)
+    return config.apf.layers or (6 if config.evaluations % 6 == 0 else 5)

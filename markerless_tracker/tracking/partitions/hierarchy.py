@@ -27,20 +27,20 @@ def hierarchical_stages(
         algorithm: what searches each step.
         budget: published particles and iterations per step.
         soft: whether the subspaces that a step names after its own join, with their spreads divided
-            by `soft_factor`.
+            by `sigma.soft_factor`.
 
     Raises:
         ConfigError: the budget cannot be spent exactly.
         BodyModelError: the body has no such hierarchy.
     """
-    steps = body.steps(config.hierarchy)
+    steps = body.steps(config.hmcpso.hierarchy)
     stages = []
     for step, shares in zip(steps, shared_out((budget,) * len(steps), config), strict=True):
         own = body.subspaces[step[0]]
         joining = [body.subspaces[name] for name in step[1:]] if soft else []
         spread = sigma.copy()
         for members in joining:
-            spread[members] /= config.soft_factor
+            spread[members] /= config.sigma.soft_factor
         spread[own] = sigma[own]
         active = np.unique(np.concatenate([own, *joining]))
         stages.append(

@@ -42,6 +42,6 @@ def hmcpso_stages(
 def check_swarms(particles: int, config: TrackerConfig) -> None:
     """Raise a ConfigError unless the particles do for the sub-swarms and the master."""
     try:
-        swarm_sizes(particles, config.sub_swarms)
+        swarm_sizes(particles, config.hmcpso.sub_swarms)
     except SearchError as error:
         raise ConfigError(f"evaluations is {config.evaluations}: {error}") from error

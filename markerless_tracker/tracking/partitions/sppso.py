@@ -26,7 +26,7 @@ SPPSO_STAGES: Mapping[str, tuple[tuple[int, int], ...]] = {
     "three": ((10, 20), (10, 20), (20, 30)),
     "global": ((20, 50),),
 }
-"""Particles and iterations of each stage at 1000 evaluations, by `sppso_stages`."""
+"""Particles and iterations of each stage at 1000 evaluations, by `sppso.stages`."""
 RESCUE_STAGES: Mapping[str, tuple[tuple[int, int], ...]] = {
     "two": ((40, 5), (80, 10)),
     "three": ((40, 5), (40, 5), (60, 10)),
@@ -42,15 +42,15 @@ def sppso_stages(
 
     Stage 1 varies the root's six parameters and samples edges on the cones that are rigid with it;
     the last stage varies all from stage 1's estimate, with the root's position spread, and that of
-    a step in between, divided by `soft_factor`. In the hard partition every stage varies its own
-    parameters alone. Beside a refinement the swarm keeps `SWARM_SHARE` of the budget.
+    a step in between, divided by `sigma.soft_factor`. In the hard partition every stage varies its
+    own parameters alone. Beside a refinement the swarm keeps `SWARM_SHARE` of the budget.
 
     Raises:
         ConfigError: the budget cannot be spent exactly.
         BodyModelError: three stages, and the body has no subspace 'torso_head'.
     """
     alone = config.refinement == "none"
-    published = (SPPSO_STAGES if alone else RESCUE_STAGES)[config.sppso_stages]
+    published = (SPPSO_STAGES if alone else RESCUE_STAGES)[config.sppso.stages]
     share = Fraction(1) if alone else SWARM_SHARE
     particles = scaled_particles(published, config.evaluations, "sppso", share=share)
     trunk = body.cone_node == body.frames[body.root_frame]
@@ -58,7 +58,7 @@ def sppso_stages(
     earlier = np.empty(0, dtype=np.int64)
     spread = sigma.copy()
     for (name, own), count, (_, iterations) in zip(
-        _parts(body, config.sppso_stages).items(), particles, published, strict=True
+        _parts(body, config.sppso.stages).items(), particles, published, strict=True
     ):
         active = own if config.partition == "hard" else np.union1d(earlier, own)
         budget = (count, iterations)
@@ -69,7 +69,7 @@ def sppso_stages(
             )
         )  # fmt: skip
         settled = body.translations if name == "root" else own
-        spread[settled] /= config.soft_factor
+        spread[settled] /= config.sigma.soft_factor
         earlier = active
     return tuple(stages)
 
@@ -82,7 +82,7 @@ def _parts(body: BodyModel, stages: str) -> dict[str, IntArray]:
         return {"root": body.root, "body": body.joints}
     if "torso_head" not in body.subspaces:
         raise BodyModelError(
-            f"sppso_stages is 'three': body {body.name} has no subspace 'torso_head'"
+            f"sppso.stages is 'three': body {body.name} has no subspace 'torso_head'"
         )
     trunk = body.subspaces["torso_head"]
     return {"root": body.root, "trunk": trunk, "body": np.setdiff1d(body.joints, trunk)}

@@ -1,6 +1,6 @@
 """What all swarms' stages share: the whole body explains the whole view."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -45,18 +45,21 @@ def swarm_stage(
 
 def options(algorithm: str, config: TrackerConfig) -> dict[str, Any]:
     """The settings of an algorithm of `optim`, by its arguments' names."""
-    swarm = {name: getattr(config, name) for name in ("inertia_max", "inertia_min", "acceleration")}
+    swarm = asdict(config.pso)
+    cooperative = config.hmcpso
     return {
-        "sppso": {"update": config.update},
+        "sppso": {"update": config.sppso.update},
         "pso": swarm,
         "mcpso": {
             **swarm,
-            **{name: getattr(config, name) for name in ("sub_swarms", "migration", "master_term")},
+            "sub_swarms": cooperative.sub_swarms,
+            "migration": cooperative.migration,
+            "master_term": cooperative.master_term,
         },
         "apf": {
-            "survival": config.survival,
-            "shrink": config.layer_shrink,
-            "estimate": config.estimate,
+            "survival": config.apf.survival,
+            "shrink": config.apf.layer_shrink,
+            "estimate": config.apf.estimate,
         },
-        "pf": {"sharpness": config.sharpness, "estimate": config.estimate},
+        "pf": asdict(config.pf),
     }[algorithm]

@@ -134,6 +134,6 @@ def _settled(
         ),
         bounds=np.concatenate([limits, np.outer(_LENGTH_RANGE, begin)], axis=1),
         iterations=_ITERATIONS,
-        truncation=(config.refine_truncation_m, config.refine_truncation_end_m),
+        truncation=(config.refine.truncation_m, config.refine.truncation_end_m),
     )
     return z[p:], z[:p]

@@ -9,10 +9,10 @@ def config(**values):
 
 
 def test_what_leaves_the_preset_is_told() -> None:
-    a = config(preset="paper", optimizer="hmcpso", sub_swarms=4)
+    a = config(preset="paper", optimizer="hmcpso", **{"hmcpso.sub_swarms": 4})
     b = config(preset="paper", optimizer="hmcpso", evaluations=7200, body="person34", seed=3)
-    c = config(preset="paper", optimizer="apf", cost="overlap", layer_shrink=0.25)
-    assert variants([a, b, c]) == ["sub_swarms=4", "", "layer_shrink=0.25, cost=overlap"]
+    c = config(preset="paper", optimizer="apf", cost="overlap", **{"apf.layer_shrink": 0.25})
+    assert variants([a, b, c]) == ["hmcpso.sub_swarms=4", "", "cost=overlap, apf.layer_shrink=0.25"]
 
 
 def test_what_all_share_is_left_out() -> None:

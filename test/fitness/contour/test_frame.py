@@ -11,8 +11,8 @@ from markerless_tracker.body import BodyModel, load_body, markers
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
-from markerless_tracker.fitness.contour.frame import (
-    ContourFrame,
+from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour.silhouette_contour import (
     SilhouetteContour,
     edge_of_mask,
     join_edges,

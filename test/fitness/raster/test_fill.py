@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.fitness.raster.fill import clear_used, fill_outline
-from markerless_tracker.fitness.raster.outline import LANES, make_outlines, outlines_of, scan_edges
+from markerless_tracker.fitness.raster.outline import scan_edges
+from markerless_tracker.fitness.raster.outline_arrays import LANES, make_outlines, outlines_of
 from markerless_tracker.records import unpack_mask
 
 LANE = 3

@@ -3,8 +3,12 @@ import pytest
 
 from markerless_tracker.imaging import ImagingSettings, Region, Segmenter, learn_background
 
-FOLLOW = ImagingSettings(background_follow_s=2.0, exposure_compensation=False, texture_radius_px=0)
-STILL = ImagingSettings(exposure_compensation=False, texture_radius_px=0)
+FOLLOW = ImagingSettings.from_mapping(
+    {"background.follow_s": 2.0, "background.exposure_compensation": False, "texture.radius_px": 0}
+)
+STILL = ImagingSettings.from_mapping(
+    {"background.exposure_compensation": False, "texture.radius_px": 0}
+)
 
 
 def shot(lamp: float, person: bool, seed: int, channels: int) -> np.ndarray:
@@ -53,13 +57,13 @@ def test_the_same_images_give_the_same_masks_again_after_a_reset() -> None:
 def test_nothing_is_learned_across_a_gap_or_backwards() -> None:
     empty = [shot(0.0, False, i, 3) for i in range(10)]
     segmenter = Segmenter("cam01", learn_background(empty), FOLLOW)
-    before = segmenter._mean.copy()
+    before = segmenter._labeller.background.mean.copy()
     for stamp_ns in (0, 5_000_000_000, 3_000_000_000, 3_000_000_000):
         segmenter.observe(shot(5.0, False, 3, 3), stamp_ns)
-    assert (segmenter._mean == before).all()
+    assert (segmenter._labeller.background.mean == before).all()
     for i in range(4):
         segmenter.observe(shot(5.0, False, 3, 3), 3_100_000_000 + i)
-    assert (segmenter._mean != before).any()
+    assert (segmenter._labeller.background.mean != before).any()
 
 
 def test_regions_in_between_do_not_count_as_a_gap() -> None:
@@ -75,6 +79,6 @@ def test_regions_in_between_do_not_count_as_a_gap() -> None:
                 continue
             region = None if i % 20 == 0 else Region(0, 0, 20, 20)
             segmenter.observe(image, i * 100_000_000, region)
-        levels[every] = float(segmenter._mean[0, :, :, :40].mean())
+        levels[every] = float(segmenter._labeller.background.mean[0, :, :, :40].mean())
     assert levels[0] == pytest.approx(110.0, abs=0.5)
     assert levels[20] == pytest.approx(116.0, abs=0.5)

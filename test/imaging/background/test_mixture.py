@@ -6,7 +6,7 @@ from markerless_tracker.imaging import BackgroundModel, ImagingSettings, Mode, l
 from markerless_tracker.imaging.background.model import foreground_limit, risk_of
 from markerless_tracker.imaging.segmentation.segmenter import Segmenter
 
-TWO = ImagingSettings(background_modes=3)
+TWO = ImagingSettings.from_mapping({"background.modes": 3})
 
 
 def blinking(channels: int = 3) -> list[np.ndarray]:
@@ -28,7 +28,9 @@ def test_both_things_that_a_screen_shows_are_background(channels: int) -> None:
     (mode,) = model.modes
     assert mode.weight[20, 30] == pytest.approx(1 / 3) and mode.weight[50, 60] == 0.0
     assert mode.mean[20, 30] == pytest.approx(180.0, abs=3.0)
-    options = ImagingSettings(background_modes=3, exposure_compensation=False)
+    options = ImagingSettings.from_mapping(
+        {"background.modes": 3, "background.exposure_compensation": False}
+    )
     for frame in frames[:2]:
         assert not Segmenter("cam01", model, options).observe(frame, 0).mask.any()
     brighter = frames[0].copy()
@@ -62,10 +64,10 @@ def test_a_rare_mode_must_be_met_more_closely() -> None:
 
 
 def test_published_risks_by_camera() -> None:
-    options = ImagingSettings(background_risks="humaneva", background_risk=5.0)
+    options = ImagingSettings.from_mapping({"background.risks": "humaneva", "background.risk": 5.0})
     names = ("C1", "cam02", "Combo_1_(C3)", "C4", "BW1x", "side", "cam17")
     assert [risk_of(name, options) for name in names] == [80.0, 60.0, 30.0, 80.0, 80.0, 5.0, 5.0]
-    assert risk_of("C1", ImagingSettings()) == ImagingSettings().background_risk
+    assert risk_of("C1", ImagingSettings()) == ImagingSettings().background.risk
 
 
 def test_modes_that_do_not_fit_are_refused() -> None:

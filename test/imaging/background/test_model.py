@@ -30,13 +30,16 @@ def test_mean_and_variance_agree_with_numpy(grey: bool) -> None:
 
 def test_few_frames_never_claim_a_noise_below_the_floor() -> None:
     frame = np.full((5, 6, 3), 90, np.uint8)
-    model = learn_background([frame, frame, frame], ImagingSettings(background_sigma_min=3.0))
+    model = learn_background(
+        [frame, frame, frame], ImagingSettings.from_mapping({"background.sigma_min": 3.0})
+    )
     assert (model.variance == 9.0).all()
 
 
 def test_a_single_still_says_what_it_assumes() -> None:
     model = learn_background(
-        [np.full((5, 6, 3), 90, np.uint8)], ImagingSettings(background_sigma_still=7.0)
+        [np.full((5, 6, 3), 90, np.uint8)],
+        ImagingSettings.from_mapping({"background.sigma_still": 7.0}),
     )
     assert (model.variance == 49.0).all()
     assert "still" in model.note and "7" in model.note

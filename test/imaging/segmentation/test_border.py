@@ -63,7 +63,7 @@ def test_the_segmenter_finds_the_area_without_bias(channels: int) -> None:
         empty, image = [frame[:, :, 0] for frame in empty], image[:, :, 0]
     areas = {}
     for layers in (0, 1):
-        options = ImagingSettings(mask_trim_px=layers, texture_radius_px=0)
+        options = ImagingSettings.from_mapping({"mask.trim_px": layers, "texture.radius_px": 0})
         segmenter = Segmenter("cam01", learn_background(empty, options), options)
         areas[layers] = segmenter.observe(image, 0).mask.sum() / covered.sum()
     assert areas[1] == pytest.approx(1.0, abs=0.01)

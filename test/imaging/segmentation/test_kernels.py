@@ -30,17 +30,17 @@ def twin_colour(
     distance = (((image.astype(np.float64) - mean) * scale) ** 2).sum(axis=2)
     hsv = cv2.cvtColor(image.astype(np.float32) / 255.0, cv2.COLOR_BGR2HSV).astype(float)
     base = cv2.cvtColor(mean.astype(np.float32) / 255.0, cv2.COLOR_BGR2HSV).astype(float)
-    low, high = options.shadow_value_min * base[..., 2], options.shadow_value_max * base[..., 2]
+    low, high = options.shadow.value_min * base[..., 2], options.shadow.value_max * base[..., 2]
     turn = np.abs(hsv[..., 0] - base[..., 0])
     turn = np.minimum(turn, 360.0 - turn)
     spread = mean.max(axis=2) - mean.min(axis=2)
     ratio = hsv[..., 2] / np.maximum(base[..., 2], 1e-9)
-    dull = spread * ratio < options.shadow_chroma_min
+    dull = spread * ratio < options.shadow.chroma_min
     coloured = image.max(axis=2) > image.min(axis=2)
     shadow = (hsv[..., 2] >= low) & (hsv[..., 2] <= high)
-    shadow &= hsv[..., 1] - base[..., 1] <= options.shadow_saturation_max
-    shadow &= dull | (coloured & (turn <= options.shadow_hue_max_deg))
-    labels = np.where(shadow & options.shadow_removal, 127, 255)
+    shadow &= hsv[..., 1] - base[..., 1] <= options.shadow.saturation_max
+    shadow &= dull | (coloured & (turn <= options.shadow.hue_max_deg))
+    labels = np.where(shadow & options.shadow.removal, 127, 255)
     return np.where(distance > 1.0, labels, 0).astype(np.uint8)
 
 
@@ -60,7 +60,7 @@ def scene(seed: int, *, channels: int = 3) -> tuple[np.ndarray, np.ndarray, np.n
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=20, deadline=None)
 def test_colour_agrees_with_the_twin(removal: bool, seed: int) -> None:
-    options = ImagingSettings(shadow_removal=removal)
+    options = ImagingSettings.from_mapping({"shadow.removal": removal})
     image, mean, scale = scene(seed)
     labels = np.empty((40, 50), np.uint8)
     label_colour(
@@ -101,8 +101,8 @@ def test_grey_is_the_ratio_alone(seed: int) -> None:
         labels,
     )
     value = image.astype(float)
-    shadow = value >= options.shadow_grey_value_min * mean
-    shadow &= value <= options.shadow_grey_value_max * mean
+    shadow = value >= options.shadow.grey_value_min * mean
+    shadow &= value <= options.shadow.grey_value_max * mean
     twin = np.where(np.abs((value - mean) * scale) > 1.0, np.where(shadow, 127, 255), 0)
     assert (labels != twin).mean() < 2e-3
 

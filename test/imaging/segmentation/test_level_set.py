@@ -97,7 +97,9 @@ def test_a_region_is_refined_as_the_whole_image(channels: int) -> None:
         empty = [image[:, :, 0] for image in empty]
     background = learn_background(empty)
     image = picture(truth(), channels).reshape(empty[0].shape)
-    segmenter = Segmenter("cam01", background, ImagingSettings(level_set_iterations=3))
+    segmenter = Segmenter(
+        "cam01", background, ImagingSettings.from_mapping({"level_set.iterations": 3})
+    )
     plain = Segmenter("cam01", background, ImagingSettings())
     whole = segmenter.mask(image).copy()
     assert (whole != plain.mask(image)).any() and iou(whole, truth()) > 0.95

@@ -42,12 +42,12 @@ def test_a_gap_open_to_the_outside_is_no_hole() -> None:
 
 
 def test_small_images_are_closed_less() -> None:
-    options = ImagingSettings(mask_close_px=5)
+    options = ImagingSettings.from_mapping({"mask.close_px": 5})
     sides = [
         closing_px(options, w * h) for w, h in ((1920, 1080), (640, 480), (320, 240), (64, 48))
     ]
     assert sides == [5, 5, 3, 1]
-    assert closing_px(ImagingSettings(mask_close_px=0), 640 * 480) == 1
+    assert closing_px(ImagingSettings.from_mapping({"mask.close_px": 0}), 640 * 480) == 1
 
 
 def test_blobs_are_dropped_by_area() -> None:

@@ -60,7 +60,7 @@ def test_a_person_is_found_and_a_shadow_is_not() -> None:
     assert observation.camera == "cam01" and observation.stamp_ns == 123
     assert observation.size_px == (160, 120) and observation.offset_px == (0, 0)
     assert observation.edges.max() > 100 and not observation.edges[:, :20].any()
-    left = Segmenter("cam01", model(empty), ImagingSettings(shadow_removal=False))
+    left = Segmenter("cam01", model(empty), ImagingSettings.from_mapping({"shadow.removal": False}))
     assert left.observe(with_noise(image, 99), 0).mask[100, 30]
 
 

@@ -51,7 +51,7 @@ def test_what_is_given_is_in_effect() -> None:
     assert settings.scale == 1.0 and settings.start_file is None and settings.stature is None
     assert settings.config.seed == 7 and settings.config.edge_weight == 2.0
     values = effective_values(settings)
-    assert values["preset"] == "paper" and values["edge_form"] == "published"
+    assert values["preset"] == "paper" and values["edges.form"] == "published"
     assert values["cameras"] == ["cam02", "cam01"] and values["start_file"] is None
     assert values["calibration_file"] == str(Path.home() / "c.toml")
     assert effective_values(read_settings({}))["cameras"] is None
@@ -75,7 +75,9 @@ def test_what_is_given_is_in_effect() -> None:
         ({"seed": 1.5}, "seed"),
         ({"optimizer": "magic"}, "optimizer"),
         ({"preset": "fast"}, "preset"),
-        ({"edge_form": "wavy"}, "edge_form"),
+        ({"layers": 5}, "'layers' is unknown, did you mean 'apf.layers'"),
+        ({"apf.layer": 5}, "'apf.layer'.*'apf.layers'"),
+        ({"edges.form": "wavy"}, "edges.form: got"),
         ({"sync_tolerance": -0.1}, "sync_tolerance"),
     ],
 )
@@ -112,5 +114,9 @@ def test_the_players_values() -> None:
 
 def test_the_example_file_is_understood(project_root: Path) -> None:
     content = yaml.safe_load((project_root / "config" / "tracker.yaml").read_text())
-    settings = read_settings(content["tracker"]["ros__parameters"])
+    given = content["tracker"]["ros__parameters"]
+    # ROS itself joins the names of nested keys with dots.
+    given |= {f"refine.{name}": value for name, value in given.pop("refine").items()}
+    settings = read_settings(given)
     assert settings.cameras == ("cam01", "cam02", "cam03", "cam04") and settings.stature == 1.72
+    assert settings.config.refine.iterations == 4

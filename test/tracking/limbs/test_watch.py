@@ -175,7 +175,9 @@ def test_a_tracker_that_starts_with_a_wrong_arm_finds_it_in_a_quarter_of_a_secon
 def test_a_limb_that_gets_lost_is_told_once_also_without_refinement(standing) -> None:
     """The swarm is too narrow to find it."""
     scene, seen, _, raised = standing
-    config = TrackerConfig(threads=1, refinement="none", sigma_scale=0.01, evaluations=100)
+    config = TrackerConfig.from_mapping(
+        {"threads": 1, "refinement": "none", "sigma.scale": 0.01, "evaluations": 100}
+    )
     tracker = Tracker(scene.rig, scene.body, config, start_pose=raised, shape_known=True)
     first, second = (tracker.step(seen, round(k * 1e9 / 60)) for k in range(2))
     assert first.limbs["l_arm"].state is second.limbs["l_arm"].state is LOST

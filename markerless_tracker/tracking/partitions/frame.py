@@ -56,7 +56,7 @@ def limb_stages(
             "sppso",
             body.subspaces[name],
             centre,
-            config.limb_spread * sigma,
+            config.refine.limb_spread * sigma,
             budget,
         )
         for name in body.limbs
@@ -65,15 +65,15 @@ def limb_stages(
 
 
 def swarm_sigma(body: BodyModel, config: TrackerConfig, sigma: FloatArray) -> FloatArray:
-    """Spreads (p,) of swarms: the body's, scaled; of an angle `angle_sigma` at least.
+    """Spreads (p,) of swarms: the body's, scaled; of an angle `sigma.angle` at least.
 
     Saini et al. (2015) print one covariance of 0.01 for all joints and name no rate. Reading: its
     root, 0.1 rad, is wider than what any joint moves between frames at 60 frames/s, so that it
     stands at every rate, until a joint's own spread, which grows with the time, exceeds it.
     """
-    spread = config.sigma_scale * sigma
+    spread = config.sigma.scale * sigma
     angles = np.setdiff1d(np.arange(body.size), body.translations)
-    spread[angles] = np.maximum(spread[angles], config.angle_sigma)
+    spread[angles] = np.maximum(spread[angles], config.sigma.angle)
     return spread
 
 
@@ -84,5 +84,5 @@ def contour_stage(
     return Stage(
         name,
         Comparison.whole(centre, len(body.cone_names), edge_weight=config.edge_weight),
-        SearchPlan(CONTOUR, config.refine_prior * sigma, 0, config.refine_iterations),
+        SearchPlan(CONTOUR, config.refine.prior * sigma, 0, config.refine.iterations),
     )

@@ -1,0 +1,162 @@
+"""Distances between the outlines of the model and of the silhouettes, taken both ways.
+
+In metres at the body's depth: outline points of the model to the silhouette's edge (its signed
+distance), and points of the silhouette's edge to the nearest outline point of the model. Each
+carries the gradient with respect to the 3D point on a cone's surface that makes it; the point moves
+rigidly with its cone, since sliding along the surface does not move the outline to first order.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.contour.nearest import nearest_facing, sort_into_bands
+from markerless_tracker.fitness.contour.outline_samples import MAX_SAMPLES
+from markerless_tracker.geometry import FloatArray
+
+
+class Residuals(NamedTuple):
+    """Residuals of v views, at most s each.
+
+    Attributes:
+        value: (v, s) m.
+        weight: (v, s) length of outline it stands for (m) times its robust weight.
+        gradient: (v, s, 3) with respect to the world point of its sample.
+        sample: (v, s) index of that sample in its view.
+        count: (v,).
+        cost: (v,) sum of length times the robust cost, m³.
+    """
+
+    value: FloatArray
+    weight: FloatArray
+    gradient: FloatArray
+    sample: NDArray[np.int64]
+    count: NDArray[np.int64]  # type: ignore[assignment]
+    cost: FloatArray
+
+
+def make_residuals(views: int, points: int) -> Residuals:
+    """Allocate room for residuals: one per outline point and one per edge point."""
+    s = (views, MAX_SAMPLES + points)
+    return Residuals(
+        np.empty(s), np.empty(s), np.empty((*s, 3)), np.empty(s, dtype=np.int64),
+        np.zeros(views, dtype=np.int64), np.zeros(views),
+    )  # fmt: skip
+
+
+@kernel
+def _distance_at(distance, start, left, top, width, height, u, v):  # type: ignore[no-untyped-def]
+    """Bilinear signed distance, px, and its gradient; whether the pixel is inside the window."""
+    x, y = u - left, v - top
+    if not (x >= 0.0 and y >= 0.0 and x < width - 1.0 and y < height - 1.0):
+        return False, 0.0, 0.0, 0.0
+    i, j = np.int64(x), np.int64(y)
+    fx, fy = x - i, y - j
+    at = np.uint64(start + j * width + i)
+    below = at + np.uint64(width)
+    one = np.uint64(1)
+    d00, d10 = np.float64(distance[at]), np.float64(distance[at + one])
+    d01, d11 = np.float64(distance[below]), np.float64(distance[below + one])
+    value = (d00 * (1 - fx) + d10 * fx) * (1 - fy) + (d01 * (1 - fx) + d11 * fx) * fy
+    along_u = (d10 - d00) * (1 - fy) + (d11 - d01) * fy
+    along_v = (d01 - d00) * (1 - fx) + (d11 - d10) * fx
+    return True, value, along_u, along_v
+
+
+@kernel
+def _world_gradient(r, t, k, d, point, s, du, dv, out, n):  # type: ignore[no-untyped-def]
+    """Fill out[n] (3,) with the gradient of du * u + dv * v with respect to world point[s].
+
+    r, t, k, d: rotation, translation, intrinsics and lens of the view.
+    """
+    px, py, pz = point[s, 0], point[s, 1], point[s, 2]
+    x = r[0, 0] * px + r[0, 1] * py + r[0, 2] * pz + t[0]
+    y = r[1, 0] * px + r[1, 1] * py + r[1, 2] * pz + t[1]
+    z = 1.0 / (r[2, 0] * px + r[2, 1] * py + r[2, 2] * pz + t[2])
+    a, b = x * z, y * z
+    r2 = a * a + b * b
+    radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]))
+    rate = 2.0 * (d[0] + r2 * (2.0 * d[1] + 3.0 * r2 * d[4]))
+    aa = radial + a * a * rate + 2.0 * d[2] * b + 6.0 * d[3] * a
+    ab = a * b * rate + 2.0 * d[2] * a + 2.0 * d[3] * b
+    bb = radial + b * b * rate + 6.0 * d[2] * b + 2.0 * d[3] * a
+    # d(u, v)/d(a, b), then d(a, b)/d(camera point), then to the world's axes.
+    ga = du * (k[0] * aa + k[1] * ab) + dv * k[3] * ab
+    gb = du * (k[0] * ab + k[1] * bb) + dv * k[3] * bb
+    gx, gy = ga * z, gb * z
+    gz = -(ga * a + gb * b) * z
+    for i in range(3):
+        out[n, i] = gx * r[0, i] + gy * r[1, i] + gz * r[2, i]
+
+
+@kernel
+def collect_residuals(view, views, contours, truncation_m, samples, start, order, residuals):  # type: ignore[no-untyped-def]
+    """Fill the residuals of one view, both ways.
+
+    With c the truncation, robust weights are Tukey's, (1 - (r / c)²)², and the cost is
+    c² / 6 (1 - (1 - (r / c)²)³).
+    """
+    r, t = views.rotation[view], views.translation[view]
+    k, d = views.intrinsics[view], views.distortion[view]
+    pixel, normal, world = samples.pixel[view], samples.normal[view], samples.world[view]
+    depth, lengths, count = samples.depth[view], samples.length[view], samples.count[view]
+    values, weights = residuals.value[view], residuals.weight[view]
+    gradient, sample = residuals.gradient[view], residuals.sample[view]
+    distance, distance_start = contours.distance, contours.distance_start[view]
+    left, top = contours.window[view, 0], contours.window[view, 1]
+    width, height = contours.window[view, 2], contours.window[view, 3]
+    n = 0
+    cost = 0.0
+    limit = truncation_m * truncation_m / 6.0
+    focal = 1.0 / k[0]
+    for s in range(count):
+        metres = depth[s] * focal
+        length = lengths[s]
+        cost += length * limit
+        inside, value, along_u, along_v = _distance_at(
+            distance, distance_start, left, top, width, height, pixel[s, 0], pixel[s, 1]
+        )
+        value *= metres
+        if not inside or abs(value) >= truncation_m:
+            continue
+        steep = np.sqrt(along_u * along_u + along_v * along_v)
+        facing = along_u * normal[s, 0] + along_v * normal[s, 1]
+        if steep < 0.3 or facing < 0.5 * steep:
+            continue
+        share = 1.0 - (value / truncation_m) ** 2
+        cost -= length * limit * share**3
+        values[n] = value
+        weights[n] = length * share * share
+        sample[n] = s
+        _world_gradient(r, t, k, d, world, s, metres * along_u, metres * along_v, gradient, n)
+        n += 1
+    bands = sort_into_bands(count, views.size[view, 1], pixel, start, order)
+    points, normals, spacing = contours.points, contours.normals, contours.spacing
+    for m in range(contours.point_start[view], contours.point_start[view + 1]):
+        u, v = points[m, 0], points[m, 1]
+        nu, nv = normals[m, 0], normals[m, 1]
+        nearest = nearest_facing(u, v, nu, nv, bands, pixel, normal, start, order)
+        metres = 0.0
+        if nearest >= 0:
+            metres = depth[nearest] * focal
+        elif count > 0:
+            metres = depth[0] * focal
+        length = spacing[m] * metres
+        cost += length * limit
+        if nearest < 0:
+            continue
+        du, dv = pixel[nearest, 0] - u, pixel[nearest, 1] - v
+        gap = (du * du + dv * dv) * metres * metres
+        if gap >= truncation_m * truncation_m:
+            continue
+        share = 1.0 - gap / (truncation_m * truncation_m)
+        cost -= length * limit * share**3
+        values[n] = (du * nu + dv * nv) * metres
+        weights[n] = length * share * share
+        sample[n] = nearest
+        _world_gradient(r, t, k, d, world, nearest, metres * nu, metres * nv, gradient, n)
+        n += 1
+    residuals.count[view] = n
+    residuals.cost[view] = cost

@@ -1,0 +1,141 @@
+"""The edges of silhouettes: signed distances around them, points and directions along them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.compiled import kernel
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation
+
+_SMALLEST_EDGE_PX = 12
+_LEAST_MARGIN_PX = 24
+# Sobel's 5x5 kernel is the outer product of these two.
+_SMOOTH = (1.0, 4.0, 6.0, 4.0, 1.0)
+_RISE = (-1.0, -2.0, 0.0, 2.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SilhouetteContour:
+    """The edge of one silhouette.
+
+    Attributes:
+        distance: (h, w) float32 signed distance to the edge, px, positive outside, of a window.
+        left, top: the window's first column and row in the frame.
+        points, normals: (n, 2) px, points of the edge and the outward directions there.
+        spacing: (n,) px of edge that each point stands for.
+    """
+
+    distance: NDArray[np.float32]
+    left: int
+    top: int
+    points: FloatArray
+    normals: FloatArray
+    spacing: FloatArray
+
+
+class ContourViews(NamedTuple):
+    """The silhouettes' edges of v views.
+
+    Attributes:
+        distance: signed distance to the silhouette's edge, px, positive outside, of a window per
+            view, flat; view i's starts at distance_start[i].
+        distance_start: (v,).
+        window: (v, 4) left, top, width, height of the window, px.
+        points: (n, 2) px, points of the edges, view after view from point_start[i] on.
+        normals: (n, 2) outward, unit length.
+        spacing: (n,) px of edge that each point stands for.
+        point_start: (v + 1,).
+    """
+
+    distance: NDArray[np.float32]
+    distance_start: NDArray[np.int64]
+    window: NDArray[np.int64]
+    points: FloatArray
+    normals: FloatArray
+    spacing: FloatArray
+    point_start: NDArray[np.int64]
+
+
+def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteContour:
+    """Signed distances around a silhouette, and points along its edge.
+
+    The window is the silhouette's bounding box and a margin of a sixth of its height. The edge
+    runs midway between pixels inside and outside; where the silhouette leaves the frame, and
+    around specks, there are no points.
+    """
+    mask = observation.in_full_frame(observation.mask.view(np.uint8))
+    height, width = mask.shape
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if rows.size == 0:
+        nothing = np.empty((0, 2))
+        return SilhouetteContour(np.empty((0, 0), np.float32), 0, 0, nothing, nothing, np.empty(0))
+    margin = max(_LEAST_MARGIN_PX, (rows[-1] - rows[0]) // 6)
+    top, bottom = max(0, rows[0] - margin), min(height, rows[-1] + margin + 1)
+    left, right = max(0, columns[0] - margin), min(width, columns[-1] + margin + 1)
+    window = np.ascontiguousarray(mask[top:bottom, left:right])
+    inside = cv2.distanceTransform(window, cv2.DIST_L2, 5)
+    distance = np.asarray(cv2.distanceTransform(1 - window, cv2.DIST_L2, 5), np.float32)
+    # The edge runs midway between pixels inside and outside.
+    distance -= inside
+    distance += window
+    distance -= 0.5
+    contours, _ = cv2.findContours(window, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    chains: list[NDArray[Any]] = [np.empty((0, 2), dtype=np.int32)]
+    spacing = [np.empty(0)]
+    for contour in contours:
+        if len(contour) < _SMALLEST_EDGE_PX:
+            continue
+        whole = cv2.arcLength(contour, closed=True)
+        kept = contour[:: max(1, round(spacing_px * len(contour) / whole)), 0]
+        chains.append(kept)
+        spacing.append(np.full(len(kept), whole / len(kept)))
+    chain = np.concatenate(chains)
+    at = chain + (left, top)
+    normal = np.empty(at.shape)
+    steepest(distance, chain, normal)
+    length = np.linalg.norm(normal, axis=1)
+    inner = (at > 0).all(axis=1) & (at < (width - 1, height - 1)).all(axis=1) & (length > 0)
+    normal = normal[inner] / length[inner, None]
+    return SilhouetteContour(
+        distance,
+        int(left),
+        int(top),
+        at[inner] + 0.5 * normal,
+        normal,
+        np.concatenate(spacing)[inner],
+    )
+
+
+@kernel
+def steepest(distance, pixels, out):  # type: ignore[no-untyped-def]
+    """Fill out (n, 2): where distances (h, w) rise at pixels (n, 2), by Sobel's 5x5 px."""
+    height, width = distance.shape
+    for n in range(pixels.shape[0]):
+        along_u, along_v = 0.0, 0.0
+        for i in range(5):
+            v = min(max(pixels[n, 1] + i - 2, 0), height - 1)
+            for j in range(5):
+                u = min(max(pixels[n, 0] + j - 2, 0), width - 1)
+                along_u += _SMOOTH[i] * _RISE[j] * distance[v, u]
+                along_v += _RISE[i] * _SMOOTH[j] * distance[v, u]
+        out[n, 0], out[n, 1] = along_u, along_v
+
+
+def join_edges(edges: Sequence[SilhouetteContour]) -> ContourViews:
+    """The edges of several views as the kernels read them."""
+    sizes = [edge.distance.size for edge in edges]
+    counts = [len(edge.points) for edge in edges]
+    return ContourViews(
+        distance=np.concatenate([edge.distance.ravel() for edge in edges]),
+        distance_start=np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64),
+        window=np.array([[e.left, e.top, *e.distance.shape[::-1]] for e in edges], dtype=np.int64),
+        points=np.concatenate([edge.points for edge in edges]),
+        normals=np.concatenate([edge.normals for edge in edges]),
+        spacing=np.concatenate([edge.spacing for edge in edges]),
+        point_start=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+    )

@@ -1,0 +1,114 @@
+"""The background as the foreground test reads it: Gaussians of every pixel, by channel."""
+
+import cv2
+import numpy as np
+
+from markerless_tracker.imaging.background.model import (
+    BackgroundModel,
+    FloatImage,
+    foreground_limit,
+    risk_of,
+)
+from markerless_tracker.imaging.images import Image, grey_of
+from markerless_tracker.imaging.region import Region
+from markerless_tracker.imaging.settings import ImagingSettings
+
+# Largest difference of a background's channels, grey levels, that a grey camera still has.
+_GREY_TOLERANCE = 0.5
+_LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
+# Window of the Gaussian blur that noisy images get.
+_SMOOTH_PX = (5, 5)
+# Mean of a mode that a pixel lacks: no value is near it, or a shadow of it.
+_NOWHERE = np.float32(-1e6)
+
+
+class BackgroundGaussians:
+    """One camera's background in the form in which images are compared with it.
+
+    Grey cameras are compared in one channel, noisy ones after a blur.
+
+    Args:
+        camera: the camera's name.
+        background: its empty scene.
+        settings: those of the foreground test.
+
+    Attributes:
+        is_grey: whether one channel carries all information.
+        mean: (k, c, h, w) float32 grey levels, means of the k Gaussians of each pixel.
+        scale: (k, c, h, w) float32, 1 / (sigma sqrt(limit)): the foreground test is |.|^2 > 1.
+        grey_mean: (h, w) float32, the first Gaussian's mean as a grey image.
+        sigma: median noise of the grey image, grey levels.
+        size_px: (width, height).
+    """
+
+    def __init__(self, camera: str, background: BackgroundModel, settings: ImagingSettings) -> None:
+        self._camera = camera
+        self._background = background
+        self._settings = settings
+        # Three equal channels are those of a grey camera.
+        spread = background.mean.max(axis=2) - background.mean.min(axis=2)
+        self.is_grey = background.channels == 1 or bool(spread.max() <= _GREY_TOLERANCE)
+        sigma = float(np.sqrt(np.median(background.variance)))
+        self._smooth = sigma > settings.background.denoise_sigma
+        self.mean, self.scale = self._learned()
+        mean, variance = self._smoothed(background.mean, background.variance)
+        if self.is_grey:
+            self.grey_mean = np.ascontiguousarray(mean[:, :, 0])
+            self.sigma = float(np.sqrt(np.median(variance[:, :, 0])))
+        else:
+            self.grey_mean = np.ascontiguousarray(mean @ _LUMA, dtype=np.float32)
+            self.sigma = float(np.sqrt(np.median(variance @ _LUMA**2)))
+        self.size_px = background.size_px
+
+    def reset(self) -> None:
+        """Restore `mean` as learned, in place."""
+        self.mean[...] = self._learned()[0]
+
+    def pixels(self, image: Image, region: Region) -> Image:
+        """(h, w, c) of a region as it is compared: smoothed if too noisy, one channel if grey."""
+        wide = region.grown(_SMOOTH_PX[0] // 2 if self._smooth else 0, self.size_px)
+        part = image[wide.slices]
+        if self._smooth:
+            part = np.asarray(cv2.GaussianBlur(part, _SMOOTH_PX, 0.0), dtype=np.uint8)
+            part = part[region.within(wide).slices]
+        part = np.ascontiguousarray(part)
+        if self.is_grey:
+            part = grey_of(part)
+        return part.reshape(region.height, region.width, -1)
+
+    def _smoothed(self, mean: FloatImage, variance: FloatImage) -> tuple[FloatImage, FloatImage]:
+        """Mean and variance (h, w, c) of images as they are compared: smoothed if too noisy."""
+        if not self._smooth:
+            return mean, variance
+        smooth = np.asarray(cv2.GaussianBlur(mean, _SMOOTH_PX, 0.0), dtype=np.float32)
+        row = cv2.getGaussianKernel(_SMOOTH_PX[0], 0.0, cv2.CV_64F)
+        less = np.maximum(
+            variance * float((row**2).sum() ** 2), self._settings.background.sigma_min**2
+        )
+        return smooth.reshape(mean.shape), less.astype(np.float32)
+
+    def _learned(self) -> tuple[FloatImage, FloatImage]:
+        """Means and 1 / (sigma sqrt(limit)) of all modes, (k, c, h, w) each."""
+        background = self._background
+        channels = slice(0, 1) if self.is_grey else slice(None)
+        rest = np.ones(background.mean.shape[:2], dtype=np.float32)
+        for mode in background.modes:
+            rest -= mode.weight
+        modes = [(rest, background.mean, background.variance)]
+        modes += [(mode.weight, mode.mean, mode.variance) for mode in background.modes]
+        risk = risk_of(self._camera, self._settings)
+        means, scales = [], []
+        for weight, mean, variance in modes:
+            mean, variance = self._smoothed(mean[:, :, channels], variance[:, :, channels])
+            mean, variance = (a.reshape(*rest.shape, -1) for a in (mean, variance))
+            there = weight[:, :, None] > 0.0
+            variance = np.where(there, variance, np.float32(1.0))
+            limit = foreground_limit(variance, risk, weight=weight)
+            means.append(np.where(there, mean, _NOWHERE))
+            scales.append(1.0 / np.sqrt(variance * limit[:, :, None]))
+        return _planar(means), _planar(scales)
+
+
+def _planar(images: list[FloatImage]) -> FloatImage:
+    """Images (h, w, c) as one array (k, c, h, w)."""
+    return np.ascontiguousarray(np.moveaxis(np.stack(images), -1, 1), dtype=np.float32)

@@ -1,0 +1,145 @@
+"""What each pixel of an image shows: background, the background in shadow, or foreground."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.imaging.background.adapt import Adaptation
+from markerless_tracker.imaging.background.model import BackgroundModel
+from markerless_tracker.imaging.images import Image, grey_of
+from markerless_tracker.imaging.region import Region
+from markerless_tracker.imaging.segmentation import kernels
+from markerless_tracker.imaging.segmentation.blobs import occupied
+from markerless_tracker.imaging.segmentation.exposure import ExposureMeter
+from markerless_tracker.imaging.segmentation.gaussians import BackgroundGaussians
+from markerless_tracker.imaging.segmentation.morphology import Mask
+from markerless_tracker.imaging.segmentation.shadow import shadow_rule
+from markerless_tracker.imaging.segmentation.texture import correct_labels, texture_reach
+from markerless_tracker.imaging.settings import ImagingSettings
+
+LOOK_PX = 3
+"""Radius within which the choice of pixels whose texture is examined depends on their labels."""
+_SOLID = np.ones((3, 3), dtype=np.uint8)
+
+
+class PixelLabeller:
+    """Labels pixels of one camera's images: 0 background, 127 shadow, 255 foreground.
+
+    A pixel's label depends on the colours near it, never on the shape of what it belongs to.
+
+    Args:
+        camera: the camera's name.
+        background: its empty scene.
+        settings: of the foreground, shadow and texture tests.
+
+    Attributes:
+        background: `mean` of it follows slow changes if `background.follow_s` says so.
+        gain: (c,) float32, brightness of the last image relative to the background's.
+    """
+
+    def __init__(self, camera: str, background: BackgroundModel, settings: ImagingSettings) -> None:
+        self.background = BackgroundGaussians(camera, background, settings)
+        self._settings = settings
+        gaussians = self.background
+        self._first = kernels.coarse(gaussians.mean[0], gaussians.scale[0])
+        # The same memory with channels last.
+        self._means_by_channel = gaussians.mean.transpose(0, 2, 3, 1)
+        self._scales_by_channel = gaussians.scale.transpose(0, 2, 3, 1)
+        self.gain: NDArray[np.float32] = np.ones(gaussians.mean.shape[1], dtype=np.float32)
+        self._meter = ExposureMeter(self._means_by_channel[0])
+        self._adaptation = (
+            Adaptation(settings.background.follow_s, settings.background.follow_margin_px)
+            if settings.background.follow_s > 0.0
+            else None
+        )
+        self._rule = shadow_rule(settings, grey=gaussians.is_grey)
+        # A pixel that alternates between several appearances has no one pattern.
+        self._uses_texture = (
+            settings.texture.radius_px > 0 and settings.shadow.removal and not background.modes
+        )
+        width, height = gaussians.size_px
+        self._memory = np.empty(height * width, dtype=np.uint8)
+
+    def reset(self) -> None:
+        """Back to the background that was given; what was learned since is forgotten."""
+        if self._adaptation is not None:
+            self._adaptation.reset()
+            self.background.reset()
+            self._first = kernels.coarse(self.background.mean[0], self.background.scale[0])
+        self.gain[:] = 1.0
+
+    def measure_exposure(self, image: Image) -> None:
+        """Set `gain` from a whole image (h, w) or (h, w, 3), if the settings ask for it."""
+        if self._settings.background.exposure_compensation:
+            self.gain[:] = self._meter.gain(image.reshape(image.shape[0], image.shape[1], -1))
+
+    def label(self, image: Image, window: Region, corrected: Region) -> Mask:
+        """Labels (h, w) uint8 of a window of the image; overwritten by the next call.
+
+        Args:
+            image: the whole image.
+            window: what is labelled.
+            corrected: inside the window; texture corrects labels here alone.
+        """
+        part = self.background.pixels(image, window)
+        count = window.width * window.height
+        labels = self._memory[:count].reshape(window.height, window.width)
+        is_grey = self.background.is_grey
+        label = kernels.label_grey if is_grey else kernels.label_colour
+        label(
+            part[:, :, 0] if is_grey else part, *self._first, self.background.mean,
+            self.background.scale, self.gain, self._rule, window.left, window.top, labels,
+        )  # fmt: skip
+        if self._uses_texture:
+            self._correct_by_texture(image, labels, window, corrected)
+        return labels
+
+    def _correct_by_texture(
+        self, image: Image, labels: Mask, window: Region, corrected: Region
+    ) -> None:
+        options, is_grey = self._settings, self.background.is_grey
+        part, looked_at = window, labels
+        if not is_grey:
+            # Specks are not worth the look.
+            solid = cv2.threshold(labels, kernels.SHADOW, 255, cv2.THRESH_BINARY)[1]
+            cv2.morphologyEx(solid, cv2.MORPH_OPEN, _SOLID, dst=solid)
+            looked_at = np.asarray(cv2.dilate(solid, _SOLID), dtype=np.uint8)
+            part = occupied(looked_at, corrected.within(window)).moved(window.left, window.top)
+        if part.width <= 0:
+            return
+        seen = part.grown(texture_reach(options.texture.radius_px), self.background.size_px)
+        correct_labels(
+            grey_of(self.background.pixels(image, seen)),
+            self.background.grey_mean,
+            float(self.gain.mean()),
+            self.background.sigma,
+            labels,
+            window,
+            part,
+            seen,
+            looked_at=looked_at,
+            radius=options.texture.radius_px,
+            light=(options.texture.light_min, options.shadow.value_max + 0.03),
+            protect=is_grey,
+            reveal=is_grey and options.texture.reveal,
+        )
+
+    def follow(self, image: Image, mask: Mask | None, stamp_ns: int) -> None:
+        """Let the background follow an image, if the settings ask for it.
+
+        Args:
+            image: the whole image.
+            mask: (h, w) its silhouette; None: of a part alone, from which nothing is learned.
+            stamp_ns: capture time.
+        """
+        if self._adaptation is None:
+            return
+        if mask is None:
+            self._adaptation.pass_over(stamp_ns)
+            return
+        values = grey_of(image) if self.background.is_grey else image
+        self._adaptation.follow(
+            values.reshape(*mask.shape, -1), mask, stamp_ns, self.gain,
+            self._means_by_channel, self._scales_by_channel,
+        )  # fmt: skip
+        self._first = kernels.coarse(self.background.mean[0], self.background.scale[0])

@@ -1,0 +1,118 @@
+"""From labels to a silhouette: shadow patches, cracks, blobs, holes, border and contour."""
+
+import numpy as np
+
+from markerless_tracker.imaging.images import Image
+from markerless_tracker.imaging.region import Region
+from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_small, occupied
+from markerless_tracker.imaging.segmentation.border import trim_border
+from markerless_tracker.imaging.segmentation.labels import PixelLabeller
+from markerless_tracker.imaging.segmentation.level_set import refine_contour
+from markerless_tracker.imaging.segmentation.morphology import (
+    Mask,
+    foreground_mask,
+    open_and_close,
+)
+from markerless_tracker.imaging.segmentation.zones import Zones
+from markerless_tracker.imaging.settings import ImagingSettings
+
+# Difference of body and background, in deviations of the noise, below which a border stays.
+_LEAST_CONTRAST = 5.0
+
+
+def repair_mask(
+    labels: Mask,
+    mask: Mask,
+    zones: Zones,
+    settings: ImagingSettings,
+    *,
+    grey: bool,
+    least_shadow_px: float,
+) -> bool:
+    """Fill a mask from labels, without what is too small to be a shadow, a person or a hole.
+
+    Args:
+        labels: (h, w) uint8 of `zones.window`: 0 background, 127 shadow, 255 foreground.
+        mask: (h, w) uint8, written: 0 or 255; right within `zones.zone` alone.
+        zones: where the labels lie in the image, and where the mask is needed.
+        settings: those beginning with ``mask_``.
+        grey: whether the camera is a grey one.
+        least_shadow_px: smaller patches of shadow become foreground.
+
+    Returns:
+        False if a patch that matters goes on outside the zone and may be larger than is seen.
+    """
+    frame_px, window = zones.frame_px, zones.window
+    if foreground_mask(
+        labels, mask, least_shadow_px, grey=grey, zone=zones.zone_before_repair.within(window),
+        need=zones.patches_before_repair.within(window), unknown=zones.open_sides,
+    ):  # fmt: skip
+        return False
+    # Outside of `zone_before_repair` the mask is wrong, but opening and closing look no further.
+    open_and_close(mask, settings, frame_px)
+    zone, need, unknown = zones.zone.within(window), zones.patches.within(window), zones.open_sides
+    least, largest = settings.mask.blob_share * frame_px, settings.mask.hole_share * frame_px
+    if clear_small(mask, least, connectivity=8, zone=zone, need=need, unknown=unknown):
+        return False
+    return not fill_small(mask, largest, zone=zone, need=need, unknown=unknown)
+
+
+def fit_border(
+    image: Image, mask: Mask, zones: Zones, labeller: PixelLabeller, settings: ImagingSettings
+) -> None:
+    """Move a mask's border to where the body ends, in place.
+
+    Args:
+        image: the whole image.
+        mask: (h, w) uint8 of `zones.window`, 0 or 255; right within `zones.zone`.
+        zones: as in `repair_mask`.
+        labeller: what labelled this image.
+        settings: `mask.trim_px` and those beginning with ``level_set_``.
+    """
+    zone = zones.zone.within(zones.window)
+    _trim(image, mask, zone, zones.window, labeller, settings.mask.trim_px)
+    _refine(image, mask, zone, zones.window, labeller, settings)
+
+
+def _trim(
+    image: Image, mask: Mask, zone: Region, window: Region, labeller: PixelLabeller, layers: int
+) -> None:
+    """Clear pixels of the mask's border that the body covers by less than half, in place."""
+    body = occupied(mask, zone)
+    if layers == 0 or body.width <= 0:
+        return
+    # One pixel more, so that the body ends inside; but it goes on beyond the image.
+    box = body.grown(1, (mask.shape[1], mask.shape[0]))
+    part = np.ascontiguousarray(mask[box.slices])
+    place = box.moved(window.left, window.top)
+    background = labeller.background
+    trim_border(
+        background.pixels(image, place), background.mean[0], labeller.gain, part, place,
+        layers=layers, least=_LEAST_CONTRAST * background.sigma,
+    )  # fmt: skip
+    mask[box.slices] = part
+
+
+def _refine(
+    image: Image,
+    mask: Mask,
+    zone: Region,
+    window: Region,
+    labeller: PixelLabeller,
+    settings: ImagingSettings,
+) -> None:
+    """Move the mask's contour to the local contrast, in place; outside the zone it stays."""
+    body = occupied(mask, zone)
+    if settings.level_set.iterations == 0 or body.width <= 0:
+        return
+    margin = settings.level_set.iterations + settings.level_set.radius_px
+    box = body.grown(margin, (mask.shape[1], mask.shape[0]))
+    part = np.ascontiguousarray(mask[box.slices])
+    refine_contour(
+        labeller.background.pixels(image, box.moved(window.left, window.top)),
+        part,
+        iterations=settings.level_set.iterations,
+        radius_px=settings.level_set.radius_px,
+        least=_LEAST_CONTRAST * labeller.background.sigma,
+    )
+    mask[box.slices] = part
