@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +15,7 @@ from markerless_tracker.fitness.raster.edge_samples import OUTLINE, SIDES, VISIB
 from markerless_tracker.fitness.raster.outline_arrays import make_outlines
 from markerless_tracker.fitness.raster.static_layer import Drawing, split_static
 from markerless_tracker.fitness.terms import OVERLAP, PROJECTED, CostRule, view_terms
-from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
+from markerless_tracker.fitness.threads import parallel, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Comparison, Observation
 
@@ -166,8 +165,7 @@ class Fitness:
         if not worth_waking(work_s, self.threads):
             kernels.evaluate(*args, 0, 1)
         else:
-            with ONE_CALLER:
-                numba.set_num_threads(self.threads)
+            with parallel(self.threads):
                 kernels.evaluate_parallel(*args)
         return counts, costs
 
