@@ -60,9 +60,12 @@ class Adaptation:
         self._turn = 0
 
     def pass_over(self, stamp_ns: int) -> None:
-        """An image came that is not followed: time goes on."""
+        """An image came that is not followed: time goes on.
+
+        One image may come twice: first a region of it, then the whole.
+        """
         before, self._seen_ns = self._seen_ns, stamp_ns
-        if before is None or not 0 < stamp_ns - before <= GAP_NS:
+        if before is None or not 0 <= stamp_ns - before <= GAP_NS:
             self._followed_ns = None
             self._turn = 0
 
