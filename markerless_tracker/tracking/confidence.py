@@ -12,7 +12,6 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers, transforms
 from markerless_tracker.body.kinematics import carried
 from markerless_tracker.body.model import FIRST_TRANSLATION
-from markerless_tracker.errors import SearchError
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.contour.outline_rows import OutlineRows, outline_rows
 from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
@@ -37,7 +36,9 @@ _LEAST_SIGMA_M = 0.002
 def confidence_of(
     body: BodyModel, pose: FloatArray, contours: ContourFrame, *, measured: bool
 ) -> Confidence | None:
-    """Standard deviations of a pose (p,); None if the contours do not hold it at all.
+    """Standard deviations of a pose (p,); None if the contours do not determine it.
+
+    Never raises: what cannot be computed is unknown.
 
     Args:
         body: the tracked body.
@@ -48,9 +49,9 @@ def confidence_of(
     sums = contours.equations(pose, _TRUNCATION_M)
     rows = outline_rows(contours)
     total = float(rows.weight.sum())
-    if total <= 0.0:
-        return None
     weight, value = rows.weight, rows.value
+    if not (total > 0.0 and np.isfinite(value).all() and np.isfinite(sums.hessian).all()):
+        return None
     variance = max(float((weight * value**2).sum()) / total, _LEAST_SIGMA_M**2)
     precision = sums.hessian / (CORRELATED * CORRELATION_M * variance)
     precision[np.diag_indices_from(precision)] += 1.0 / body.prior_sd**2 + 1e-9
@@ -58,8 +59,8 @@ def confidence_of(
         covariance = np.linalg.inv(precision)
     except np.linalg.LinAlgError:
         return None
-    if not np.isfinite(covariance).all():
-        raise SearchError("the covariance of the pose is not finite")
+    if not (np.isfinite(covariance).all() and np.diag(covariance).min() >= 0.0):
+        return None
     unseen = MEASURED_M if measured else UNMEASURED_M
     floor = float(np.hypot(unseen, DISAGREEMENT * disagreement_m(contours, rows)))
     by_marker, by_root = _slopes(body, pose)
