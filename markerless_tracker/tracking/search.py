@@ -74,10 +74,6 @@ class Searcher:
         self.particle_sets: dict[str, ParticleSet] = {}
         """What each stage left in the last frame, where its algorithm goes on from that."""
 
-    def forget(self) -> None:
-        """Forget the last frame."""
-        self.particle_sets.clear()
-
     def frame(
         self, observations: Mapping[str, Observation], stamp_ns: int, predicted: FloatArray
     ) -> "FrameSearch":

@@ -22,7 +22,7 @@ from markerless_tracker.tracking.motion import MotionModel
 from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.person.estimate import BodyEstimate
-from markerless_tracker.tracking.person.first_frame import ContourMaker, StartMarkers
+from markerless_tracker.tracking.person.first_frame import StartMarkers
 from markerless_tracker.tracking.search import make_searcher
 from markerless_tracker.tracking.start.starter import Starter
 from markerless_tracker.tracking.states import Phase, Track
@@ -105,8 +105,7 @@ class Tracker:
         self._motion.reset()
         self._body.reset()
         self._assessor.reset()
-        self._searcher.forget()
-        self._use_body()
+        self._searcher = self._searcher_for(self.body)
         self._starter = None if self._given else self._new_starter()
 
     def warm_up(self) -> None:
@@ -117,7 +116,7 @@ class Tracker:
             self._starter, self._assessor.track = None, Track(Phase.TRACKING)
             self.step(views, 0)
             self.reset()
-        self._body.warm_up(self._motion.pose, self._contours_of(blank, 0))
+        self._body.warm_up(self._searcher_for, blank, self._motion.pose)
         self.reset()
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
@@ -212,10 +211,13 @@ class Tracker:
         believed, stamp_ns = seen.believed, seen.stamp_ns
         if not anybody(believed):
             return None
-        if not self._body.sections_fitted:
-            contours = self._contours_of(believed, stamp_ns)
-            predicted = self._body.fit_first_frame(self._motion.pose, contours)
-            self._use_body()
+        if self._body.awaits_first_frame:
+            at = self._motion.pose
+            start = self._body.fit_first_frame(self._searcher_for, believed, stamp_ns, at)
+            if start is None:
+                return None
+            predicted = start
+            self._searcher = self._searcher_for(self.body)
         search = self._searcher.frame(believed, stamp_ns, predicted)
         sigma = self.body.sigma * self._motion.widening(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
@@ -224,9 +226,10 @@ class Tracker:
             search.pose, names = self._assessor.limbs.recover(
                 self._searcher, search.contours, believed, stamp_ns, search.pose
             )
-        notes = seen.notes + tuple(f"{name}: found elsewhere" for name in names) + seen.left_out
+        notes = self._body.take_warnings() + tuple(f"{name}: found elsewhere" for name in names)
         jumped = np.array([i for name in names for i in self.body.subspaces[name]], dtype=np.int64)
-        return Found(search, stamp_ns, believed, notes, jumped=jumped)
+        warnings = seen.notes + notes + seen.left_out
+        return Found(search, stamp_ns, believed, warnings, jumped=jumped)
 
     def _learn(self, found: Found) -> None:
         """Take a frame into the motion and, while the body is tracked, into its fit."""
@@ -234,9 +237,9 @@ class Tracker:
         self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
         if not tracked or found.anew:
             return
-        moved = self._body.fit_tracked_frame(found.search.contours, pose)
+        moved = self._body.fit_tracked_frame(found.search)
         if moved is not None:
-            self._use_body()
+            self._searcher = self._searcher_for(self.body)
             self._motion.shift(moved, self._body.limits)
 
     def _new_starter(self, last_pose: FloatArray | None = None) -> Starter:
@@ -244,11 +247,3 @@ class Tracker:
             self.rig, self.body, self._searcher_for, self._evidence.select,
             sized=self._body.sized, fit_shape=not self._body.sections_fitted, last_pose=last_pose,
         )  # fmt: skip
-
-    def _use_body(self) -> None:
-        """Search with the body as fitted so far."""
-        if self._searcher.body is not self.body:
-            self._searcher = self._searcher_for(self.body)
-
-    def _contours_of(self, seen: Mapping[str, Observation], stamp_ns: int) -> ContourMaker:
-        return lambda body, pose: self._searcher_for(body).frame(seen, stamp_ns, pose).contours

@@ -1,24 +1,33 @@
 """The body of the tracked person: what is known of it, and what is still to be fitted."""
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.shape.section_fit import fit_shape
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limits import joint_limits
+from markerless_tracker.tracking.loss import LEAST_FIT, silhouette_fit
+from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import BodyFitting, Unmeasured
-from markerless_tracker.tracking.person.first_frame import (
-    ContourMaker,
-    StartMarkers,
-    shape_of_first_frame,
-)
+from markerless_tracker.tracking.person.first_frame import StartMarkers, shape_of_first_frame
+from markerless_tracker.tracking.search import FrameSearch, Searcher
+
+START_FRAMES = 30
+"""Frames that may disagree with a given start pose before tracking goes on without a fit."""
+
+SearcherFor = Callable[[BodyModel], Searcher]
 
 
 class BodyEstimate:
     """A body that becomes the person's: first its sections, then its lengths are fitted.
 
-    Sections are fitted in one frame with the pose held, lengths over several tracked frames.
+    Sections are fitted in one frame with the pose held, lengths over several tracked frames. Only
+    frames whose silhouettes agree with the body are used: f_s of at least `LEAST_FIT`.
 
     Args:
         body: with generic sections, and lengths that were measured or follow from a stature.
@@ -57,21 +66,55 @@ class BodyEstimate:
         self.body = self.generic
         self.sections_fitted = not self._fits_sections
         self.sized = None if self._person is None else self._person.sized
+        self._disagreeing = 0
+        self._reported = False
         self._lengths: BodyFitting | None = None
         if self._person is not None and self._fits_sections and self._config.fit_lengths:
             self._lengths = BodyFitting(self._person, self.limits)
 
-    def fit_first_frame(self, pose: FloatArray, contours: ContourMaker) -> FloatArray:
-        """Fit the sections to a frame with the body at a pose (p,).
+    @property
+    def awaits_first_frame(self) -> bool:
+        """Whether tracking from a given start waits for a frame to fit the sections to."""
+        return not self.sections_fitted and self._disagreeing < START_FRAMES
+
+    def fit_first_frame(
+        self,
+        searcher_for: SearcherFor,
+        observations: Mapping[str, Observation],
+        stamp_ns: int,
+        start: FloatArray,
+    ) -> FloatArray | None:
+        """Fit the sections to a frame, if its silhouettes agree with the body.
+
+        They must agree at the start pose, or where a search from there leads.
+
+        Args:
+            searcher_for: makes a searcher of a body.
+            observations: the evidence.
+            stamp_ns: its time.
+            start: (p,) given pose.
 
         Returns:
-            The pose (p,) that they were fitted at: a noisy start is refined first.
+            The pose (p,) that the sections were fitted at; None if the frame disagrees.
         """
-        self.body, pose = shape_of_first_frame(
-            self.generic, pose, self._start_markers, contours, self._config, self.limits
+        search = searcher_for(self.body).frame(observations, stamp_ns, start)
+        if not _agrees(search):
+            search.run(frame_stages(self.body, self._config, start, self.body.sigma))
+        if not _agrees(search):
+            self._disagreeing += 1
+            return None
+        return self._fit_sections(searcher_for, observations, stamp_ns, search.pose)
+
+    def take_warnings(self) -> tuple[str, ...]:
+        """What the user should know and was not yet reported, one line each."""
+        warn = not self.sections_fitted and self._disagreeing == START_FRAMES
+        if not warn or self._reported:
+            return ()
+        self._reported = True
+        return (
+            f"start: the silhouettes of {START_FRAMES} frames disagree with the start pose; "
+            "tracking goes on with the body's generic shape",
         )
-        self.sections_fitted = True
-        return pose
 
     def take_found(self, body: BodyModel, *, settled: bool) -> None:
         """Take the body of an automatic start; once settled its sections are fitted."""
@@ -79,28 +122,55 @@ class BodyEstimate:
         if settled:
             self.sections_fitted, self.sized = True, None
 
-    def fit_tracked_frame(self, contours: ContourFrame, pose: FloatArray) -> FloatArray | None:
-        """Use a tracked frame for the fit of the lengths, if they are still to be fitted.
-
-        Args:
-            contours: the frame's evidence.
-            pose: (p,) tracked.
+    def fit_tracked_frame(self, search: FrameSearch) -> FloatArray | None:
+        """Use a tracked frame for what is still to be fitted, if it agrees with the body.
 
         Returns:
-            Once `body` has changed: how far (p,) its poses lie from those tracked so far.
+            If `body` has changed: how far (p,) its poses lie from those tracked so far.
         """
-        if self._lengths is None:
+        if (self.sections_fitted and self._lengths is None) or not _agrees(search):
             return None
-        fitted = self._lengths.add(self.body, contours, pose)
+        if not self.sections_fitted:
+            self.body = fit_shape(self.body, [(search.contours, search.pose)])
+            self.sections_fitted = True
+            return np.zeros(self.body.size)
+        assert self._lengths is not None
+        fitted = self._lengths.add(self.body, search.contours, search.pose)
         if fitted is None:
             return None
         self._lengths = None
         self.body = fitted.body
         return fitted.moved
 
-    def warm_up(self, pose: FloatArray, contours: ContourMaker) -> None:
-        """Compile what the fits need; `reset` then."""
+    def warm_up(
+        self,
+        searcher_for: SearcherFor,
+        observations: Mapping[str, Observation],
+        pose: FloatArray,
+    ) -> None:
+        """Compile what the fits need; then `reset`. Arguments as of `fit_first_frame`."""
         if self._fits_sections:
-            self.fit_first_frame(pose, contours)
+            self._fit_sections(searcher_for, observations, 0, pose)
         if self._lengths is not None:
-            self._lengths.warm_up(self.body, contours(self.body, pose), np.asarray(pose))
+            contours = searcher_for(self.body).frame(observations, 0, pose).contours
+            self._lengths.warm_up(self.body, contours, pose)
+
+    def _fit_sections(
+        self,
+        searcher_for: SearcherFor,
+        observations: Mapping[str, Observation],
+        stamp_ns: int,
+        pose: FloatArray,
+    ) -> FloatArray:
+        def contours(body: BodyModel, at: FloatArray) -> ContourFrame:
+            return searcher_for(body).frame(observations, stamp_ns, at).contours
+
+        self.body, pose = shape_of_first_frame(
+            self.generic, pose, self._start_markers, contours, self._config, self.limits
+        )
+        self.sections_fitted = True
+        return pose
+
+
+def _agrees(search: FrameSearch) -> bool:
+    return silhouette_fit(search.terms().values()) >= LEAST_FIT

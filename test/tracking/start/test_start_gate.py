@@ -11,7 +11,6 @@ from markerless_tracker.synthesis.rig import ring_rig
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 from markerless_tracker.tracking.start.start_gate import (
     GAP_NS,
-    GAP_NS,
     PATIENCE_NS,
     StartGate,
     share_in_view,
