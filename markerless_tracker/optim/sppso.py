@@ -2,7 +2,7 @@
 
 Fleischmann, Austvoll, Kwolek: "Particle Swarm Optimization with Soft Search Space Partitioning for
 Video-Based Markerless Pose Tracking", ACIVS 2012, Eqs 1-3 and the algorithm of section 3. The soft
-partition itself, two such stages with their parameters and spreads, is made in `tracking`.
+partition itself, two such stages with their parameters and sigmas, is made in `tracking`.
 """
 
 import math
@@ -82,7 +82,7 @@ class Sppso(Optimizer):
 
     Every attempt to satisfy the constraints restarts from the particle's saved position and
     velocity with fresh draws. After the last failed one the particle moves all the same; it is
-    evaluated and counted, but cannot become anybody's best.
+    evaluated and counted, but cannot become a best.
 
     Args:
         problem: the search.

@@ -1,8 +1,8 @@
 """Whether a camera disagrees with the others: its silhouettes sit beside the tracked body.
 
 Now and then the pose is refined without one camera, and the shift of that camera's image is
-estimated that lays the body's outline over its silhouette. What stays over a whole run is no
-motion and no mask: the camera stands or looks elsewhere than its calibration says.
+estimated that lays the body's outline over its silhouette. A shift that
+persists over a run is neither motion nor segmentation: the calibration of the camera is wrong.
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ DISAGREES_M = 0.030
 """A systematic shift of this much, at the body, is the calibration's."""
 EVERY_NS = 160_000_000
 LEAST_VIEWS = 3
-"""Of two cameras that disagree nobody knows which is wrong."""
+"""With two cameras that disagree, either may be wrong."""
 _FIRST_NS = 300_000_000
 _LEAST_CHECKS = 3
 _ITERATIONS = 4
@@ -103,7 +103,7 @@ class CameraCheck:
         return out
 
     def _suspect(self) -> None:
-        """Trust the camera that disagrees most no longer when others are judged."""
+        """Leave out the camera that disagrees most when the others are compared."""
         worst = max(self.shifts().items(), key=lambda item: item[1].length_m, default=None)
         if worst is None or worst[0] in self._suspects or not worst[1].disagrees:
             return

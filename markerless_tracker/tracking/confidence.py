@@ -1,10 +1,9 @@
-"""How sure a pose is: from how firmly the contours hold it, and what the model cannot know.
+"""Uncertainty of a pose: posterior covariance of the contour refinement, and model error.
 
-The normal equations of the contour refinement say how far each parameter may move before the
-outlines fit worse (Gauss-Newton approximation of the posterior, noise as large as this frame's
-residuals). That is noise only. What views that disagree leave comes on top (a pose is a compromise
-between them), and what the images cannot tell: where in the flesh the joint's centre is, and for a
-person whom nobody measured how long the bones are.
+The inverse normal equations of the contour refinement are the Gauss-Newton approximation of the
+posterior covariance, with the variance of this frame's residuals. That is noise only. Added are the
+disagreement between the views, of which a pose is a compromise, and what images do not show: the
+joint's centre inside the limb and, for a person whose lengths were not measured, the lengths.
 """
 
 import numpy as np
@@ -23,12 +22,12 @@ MEASURED_M = 0.0055
 UNMEASURED_M = 0.015
 """The same with lengths that were fitted, or that are those of a stature."""
 DISAGREEMENT = 2.7
-"""A pose hides most of what views disagree by: its error is so many times what still shows."""
+"""Error of a pose relative to the disagreement of the views that remains after the fit."""
 CORRELATED = 9.0
-"""A generic section is wrong along a whole limb: its residuals agree over some half a metre, not
-over the piece of outline that a refinement takes for independent."""
+"""Factor of the residuals' correlation length: a generic section is wrong along a whole limb, some
+half a metre, not along the piece of outline that the refinement takes for independent."""
 _LEVER_M = 0.25
-"""Errors of joints' centres turn limbs about as long as this."""
+"""Length of the limbs that an error of a joint's centre rotates."""
 _TRUNCATION_M = 0.06
 _LEAST_SIGMA_M = 0.002
 
@@ -101,9 +100,9 @@ def disagreement_m(contours: ContourFrame, rows: OutlineRows) -> float:
 
 
 def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives by the parameters: of the markers (45, p), of the root's place and turn (6, p).
+    """Derivatives by the parameters: of the markers (45, p), of the root's pose (6, p).
 
-    The root's turn is a small rotation about the world's axes.
+    The root's rotation is a small one about the world's axes.
     """
     nodes = transforms(body, pose)
     root = body.frames[body.root_frame]

@@ -1,4 +1,4 @@
-"""Whether the body, or a limb, is still tracked: pure tests on how well the silhouettes agree."""
+"""Thresholds for losing and regaining the body and each limb: pure functions of a frame's fit."""
 
 import math
 from collections.abc import Iterable
@@ -15,21 +15,21 @@ LOST_BELOW, REGAINED_ABOVE = 0.40, 0.55
 LOST_FRACTION, REGAINED_FRACTION = 0.75, 0.85
 """The same relative to the mean overlap of the track."""
 LEAST_FIT = 0.62
-"""f_s from which on silhouettes are a person's in that pose: objects score lower. Bodies are only
-found in, and fitted to, frames that reach it."""
+"""Least f_s of a pose that is a person's: objects score lower. Bodies are found in, and fitted to,
+no other frames."""
 LIMB_LOST_BELOW = 0.55
 LIMB_REGAINED_ABOVE = 0.75
-"""Shares of a limb's axis inside the silhouettes, mean over the views."""
-DISAGREEING = 1.5
-"""A swarm disagrees if its particle_sd_ratio exceeds the limb's usual one by this factor."""
+"""Fraction of a limb's axis inside the silhouettes, mean over the views: a limb is lost below the
+first and regained from the second on."""
+SCATTERED = 1.5
+"""A swarm has not converged if its particle_sd_ratio exceeds the limb's mean by this factor."""
 _MEMORY = 0.05
 
 
 def shared_overlap(views: Iterable[ViewTerms]) -> float:
     """Overlap (IoU) of body and silhouettes in some views together.
 
-    Views count by what they show: a hand at the edge of one hardly does, nobody in one not at all.
-    1 if nobody is in any, nor should be.
+    Views are weighted by the pixels that body or silhouette cover. 1 if no view has any.
     """
     seen = list(views)
     pixels = sum(view.pixels for view in seen)
@@ -62,46 +62,48 @@ def next_limb_state(
     state: TrackState,
     inside_fraction: float,
     particle_sd_ratio: float = math.nan,
-    usual: float = math.nan,
+    mean_sd_ratio: float = math.nan,
 ) -> TrackState:
     """State of a limb after a frame.
 
     A limb outside the silhouettes is lost, one inside them is tracked. In between the state stays,
-    but for a limb whose swarm does not agree where it is: that one is lost, too.
+    except that a limb whose swarm has not converged is lost.
 
     Args:
         state: before the frame.
         inside_fraction: of the limb's axis, how much lies inside the silhouettes.
         particle_sd_ratio: of the limb's swarm, see `LimbState`; NaN without a swarm.
-        usual: the particle_sd_ratio that this limb usually has, NaN if unknown.
+        mean_sd_ratio: mean particle_sd_ratio of this limb's tracked frames, NaN if unknown.
     """
     if inside_fraction >= LIMB_REGAINED_ABOVE:
         return TrackState.TRACKING
-    disagreeing = particle_sd_ratio > DISAGREEING * usual
-    if inside_fraction < LIMB_LOST_BELOW or disagreeing or state is TrackState.LOST:
+    scattered = particle_sd_ratio > SCATTERED * mean_sd_ratio
+    if inside_fraction < LIMB_LOST_BELOW or scattered or state is TrackState.LOST:
         return TrackState.LOST
     return TrackState.TRACKING
 
 
 @dataclass
 class LimbTrack:
-    """What a limb's frames were like, for `next_limb_state`.
+    """State of a limb, and what `next_limb_state` depends on.
 
     Attributes:
         state: after the last frame.
-        usual: running mean of particle_sd_ratio over tracked frames; NaN before the first.
+        mean_sd_ratio: running mean of particle_sd_ratio over tracked frames; NaN before the first.
     """
 
     state: TrackState = TrackState.TRACKING
-    usual: float = math.nan
+    mean_sd_ratio: float = math.nan
 
     def note(self, inside_fraction: float, particle_sd_ratio: float) -> TrackState:
         """The state after a frame, see `next_limb_state`."""
-        self.state = next_limb_state(self.state, inside_fraction, particle_sd_ratio, self.usual)
+        self.state = next_limb_state(
+            self.state, inside_fraction, particle_sd_ratio, self.mean_sd_ratio
+        )
         if self.state is TrackState.TRACKING and math.isfinite(particle_sd_ratio):
-            known = math.isfinite(self.usual)
-            self.usual = (
-                self.usual + _MEMORY * (particle_sd_ratio - self.usual)
+            known = math.isfinite(self.mean_sd_ratio)
+            self.mean_sd_ratio = (
+                self.mean_sd_ratio + _MEMORY * (particle_sd_ratio - self.mean_sd_ratio)
                 if known
                 else particle_sd_ratio
             )

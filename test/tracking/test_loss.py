@@ -5,11 +5,11 @@ import pytest
 from markerless_tracker.fitness import ViewTerms
 from markerless_tracker.records import TrackState
 from markerless_tracker.tracking.loss import (
-    DISAGREEING,
     LIMB_LOST_BELOW,
     LIMB_REGAINED_ABOVE,
     LOST_BELOW,
     REGAINED_ABOVE,
+    SCATTERED,
     LimbTrack,
     event_of,
     next_limb_state,
@@ -72,8 +72,8 @@ NAN = float("nan")
     [
         (TRACKING, LIMB_LOST_BELOW - 1e-9, 0.1, LOST),
         (TRACKING, LIMB_LOST_BELOW, 0.1, TRACKING),
-        (TRACKING, LIMB_MIDDLE, 0.1 * DISAGREEING - 1e-9, TRACKING),
-        (TRACKING, LIMB_MIDDLE, 0.1 * DISAGREEING + 1e-9, LOST),
+        (TRACKING, LIMB_MIDDLE, 0.1 * SCATTERED - 1e-9, TRACKING),
+        (TRACKING, LIMB_MIDDLE, 0.1 * SCATTERED + 1e-9, LOST),
         (TRACKING, LIMB_MIDDLE, NAN, TRACKING),
         (TRACKING, LIMB_REGAINED_ABOVE, 9.0, TRACKING),
         (LOST, LIMB_MIDDLE, 0.0, LOST),
@@ -83,18 +83,18 @@ NAN = float("nan")
     ],
 )
 def test_a_limbs_transitions(state, inside_fraction, particle_sd_ratio, expected):
-    assert next_limb_state(state, inside_fraction, particle_sd_ratio, usual=0.1) is expected
+    assert next_limb_state(state, inside_fraction, particle_sd_ratio, mean_sd_ratio=0.1) is expected
 
 
-def test_a_swarm_does_not_count_until_its_usual_scatter_is_known():
+def test_a_swarm_does_not_count_until_the_mean_ratio_is_known():
     assert next_limb_state(TRACKING, LIMB_MIDDLE, 9.0) is TRACKING
 
 
-def test_a_limb_remembers_the_scatter_of_the_frames_that_were_tracked():
+def test_the_mean_ratio_is_that_of_the_tracked_frames():
     limb = LimbTrack()
-    assert limb.note(1.0, 0.1) is TRACKING and limb.usual == pytest.approx(0.1)
-    assert limb.note(1.0, NAN) is TRACKING and limb.usual == pytest.approx(0.1)
-    assert limb.note(0.9, 0.14) is TRACKING and limb.usual == pytest.approx(0.102)
-    assert limb.note(LIMB_MIDDLE, 0.2) is LOST and limb.usual == pytest.approx(0.102)
+    assert limb.note(1.0, 0.1) is TRACKING and limb.mean_sd_ratio == pytest.approx(0.1)
+    assert limb.note(1.0, NAN) is TRACKING and limb.mean_sd_ratio == pytest.approx(0.1)
+    assert limb.note(0.9, 0.14) is TRACKING and limb.mean_sd_ratio == pytest.approx(0.102)
+    assert limb.note(LIMB_MIDDLE, 0.2) is LOST and limb.mean_sd_ratio == pytest.approx(0.102)
     assert limb.note(LIMB_MIDDLE, 0.1) is LOST
-    assert limb.note(0.9, 0.1) is TRACKING and limb.usual < 0.102
+    assert limb.note(0.9, 0.1) is TRACKING and limb.mean_sd_ratio < 0.102

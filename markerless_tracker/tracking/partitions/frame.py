@@ -25,13 +25,13 @@ def frame_stages(
         body: the body.
         config: names the optimiser and how the budget is shared out.
         centre: (p,) predicted pose.
-        sigma: (p,) published spreads, widened for the time since the last frame.
+        sigma: (p,) published standard deviations, widened for the time since the last frame.
 
     Raises:
         ConfigError: the budget cannot be spent exactly.
     """
-    spread = swarm_sigma(body, config, sigma)
-    swarm = STAGES[config.optimizer](body, config, centre, spread)
+    widened = swarm_sigma(body, config, sigma)
+    swarm = STAGES[config.optimizer](body, config, centre, widened)
     if config.refinement == "none":
         return swarm
     return (
@@ -65,16 +65,16 @@ def limb_stages(
 
 
 def swarm_sigma(body: BodyModel, config: TrackerConfig, sigma: FloatArray) -> FloatArray:
-    """Spreads (p,) of swarms: the body's, scaled; of an angle `sigma.angle` at least.
+    """Sigma (p,) of swarms: the body's, scaled; of an angle `sigma.angle` at least.
 
     Saini et al. (2015) print one covariance of 0.01 for all joints and name no rate. Reading: its
     root, 0.1 rad, is wider than what any joint moves between frames at 60 frames/s, so that it
-    stands at every rate, until a joint's own spread, which grows with the time, exceeds it.
+    stands at every rate, until a joint's own sigma, which grows with the time, exceeds it.
     """
-    spread = config.sigma.scale * sigma
+    scaled = config.sigma.scale * sigma
     angles = np.setdiff1d(np.arange(body.size), body.translations)
-    spread[angles] = np.maximum(spread[angles], config.sigma.angle)
-    return spread
+    scaled[angles] = np.maximum(scaled[angles], config.sigma.angle)
+    return scaled
 
 
 def contour_stage(

@@ -41,7 +41,7 @@ def sppso_stages(
     """SPPSO's soft partition (section 3): the root first, then everything, the root nearly fixed.
 
     Stage 1 varies the root's six parameters and samples edges on the cones that are rigid with it;
-    the last stage varies all from stage 1's estimate, with the root's position spread, and that of
+    the last stage varies all from stage 1's estimate, with the root's position sigma, and that of
     a step in between, divided by `sigma.soft_factor`. In the hard partition every stage varies its
     own parameters alone. Beside a refinement the swarm keeps `SWARM_SHARE` of the budget.
 
@@ -56,7 +56,7 @@ def sppso_stages(
     trunk = body.cone_node == body.frames[body.root_frame]
     stages: list[Stage] = []
     earlier = np.empty(0, dtype=np.int64)
-    spread = sigma.copy()
+    widths = sigma.copy()
     for (name, own), count, (_, iterations) in zip(
         _parts(body, config.sppso.stages).items(), particles, published, strict=True
     ):
@@ -64,12 +64,12 @@ def sppso_stages(
         budget = (count, iterations)
         stages.append(
             swarm_stage(
-                body, config, name, "sppso", active, centre, spread.copy(), budget,
+                body, config, name, "sppso", active, centre, widths.copy(), budget,
                 edge_cones=trunk if name == "root" else None,
             )
         )  # fmt: skip
         settled = body.translations if name == "root" else own
-        spread[settled] /= config.sigma.soft_factor
+        widths[settled] /= config.sigma.soft_factor
         earlier = active
     return tuple(stages)
 

@@ -1,4 +1,4 @@
-"""Where somebody is: a coarse visual hull of the silhouettes, and the trunk in it.
+"""Where a person is: a coarse visual hull of the silhouettes, and the trunk in it.
 
 The hull is what all silhouettes agree on: a point of the room belongs to it if every camera that
 looks there sees silhouette (Laurentini 1994, on a grid of points). People are where it has a lump
@@ -25,7 +25,7 @@ FINE_M = 0.03
 LEAST_VIEWS = 2
 """Cameras that must look at a point for it to count."""
 LEAST_HEIGHT_M = 0.45
-"""A lump that reaches less far, in any direction, is nobody."""
+"""A lump with a smaller extent in every direction is no person."""
 LEAST_VOLUME_M3 = 0.015
 MOST_VOLUME_M3 = 1.5
 """A person of two metres with the slack of two views; more is a room, not a person."""
@@ -52,7 +52,7 @@ class Hull:
 
     @property
     def low_m(self) -> float:
-        """Height of its lowest point: the floor, for somebody who stands."""
+        """Height of its lowest point: the floor, for a standing person."""
         return float(self.points_m[:, 2].min()) - 0.5 * FINE_M
 
     @property
@@ -80,7 +80,7 @@ def find_hulls(
         cameras: cameras by name.
         observations: silhouettes of some of them.
     """
-    # A view without any silhouette says nothing about who is there: perhaps it is broken.
+    # A view without any silhouette is left out: the camera may be broken.
     seen = [
         (cameras[name], observation)
         for name, observation in observations.items()

@@ -64,7 +64,7 @@ class FramePopulation:
         searcher: the body, the cameras and the settings.
         observations: the evidence.
         stamp_ns: keys the draws, together with the seed.
-        near: (p,) a pose whose root is about where the body is.
+        near: (p,) a pose whose root is near the body.
         contours: the frame's contour evidence, if it was made already.
     """
 
@@ -104,9 +104,9 @@ class FramePopulation:
         """One more generation.
 
         Args:
-            population: the parents, who stay if they are good enough.
+            population: the parents; they stay if they are good enough.
             generation: keys the draws.
-            share: of the usual number of children.
+            share: fraction of the full number of children.
         """
         rng = keyed_generator(
             self._searcher.config.seed, self._stamp_ns, f"generation {generation}"
@@ -143,16 +143,16 @@ class FramePopulation:
         )  # fmt: skip
 
     def selected(self, poses: FloatArray) -> Population:
-        """The best of poses (n, p) that differ; some facing the other way among them."""
+        """The best of poses (n, p) that differ, among them some of each quarter of the headings."""
         costs = self.costs(poses)
         order = [int(i) for i in np.argsort(costs, kind="stable") if np.isfinite(costs[i])]
         points = {i: markers(self._searcher.body, poses[i]) for i in order}
-        ways = {i: heading(points[i]) for i in order}
+        headings = {i: heading(points[i]) for i in order}
         kept: list[int] = []
         quarters = [0, 0, 0, 0]
         for i in order:
-            turn = ways[i] - ways[kept[0]] if kept else 0.0
-            quarter = round(turn / (0.5 * np.pi)) % 4
+            rotation = headings[i] - headings[kept[0]] if kept else 0.0
+            quarter = round(rotation / (0.5 * np.pi)) % 4
             if quarters[quarter] == PER_QUARTER:
                 continue
             gaps = (np.linalg.norm(points[i] - points[j], axis=1).mean() for j in kept)
@@ -160,7 +160,7 @@ class FramePopulation:
                 kept.append(i)
                 quarters[quarter] += 1
         rows = np.array(kept, dtype=np.int64)
-        return Population(poses[rows], costs[rows], np.array([ways[i] for i in kept]))
+        return Population(poses[rows], costs[rows], np.array([headings[i] for i in kept]))
 
 
 def scaled_to(body: BodyModel, other: BodyModel, poses: FloatArray) -> FloatArray:

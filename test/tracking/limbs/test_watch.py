@@ -9,7 +9,7 @@ from markerless_tracker.body import MARKER_NAMES, markers
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
-from markerless_tracker.tracking.limbs.watch import TURN_NS, LimbWatch, inside_fractions
+from markerless_tracker.tracking.limbs.watch import ROTATION_NS, LimbWatch, inside_fractions
 from markerless_tracker.tracking.loss import LIMB_LOST_BELOW, LIMB_REGAINED_ABOVE
 from markerless_tracker.tracking.search import Searcher
 
@@ -93,7 +93,7 @@ def test_a_lost_arm_is_found_alone(standing) -> None:
     assert gaps(scene.body, found, pose)[ARM].max() < 0.10
 
 
-def test_an_arm_that_is_wrong_inside_the_silhouettes_is_found_at_its_turn(balancing) -> None:
+def test_a_wrong_arm_inside_the_silhouettes_is_found_in_rotation(balancing) -> None:
     scene, seen, pose, hidden = balancing
     body = scene.body
     assert gaps(body, hidden, pose)[ARM].max() > 0.3
@@ -102,7 +102,7 @@ def test_an_arm_that_is_wrong_inside_the_silhouettes_is_found_at_its_turn(balanc
     states = watch.assess(body, hidden, seen, np.full(body.size, np.nan))
     assert states["l_arm"].state is TRACKING
     at, taken = hidden, []
-    for stamp_ns in range(0, 8 * TURN_NS, TURN_NS):
+    for stamp_ns in range(0, 8 * ROTATION_NS, ROTATION_NS):
         at, names = watch.recover(searcher, contours_of(searcher, seen, at), seen, stamp_ns, at)
         taken += names
     assert taken[0] == "l_arm"
@@ -113,7 +113,7 @@ def test_limbs_in_their_place_are_left_alone(balancing) -> None:
     scene, seen, pose, _ = balancing
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
-    for stamp_ns in range(0, 4 * TURN_NS, TURN_NS):
+    for stamp_ns in range(0, 4 * ROTATION_NS, ROTATION_NS):
         contours = contours_of(searcher, seen, pose)
         assert watch.recover(searcher, contours, seen, stamp_ns, pose) == (pose, ())
 
@@ -138,8 +138,8 @@ def test_turns_come_by_time_and_depend_on_nothing_else(balancing) -> None:
         return [watch.recover(searcher, contours, seen, stamp, hidden)[1] for stamp in stamps]
 
     # The arm is first in the order of turns, and nobody's turn comes again so soon.
-    assert found([0, 1, TURN_NS - 1]) == [("l_arm",), (), ()]
-    assert found([0, TURN_NS], threads=2) == found([0, TURN_NS])
+    assert found([0, 1, ROTATION_NS - 1]) == [("l_arm",), (), ()]
+    assert found([0, ROTATION_NS], threads=2) == found([0, ROTATION_NS])
     assert scene.body.limbs[0] == "l_arm"
 
 
