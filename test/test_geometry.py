@@ -33,14 +33,14 @@ def test_rotations_are_rotations_and_those_of_opencv(v: np.ndarray) -> None:
 
 
 @given(direction, st.floats(-3, 3))
-def test_the_axis_stays_and_the_trace_tells_the_angle(axis: np.ndarray, a: float) -> None:
+def test_the_axis_is_invariant_and_the_trace_gives_the_angle(axis: np.ndarray, a: float) -> None:
     r = rotation_from_rodrigues(axis * a)
     np.testing.assert_allclose(r @ axis, axis, atol=1e-12)
     assert np.trace(r) == pytest.approx(1 + 2 * np.cos(a))
 
 
 @given(turn)
-def test_rodrigues_vectors_come_back(v: np.ndarray) -> None:
+def test_rodrigues_vectors_round_trip(v: np.ndarray) -> None:
     back = rodrigues_from_rotation(rotation_from_rodrigues(v))
     assert np.linalg.norm(back) <= np.pi + 1e-9
     if np.linalg.norm(v) < np.pi - 1e-6:
@@ -50,14 +50,14 @@ def test_rodrigues_vectors_come_back(v: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("axis", np.eye(3).tolist() + [[0.6, -0.8, 0], [-1, 0, 0], [0, -1, 0]])
-def test_half_turns_come_back(axis: list[float]) -> None:
+def test_rotations_by_pi_round_trip(axis: list[float]) -> None:
     v = np.pi * np.array(axis)
     back = rotation_from_rodrigues(rodrigues_from_rotation(rotation_from_rodrigues(v)))
     np.testing.assert_allclose(back, rotation_from_rodrigues(v), atol=1e-9)
 
 
 @given(turn)
-def test_quaternions_come_back_and_are_unit(v: np.ndarray) -> None:
+def test_quaternions_round_trip_and_have_unit_length(v: np.ndarray) -> None:
     r = rotation_from_rodrigues(v)
     q = quaternion_from_rotation(r)
     assert np.linalg.norm(q) == pytest.approx(1) and q[0] >= 0
@@ -79,7 +79,9 @@ def test_skew_is_the_cross_product(a: np.ndarray, b: np.ndarray) -> None:
 
 
 @given(turn, vector, st.lists(vector, min_size=1, max_size=4))
-def test_inverse_takes_points_back(v: np.ndarray, t: np.ndarray, points: list[np.ndarray]) -> None:
+def test_the_inverse_undoes_a_transform(
+    v: np.ndarray, t: np.ndarray, points: list[np.ndarray]
+) -> None:
     T = transform(rotation_from_rodrigues(v), t)
     moved = apply(T, points)
     expected = [(T @ np.append(p, 1.0))[:3] for p in points]

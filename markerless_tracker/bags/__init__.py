@@ -1,4 +1,4 @@
-"""Writing bags."""
+"""Writing recordings as bags: MCAP rosbag2, without ROS."""
 
 from markerless_tracker.bags.write import COMPRESSIONS, BagSummary, write_bag
 

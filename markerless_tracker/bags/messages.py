@@ -1,4 +1,4 @@
-"""ROS messages of a bag, made from cameras and images (rosbags' types, no ROS needed)."""
+"""ROS messages of a bag, from cameras and images (message types of rosbags, without ROS)."""
 
 from functools import cache
 from typing import Any
@@ -6,10 +6,11 @@ from typing import Any
 import cv2
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
 
 from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.camera.ros_fields import camera_info_fields
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.geometry import quaternion_from_rotation
 from markerless_tracker.imaging import Image
 
 WORLD_FRAME = "map"
@@ -72,16 +73,12 @@ def jpeg_message(image: Image, stamp_ns: int, camera: CameraModel) -> Any:
 
 def camera_info_message(camera: CameraModel, stamp_ns: int) -> Any:
     """sensor_msgs/CameraInfo of an unrectified camera: R = 1, P = [K 0], plumb_bob."""
-    k = camera.matrix
+    lists = camera_info_fields(camera)
+    arrays = {name: np.array(lists.pop(name)) for name in ("d", "k", "r", "p")}
     return _type("sensor_msgs/msg/CameraInfo")(
         header=header(stamp_ns, optical_frame(camera.name)),
-        height=camera.size_px[1],
-        width=camera.size_px[0],
-        distortion_model="plumb_bob",
-        d=camera.distortion.copy(),
-        k=k.reshape(-1).copy(),
-        r=np.eye(3).reshape(-1),
-        p=np.hstack([k, np.zeros((3, 1))]).reshape(-1),
+        **lists,
+        **arrays,
         binning_x=0,
         binning_y=0,
         roi=_type("sensor_msgs/msg/RegionOfInterest")(
@@ -100,7 +97,7 @@ def static_transforms_message(rig: CameraRig, stamp_ns: int) -> Any:
     transforms = []
     for camera in rig:
         pose = camera.T_world_cam
-        w, x, y, z = (float(value) for value in quaternion_from_rotation(pose[:3, :3]))
+        x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True).tolist()
         tx, ty, tz = (float(value) for value in pose[:3, 3])
         transforms.append(
             stamped(

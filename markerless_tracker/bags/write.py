@@ -1,4 +1,4 @@
-"""A recording as a bag: MCAP rosbag2, version 9 (Jazzy), with what the tracker needs beside it."""
+"""Writing a recording as a bag folder: MCAP rosbag2 version 9 (Jazzy), calibration, background."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -32,18 +32,18 @@ from markerless_tracker.imaging import Image, write_background_model
 from markerless_tracker.imaging.background.model_file import SUFFIX as MODEL_SUFFIX
 
 COMPRESSIONS = ("none", "zstd", "jpeg")
-# Stamps of ROS are int32 seconds; earlier or later ones cannot be written.
+# Stamps of ROS have int32 seconds; later ones cannot be written.
 LAST_SECOND = 2**31 - 1
 _FOREVER = QosTime(2147483647, 4294967295)
 
 
 @dataclass(frozen=True)
 class BagSummary:
-    """What was written.
+    """Contents of a bag that was written.
 
     Attributes:
         path: the bag's folder.
-        sets: sets of images.
+        sets: number of sets of images.
         first_ns, last_ns: stamps of the first and last set.
         bytes: size of the folder.
     """
@@ -67,13 +67,13 @@ def write_bag(
     """Write a recording, at its scale, as a bag folder.
 
     Topics per camera: `/NAME/image_raw` (or `/NAME/image_raw/compressed` for jpeg) and
-    `/NAME/camera_info`; once `/tf_static` with `map` -> NAME_optical_frame. Beside the MCAP lie
-    `calibration.toml` and `background/`, scaled as the images and lossless whatever `compress` is,
-    with the recording's learned backgrounds.
-    The folder appears when it is complete; nothing is left of one that failed.
+    `/NAME/camera_info`; once `/tf_static` with `map` -> NAME_optical_frame. The folder also holds
+    `calibration.toml` and `background/` (images and learned models), scaled like the images and
+    lossless for every `compress`.
+    The folder appears when it is complete; a failure leaves nothing.
 
     Args:
-        recording: what to write; its stamps are kept.
+        recording: the sets to write; their stamps are kept.
         out: the new folder.
         every: keep every k-th set, from the first.
         compress: `none`, `zstd` (lossless chunks) or `jpeg` (lossy images).
@@ -82,19 +82,19 @@ def write_bag(
 
     Raises:
         ConfigError: an unknown compression.
-        DatasetError: `out` is taken, cannot be written, or the recording fails.
+        DatasetError: `out` exists or cannot be written, or the recording cannot be read.
     """
     if compress not in COMPRESSIONS:
         raise ConfigError(f"compress {compress!r}: expected one of {', '.join(COMPRESSIONS)}")
     for name in recording.rig.names:
         if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
             raise DatasetError(
-                f"{name}: this camera name cannot be a ROS topic, expected letters, digits and _ "
-                "after a letter"
+                f"{name}: this camera name cannot be part of a ROS topic, expected a letter, then "
+                "letters, digits and _"
             )
     total = None if recording.frame_count is None else -(-recording.frame_count // every)
     with new_folder(out) as folder:
-        # The writer makes its own folder, and would not take ours with the other files in it.
+        # The writer creates the folder and refuses an existing one.
         folder.rmdir()
         writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
         if compress == "zstd":
@@ -108,7 +108,7 @@ def write_bag(
                 if progress is not None:
                     progress(len(stamps), total)
             if not stamps:
-                raise DatasetError(f"{recording.name}: gave no set of images, nothing to write")
+                raise DatasetError(f"{recording.name}: has no set of images, expected at least one")
         write_calibration(folder / "calibration.toml", recording.rig)
         frames = recording.background_frames() if backgrounds is None else backgrounds
         for name, images in frames.items():
@@ -136,11 +136,11 @@ class _Topics:
         }
 
     def write(self, frame: FrameSet, *, first: bool) -> None:
-        """Write one set; the static transforms go before the first."""
+        """Write one set; the static transforms are written before the first."""
         stamp = frame.stamp_ns
         if not 0 <= stamp < LAST_SECOND * 10**9:
             raise DatasetError(
-                f"frame {frame.index}: its stamp {stamp} ns cannot stand in a ROS message"
+                f"frame {frame.index}: its stamp {stamp} ns cannot be written to a ROS message"
             )
         if first:
             self._put(self._static, stamp, static_transforms_message(self._rig, stamp))

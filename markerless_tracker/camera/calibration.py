@@ -2,7 +2,7 @@
 
 A `calibration.toml` holds one table per camera: `name`, `size` [w, h] px (floats allowed),
 `matrix` K, `distortions` [k1 k2 p1 p2 (k3)], `rotation` (Rodrigues vector, world to camera),
-`translation` (m) and `fisheye`. Tables without `matrix` (`[metadata]`) describe no camera.
+`translation` (m) and `fisheye`. Tables without `matrix` (`[metadata]`) are not cameras.
 """
 
 import math
@@ -23,7 +23,7 @@ from markerless_tracker.geometry import (
     transform,
 )
 
-# Qualisys stores focal lengths and principal points in this fraction of a pixel.
+# Qualisys stores focal lengths and principal points in 1/64 px.
 QCA_SUBPIXELS = 64.0
 
 
@@ -32,7 +32,7 @@ def read_calibration(path: str | Path) -> CameraRig:
 
     Raises:
         CalibrationError: the file cannot be read, a camera lacks a key or has a value of the wrong
-            shape, two cameras share a name, or a camera is a fisheye (not supported).
+            shape, two cameras have one name, or a camera is a fisheye (not supported).
     """
     path = Path(path)
     try:
@@ -68,7 +68,7 @@ def read_qca(path: str | Path) -> CameraRig:
     """Read a Qualisys `*.qca.txt` (XML).
 
     Its camera looks along -z with y up: R = diag(1, -1, -1) r, t = -R C, with C the camera's
-    position in mm. Distortion coefficients are taken as they stand in the file.
+    position in mm. Distortion coefficients are taken unchanged from the file.
 
     Raises:
         CalibrationError: the file cannot be read, is not XML, holds no camera or lacks an
@@ -84,7 +84,7 @@ def read_qca(path: str | Path) -> CameraRig:
 
 def _rig(path: Path, cameras: list[CameraModel]) -> CameraRig:
     if not cameras:
-        raise CalibrationError(f"{path}: holds no camera (a table or element with its matrix)")
+        raise CalibrationError(f"{path}: no camera, expected a table or element with its matrix")
     try:
         return CameraRig(tuple(cameras))
     except CalibrationError as error:
@@ -178,13 +178,13 @@ def _table(camera: CameraModel) -> str:
 def _canonical(vector: FloatArray) -> FloatArray:
     """The Rodrigues vector (3,) of the same rotation, shorter than pi and with 12 decimals.
 
-    Vector -> matrix -> vector is not exact in floating point; on this grid it is, so that a rig
-    read, written and read again has the same bits. It moves a ray by less than 1e-8 rad at
-    rotations by pi, by less than 1e-12 rad elsewhere.
+    Vector -> matrix -> vector is not exact in floating point. On this grid it is: a rig read,
+    written and read again has the same bits. Rounding rotates a ray by less than 1e-12 rad, at
+    rotations by pi by less than 1e-8 rad.
     """
     short = rodrigues_from_rotation(rotation_from_rodrigues(vector))
     length = float(np.linalg.norm(short))
-    if length > math.pi - 1e-9:  # beyond pi the vector would come back as its opposite
+    if length > math.pi - 1e-9:  # beyond pi, reading would give the opposite vector
         short = short * ((math.pi - 2e-9) / length)
     rounded: FloatArray = np.round(short, 12) + 0.0
     return rounded

@@ -1,4 +1,4 @@
-"""A calibrated camera and a rig of them (OpenCV convention: x right, y down, z forward)."""
+"""A calibrated camera, and a rig of cameras (OpenCV convention: x right, y down, z forward)."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ class CameraModel:
     """Pinhole camera with radial-tangential distortion.
 
     Attributes:
-        name: the camera's name; topics and files carry it.
+        name: the camera's name, used in topics and file names.
         size_px: (width, height) of its images.
         matrix: (3, 3) K, px; the centre of the top left pixel is (0, 0).
         distortion: (5,) k1 k2 p1 p2 k3 (four or five may be given).
@@ -68,7 +68,7 @@ class CameraModel:
 
     @property
     def is_distorted(self) -> bool:
-        """Whether the lens bends straight lines at all."""
+        """Whether any distortion coefficient is not zero."""
         return bool(np.any(self.distortion != 0.0))
 
     def resized(self, size_px: tuple[int, int]) -> "CameraModel":
@@ -137,7 +137,7 @@ def scaled_size(size_px: tuple[int, int], scale: float) -> tuple[int, int]:
 def project(points_world: NDArray[np.floating], rig: CameraRig) -> FloatArray:
     """Project points (n, 3) in m, world frame, through every lens of a rig.
 
-    Returns pixels (c, n, 2) as (u, v), NaN for points that do not lie in front of the camera.
+    Returns pixels (c, n, 2) as (u, v), NaN for points that are not in front of the camera.
     """
     points = np.asarray(points_world, dtype=np.float64).reshape(-1, 3)
     return np.stack([project_camera(points, camera) for camera in rig])

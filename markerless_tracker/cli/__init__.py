@@ -1,1 +1,1 @@
-"""The command ``markerless_tracker`` and its verbs, one module each."""
+"""The command ``markerless_tracker`` and its verbs, one module or folder each."""

@@ -1,4 +1,4 @@
-"""Verb `convert`: a recording to a bag."""
+"""Verb `convert`: writes a recording as a bag."""
 
 import argparse
 import json
@@ -15,27 +15,33 @@ from markerless_tracker.datasets import FORMATS, Recording, every_for_fps, open_
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 
 HELP = (
-    "Turn a recording folder, a Pose2Sim project or another bag into an MCAP bag: images, camera "
-    "infos and static transforms as topics, calibration.toml and background/ beside them. Where a "
-    "camera has no empty-scene image, one is learned from the recording."
+    "Write a recording folder, a Pose2Sim project or another bag as an MCAP bag folder: images, "
+    "camera infos and static transforms as topics, calibration.toml and background/ in the folder. "
+    "For a camera without an empty-scene image, one is learned from the recording."
 )
 EXAMPLE = "markerless_tracker convert recordings/walk walk_bag --scale 0.5"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("source", type=Path, help="recording folder, Pose2Sim project or bag")
-    parser.add_argument("bag", type=Path, help="folder to make (new, or empty)")
-    parser.add_argument("--format", choices=FORMATS, help="what SOURCE is (default: find out)")
-    parser.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images")
+    parser.add_argument(
+        "source", metavar="SOURCE", type=Path, help="recording folder, Pose2Sim project or bag"
+    )
+    parser.add_argument("bag", metavar="BAG", type=Path, help="folder to write (new or empty)")
+    parser.add_argument("--format", choices=FORMATS, help="format of SOURCE (default: detected)")
+    parser.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images, 1/s")
     parser.add_argument(
         "--fps",
         type=float,
         metavar="N",
-        help="keep every k-th set, from the first, to get this rate",
+        help="keep every k-th set, from the first, to get this rate (default: all)",
     )
     parser.add_argument(
-        "--scale", type=float, default=1.0, metavar="S", help="factor for the images (default 1)"
+        "--scale",
+        type=float,
+        default=1.0,
+        metavar="S",
+        help="scale factor of the images (default 1)",
     )
     parser.add_argument(
         "--compress",
@@ -43,11 +49,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="none",
         help="none (default), zstd (lossless, smaller, slower) or jpeg (lossy, much smaller)",
     )
-    parser.add_argument("--json", action="store_true", help="print what was written as JSON")
+    parser.add_argument("--json", action="store_true", help="print a summary as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it; returns the exit status."""
+    """Convert; returns the exit status."""
     started = time.monotonic()
     console = Console(stderr=True)
     recording = open_recording(

@@ -1,4 +1,4 @@
-"""Verb `evaluate`: the error of a result against reference markers."""
+"""Verb `evaluate`: errors of a result with respect to reference markers."""
 
 import argparse
 import json
@@ -13,21 +13,24 @@ from markerless_tracker.datasets import read_trc
 from markerless_tracker.results.score import Score, score
 
 HELP = (
-    "Compare two marker files, rows by their Time and markers by name, in mm. A missing Pelvis is "
-    "the midpoint of the hips; rows that are blank in either file are left out."
+    "Compare two marker files: rows are matched by Time, markers by name, errors are in mm. A "
+    "missing Pelvis is replaced by the midpoint of the hips; rows that are blank in either file "
+    "are not compared."
 )
 EXAMPLE = "markerless_tracker evaluate out/walk.trc recordings/walk/ground_truth.trc"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("result", type=Path, help="marker file to judge (.trc)")
-    parser.add_argument("reference", type=Path, help="marker file to judge by (.trc)")
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    parser.add_argument("result", metavar="RESULT.trc", type=Path, help="marker file to evaluate")
+    parser.add_argument(
+        "reference", metavar="REFERENCE.trc", type=Path, help="marker file with the reference"
+    )
+    parser.add_argument("--json", action="store_true", help="print the errors as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it; returns the exit status."""
+    """Evaluate; returns the exit status."""
     figures = score(read_trc(args.result), read_trc(args.reference))
     if args.json:
         json.dump(figures.as_dict(), sys.stdout, indent=2, allow_nan=False)

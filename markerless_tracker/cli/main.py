@@ -1,19 +1,20 @@
-"""The command ``markerless_tracker VERB``: finds the verb, parses, runs, turns errors into a line.
+"""The command ``markerless_tracker VERB``: parses, runs the verb, reports an error in one line.
 
 A verb is a module of this folder with
 
-- ``HELP``: what it does, for its ``--help``;
-- ``EXAMPLE``: a command that a reader could type;
+- ``HELP``: description for its ``--help``;
+- ``EXAMPLE``: a command line that uses it;
 - ``add_arguments(parser)``;
 - ``run(args) -> int``, the exit status.
 
-Verbs are imported when called, so that ``--help`` answers at once.
+Verbs are imported when called: ``--help`` does not wait for imports.
 """
 
 import argparse
 import importlib
 import os
 import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NoReturn
@@ -23,16 +24,19 @@ from markerless_tracker.errors import TrackerError
 
 PROGRAM = "markerless_tracker"
 
+HELP_WIDTH = 88
+"""Columns of a verb's description."""
+
 VERBS: Mapping[str, str] = MappingProxyType(
     {
-        "convert": "a recording, dataset or videos to an MCAP bag",
-        "track": "a recording or bag to the pose of the person in it",
-        "evaluate": "the error of a result against reference markers, in mm",
-        "synthesize": "a made-up person as a recording with exact truth",
-        "benchmark": "measured tables of speed and accuracy",
+        "convert": "write a recording, dataset or videos as an MCAP bag",
+        "track": "track the person in a recording or bag",
+        "evaluate": "compare a result with reference markers, in mm",
+        "synthesize": "render a synthetic person as a recording with exact reference markers",
+        "benchmark": "measure speed and accuracy",
     }
 )
-"""The verbs and what each does, in one line."""
+"""Verb -> description in one line."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -46,11 +50,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Args:
-        argv: the words after the program's name; those of this process unless given.
+        argv: the arguments after the program's name; default: those of this process.
 
     Returns:
         Exit status: 0 done, 1 failed with one line on standard error, 2 wrong arguments,
-        130 interrupted, 141 nobody reads standard output any more.
+        3 nobody found (`track`), 130 interrupted, 141 standard output was closed by its reader.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if not words:
@@ -73,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:
-        # Python would complain once more when it flushes at exit.
+        # Otherwise Python reports the error again when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     except (TrackerError, OSError) as error:
@@ -85,7 +89,7 @@ def _run(verb: str, words: Sequence[str]) -> int:
     module = importlib.import_module(f"markerless_tracker.cli.{verb}")
     parser = _Parser(
         prog=f"{PROGRAM} {verb}",
-        description=module.HELP,
+        description=textwrap.fill(module.HELP, HELP_WIDTH),
         epilog=f"example:\n  {module.EXAMPLE}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -102,12 +106,12 @@ def _overview() -> str:
         f"usage: {PROGRAM} VERB ...\n\n"
         "Full-body pose tracking from several calibrated cameras.\n\n"
         f"verbs:\n{rows}\n"
-        f"{PROGRAM} VERB --help explains one, with an example; {PROGRAM} --version.\n"
+        f"{PROGRAM} VERB --help describes a verb, with an example; {PROGRAM} --version.\n"
     )
 
 
 def _line(error: Exception) -> str:
-    """One line of what went wrong; the system's errors name their file first."""
+    """The error in one line; errors of the operating system name their file first."""
     if isinstance(error, OSError) and error.strerror:
         names = [str(name) for name in (error.filename, error.filename2) if name is not None]
         return ": ".join([*names, error.strerror])

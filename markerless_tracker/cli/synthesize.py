@@ -1,4 +1,4 @@
-"""The verb ``synthesize``: a made-up person as a recording folder with exact truth."""
+"""Verb `synthesize`: renders a synthetic person as a recording with exact reference markers."""
 
 import argparse
 import json
@@ -18,35 +18,42 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.synthesis import LIGHTS, MILD_LENS, MOTIONS, SyntheticScene
 
 HELP = (
-    "Write a made-up person (shaded cones in a textured room) as a recording folder: calibration, "
-    "videos, empty-scene images, exact masks and markers, subject and start pose. What a tracker "
-    "scores on it proves that the parts fit together; it is no measure of accuracy."
+    "Render a synthetic person (shaded cones in a textured room) as a recording folder: "
+    "calibration, videos, empty-scene images, exact masks and markers, subject and start pose. "
+    "Errors on it test the software; they do not measure the accuracy on real images."
 )
-EXAMPLE = "markerless_tracker synthesize made_up --seconds 2 --motion balance"
+EXAMPLE = "markerless_tracker synthesize recordings/synthetic --seconds 2 --motion balance"
 EMPTY_IMAGES = 10
 _MOST_FRAMES = 100_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("out", metavar="OUT", type=Path, help="folder to write: new, or empty")
-    parser.add_argument("--seconds", type=float, default=4.0, help="length (default 4)")
+    """Declare the verb's arguments."""
+    parser.add_argument("out", metavar="OUT", type=Path, help="folder to write (new or empty)")
+    parser.add_argument("--seconds", type=float, default=4.0, help="duration in s (default 4)")
     parser.add_argument("--fps", type=float, default=60.0, help="frames per second (default 60)")
     parser.add_argument(
-        "--motion", choices=MOTIONS, default="walk", help="what the person does (default walk)"
+        "--motion", choices=MOTIONS, default="walk", help="motion of the person (default walk)"
     )
     parser.add_argument("--cameras", type=int, default=4, help="number of cameras (default 4)")
     parser.add_argument(
-        "--size", metavar="WxH", default="656x490", help="size of the images (default 656x490)"
+        "--size",
+        metavar="WxH",
+        default="656x490",
+        help="image size in px (default 656x490)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, help="of motion, room, clothes and noise (default 0)"
+        "--seed", type=int, default=0, help="seed of motion, room, clothes and noise (default 0)"
     )
     parser.add_argument(
-        "--stature", metavar="M", type=float, default=1.72, help="height in metres (default 1.72)"
+        "--stature",
+        metavar="M",
+        type=float,
+        default=1.72,
+        help="body height in m (default 1.72)",
     )
     parser.add_argument(
-        "--body", default="balan31", help="body by name or .yaml file (default balan31)"
+        "--body", default="balan31", help="body model by name or YAML file (default balan31)"
     )
     parser.add_argument(
         "--noise", metavar="SIGMA", type=float, default=3.0,
@@ -54,25 +61,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--shadow", type=float, default=0.35,
-        help="part of the light that the shadow on the floor takes away (default 0.35)",
+        help="fraction of the light that the shadow on the floor removes (default 0.35)",
     )  # fmt: skip
     parser.add_argument(
         "--light", choices=tuple(LIGHTS), default="steady",
         help="drift: 20 %% brighter and darker in 10 s; step: 30 %% brighter from 1 s on",
     )  # fmt: skip
-    parser.add_argument("--grey", action="store_true", help="grey cameras")
+    parser.add_argument("--grey", action="store_true", help="greyscale cameras")
     parser.add_argument(
         "--dull", action="store_true", help="grey clothes within 10 %% of the room's brightness"
     )
-    parser.add_argument("--undistorted", action="store_true", help="lenses without distortion")
-    parser.add_argument(
-        "--lossless", action="store_true", help="videos that keep every grey level (large)"
-    )
-    parser.add_argument("--json", action="store_true", help="a summary for machines on stdout")
+    parser.add_argument("--undistorted", action="store_true", help="no lens distortion")
+    parser.add_argument("--lossless", action="store_true", help="lossless videos (large)")
+    parser.add_argument("--json", action="store_true", help="print a summary as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the recording."""
+    """Write the recording; returns the exit status."""
     frames = _frames(args.seconds, args.fps)
     scene = SyntheticScene(
         body=args.body,
@@ -117,7 +122,7 @@ def synthesize(
     lossless: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> None:
-    """Write a scene's first frames as a recording folder, which appears when it is whole.
+    """Write the first frames of a scene as a recording folder, which appears when it is complete.
 
     Written: `calibration.toml`, `camNN.mp4` (`.mkv` if lossless: some 0.6 MB per image of 656x490),
     `background/camNN/` with empty images, `masks/camNN/FFFFFF.png` for every `mask_every`-th frame,
@@ -126,14 +131,14 @@ def synthesize(
 
     Args:
         out: a new or an empty folder.
-        scene: what to write; it names the frame rate.
+        scene: the scene, with its frame rate.
         frames: number of frames.
-        mask_every: distance of the frames with exact masks.
-        lossless: keep every grey level instead of compressing as ordinary cameras do.
+        mask_every: exact masks are written for every such frame.
+        lossless: write lossless instead of MPEG-4 videos.
         progress: called with the number of frames written so far.
 
     Raises:
-        DatasetError: something is at `out` already, it cannot be written, or a size is odd.
+        DatasetError: `out` is not empty or cannot be written, or a size is odd.
     """
     with new_recording(out, scene.rig, scene.fps, lossless=lossless) as writer:
         for name, images in scene.backgrounds(EMPTY_IMAGES).items():

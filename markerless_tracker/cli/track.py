@@ -1,10 +1,12 @@
-"""Verb `track`: a recording or bag to a result, without a ROS graph."""
+"""Verb `track`: tracks the person in a recording or bag and writes a result, without ROS."""
 
 import argparse
 import json
 import sys
 import time
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,86 +15,39 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from markerless_tracker.camera.calibration import write_calibration
-from markerless_tracker.datasets import Recording, open_recording
+from markerless_tracker.cli.frame_warnings import FrameWarnings
+from markerless_tracker.cli.track_arguments import add_arguments
+from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.records import TrackState
 from markerless_tracker.results.result import ResultWriter
 from markerless_tracker.results.run import recording_backgrounds, track_recording
-from markerless_tracker.tracking import OPTIMIZERS, PRESETS, TrackerConfig, build_tracker
+from markerless_tracker.tracking import (
+    TrackerConfig,
+    TrackerSetup,
+    build_tracker,
+)
 from markerless_tracker.tracking.camera_check import CameraCheck, Shift, corrected, describe
 from markerless_tracker.viewing.debug_images import DebugImages
 
 HELP = (
-    "Track the person in a recording folder, a Pose2Sim project or a bag, as fast as it goes, and "
-    "write NAME.trc (15 markers, metres) and NAME.json (settings, state, fitness, parameters)."
+    "Track the person in a recording folder, a Pose2Sim project or a bag, without ROS. Writes "
+    "NAME.trc (15 markers, metres), NAME.json (settings, and per frame state, fitness, parameters "
+    "and warnings) and NAME.subject.yaml (the sizes of the body). The start pose and the stature "
+    "are optional: without them both are estimated. Exit status 3: nobody was found."
 )
-EXAMPLE = "markerless_tracker track RECORDING -o out/walk --stature 1.75"
+EXAMPLE = "markerless_tracker track recordings/walk -o out/walk --stature 1.75"
+
+__all__ = ["EXAMPLE", "HELP", "add_arguments", "read_config", "run"]
+
+NOBODY_FOUND = 3
+"""Exit status when the person was tracked in no frame."""
 
 _KEYS = ("optimizer", "body", "evaluations", "seed", "threads")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments."""
-    parser.add_argument("source", type=Path, help="recording folder, Pose2Sim project or bag")
-    parser.add_argument(
-        "-o", dest="name", type=Path, required=True, metavar="NAME", help="result without suffix"
-    )
-    parser.add_argument(
-        "--start", type=Path, metavar="TRC|YAML", help="start pose; default: found by itself"
-    )
-    parser.add_argument("--subject", type=Path, metavar="FILE", help="subject file")
-    parser.add_argument(
-        "--subject-from", type=Path, metavar="TRC", help="measure the subject on its first row"
-    )
-    parser.add_argument(
-        "--stature", type=float, metavar="M", help="a generic person of that height"
-    )
-    parser.add_argument(
-        "--optimizer",
-        metavar="NAME",
-        help=f"search algorithm: {', '.join(OPTIMIZERS)} (default sppso)",
-    )
-    parser.add_argument("--body", metavar="NAME|FILE", help="body description")
-    parser.add_argument(
-        "--evaluations",
-        type=int,
-        metavar="N",
-        help="evaluations per frame (default: the optimizer's own)",
-    )
-    parser.add_argument("--preset", choices=tuple(PRESETS), help="tuned (default) or paper")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
-    parser.add_argument(
-        "--fps", type=float, metavar="N", help="keep every k-th frame from the start"
-    )
-    parser.add_argument(
-        "--scale", type=float, default=1.0, metavar="S", help="factor for the images"
-    )
-    parser.add_argument(
-        "--background",
-        type=Path,
-        metavar="DIR",
-        help="empty-scene images, or learned backgrounds (.npz), per camera",
-    )
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of all random draws")
-    parser.add_argument("--threads", type=int, metavar="N", help="0 (default) = one per core")
-    parser.add_argument(
-        "--debug-images",
-        type=Path,
-        metavar="DIR",
-        help="per frame and camera: input, background, foreground and shadow, silhouette, edges, "
-        "body",
-    )
-    parser.add_argument(
-        "--refine-calibration",
-        type=Path,
-        metavar="OUT.toml",
-        help="write the calibration with cameras that disagree with the others corrected",
-    )
-    parser.add_argument("--json", action="store_true", help="print a summary as JSON")
-
-
 def run(args: argparse.Namespace) -> int:
-    """Do it; returns the exit status."""
+    """Track; returns 0, or 3 if nobody was found."""
     console = Console(stderr=True)
     config = read_config(args.config, _flags(args))
     recording = open_recording(args.source, scale=args.scale)
@@ -112,69 +67,135 @@ def run(args: argparse.Namespace) -> int:
         )
         bars.update(task, description="compiling")
         setup.tracker.warm_up()
-        bars.update(task, description=f"tracking {recording.name}")
-        rate = args.fps or recording.fps
-        debug = DebugImages(args.debug_images) if args.debug_images else None
-        states: dict[str, int] = {}
-        writer = ResultWriter(
-            args.name, setup.tracker.body, config, fps=rate, source=recording.name
+        bars.update(
+            task, description=f"tracking {recording.name}", total=_total(recording, setup, args.fps)
         )
-        started = time.perf_counter()
-        frames = 0
-        check = CameraCheck(setup.tracker.rig, config)
-        with writer:
-            for tracked in track_recording(recording, setup, fps=args.fps):
-                writer.add(tracked.result)
-                writer.body = setup.tracker.body
-                check.add(tracked.result, setup.tracker.body)
-                state = tracked.result.state.value
-                states[state] = states.get(state, 0) + 1
-                if debug:
-                    tracker = setup.tracker
-                    debug.write(
-                        tracked.images,
-                        tracked.result,
-                        tracker.rig,
-                        tracker.body,
-                        tracker.segmenter,
-                    )
-                frames += 1
-                bars.update(
-                    task, completed=frames, total=_total(recording, setup.start_stamp_ns, rate)
-                )
-            shifts = check.shifts()
-            cameras = _cameras(shifts)
-            writer.note({"cameras": cameras})
-        seconds = time.perf_counter() - started
+        outcome = _track(
+            args,
+            recording,
+            setup,
+            config,
+            warn=lambda text: _warn(console, text),
+            progress=lambda done: bars.update(task, completed=done),
+        )
     if args.refine_calibration is not None:
         full = open_recording(args.source).rig
-        write_calibration(args.refine_calibration, corrected(full, shifts, args.scale))
-    for warning in (*recording.warnings, *describe(shifts)):
-        console.print(f"warning: {warning}", markup=False, highlight=False, soft_wrap=True)
-    summary: dict[str, Any] = {
-        "source": str(args.source),
-        "result": str(writer.trc_path),
-        "frames": frames,
-        "states": states,
-        "seconds": round(seconds, 3),
-        "frames_per_s": round(frames / seconds, 2) if seconds > 0 else None,
-        "warnings": [*recording.warnings, *describe(shifts)],
-        "cameras": cameras,
-    }
+        write_calibration(args.refine_calibration, corrected(full, outcome.shifts, args.scale))
+    for warning in (*recording.warnings, *describe(outcome.shifts)):
+        _warn(console, warning)
+    if outcome.warnings.frames:
+        _warn(
+            console,
+            f"{outcome.warnings.frames} of {outcome.frames} frames have warnings, "
+            f"{len(outcome.warnings.kinds)} kinds of them",
+        )
     if args.json:
-        json.dump(summary, sys.stdout, indent=2)
+        json.dump(_summary(args, recording, outcome), sys.stdout, indent=2)
         sys.stdout.write("\n")
     else:
-        lost = states.get(TrackState.LOST.value, 0)
         print(
-            f"{writer.trc_path}: {frames} frames, {lost} of them lost, "
-            f"{summary['frames_per_s']} frames/s"
+            f"{outcome.trc_path}: {outcome.frames} frames, {outcome.tracked} tracked, "
+            f"{outcome.states.get(TrackState.LOST.value, 0)} lost, {outcome.frames_per_s} frames/s"
         )
-    return 0
+    if outcome.tracked:
+        return 0
+    console.print(
+        f"nobody was found in {outcome.frames} of {outcome.frames} frames; no subject file was "
+        "written",
+        markup=False,
+        highlight=False,
+        soft_wrap=True,
+    )
+    return NOBODY_FOUND
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What a run gave.
+
+    Attributes:
+        trc_path: the marker file.
+        frames: frames processed.
+        states: state -> number of frames.
+        seconds: duration of tracking.
+        shifts: camera -> offset of its silhouettes from the body.
+        warnings: of single frames.
+    """
+
+    trc_path: Path
+    frames: int
+    states: Mapping[str, int]
+    seconds: float
+    shifts: Mapping[str, Shift]
+    warnings: FrameWarnings
+
+    @property
+    def tracked(self) -> int:
+        """Frames in which the person was tracked."""
+        return self.states.get(TrackState.TRACKING.value, 0)
+
+    @property
+    def frames_per_s(self) -> float | None:
+        """Frames per second of tracking, None where the clock shows no duration."""
+        return round(self.frames / self.seconds, 2) if self.seconds > 0 else None
+
+
+def _track(
+    args: argparse.Namespace,
+    recording: Recording,
+    setup: TrackerSetup,
+    config: TrackerConfig,
+    *,
+    warn: Callable[[str], None],
+    progress: Callable[[int], Any],
+) -> _Outcome:
+    """Track all frames and write the result and the debug images."""
+    tracker = setup.tracker
+    debug = DebugImages(args.debug_images) if args.debug_images else None
+    check = CameraCheck(tracker.rig, config)
+    states: Counter[str] = Counter()
+    warnings = FrameWarnings()
+    started = time.perf_counter()
+    rate = args.fps or recording.fps
+    with ResultWriter(args.name, tracker.body, config, fps=rate, source=recording.name) as writer:
+        for tracked in track_recording(recording, setup, fps=args.fps):
+            result, body = tracked.result, tracker.body
+            writer.add(result)
+            writer.body = body
+            check.add(result, body)
+            states[result.state.value] += 1
+            for kind in warnings.add(tracked.images.index, result.warnings):
+                warn(f"frame {kind.first_frame}: {kind.text}")
+            if debug:
+                debug.write(tracked.images, result, tracker.rig, body, tracker.segmenter)
+            progress(states.total())
+        shifts = check.shifts()
+        writer.note({"cameras": _cameras(shifts)})
+    seconds = time.perf_counter() - started
+    return _Outcome(writer.trc_path, states.total(), states, seconds, shifts, warnings)
+
+
+def _summary(args: argparse.Namespace, recording: Recording, outcome: _Outcome) -> dict[str, Any]:
+    return {
+        "source": str(args.source),
+        "result": str(outcome.trc_path),
+        "frames": outcome.frames,
+        "tracked": outcome.tracked,
+        "states": dict(outcome.states),
+        "seconds": round(outcome.seconds, 3),
+        "frames_per_s": outcome.frames_per_s,
+        "warnings": [*recording.warnings, *describe(outcome.shifts)],
+        "frame_warnings": outcome.warnings.as_list(),
+        "cameras": _cameras(outcome.shifts),
+    }
+
+
+def _warn(console: Console, text: str) -> None:
+    console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
 
 
 def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
-    """Settings of a YAML file, overruled by flags that were given, by dotted name.
+    """Settings of a YAML file; flags that were given take precedence, by dotted name.
 
     Raises:
         ConfigError: the file cannot be read, or a setting is unknown or impossible.
@@ -195,7 +216,7 @@ def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
 
 
 def _cameras(shifts: Mapping[str, Shift]) -> dict[str, Any]:
-    """How far each camera's silhouettes lie from the body, for JSON."""
+    """Offset of each camera's silhouettes from the body, for JSON."""
     return {
         name: {
             "shift_px": [round(value, 2) for value in shift.px],
@@ -212,8 +233,9 @@ def _flags(args: argparse.Namespace) -> dict[str, Any]:
     return {key: value for key, value in named.items() if value is not None}
 
 
-def _total(recording: Recording, start_stamp_ns: int | None, rate: float) -> int | None:
+def _total(recording: Recording, setup: TrackerSetup, fps: float | None) -> int | None:
+    """Frames that will be tracked, None if unknown."""
     if recording.frame_count is None:
         return None
-    start = 0 if start_stamp_ns is None else recording.start_index(start_stamp_ns)
-    return -(-(recording.frame_count - start) // max(1, round(recording.fps / rate)))
+    start = 0 if setup.start_stamp_ns is None else recording.start_index(setup.start_stamp_ns)
+    return -(-(recording.frame_count - start) // every_for_fps(recording.fps, fps))

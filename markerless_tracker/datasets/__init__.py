@@ -1,4 +1,4 @@
-"""Recordings, markers and calibrations from disk, whatever their format."""
+"""Recordings and marker files: reading every supported format, writing ours."""
 
 from markerless_tracker.datasets.background import read_background, read_background_models
 from markerless_tracker.datasets.folder import FolderRecording
@@ -8,6 +8,7 @@ from markerless_tracker.datasets.pose2sim import Pose2SimRecording
 from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.datasets.source import FORMATS, detect_format, open_recording
 from markerless_tracker.datasets.target import new_folder
+from markerless_tracker.datasets.truth import TRUTH, existing_truth, truth_path
 from markerless_tracker.datasets.video.rates import every_for_fps, stamp_of, tidy_fps
 from markerless_tracker.datasets.writer import (
     RecordingWriter,
@@ -18,6 +19,7 @@ from markerless_tracker.datasets.writer import (
 
 __all__ = [
     "FORMATS",
+    "TRUTH",
     "FolderRecording",
     "FrameSet",
     "MarkerTrack",
@@ -26,6 +28,7 @@ __all__ = [
     "RecordingWriter",
     "detect_format",
     "every_for_fps",
+    "existing_truth",
     "format_trc",
     "new_folder",
     "new_recording",
@@ -35,6 +38,7 @@ __all__ = [
     "read_trc",
     "stamp_of",
     "tidy_fps",
+    "truth_path",
     "write_background",
     "write_image",
     "write_trc",

@@ -37,11 +37,11 @@ def read_background(
         folder: holds `NAME.png`, `.jpg`, `.mp4` (or another image or video type), or a folder
             `NAME` of numbered images, for any of the cameras.
         rig: the cameras of the (scaled) images wanted.
-        stored_sizes_px: size of each camera's images before scaling; images may come in that size
-            or in the rig's.
+        stored_sizes_px: size of each camera's images before scaling; images may have that size
+            or the rig's.
 
     Returns:
-        Camera name -> images in the rig's size; a camera without any is not there.
+        Camera name -> images in the rig's size; a camera without any is omitted.
 
     Raises:
         DatasetError: no such folder, an unreadable file, a name that is no camera's, or two
@@ -74,16 +74,16 @@ def read_background_models(
 ) -> dict[str, BackgroundModel]:
     """Read the learned backgrounds (`NAME.npz`) among the empty scenes of a rig.
 
-    They hold more than an image does, and may lie beside images: whoever finds both for a camera
-    takes the model.
+    A folder may hold images and a model of the same camera; the model takes precedence, because it
+    also holds the noise of each pixel.
 
     Args:
         folder: as in `read_background`.
         rig: the cameras of the (scaled) images wanted.
-        stored_sizes_px: as in `read_background`; a model of images in that size is made smaller.
+        stored_sizes_px: as in `read_background`; a model of images in that size is scaled down.
 
     Returns:
-        Camera name -> model in the rig's size; a camera without one is not there.
+        Camera name -> model in the rig's size; a camera without one is omitted.
 
     Raises:
         DatasetError: no such folder, or a name that is no camera's.

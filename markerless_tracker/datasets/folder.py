@@ -1,6 +1,6 @@
-"""Recordings as files: one video or folder of numbered images per camera, beside a calibration."""
+"""Recordings as files: a calibration, and one video or folder of numbered images per camera."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ from markerless_tracker.camera import CameraRig, read_calibration
 from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.datasets.markers.trc import read_trc
 from markerless_tracker.datasets.recording import FrameSet, Recording
+from markerless_tracker.datasets.truth import truth_path
 from markerless_tracker.datasets.video.decode import read_together
 from markerless_tracker.datasets.video.images import (
     find_stream,
@@ -24,7 +25,7 @@ CALIBRATION = "calibration.toml"
 
 
 class VideoRecording(Recording):
-    """Images from one source per camera; frame i of each belongs together.
+    """Images from one source per camera; frames of one index form a set.
 
     The recording ends with its shortest camera.
 
@@ -66,20 +67,23 @@ class VideoRecording(Recording):
                     f"{camera.name}: {stream.path} has images of {stream.size_px[0]}x"
                     f"{stream.size_px[1]} px, expected {expected[0]}x{expected[1]} px as calibrated"
                 )
-        counts = {name: stream.frame_count for name, stream in streams.items()}
         rates = {name: stream.fps for name, stream in streams.items()}
+        # The stated counts; a camera without one can only be read to its end.
+        counts = {name: stream.frame_count for name, stream in streams.items()}
+        stated = [count for count in counts.values() if count is not None]
+        self._most_frames = min(stated) if stated else None
         super().__init__(
             path,
             rig,
             scale=scale,
             fps=_common_rate(path, rates),
-            frame_count=min(counts.values()),
+            frame_count=self._most_frames if len(stated) == len(counts) else None,
         )
-        if len(set(counts.values())) > 1:
+        if len(set(stated)) > 1:
             self.warn(
                 f"{self.name}: cameras differ in length ("
-                + ", ".join(f"{name} {count}" for name, count in counts.items())
-                + f" frames), the recording ends after {self.frame_count}"
+                + ", ".join(f"{name} {count or 'unknown'}" for name, count in counts.items())
+                + f" frames), the recording ends after {self._most_frames}"
             )
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
@@ -89,15 +93,16 @@ class VideoRecording(Recording):
         }
         sizes = {camera.name: camera.size_px for camera in self.rig}
         for index, images in read_together(streams, sizes, start=start, every=every):
+            if self._most_frames is not None and index >= self._most_frames:
+                return
             ended = [name for name, image in images.items() if image is None]
             if ended:
-                if index < (self.frame_count or 0):
-                    self.warn(
-                        f"{self.name}: {', '.join(ended)} cannot be read beyond frame "
-                        f"{max(index - every, 0)} of {self.frame_count}, the recording ends there"
+                if index == start:
+                    raise DatasetError(
+                        f"{self.name}: {', '.join(ended)} has no frame {start}, expected to start "
+                        "there"
                     )
-                return
-            if self.frame_count is not None and index >= self.frame_count:
+                self._warn_of_end(ended, max(index - every, 0))
                 return
             yield FrameSet(
                 index,
@@ -105,14 +110,28 @@ class VideoRecording(Recording):
                 {name: image for name, image in images.items() if image is not None},
             )
 
+    def _warn_of_end(self, ended: Sequence[str], last: int) -> None:
+        """Warn unless the frames ended as stated, or without a statement at once in all cameras."""
+        if self._most_frames is not None:
+            self.warn(
+                f"{self.name}: {', '.join(ended)} cannot be read beyond frame {last} of "
+                f"{self._most_frames}, the recording ends there"
+            )
+        elif len(ended) < len(self.rig):
+            self.warn(
+                f"{self.name}: {', '.join(ended)} ends after frame {last}, before the other "
+                "cameras; the recording ends there"
+            )
+
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
-        last = (self.frame_count or 1) - 1
-        index = min(max(round(stamp_ns * self.fps / 1e9), 0), last)
+        index = max(round(stamp_ns * self.fps / 1e9), 0)
+        if self._most_frames is not None:
+            index = min(index, self._most_frames - 1)
         return index, stamp_of(index, self.fps)
 
 
 class FolderRecording(VideoRecording):
-    """The neutral layout: `calibration.toml` and one video or image folder per camera."""
+    """A recording folder: `calibration.toml` and one video or image folder per camera."""
 
     def __init__(self, path: Path, *, scale: float = 1.0, input_fps: float | None = None) -> None:
         rig = read_calibration(path / CALIBRATION)
@@ -128,7 +147,7 @@ class FolderRecording(VideoRecording):
 
     def ground_truth(self) -> MarkerTrack | None:
         """The markers of `ground_truth.trc`, None if there is no such file."""
-        path = self.path / "ground_truth.trc"
+        path = truth_path(self.path)
         return read_trc(path) if path.is_file() else None
 
     def masks(self, camera: str) -> dict[int, Image]:
@@ -154,7 +173,7 @@ class FolderRecording(VideoRecording):
 def _common_rate(path: Path, rates: Mapping[str, float | None]) -> float:
     for name, rate in rates.items():
         if rate is None:
-            raise DatasetError(f"{path}: {name} does not say its rate, expected --input-fps")
+            raise DatasetError(f"{path}: {name} states no rate, expected --input-fps")
     if len(set(rates.values())) > 1:
         listed = ", ".join(f"{name} {rate:g}" for name, rate in rates.items())
         raise DatasetError(f"{path}: cameras differ in rate ({listed} fps), expected one rate")

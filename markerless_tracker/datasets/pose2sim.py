@@ -52,7 +52,7 @@ class Pose2SimRecording(VideoRecording):
     def room_stills(self) -> dict[str, list[Image]]:
         """Camera name -> stills of the room, from `calibration/extrinsics/NAME_ext.png`.
 
-        They were taken to calibrate, so people may stand in them. Stretched to the videos' size.
+        They were taken for calibration, so people may be visible. Scaled to the videos' size.
         """
         folder = self._calibration_folder / "extrinsics"
         stills: dict[str, list[Image]] = {}
@@ -104,14 +104,12 @@ def _match(folder: Path, rig: CameraRig) -> tuple[Mapping[str, Path], list[str]]
         )
     pairs = dict(zip(rig.names, videos, strict=True))
     listed = ", ".join(f"{name} = {video.name}" for name, video in pairs.items())
-    return pairs, [
-        f"{folder}: videos are named otherwise than the cameras, taken in order: {listed}"
-    ]
+    return pairs, [f"{folder}: names of videos and cameras differ, paired in order: {listed}"]
 
 
 def _stretched(camera: CameraModel, size_px: tuple[int, int]) -> CameraModel:
-    # Rows of K in plain proportion, as the project's own tools (and references made with them) do;
-    # `CameraModel.resized` would differ by the shift of the pixel centres, under 0.01 px here.
+    # Rows of K in proportion, as Pose2Sim (and references made with it) does; `CameraModel.resized`
+    # would also shift the pixel centres, by less than 0.01 px here.
     matrix = camera.matrix.copy()
     matrix[0] *= size_px[0] / camera.size_px[0]
     matrix[1] *= size_px[1] / camera.size_px[1]

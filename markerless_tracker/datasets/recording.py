@@ -1,4 +1,4 @@
-"""What every source of synchronous images offers, whatever its format."""
+"""The interface of all recordings: sets of synchronous images of a calibrated rig."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
@@ -33,15 +33,15 @@ class FrameSet:
 
 
 class Recording(ABC):
-    """Images of a calibrated rig, read in order; a context manager is not needed.
+    """Images of a calibrated rig, read in order; needs no closing.
 
     Attributes:
-        path: the folder; `background/` lies in it.
+        path: the folder; its `background/` is optional.
         name: its short name.
         rig: the cameras of the images that `frames` yields (scaled).
         scale: factor from the stored images to those.
         fps: rate of the source, 1/s.
-        frame_count: sets in the source, None if only reading tells.
+        frame_count: number of sets in the source, None if it is unknown before reading.
     """
 
     def __init__(
@@ -62,24 +62,29 @@ class Recording(ABC):
         self.scale = scale
         self.fps = fps
         self.frame_count = frame_count
-        self._warnings: list[str] = []
+        self._warnings: dict[str, str] = {}
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know, one line each; reading the images may add some."""
-        return tuple(self._warnings)
+        """Problems found, one line each; reading the images may add some."""
+        return tuple(self._warnings.values())
 
-    def warn(self, message: str) -> None:
-        """Add a warning, once."""
-        if message not in self._warnings:
-            self._warnings.append(message)
+    def warn(self, message: str, *, replaces: str | None = None) -> None:
+        """Add a warning, once.
+
+        Args:
+            message: one line.
+            replaces: a key; the warning takes the place of the last one with that key, such as
+                the counts of an earlier reading.
+        """
+        self._warnings[replaces or message] = message
 
     def frames(self, *, start: int = 0, every: int = 1) -> Iterator[FrameSet]:
         """Every `every`-th set from index `start` on, in order.
 
         Raises:
             ConfigError: `start` or `every` is impossible.
-            DatasetError: the source turns out to be unreadable.
+            DatasetError: the source cannot be read.
         """
         if start < 0 or every < 1:
             raise ConfigError(f"{self.name}: start {start}, every {every}: expected >= 0 and >= 1")
@@ -93,7 +98,7 @@ class Recording(ABC):
         """The index of the set within half a frame of a stamp.
 
         Raises:
-            DatasetError: there is none; says what the recording covers.
+            DatasetError: there is none; names the nearest.
         """
         index, nearest_ns = self._nearest(stamp_ns)
         if abs(nearest_ns - stamp_ns) > 0.5e9 / self.fps:
@@ -106,7 +111,7 @@ class Recording(ABC):
     def background_frames(self, folder: Path | None = None) -> dict[str, list[Image]]:
         """Camera name -> empty-scene images (scaled) from a folder, its own `background/` if None.
 
-        Cameras without any are not there; {} without that folder. Raises as `read_background` does.
+        Cameras without any are omitted; {} without that folder. Raises as `read_background` does.
         """
         folder = folder or self._own_backgrounds()
         if folder is None:
@@ -128,7 +133,7 @@ class Recording(ABC):
         return folder if folder.is_dir() else None
 
     def room_stills(self) -> dict[str, list[Image]]:
-        """Camera name -> stills (scaled) of the room in which people may appear anywhere."""
+        """Camera name -> still images (scaled) of the room, in which people may be visible."""
         return {}
 
     @abstractmethod
@@ -137,4 +142,4 @@ class Recording(ABC):
 
     @abstractmethod
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
-        """The sets `frames` yields; its arguments are checked already."""
+        """The sets that `frames` yields; its arguments have been checked."""

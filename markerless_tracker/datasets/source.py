@@ -1,4 +1,4 @@
-"""Finding out what lies at a path, and opening it."""
+"""Opening a recording of any supported format, detected or named."""
 
 from pathlib import Path
 
@@ -20,21 +20,21 @@ def open_recording(
     """Open a recording folder, a Pose2Sim project or a bag (folder or `.mcap`).
 
     Args:
-        path: where it lies.
+        path: the folder or file.
         scale: factor for all images and cameras, in (0, 1].
-        format: one of `FORMATS`; None finds out.
+        format: one of `FORMATS`; None detects it.
         input_fps: rate of numbered images (and, if given, of videos), 1/s.
 
     Raises:
-        DatasetError: nothing known lies there, or it is damaged.
-        CalibrationError, ImageError, ConfigError: as the reader of the format says.
+        DatasetError: no supported format, or the recording is damaged.
+        CalibrationError, ImageError, ConfigError: as documented by the reader of the format.
     """
     path = Path(path)
     if not path.exists():
         raise DatasetError(f"{path}: no such file or folder")
     kind = format or detect_format(path)
     if kind == "bag":
-        # rosbags and mcap take a moment to import; other formats do without.
+        # rosbags and mcap are slow to import, and only bags need them.
         from markerless_tracker.datasets.bag.recording import BagRecording
 
         return BagRecording(path, scale=scale)
@@ -51,7 +51,7 @@ def open_recording(
 
 
 def detect_format(path: Path) -> str | None:
-    """Which of `FORMATS` lies at a path, None if none does."""
+    """The format (one of `FORMATS`) of what is at a path, None if it has none of them."""
     if path.is_file():
         return "bag" if path.suffix == ".mcap" else None
     if (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")):

@@ -1,4 +1,4 @@
-"""Folders that appear whole or not at all."""
+"""Folders that are created complete or not at all."""
 
 import os
 import shutil
@@ -12,9 +12,9 @@ from markerless_tracker.errors import DatasetError
 
 @contextmanager
 def new_folder(path: str | Path) -> Iterator[Path]:
-    """A folder to fill; it takes its place at `path` when the block ends without an exception.
+    """A folder to fill; it is renamed to `path` when the block ends without an exception.
 
-    Until then it lies in a hidden `.NAME.partial-*` beside it, which is removed on any exception,
+    Until then it is in a hidden `.NAME.partial-*` next to it, which is removed on any exception,
     Ctrl-C included. An empty folder at `path` is replaced.
 
     Raises:
@@ -22,7 +22,7 @@ def new_folder(path: str | Path) -> Iterator[Path]:
     """
     path = Path(os.path.abspath(path))
     if path.is_symlink() or (path.exists() and not path.is_dir()):
-        raise DatasetError(f"{path}: exists already, expected a new or an empty folder")
+        raise DatasetError(f"{path}: exists and is not a folder, expected a new or an empty folder")
     if path.is_dir() and any(path.iterdir()):
         raise DatasetError(f"{path}: exists and is not empty, expected a new or an empty folder")
     try:
@@ -31,7 +31,7 @@ def new_folder(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise DatasetError(f"{path}: cannot be created: {error.strerror}") from error
     try:
-        # Within the holder it has its final name: some formats name their files after the folder.
+        # It has its final name inside the holder: some formats name files after their folder.
         inner = holder / path.name
         inner.mkdir()
         yield inner

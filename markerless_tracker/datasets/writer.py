@@ -1,4 +1,4 @@
-"""Writing recordings in the neutral layout: videos, masks, background, calibration, truth."""
+"""Writing recording folders: videos, masks, background, calibration, reference markers."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,17 +14,18 @@ from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.datasets.markers.trc import write_trc
 from markerless_tracker.datasets.recording import BACKGROUND
 from markerless_tracker.datasets.target import new_folder
+from markerless_tracker.datasets.truth import truth_path
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image, check_image
 
-# Suffix and codec. FFV1 keeps every bit; MPEG-4 is small, but softens noise and edges.
+# Suffix and codec. FFV1 is lossless; MPEG-4 is small, but blurs noise and edges.
 LOSSLESS, LOSSY = (".mkv", "FFV1"), (".mp4", "mp4v")
 # Numbered image folders start their names with this many digits.
 DIGITS = 6
 
 
 class RecordingWriter:
-    """Fills a folder in the neutral layout; use `new_recording`.
+    """Writes a recording folder; use `new_recording`.
 
     Args:
         folder: an existing, empty folder.
@@ -59,7 +60,7 @@ class RecordingWriter:
     def write(
         self, images: Mapping[str, Image], *, masks: Mapping[str, Image] | None = None
     ) -> None:
-        """Append one set; `masks` (0 or 255) of this frame go to `masks/NAME/FFFFFF.png`.
+        """Append one set; `masks` (0 or 255) are written to `masks/NAME/FFFFFF.png`.
 
         Raises:
             DatasetError: a camera is missing or a file cannot be written.
@@ -83,7 +84,7 @@ class RecordingWriter:
 
     def write_truth(self, track: MarkerTrack) -> None:
         """Write `ground_truth.trc`."""
-        write_trc(self.folder / "ground_truth.trc", track, self.fps)
+        write_trc(truth_path(self.folder), track, self.fps)
 
     def close(self) -> None:
         """Finish the videos."""
@@ -106,10 +107,10 @@ class RecordingWriter:
 def new_recording(
     path: str | Path, rig: CameraRig, fps: float, *, lossless: bool = False
 ) -> Iterator[RecordingWriter]:
-    """A writer whose folder appears at `path` when the block ends well, and not at all otherwise.
+    """A writer whose folder appears at `path` when the block ends without an exception.
 
     Raises:
-        DatasetError: `path` is taken or cannot be written, or as `RecordingWriter` says.
+        DatasetError: `path` exists or cannot be written, or as `RecordingWriter` raises.
     """
     with new_folder(path) as folder, RecordingWriter(folder, rig, fps, lossless=lossless) as writer:
         yield writer
@@ -129,10 +130,10 @@ def write_background(folder: Path, camera: CameraModel, images: Sequence[Image])
 
 
 def write_image(path: Path, image: Image) -> None:
-    """Write an image file, folders included.
+    """Write an image file; its folders are created.
 
     Raises:
-        DatasetError: it cannot be written.
+        DatasetError: the file cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -19,7 +19,7 @@ from markerless_tracker import __version__
 from markerless_tracker.body import MARKER_NAMES, BodyModel, Subject, write_subject
 from markerless_tracker.datasets import MarkerTrack, write_trc
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.records import TrackResult
+from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.tracking import TrackerConfig
 
 _DEPENDENCIES = ("numpy", "numba", "opencv-python-headless", "scipy")
@@ -29,8 +29,8 @@ class ResultWriter:
     """Collects results and writes them when closed; also usable as a context manager.
 
     Args:
-        name: path without suffix; NAME.trc, NAME.json and NAME.subject.yaml are written, their
-            folder is made.
+        name: path without suffix; NAME.trc, NAME.json and, if a frame was tracked,
+            NAME.subject.yaml are written, their folder is made.
         body: the tracked body; also an attribute, for a tracker that fits it on the way.
         config: the tracker's settings.
         fps: rate of the results, 1/s.
@@ -87,7 +87,11 @@ class ResultWriter:
             self.json_path.write_text(
                 json.dumps(self._summary(), indent=1) + "\n", encoding="utf-8"
             )
-            write_subject(self.subject_path, self._subject())
+            if any(r.state is TrackState.TRACKING for r in self._results):
+                write_subject(self.subject_path, self._subject())
+            else:
+                # Nobody was measured; a file of an earlier run would pass for this one's.
+                self.subject_path.unlink(missing_ok=True)
         except OSError as error:
             raise DatasetError(f"{error.filename}: cannot be written: {error.strerror}") from error
 

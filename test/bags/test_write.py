@@ -1,4 +1,4 @@
-"""A recording through a bag and back, and bags that must not appear."""
+"""Round trips of recordings through bags, and failures that must leave no bag."""
 
 import json
 from pathlib import Path
@@ -84,7 +84,7 @@ def test_jpeg_is_close_and_its_background_exact(make_recording, tmp_path: Path) 
     assert "one set only" in bag.warnings[0]
 
 
-def test_other_readers_understand_it(make_recording, tmp_path: Path) -> None:
+def test_other_readers_read_the_same_messages(make_recording, tmp_path: Path) -> None:
     source = open_recording(make_recording(frames=3))
     write_bag(source, tmp_path / "out")
     camera = source.rig["cam02"]
@@ -119,7 +119,7 @@ def test_other_readers_understand_it(make_recording, tmp_path: Path) -> None:
     assert "transient_local" in json.dumps(about) and "keep_last" in json.dumps(about)
 
 
-def test_backgrounds_given_replace_the_recordings(make_recording, tmp_path: Path) -> None:
+def test_given_backgrounds_replace_the_recordings(make_recording, tmp_path: Path) -> None:
     given = np.full((48, 64, 3), 7, np.uint8)
     write_bag(open_recording(make_recording()), tmp_path / "out", backgrounds={"cam01": [given]})
     found = open_recording(tmp_path / "out").background_frames()
@@ -142,7 +142,9 @@ def test_an_interruption_leaves_no_bag(make_recording, tmp_path: Path, error) ->
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_taken_targets_and_impossible_wishes_are_refused(make_recording, tmp_path: Path) -> None:
+def test_existing_targets_and_unknown_compressions_are_refused(
+    make_recording, tmp_path: Path
+) -> None:
     source = open_recording(make_recording())
     with pytest.raises(DatasetError, match="exists and is not empty"):
         write_bag(source, tmp_path / "small")
@@ -152,7 +154,7 @@ def test_taken_targets_and_impossible_wishes_are_refused(make_recording, tmp_pat
     assert write_bag(source, tmp_path / "out").sets == 6
 
 
-def test_names_that_are_no_topics_are_refused(make_recording, tmp_path: Path) -> None:
+def test_names_that_cannot_be_topics_are_refused(make_recording, tmp_path: Path) -> None:
     folder = make_recording()
     text = (folder / "calibration.toml").read_text().replace("cam01", "cam-01")
     (folder / "calibration.toml").write_text(text)
@@ -168,6 +170,6 @@ def test_stamps_beyond_a_ros_message_are_refused(make_recording, tmp_path: Path)
     with pytest.raises(DatasetError, match="stamp -5"):
         write_bag(source, tmp_path / "out")
     source._read = lambda start, every: iter([])  # type: ignore[method-assign]
-    with pytest.raises(DatasetError, match="nothing to write"):
+    with pytest.raises(DatasetError, match="has no set of images"):
         write_bag(source, tmp_path / "out")
     assert not (tmp_path / "out").exists()

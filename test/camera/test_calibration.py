@@ -1,4 +1,4 @@
-"""Calibration files: what is read, what is refused, and that numbers survive."""
+"""Calibration files: reading, refusals, and round trips without loss."""
 
 from pathlib import Path
 
@@ -64,7 +64,7 @@ def test_a_table_is_read_and_metadata_is_no_camera(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "reported"),
     [
         ("fisheye = false", "fisheye = true", "fisheye"),
         ("size = [ 656.0, 490.0]\n", "", "size is missing"),
@@ -81,17 +81,17 @@ def test_a_table_is_read_and_metadata_is_no_camera(tmp_path: Path) -> None:
         ("[ 550, 0,", "[ -550, 0,", "focal lengths"),
     ],
 )
-def test_what_is_wrong_is_named_with_file_and_camera(tmp_path: Path, old, new, said) -> None:
+def test_what_is_wrong_is_named_with_file_and_camera(tmp_path: Path, old, new, reported) -> None:
     assert old in TABLE
     path = saved(tmp_path, TABLE.replace(old, new))
-    with pytest.raises(CalibrationError, match=said) as error:
+    with pytest.raises(CalibrationError, match=reported) as error:
         read_calibration(path)
     assert str(path) in str(error.value) and "cam01" in str(error.value)
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reported"),
     [
         ("[cam01\n", "TOML"),
         ("", "no camera"),
@@ -100,9 +100,9 @@ def test_what_is_wrong_is_named_with_file_and_camera(tmp_path: Path, old, new, s
         (TABLE.replace('name = "cam01"', "name = 3"), "name is 3"),
     ],
 )
-def test_malformed_files_are_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_malformed_files_are_refused(tmp_path: Path, text: str, reported: str) -> None:
     path = saved(tmp_path, text)
-    with pytest.raises(CalibrationError, match=said) as error:
+    with pytest.raises(CalibrationError, match=reported) as error:
         read_calibration(path)
     assert str(path) in str(error.value) and "\n" not in str(error.value)
 
@@ -137,7 +137,7 @@ axis = st.one_of(finite, st.sampled_from([0.0, np.pi, -np.pi, np.pi / 2, 3.14159
     st.lists(finite, min_size=4, max_size=5),
     st.floats(0.1, 1.0),
 )
-def test_what_was_read_is_written_and_read_back_bit_for_bit(
+def test_a_rig_that_was_read_round_trips_bit_for_bit(
     tmp_path_factory, rotation, translation, lens, scale
 ) -> None:
     folder = tmp_path_factory.mktemp("rig")
@@ -152,7 +152,7 @@ def test_what_was_read_is_written_and_read_back_bit_for_bit(
 
 
 @given(st.text(min_size=1, max_size=20).filter(lambda name: name.isprintable()))
-def test_any_printable_name_survives(tmp_path_factory, name: str) -> None:
+def test_any_printable_name_round_trips(tmp_path_factory, name: str) -> None:
     path = tmp_path_factory.mktemp("name") / "calibration.toml"
     pose = transform(np.eye(3), [0.0, 0.0, 3.0])
     matrix = np.array([[500.0, 0.0, 50.0], [0.0, 500.0, 50.0], [0.0, 0.0, 1.0]])
@@ -181,7 +181,7 @@ def test_qualisys_units_and_axes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reported"),
     [
         ("no xml", "XML"),
         ("<calibration/>", "no camera"),
@@ -193,8 +193,8 @@ def test_qualisys_units_and_axes(tmp_path: Path) -> None:
         (QCA.replace('right="1087"', 'right="-5"'), "left.*size"),
     ],
 )
-def test_malformed_qualisys_files_are_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_malformed_qualisys_files_are_refused(tmp_path: Path, text: str, reported: str) -> None:
     path = saved(tmp_path, text, "rig.qca.txt")
-    with pytest.raises(CalibrationError, match=said) as error:
+    with pytest.raises(CalibrationError, match=reported) as error:
         read_qca(path)
     assert str(path) in str(error.value) and "\n" not in str(error.value)

@@ -1,4 +1,4 @@
-"""Projection against OpenCV's own, scaling, and what a camera refuses."""
+"""Projection compared with OpenCV, scaling, and invalid cameras."""
 
 import cv2
 import numpy as np
@@ -60,7 +60,7 @@ def test_points_behind_the_camera_are_nan() -> None:
     assert np.isnan(pixels[1:]).all()
 
 
-def test_a_rig_projects_through_every_lens() -> None:
+def test_a_rig_projects_with_every_camera() -> None:
     rig = CameraRig((camera(), camera(name="cam02", translation=(0.5, 0.0, 4.0), lens=(0.1,) * 4)))
     points = np.array([[0.1, 0.2, 0.3], [0.0, 0.4, 1.0]])
     pixels = project(points, rig)
@@ -69,7 +69,7 @@ def test_a_rig_projects_through_every_lens() -> None:
 
 
 @given(st.floats(0.05, 1.0))
-def test_scaling_moves_pixels_as_area_averaging_does(scale: float) -> None:
+def test_scaling_agrees_with_area_averaging(scale: float) -> None:
     view = camera(lens=(-0.05, 0.1, 0.001, 0.002, 0.0))
     scaled = view.scaled(scale)
     points = np.array([[0.2, -0.1, 0.4], [0.0, 0.3, 0.0]])
@@ -86,7 +86,7 @@ def test_halving_twice_is_quartering() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "reported"),
     [
         ({"matrix": np.eye(2)}, "matrix"),
         ({"matrix": MATRIX * np.nan}, "matrix"),
@@ -96,7 +96,7 @@ def test_halving_twice_is_quartering() -> None:
         ({"size_px": (0, 10)}, "0x10"),
     ],
 )
-def test_impossible_cameras_are_refused_by_name(change, said) -> None:
+def test_impossible_cameras_are_refused_by_name(change, reported) -> None:
     good = {
         "name": "cam07",
         "size_px": (10, 10),
@@ -104,12 +104,12 @@ def test_impossible_cameras_are_refused_by_name(change, said) -> None:
         "distortion": np.zeros(5),
         "T_cam_world": np.eye(4),
     }
-    with pytest.raises(CalibrationError, match=said) as error:
+    with pytest.raises(CalibrationError, match=reported) as error:
         CameraModel(**{**good, **change})
     assert "cam07" in str(error.value)
 
 
-def test_a_rig_wants_distinct_names_and_knows_its_cameras() -> None:
+def test_a_rig_requires_distinct_names_and_finds_its_cameras() -> None:
     with pytest.raises(CalibrationError, match="distinct"):
         CameraRig((camera(), camera()))
     with pytest.raises(CalibrationError, match="cam09.*cam01"):

@@ -15,27 +15,29 @@ def test_json_alone_is_on_standard_output(make_recording, tmp_path: Path, capsys
     folder = make_recording(frames=7, fps=60.0)
     words = ["convert", str(folder), str(tmp_path / "bag"), "--fps", "20", "--scale", "0.5"]
     assert main([*words, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["cameras"] == ["cam01", "cam02"] and told["size_px"]["cam01"] == [32, 24]
-    assert (told["frames"], told["fps"], told["compress"]) == (3, 20.0, "none")
-    assert (told["first_ns"], told["last_ns"], told["warnings"]) == (0, 100_000_000, [])
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["cameras"] == ["cam01", "cam02"] and summary["size_px"]["cam01"] == [32, 24]
+    assert (summary["frames"], summary["fps"], summary["compress"]) == (3, 20.0, "none")
+    assert (summary["first_ns"], summary["last_ns"], summary["warnings"]) == (0, 100_000_000, [])
     stamps = [s.stamp_ns for s in open_recording(tmp_path / "bag").frames()]
     assert stamps == [0, 50_000_000, 100_000_000]
-    assert told["bytes"] == sum(f.stat().st_size for f in (tmp_path / "bag").rglob("*.*"))
+    assert summary["bytes"] == sum(f.stat().st_size for f in (tmp_path / "bag").rglob("*.*"))
 
 
-def test_one_line_for_people(make_recording, tmp_path: Path, capsys) -> None:
+def test_one_line_of_text(make_recording, tmp_path: Path, capsys) -> None:
     words = ["convert", str(make_recording()), str(tmp_path / "bag"), "--compress", "zstd"]
     assert main(words) == 0
     out = capsys.readouterr().out
     assert re.search(r"bag: 6 sets at 60 fps, cam01 64x48, cam02 64x48, \d+\.\d MB\n$", out)
 
 
-def test_a_missing_background_is_learned_and_said(make_recording, tmp_path: Path, capsys) -> None:
+def test_a_missing_background_is_learned_and_reported(
+    make_recording, tmp_path: Path, capsys
+) -> None:
     folder = make_recording(backgrounds=0)
     assert main(["convert", str(folder), str(tmp_path / "bag")]) == 0
-    told = capsys.readouterr().err
-    assert told.count("background learned from") == 2
+    summary = capsys.readouterr().err
+    assert summary.count("background learned from") == 2
     found = open_recording(tmp_path / "bag").background_frames()
     assert {name: images[0].shape for name, images in found.items()} == {
         "cam01": (48, 64, 3),
@@ -61,7 +63,7 @@ def test_numbered_images_with_their_rate(make_recording, tmp_path: Path, capsys)
 
 
 @pytest.mark.parametrize(
-    ("extra", "said"),
+    ("extra", "reported"),
     [
         (["--fps", "25"], "fps 25.*30 or 20|fps 25.*20 or 30"),
         (["--fps", "0"], "fps 0"),
@@ -72,16 +74,16 @@ def test_numbered_images_with_their_rate(make_recording, tmp_path: Path, capsys)
         (["--format", "pose2sim"], "no calibration folder"),
     ],
 )
-def test_impossible_wishes_fail_in_one_line(
-    make_recording, tmp_path: Path, capsys, extra: list[str], said: str
+def test_impossible_options_fail_in_one_line(
+    make_recording, tmp_path: Path, capsys, extra: list[str], reported: str
 ) -> None:
     assert main(["convert", str(make_recording()), str(tmp_path / "bag"), *extra]) == 1
     captured = capsys.readouterr()
-    assert re.search(said, captured.err) and captured.err.count("\n") == 1 and not captured.out
+    assert re.search(reported, captured.err) and captured.err.count("\n") == 1 and not captured.out
     assert not (tmp_path / "bag").exists()
 
 
-def test_a_source_that_fails_midway_leaves_no_bag(make_recording, tmp_path: Path, capsys) -> None:
+def test_an_unreadable_image_leaves_no_bag(make_recording, tmp_path: Path, capsys) -> None:
     from markerless_tracker.datasets import write_image
 
     folder = make_recording(name="images")
@@ -97,7 +99,7 @@ def test_a_source_that_fails_midway_leaves_no_bag(make_recording, tmp_path: Path
     assert sorted(path.name for path in tmp_path.iterdir()) == ["images"]
 
 
-def test_a_taken_target_is_left_alone(make_recording, tmp_path: Path, capsys) -> None:
+def test_a_target_that_is_not_empty_is_not_changed(make_recording, tmp_path: Path, capsys) -> None:
     folder = make_recording()
     assert main(["convert", str(folder), str(folder)]) == 1
     assert "exists and is not empty" in capsys.readouterr().err

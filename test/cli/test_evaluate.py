@@ -27,15 +27,15 @@ def files(tmp_path: Path) -> tuple[str, str]:
 
 def test_json(files, capsys) -> None:
     assert main(["evaluate", *files, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["mean_mm"] == pytest.approx(20.0)
-    assert (told["frames"], told["reference_frames"]) == (2, 3)
-    assert told["bias"]["Pelvis"] == pytest.approx([20.0, 0.0, 0.0], abs=1e-6)
-    assert list(told["joints"]) == [*NAMES, "Pelvis"]
-    assert len(told["frame_mm"]) == 2
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["mean_mm"] == pytest.approx(20.0)
+    assert (summary["frames"], summary["reference_frames"]) == (2, 3)
+    assert summary["bias"]["Pelvis"] == pytest.approx([20.0, 0.0, 0.0], abs=1e-6)
+    assert list(summary["joints"]) == [*NAMES, "Pelvis"]
+    assert len(summary["frame_mm"]) == 2
 
 
-def test_a_table_for_people(files, capsys) -> None:
+def test_a_table(files, capsys) -> None:
     assert main(["evaluate", *files]) == 0
     out = capsys.readouterr().out
     assert "Head" in out and "+20.0" in out
@@ -48,7 +48,7 @@ def test_what_cannot_be_compared_fails_in_one_line(files, tmp_path: Path, capsys
     late = str(tmp_path / "late.trc")
     write_trc(late, MarkerTrack(NAMES, np.array([9 * 10**9]), POSE[None]), 20.0)
     (tmp_path / "broken.trc").write_text("PathFileType\nno header")
-    for words, said in (
+    for words, reported in (
         ([files[0], other], "no common marker"),
         ([late, files[1]], "no common frame"),
         ([files[0], str(tmp_path / "none.trc")], "none.trc: cannot be read"),
@@ -56,4 +56,4 @@ def test_what_cannot_be_compared_fails_in_one_line(files, tmp_path: Path, capsys
     ):
         assert main(["evaluate", *words, "--json"]) == 1
         captured = capsys.readouterr()
-        assert said in captured.err and captured.err.count("\n") == 1 and not captured.out
+        assert reported in captured.err and captured.err.count("\n") == 1 and not captured.out

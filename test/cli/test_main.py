@@ -1,4 +1,4 @@
-"""The command's frame: overview, dispatch, errors, exit statuses."""
+"""The command line: overview, dispatch, errors, exit statuses."""
 
 import argparse
 import importlib
@@ -19,7 +19,7 @@ Install = Callable[[Callable[[argparse.Namespace], int]], None]
 
 @pytest.fixture
 def verb(monkeypatch: pytest.MonkeyPatch) -> Install:
-    """Puts a verb `probe` in place whose `run` is the function given."""
+    """Installs a verb `probe` whose `run` is the given function."""
 
     def install(run: Callable[[argparse.Namespace], int]) -> None:
         def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,7 +53,7 @@ def test_overview_lists_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
         assert text in out
 
 
-def test_no_verb_explains_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_verb_the_overview_is_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
@@ -73,7 +73,7 @@ def test_unknown_verb_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert "track" in err
 
 
-def test_arguments_reach_the_verb(verb: Install) -> None:
+def test_arguments_are_passed_to_the_verb(verb: Install) -> None:
     seen = []
 
     def run(args: argparse.Namespace) -> int:
@@ -137,13 +137,13 @@ def test_a_programming_error_is_not_hidden(verb: Install) -> None:
         cli.main(["probe", "here"])
 
 
-def test_interrupt_is_quiet(verb: Install, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupt_prints_nothing(verb: Install, capsys: pytest.CaptureFixture[str]) -> None:
     verb(raising(KeyboardInterrupt()))
     assert cli.main(["probe", "here"]) == 130
     assert capsys.readouterr() == ("", "")
 
 
-def test_help_imports_nothing_heavy() -> None:
+def test_help_imports_no_numerical_library() -> None:
     code = (
         "import sys; from markerless_tracker.cli.main import main; main(['--help']); "
         "print(sorted({'numpy', 'cv2', 'numba', 'scipy', 'rclpy', 'rosbags'} & set(sys.modules)))"
@@ -152,7 +152,7 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_a_reader_that_leaves_early_is_no_error() -> None:
+def test_a_closed_pipe_is_no_error() -> None:
     read_end, write_end = os.pipe()
     os.close(read_end)
     code = (
@@ -181,7 +181,7 @@ def test_module_runs_as_a_command() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(cli.VERBS))
-def test_each_verb_keeps_the_contract(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_each_verb_has_help_with_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     module = importlib.import_module(f"markerless_tracker.cli.{name}")
     assert module.EXAMPLE.startswith(f"markerless_tracker {name}")
     assert "\n\n" not in module.EXAMPLE

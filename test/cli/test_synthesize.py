@@ -22,7 +22,7 @@ from markerless_tracker.drawing import silhouette
 SMALL = ["--seconds", "0.1", "--size", "164x122"]
 
 
-def test_everything_of_a_recording_is_there_and_fits(tmp_path: Path, capsys) -> None:
+def test_the_recording_is_complete_and_consistent(tmp_path: Path, capsys) -> None:
     out = tmp_path / "made" / "up"
     words = [
         "--motion",
@@ -36,9 +36,9 @@ def test_everything_of_a_recording_is_there_and_fits(tmp_path: Path, capsys) -> 
         "4",
     ]
     assert main(["synthesize", str(out), *SMALL, *words, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["frames"] == 6 and told["cameras"] == ["cam01", "cam02", "cam03"]
-    assert told["motion"] == "balance" and told["seed"] == 4 and told["fps"] == 60.0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["frames"] == 6 and summary["cameras"] == ["cam01", "cam02", "cam03"]
+    assert summary["motion"] == "balance" and summary["seed"] == 4 and summary["fps"] == 60.0
 
     recording = open_recording(out)
     assert recording.fps == 60.0 and recording.frame_count == 6 and recording.warnings == ()
@@ -66,7 +66,7 @@ def test_everything_of_a_recording_is_there_and_fits(tmp_path: Path, capsys) -> 
         assert np.median(changed[mask]) > 40 and np.median(changed[~mask]) < 10
 
 
-def test_the_same_words_give_the_same_bytes(tmp_path: Path, capsys) -> None:
+def test_the_same_arguments_give_the_same_bytes(tmp_path: Path, capsys) -> None:
     for name in ("one", "two"):
         assert main(["synthesize", str(tmp_path / name), *SMALL, "--lossless"]) == 0
     files = [p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*") if p.is_file()]
@@ -80,13 +80,13 @@ def test_the_same_words_give_the_same_bytes(tmp_path: Path, capsys) -> None:
             np.testing.assert_array_equal(a.images[camera], b.images[camera])
 
 
-def test_videos_are_compressed_unless_asked(tmp_path: Path, capsys) -> None:
+def test_videos_are_lossless_only_on_request(tmp_path: Path, capsys) -> None:
     assert main(["synthesize", str(tmp_path / "a"), *SMALL]) == 0
     assert sorted(p.name for p in (tmp_path / "a").glob("cam*")) == [
         f"cam0{i}.mp4" for i in (1, 2, 3, 4)
     ]
-    told = capsys.readouterr()
-    assert told.out == f"{tmp_path / 'a'}: 6 frames of 4 cameras, with exact truth\n"
+    summary = capsys.readouterr()
+    assert summary.out == f"{tmp_path / 'a'}: 6 frames of 4 cameras, with exact truth\n"
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_videos_are_compressed_unless_asked(tmp_path: Path, capsys) -> None:
         (["--shadow", "2"], "shadow is 2, expected 0 to 1"),
     ],
 )
-def test_impossible_words_leave_one_line_and_no_folder(
+def test_impossible_arguments_fail_in_one_line_without_a_folder(
     tmp_path: Path, capfd, words: list[str], expected: str
 ) -> None:
     assert main(["synthesize", str(tmp_path / "out"), *words]) == 1
@@ -123,7 +123,7 @@ def test_unknown_motion_is_a_wrong_argument(tmp_path: Path, capsys) -> None:
     assert stop.value.code == 2 and "fly" in capsys.readouterr().err
 
 
-def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path, capsys) -> None:
+def test_a_folder_that_is_not_empty_is_not_changed(tmp_path: Path, capsys) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine.txt").write_text("keep")
     assert main(["synthesize", str(tmp_path / "out"), *SMALL]) == 1

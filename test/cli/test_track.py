@@ -1,4 +1,4 @@
-"""Verb `track`, from a made-up recording to its result."""
+"""Verb `track`, from a synthetic recording to its result."""
 
 import json
 from pathlib import Path
@@ -34,7 +34,7 @@ FRAMES = 4
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four frames at 60 Hz of a made-up person."""
+    """Four frames at 60 Hz of a synthetic person."""
     folder = tmp_path_factory.mktemp("made-up") / "walk"
     scene = SyntheticScene(body="balan31", motion="walk", size_px=(192, 144), seed=4, noise=2.0)
     synthesize(folder, scene, frames=FRAMES, lossless=True)
@@ -75,7 +75,7 @@ def refusal(outcome: tuple[int, str, str]) -> str:
 def test_a_recording_becomes_markers_and_a_summary(track, walk, tmp_path):
     status, out, _ = track("--start", walk / "ground_truth.trc")
     assert status == 0
-    assert f"{tmp_path / 'out.trc'}: 4 frames, 0 of them lost" in out
+    assert f"{tmp_path / 'out.trc'}: 4 frames, 4 tracked, 0 lost, " in out
     found = score(read_trc(tmp_path / "out.trc"), read_trc(walk / "ground_truth.trc"))
     assert found.frames == FRAMES
     assert found.mean_mm < 40.0
@@ -92,10 +92,10 @@ def test_json_alone_on_standard_output(track, walk, tmp_path):
     summary = json.loads(out)
     assert summary["result"] == str(tmp_path / "out.trc")
     assert summary["source"] == str(walk)
-    assert summary["frames"] == FRAMES
+    assert summary["frames"] == summary["tracked"] == FRAMES
     assert summary["states"] == {"TRACKING": FRAMES}
     assert summary["frames_per_s"] > 0
-    assert summary["warnings"] == []
+    assert summary["warnings"] == summary["frame_warnings"] == []
     assert "tracking walk" in err
 
 
@@ -106,7 +106,7 @@ def test_a_pose_and_a_subject_from_yaml(track, walk, tmp_path):
     assert found.mean_mm < 40.0
 
 
-def test_flags_overrule_the_settings_file(track, walk, tmp_path):
+def test_flags_take_precedence_over_the_settings_file(track, walk, tmp_path):
     status, _, _ = track(
         "--start", walk / "ground_truth.trc", "--evaluations", 100, "--seed", 8, "--threads", 2,
         "--preset", "paper",
@@ -170,12 +170,12 @@ class TestRefusals:
             ("a: b: c", "cannot read the settings: "),
         ],
     )
-    def test_settings_that_are_none(self, track, walk, tmp_path, text, message):
+    def test_malformed_settings_files(self, track, walk, tmp_path, text, message):
         path = tmp_path / "wrong.yaml"
         path.write_text(text + "\n", encoding="utf-8")
         assert message in refusal(track("--start", walk / "ground_truth.trc", config=path))
 
-    def test_a_settings_file_that_is_not_there(self, track, walk, tmp_path):
+    def test_a_missing_settings_file(self, track, walk, tmp_path):
         line = refusal(
             track("--start", walk / "ground_truth.trc", config=tmp_path / "nothing.yaml")
         )
@@ -186,15 +186,15 @@ class TestRefusals:
         path.write_text("", encoding="utf-8")
         assert "nowhere.trc" in refusal(track("--start", tmp_path / "nowhere.trc", config=path))
 
-    def test_a_budget_that_cannot_be_spent(self, track, walk):
+    def test_an_impossible_budget(self, track, walk):
         line = refusal(track("--start", walk / "ground_truth.trc", "--evaluations", 1050))
         assert line.endswith("which sppso cannot spend exactly: nearest are 1000 or 1100")
 
-    def test_a_source_that_is_not_there(self, track, walk, tmp_path):
+    def test_a_missing_source(self, track, walk, tmp_path):
         line = refusal(track("--start", walk / "ground_truth.trc", source=tmp_path / "nowhere"))
         assert "nowhere" in line
 
-    def test_a_rate_that_no_frames_give(self, track, walk):
+    def test_an_impossible_rate(self, track, walk):
         line = refusal(track("--start", walk / "ground_truth.trc", "--fps", 25))
         assert line.startswith("fps 25: the source has 60")
         line = refusal(track("--start", walk / "ground_truth.trc", "--fps", 0))
@@ -220,7 +220,7 @@ class TestRefusals:
         with pytest.raises(SystemExit) as caught:
             main(["track"])
         assert caught.value.code == 2
-        assert "the following arguments are required: source, -o" in capsys.readouterr().err
+        assert "the following arguments are required: SOURCE, -o" in capsys.readouterr().err
 
 
 def test_help_has_an_example(capsys):

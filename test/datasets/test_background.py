@@ -1,4 +1,4 @@
-"""Empty-scene images: where they may lie, and what is refused."""
+"""Empty-scene images and learned backgrounds: sources, sizes, refusals."""
 
 import shutil
 from pathlib import Path
@@ -51,12 +51,12 @@ def test_stills_videos_and_folders(tmp_path: Path, rig) -> None:
     assert len(read_background(tmp_path / "bg", rig)["cam01"]) == MAX_FRAMES
 
 
-def test_a_camera_without_any_is_not_there(tmp_path: Path, rig) -> None:
+def test_a_camera_without_any_is_omitted(tmp_path: Path, rig) -> None:
     write_image(tmp_path / "bg" / "cam02.jpg", IMAGE)
     assert list(read_background(tmp_path / "bg", rig)) == ["cam02"]
 
 
-def test_stored_or_scaled_sizes_are_taken_others_named(tmp_path: Path, rig) -> None:
+def test_stored_or_scaled_sizes_are_accepted_others_refused(tmp_path: Path, rig) -> None:
     half = rig.scaled(0.5)
     write_image(tmp_path / "bg" / "cam01.png", IMAGE)
     with pytest.raises(ImageError, match="cam01.png.*64x48.*expected 32x24 px"):
@@ -69,7 +69,7 @@ def test_stored_or_scaled_sizes_are_taken_others_named(tmp_path: Path, rig) -> N
         read_background(tmp_path / "bg", half, stored_sizes_px=stored)
 
 
-def test_what_is_wrong_is_named(tmp_path: Path, rig) -> None:
+def test_wrong_files_are_named(tmp_path: Path, rig) -> None:
     with pytest.raises(DatasetError, match="no such folder"):
         read_background(tmp_path / "bg", rig)
     write_image(tmp_path / "bg" / "cam9.png", IMAGE)
@@ -102,7 +102,7 @@ def learned(level: float) -> BackgroundModel:
     return BackgroundModel(level + rng.uniform(0, 4, shape), np.full(shape, 5.0), "test", (mode,))
 
 
-def test_learned_models_lie_beside_images_and_are_scaled(tmp_path: Path, rig) -> None:
+def test_learned_models_beside_images_are_read_and_scaled(tmp_path: Path, rig) -> None:
     write_image(tmp_path / "bg" / "cam01.png", IMAGE)
     write_background_model(tmp_path / "bg" / "cam01.npz", learned(40.0))
     assert list(read_background(tmp_path / "bg", rig)) == ["cam01"]
@@ -122,7 +122,7 @@ def test_learned_models_lie_beside_images_and_are_scaled(tmp_path: Path, rig) ->
     np.testing.assert_allclose(mode.mean[:, 4:16], 200.0, rtol=1e-6)
 
 
-def test_learned_models_of_strangers_or_nothing_are_refused(tmp_path: Path, rig) -> None:
+def test_learned_models_of_other_cameras_or_damaged_are_refused(tmp_path: Path, rig) -> None:
     with pytest.raises(DatasetError, match="nowhere: no such folder"):
         read_background_models(tmp_path / "nowhere", rig)
     write_background_model(tmp_path / "bg" / "cam09.npz", learned(40.0))
@@ -134,7 +134,7 @@ def test_learned_models_of_strangers_or_nothing_are_refused(tmp_path: Path, rig)
         read_background_models(tmp_path / "bg", rig)
 
 
-def test_a_recording_takes_the_model_before_the_image(make_recording) -> None:
+def test_the_model_takes_precedence_over_the_image(make_recording) -> None:
     folder = make_recording()
     recording = open_recording(folder)
     assert recording.background_models() == {}

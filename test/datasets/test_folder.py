@@ -9,9 +9,17 @@ import numpy as np
 import pytest
 
 from markerless_tracker.camera import read_calibration
-from markerless_tracker.datasets import FolderRecording, MarkerTrack, open_recording, write_image
+from markerless_tracker.datasets import (
+    FolderRecording,
+    MarkerTrack,
+    empty_scene,
+    open_recording,
+    write_image,
+)
+from markerless_tracker.datasets.empty_scene import FRAMES, backgrounds_of
 from markerless_tracker.errors import CalibrationError, ConfigError, DatasetError, ImageError
 from markerless_tracker.imaging import scale_image
+from markerless_tracker.imaging.background.plate import background_plate
 
 
 def test_sets_carry_index_stamp_and_every_camera(make_recording) -> None:
@@ -25,7 +33,7 @@ def test_sets_carry_index_stamp_and_every_camera(make_recording) -> None:
     assert sets[0].images["cam01"].shape == (48, 64, 3) and recording.warnings == ()
 
 
-def test_start_and_every_pick_the_same_images(make_recording) -> None:
+def test_start_and_every_select_the_same_images(make_recording) -> None:
     recording = open_recording(make_recording(frames=8))
     whole = list(recording.frames())
     picked = list(recording.frames(start=1, every=3))
@@ -54,7 +62,7 @@ def test_impossible_scales_are_refused(make_recording, scale: float) -> None:
 
 
 @pytest.mark.parametrize(("start", "every"), [(-1, 1), (0, 0)])
-def test_impossible_picks_are_refused(make_recording, start: int, every: int) -> None:
+def test_impossible_starts_and_steps_are_refused(make_recording, start: int, every: int) -> None:
     with pytest.raises(ConfigError, match="start"):
         open_recording(make_recording()).frames(start=start, every=every)
 
@@ -72,7 +80,7 @@ def test_the_frame_of_a_stamp(make_recording) -> None:
         recording.start_index(5 * 10**9)
 
 
-def test_leaving_early_ends_the_threads(make_recording) -> None:
+def test_closing_the_iterator_ends_the_threads(make_recording) -> None:
     frames = open_recording(make_recording()).frames()
     next(frames)
     frames.close()
@@ -96,6 +104,62 @@ def test_a_cut_video_ends_the_recording_with_a_warning(make_recording) -> None:
     read = list(recording.frames())
     assert 0 < len(read) < 30
     assert any("cam02" in warning for warning in recording.warnings)
+
+
+def streamed(path: Path) -> None:
+    """Makes a Matroska file look as if streamed: its Duration (0x4489) becomes a Void element."""
+    content = path.read_bytes()
+    place = content.index(b"\x44\x89\x88")
+    path.write_bytes(content[:place] + b"\xec\x89" + bytes(9) + content[place + 11 :])
+
+
+def test_a_video_without_a_frame_count_is_read_to_its_end(make_recording) -> None:
+    folder = make_recording(frames=5)
+    whole = list(open_recording(folder).frames())
+    for name in ("cam01", "cam02"):
+        streamed(folder / f"{name}.mkv")
+    recording = open_recording(folder)
+    assert recording.frame_count is None
+    read = list(recording.frames())
+    assert [s.stamp_ns for s in read] == [s.stamp_ns for s in whole]
+    np.testing.assert_array_equal(read[-1].images["cam02"], whole[-1].images["cam02"])
+    assert recording.start_index(66_666_667) == 4 and recording.warnings == ()
+    assert [s.index for s in recording.frames(start=1, every=3)] == [1, 4]
+    with pytest.raises(DatasetError, match=r"cam01, cam02 has no frame 5"):
+        next(recording.frames(start=5))
+
+
+def test_a_camera_without_a_frame_count_that_ends_first_is_named(make_recording) -> None:
+    folder = make_recording(frames=6)
+    shutil.copy(make_recording("short", frames=4) / "cam02.mkv", folder / "cam02.mkv")
+    streamed(folder / "cam02.mkv")
+    recording = open_recording(folder)
+    assert recording.frame_count is None and len(list(recording.frames())) == 4
+    assert "cam02 cannot be read beyond frame 3 of 6" in recording.warnings[0]
+    streamed(folder / "cam01.mkv")
+    recording = open_recording(folder)
+    assert len(list(recording.frames())) == 4
+    assert "cam02 ends after frame 3, before the other cameras" in recording.warnings[0]
+
+
+def test_learning_keeps_few_images_of_a_recording_of_unknown_length(
+    make_recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = make_recording(frames=2 * FRAMES + 7, backgrounds=0)
+    for name in ("cam01", "cam02"):
+        streamed(folder / f"{name}.mkv")
+    recording = open_recording(folder)
+    whole = [frame.images["cam01"] for frame in recording.frames()]
+    used = {}
+
+    def plate(clips, stills, *, camera):
+        used[camera] = clips[0]
+        return background_plate(clips, stills, camera=camera)
+
+    monkeypatch.setattr(empty_scene, "background_plate", plate)
+    assert list(backgrounds_of(recording)) == ["cam01", "cam02"]
+    # Every second image of the whole recording.
+    np.testing.assert_array_equal(used["cam01"], whole[::2])
 
 
 @pytest.mark.parametrize("content", [b"", b"this is no video at all" * 50])

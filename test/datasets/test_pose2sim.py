@@ -29,7 +29,7 @@ def test_a_project_is_read(project: Path) -> None:
     assert len(list(recording.frames())) == 6
 
 
-def test_the_matrix_follows_the_video_per_axis(project: Path) -> None:
+def test_the_matrix_is_scaled_to_the_video_per_axis(project: Path) -> None:
     path = project / "calibration" / "Calib_scene.toml"
     path.write_text(path.read_text().replace("[64, 48]", "[68.0, 96.0]", 1))
     stored = read_calibration(path)["cam01"].matrix
@@ -42,7 +42,7 @@ def test_the_matrix_follows_the_video_per_axis(project: Path) -> None:
     assert "cam01" in recording.warnings[0] and "68x96" in recording.warnings[0]
 
 
-def test_videos_named_otherwise_are_taken_in_order(project: Path) -> None:
+def test_videos_with_other_names_are_paired_in_order(project: Path) -> None:
     for name, other in (("cam01", "a"), ("cam02", "b")):
         (project / "videos" / f"{name}.mkv").rename(project / "videos" / f"{other}.mkv")
     recording = open_recording(project)
@@ -52,7 +52,7 @@ def test_videos_named_otherwise_are_taken_in_order(project: Path) -> None:
         open_recording(project)
 
 
-def test_a_missing_or_double_calibration_is_named(project: Path) -> None:
+def test_no_calibration_and_two_calibrations_are_refused(project: Path) -> None:
     toml = project / "calibration" / "Calib_scene.toml"
     shutil.copy(toml, project / "calibration" / "other.toml")
     with pytest.raises(DatasetError, match="Calib_scene.toml, other.toml"):
@@ -69,7 +69,7 @@ def test_a_project_without_calibration_folder_is_refused_by_format(project: Path
         open_recording(project, format="pose2sim")
 
 
-def test_room_stills_take_the_size_of_the_images(project: Path) -> None:
+def test_room_stills_are_scaled_to_the_images(project: Path) -> None:
     still = np.zeros((96, 68, 3), np.uint8)
     write_image(project / "calibration" / "extrinsics" / "cam02_ext.png", still)
     stills = open_recording(project, scale=0.5).room_stills()
@@ -106,7 +106,7 @@ def qca(rig: CameraRig) -> str:
     return f"<calibration><cameras>{cameras}</cameras></calibration>"
 
 
-def test_the_shared_rig_survives_qualisys_form(balance_real: Path, tmp_path: Path) -> None:
+def test_a_real_rig_round_trips_through_qualisys(balance_real: Path, tmp_path: Path) -> None:
     from markerless_tracker.camera import read_qca
 
     rig = read_calibration(balance_real / "calibration.toml")

@@ -1,4 +1,4 @@
-"""Finding out what lies at a path."""
+"""Detecting the format of a recording."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from markerless_tracker.datasets import detect_format, open_recording
 from markerless_tracker.errors import DatasetError
 
 
-def test_nothing_known(tmp_path: Path) -> None:
+def test_unknown_formats_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="no such file or folder"):
         open_recording(tmp_path / "none")
     with pytest.raises(DatasetError, match="no recording; expected.*calibration.toml.*mcap"):
@@ -20,7 +20,7 @@ def test_nothing_known(tmp_path: Path) -> None:
         open_recording(tmp_path, format="video")
 
 
-def test_formats_are_told_apart(tmp_path: Path, make_recording) -> None:
+def test_formats_are_detected(tmp_path: Path, make_recording) -> None:
     assert detect_format(make_recording()) == "folder"
     (tmp_path / "project" / "videos").mkdir(parents=True)
     assert detect_format(tmp_path / "project") is None

@@ -1,4 +1,4 @@
-"""Writing recordings: lossless means lossless, and nothing half-written stays."""
+"""Writing recordings: lossless videos round-trip, and a failure leaves no folder."""
 
 from pathlib import Path
 
@@ -56,7 +56,7 @@ def test_grey_images_are_written_too(tmp_path: Path, rig) -> None:
     np.testing.assert_array_equal(read, np.dstack([grey] * 3))
 
 
-def test_what_does_not_fit_is_named(tmp_path: Path, rig) -> None:
+def test_images_of_another_size_and_odd_sizes_are_refused(tmp_path: Path, rig) -> None:
     images = images_of(rig, 0)
     with new_recording(tmp_path / "made", rig, 30.0) as out:
         with pytest.raises(DatasetError, match="cam02"):
@@ -79,7 +79,7 @@ def test_a_failure_leaves_nothing(tmp_path: Path, error: type[BaseException]) ->
     assert list((tmp_path / "deep").iterdir()) == []
 
 
-def test_taken_targets_are_refused_and_left_alone(tmp_path: Path) -> None:
+def test_existing_targets_are_refused_and_not_changed(tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine").write_text("keep")
     (tmp_path / "file").write_text("keep")

@@ -100,7 +100,7 @@ def test_the_body_may_be_fitted_on_the_way(tmp_path, body, config):
 
 def test_the_content_does_not_depend_on_where_it_is_written(tmp_path, body, config):
     texts = []
-    for name in (tmp_path / "a", tmp_path / "deep" / "folder" / "with.dots.b"):
+    for name in (tmp_path / "with.dots.b", tmp_path / "deep" / "folder" / "with.dots.b"):
         with ResultWriter(name, body, config, fps=59.94) as writer:
             writer.add(result(0, 0.1))
         texts += [name.parent / f"{name.name}{suffix}" for suffix in (".trc", ".json")]
@@ -177,9 +177,18 @@ def test_the_subject_it_writes_gives_the_same_body_again(tmp_path) -> None:
     fitted = replace(body, cone_shape=shape)
     with ResultWriter(tmp_path / "walk", body, TrackerConfig(), fps=60.0) as writer:
         writer.body = fitted
+        writer.add(result(0))
     again = load_body("person31", read_subject(tmp_path / "walk.subject.yaml"))
     np.testing.assert_array_equal(again.cone_shape, fitted.cone_shape)
     assert again.lengths_m == fitted.lengths_m
+
+
+def test_nobody_tracked_leaves_no_subject_not_even_an_old_one(tmp_path, body, config) -> None:
+    path = tmp_path / "walk.subject.yaml"
+    path.write_text("of an earlier run", encoding="utf-8")
+    with ResultWriter(tmp_path / "walk", body, config, fps=60.0) as writer:
+        writer.add(result(0, None))
+    assert not path.exists()
 
 
 def test_standard_deviations_stand_beside_the_pose(tmp_path, body, config):

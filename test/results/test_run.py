@@ -55,16 +55,16 @@ def bag(walk, tmp_path_factory) -> Path:
 
 def test_the_same_bytes_with_any_threads_from_folder_and_from_bag(walk, bag, search, tmp_path):
     truth = walk / "ground_truth.trc"
-    one = result_bytes(walk, truth, tmp_path / "one", search, threads=1)
-    assert one == result_bytes(walk, truth, tmp_path / "elsewhere" / "two", search, threads=2)
-    assert one == result_bytes(bag, truth, tmp_path / "bag", search, threads=2)
+    one = result_bytes(walk, truth, tmp_path / "one" / "walk", search, threads=1)
+    assert one == result_bytes(walk, truth, tmp_path / "two" / "walk", search, threads=2)
+    assert one == result_bytes(bag, truth, tmp_path / "three" / "walk", search, threads=2)
     # Swarms alone end elsewhere with each seed; beside a refinement few of them decide.
     swarms = [
         result_bytes(walk, truth, tmp_path / str(seed), search, seed=seed, refinement="none")
         for seed in (1, 2)
     ]
     assert swarms[0] != swarms[1]
-    found = score(read_trc(tmp_path / "one.trc"), read_trc(truth))
+    found = score(read_trc(tmp_path / "one" / "walk.trc"), read_trc(truth))
     assert (found.frames, found.reference_frames) == (6, 6)
     assert found.mean_mm < 30.0
 

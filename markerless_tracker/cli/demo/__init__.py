@@ -1,1 +1,1 @@
-"""``python -m markerless_tracker.cli.demo``: a person tracked live over ROS 2, end to end."""
+"""The demo (``python -m markerless_tracker.cli.demo``): tracks a person live over ROS 2."""

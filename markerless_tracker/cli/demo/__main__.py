@@ -1,4 +1,4 @@
-"""The demo: fetch, learn the backgrounds, convert, replay live twice, report."""
+"""The demo: download, learn backgrounds, convert to a bag, replay it live twice, report."""
 
 import argparse
 import shutil
@@ -24,11 +24,11 @@ from markerless_tracker.errors import DatasetError, TrackerError
 from markerless_tracker.node.ros.process import require_ros
 
 SLOW_RATE = 0.04
-"""First try of a pace at which nothing is skipped: 2.4 sets a second of a 60 fps recording. The
-first frames decide: looking for the person takes many times as long as tracking him."""
+"""Playback rate of the first attempt to skip no set: 2.4 sets/s of a 60 fps recording. The search
+for the person in the first frames takes many times as long as tracking."""
 
 MISSED_AT_START = 8
-"""Sets that may pass while the person is looked for, without a slower try."""
+"""Sets that may be skipped during the search for the person without a slower attempt."""
 
 _TRIES = 2
 
@@ -36,9 +36,9 @@ _TRIES = 2
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the demo; returns the exit status."""
     parser = argparse.ArgumentParser(prog="make demo", description=__doc__)
-    parser.add_argument("--folder", type=Path, default=Path("demo"), help="where all files go")
+    parser.add_argument("--folder", type=Path, default=Path("demo"), help="folder for all files")
     parser.add_argument(
-        "--made-up", action="store_true", help="track a made-up person, fetch nothing"
+        "--made-up", action="store_true", help="track a synthetic person, download nothing"
     )
     args = parser.parse_args(argv)
     console = Console(highlight=False)
@@ -72,13 +72,13 @@ def _demo(folder: Path, console: Console, *, made_up: bool) -> None:
 
 def _scene(folder: Path, console: Console, *, made_up: bool) -> Scene:
     if made_up:
-        return made_up_scene(folder, "asked for with --made-up")
+        return made_up_scene(folder, "chosen with --made-up")
     try:
-        with _bar(console, "fetching the recording", None):
+        with _bar(console, "downloading the recording", None):
             return real_scene(folder)
     except DatasetError as error:
         console.print(
-            f"{error}\nThe demo runs on a made-up person instead.", markup=False, soft_wrap=True
+            f"{error}\nThe demo uses a synthetic person instead.", markup=False, soft_wrap=True
         )
         return made_up_scene(folder, str(error))
 
@@ -101,7 +101,7 @@ def _convert(scene: Scene, bag: Path, console: Console) -> tuple[int, float]:
 def _replays(
     scene: Scene, bag: Path, folder: Path, console: Console, *, sets: int, fps: float
 ) -> tuple[Replay, Replay]:
-    """One replay at a pace at which nothing is skipped, one in real time."""
+    """One replay at a rate at which no set is skipped, and one in real time."""
     tracker: dict[str, object] = {
         "calibration_file": bag / "calibration.toml",
         "background_dir": bag / "background",
@@ -127,7 +127,7 @@ def _replays(
         missed = slow.skipped + slow.lost
         if missed <= MISSED_AT_START:
             break
-        console.print(f"  {missed} of {sets} sets were skipped at this pace")
+        console.print(f"  {missed} of {sets} sets were skipped at this rate")
         rate /= 2
     live = run(1.0, "real_time", "tracking in real time")
     for warning in live.warnings:
@@ -136,7 +136,7 @@ def _replays(
 
 
 def _overlap(result: Path) -> dict[str, float]:
-    """Overlaps of a result, none if the person was tracked in no frame of it."""
+    """Overlaps of a result; empty if the person was tracked in no frame."""
     try:
         return mean_overlap(read_outcome(result).frames)
     except DatasetError:
@@ -145,7 +145,7 @@ def _overlap(result: Path) -> dict[str, float]:
 
 @contextmanager
 def _bar(console: Console, title: str, total: int | None) -> Iterator[Callable[[str, int], None]]:
-    """A progress bar; yields a function that takes what goes on and the number done."""
+    """A progress bar; yields a function of the current activity and the number of sets done."""
     columns = [TextColumn("{task.description:<42}"), BarColumn(), TimeElapsedColumn()]
     if total is not None:
         columns.insert(2, MofNCompleteColumn())
@@ -168,7 +168,7 @@ def _report(
     sheets: Sequence[Path],
 ) -> None:
     table = Table(title=f"Tracked live: {scene.title}")
-    headings = ("pace", "sets", "tracked", "skipped", "fps", "latency median", "p95", "overlap")
+    headings = ("rate", "sets", "tracked", "skipped", "fps", "latency median", "p95", "overlap")
     for heading in headings:
         table.add_column(heading, justify="right")
     for run, overlap in zip(replays, overlaps, strict=True):

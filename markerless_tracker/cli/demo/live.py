@@ -1,4 +1,4 @@
-"""Replaying a bag into a running tracker, both processes of their own, and what came of it."""
+"""Replaying a bag to a running tracker, each in its own process."""
 
 import os
 import time
@@ -11,28 +11,28 @@ from markerless_tracker.node.ros.profile import apply_profile
 from markerless_tracker.node.watch import StateWatch
 
 READY_S = 240.0
-"""The first start compiles every kernel."""
+"""Time for the tracker to start; the first start compiles every kernel."""
 
 _QUIET_S = 5.0
 
 Report = Callable[[str, int], None]
-"""Called with what goes on and the number of sets the tracker has dealt with."""
+"""Called with the current activity and the number of sets that the tracker has finished."""
 
 
 @dataclass(frozen=True)
 class Replay:
-    """What a tracker did with one replay.
+    """Counts and times of one replay.
 
     Attributes:
-        rate: pace of the replay, 1 = the recording's own.
+        rate: playback rate, 1 = real time.
         sets: sets of images in the bag.
         tracked: sets that were tracked.
-        skipped: complete sets that newer ones overtook.
-        lost: sets that never were complete.
-        fps: frames tracked per second, at this pace.
+        skipped: complete sets replaced by newer ones before they were tracked.
+        lost: sets that were never complete.
+        fps: frames tracked per second at this rate.
         latency_median_ms, latency_p95_ms: from the arrival of a set's last image to its result.
         result: the result files' path without suffix.
-        warnings: what the player warned of.
+        warnings: the warnings of the player.
     """
 
     rate: float
@@ -63,15 +63,15 @@ def replay(
     Args:
         bag: the bag's folder.
         sets: sets of images in it.
-        rate: pace, 1 = the recording's own.
+        rate: playback rate, 1 = real time.
         fps: the recording's rate, 1/s.
         tracker: the tracker's parameters.
         result: path of the result files without suffix.
-        log_dir: folder for what the processes print.
-        report: told of the progress.
+        log_dir: folder for the output of the processes.
+        report: called with the progress.
 
     Raises:
-        NodeError: a process failed, or the tracker did not get ready in time.
+        NodeError: a process failed, or the tracker was not ready in time.
         RosMissingError: ROS 2 is not installed.
     """
     domain_id = own_domain()
@@ -110,7 +110,7 @@ def replay(
 
 
 def own_domain() -> int:
-    """The user's ROS domain if one was chosen, else one that others on this machine hardly use."""
+    """ROS domain of the environment, else one derived from the process id."""
     chosen = os.environ.get("ROS_DOMAIN_ID", "")
     return int(chosen) if chosen.isdecimal() else 1 + os.getpid() % 101
 
@@ -135,7 +135,7 @@ def _until_through(
     lasts_s: float,
     report: Report,
 ) -> Mapping[str, str]:
-    """Wait until the player has ended and the tracker has dealt with all it got."""
+    """Wait until the player has ended and the tracker has finished all sets it received."""
     deadline_s = time.monotonic() + lasts_s + 60.0
     changed_s, seen = time.monotonic(), -1
     while True:

@@ -1,4 +1,4 @@
-"""What the demo found, drawn over the images of every view, and how well it covers the person."""
+"""The body of a result drawn over the images of all views, and its overlap with the person."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ Frame = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a tracker wrote about a run.
+    """The result of a tracker, as far as the demo shows it.
 
     Attributes:
         body: name or file of the tracked body.
@@ -35,7 +35,7 @@ def read_outcome(result: Path) -> Outcome:
     """Read `result`.json.
 
     Raises:
-        DatasetError: the file is not there, no result, or one without any tracked frame.
+        DatasetError: the file is missing, not a result, or has no tracked frame.
     """
     path = result.with_name(result.name + ".json")
     try:
@@ -50,7 +50,7 @@ def read_outcome(result: Path) -> Outcome:
 
 
 def mean_overlap(frames: Sequence[Frame]) -> dict[str, float]:
-    """Camera -> overlap (IoU) of the person's silhouette and the projected body, mean of frames."""
+    """Camera -> overlap (IoU) of silhouette and projected body, mean over frames."""
     values: dict[str, list[float]] = {}
     for frame in frames:
         for camera, overlap in frame["iou"].items():
@@ -59,13 +59,13 @@ def mean_overlap(frames: Sequence[Frame]) -> dict[str, float]:
 
 
 def draw_pictures(bag: Path, frames: Sequence[Frame], body: BodyModel, folder: Path) -> list[Path]:
-    """Draw the body over all views of the first, the middle and the last tracked frame.
+    """Draw the body over all views of the first, middle and last tracked frame.
 
     Args:
-        bag: the images.
-        frames: those of an `Outcome`.
+        bag: the bag with the images.
+        frames: the frames of an `Outcome`.
         body: the tracked body.
-        folder: gets `NAME_FFFFFF.png` of each view and `all_FFFFFF.png` of all of them.
+        folder: gets `NAME_FFFFFF.png` of each view and `all_FFFFFF.png` of all views.
 
     Returns:
         The sheets of all views.

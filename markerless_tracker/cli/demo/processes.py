@@ -1,4 +1,4 @@
-"""The demo's nodes as processes of their own, none of which outlives it."""
+"""The demo's nodes as processes that end with the demo."""
 
 import os
 import signal
@@ -13,17 +13,17 @@ from markerless_tracker.errors import TrackerError
 
 
 class NodeError(TrackerError):
-    """A node of the demo ended when it should not have, or never got ready."""
+    """A node of the demo ended early, or was not ready in time."""
 
 
 class NodeProcess:
-    """One ROS executable of this package; a context manager that ends it.
+    """A running ROS executable of this package; a context manager that ends it.
 
     Args:
         module: the executable's module.
         parameters: its ROS parameters.
-        log: file for all it prints.
-        domain_id: ROS domain to run in.
+        log: file for its output.
+        domain_id: its ROS domain.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class NodeProcess:
         return self._process.poll() is None
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for its end; returns whether it has ended."""
+        """Wait until it ends; returns whether it has ended."""
         try:
             self._process.wait(timeout_s)
         except subprocess.TimeoutExpired:
@@ -66,22 +66,22 @@ class NodeProcess:
         return True
 
     def check(self) -> None:
-        """Make sure that it runs, or ended well.
+        """Check that it runs, or ended with status 0.
 
         Raises:
-            NodeError: it failed; gives the last line that it printed.
+            NodeError: it failed; holds the last line of its output.
         """
         status = self._process.poll()
         if status:
             raise NodeError(f"{self.name} ended with status {status}: {self._last_line()}")
 
     def warnings(self) -> list[str]:
-        """The texts of the warnings that it has logged so far."""
+        """The texts of the warnings in its log so far."""
         lines = self._log.read_text(encoding="utf-8", errors="replace").splitlines()
         return [line.partition("]: ")[2] for line in lines if line.startswith("[WARN]")]
 
     def stop(self, timeout_s: float = 20.0) -> int:
-        """Ask it to end (SIGINT), and insist after a while; returns its exit status."""
+        """End it with SIGINT, after the timeout with SIGKILL; returns its exit status."""
         if self.running:
             self._process.send_signal(signal.SIGINT)
         if not self.wait(timeout_s):
@@ -92,7 +92,7 @@ class NodeProcess:
 
     def _last_line(self) -> str:
         lines = self._log.read_text(encoding="utf-8", errors="replace").split("\n")
-        return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+        return next((line.strip() for line in reversed(lines) if line.strip()), "no output")
 
 
 def ros_arguments(parameters: Mapping[str, object]) -> Sequence[str]:
@@ -103,7 +103,7 @@ def ros_arguments(parameters: Mapping[str, object]) -> Sequence[str]:
         if isinstance(value, bool):
             text = text.lower()
         elif isinstance(value, (str, Path)):
-            # Quoted, or a path such as 2026 or 1e3 would arrive as a number.
+            # Quoted, because ROS would parse a path such as 2026 or 1e3 as a number.
             text = "'" + text.replace("'", "''") + "'"
         words += ["-p", f"{name}:={text}"]
     return words

@@ -1,4 +1,4 @@
-"""What the demo tracks: the real recording, or a made-up person where that cannot be had."""
+"""The recording that the demo tracks: a real one, or a synthetic one without a download."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +8,7 @@ from markerless_tracker.cli.main import main as command
 from markerless_tracker.errors import DatasetError
 
 SCALE = 0.5
-"""Full-size sets are 25 MB; no middleware carries sixty of those a second."""
+"""Scale factor of the images: full-size sets (25 MB at 60 fps) overload the middleware."""
 
 MADE_UP_SECONDS = 1.5
 MADE_UP_BODY = "balan31"
@@ -16,14 +16,14 @@ MADE_UP_BODY = "balan31"
 
 @dataclass(frozen=True)
 class Scene:
-    """A recording and how to track it: nobody says where the person is, or how tall.
+    """A recording and how to track it; start pose and stature are estimated.
 
     Attributes:
-        title: what is seen, for the reader.
-        recording: folder to convert.
+        title: description for the report.
+        recording: folder of the recording.
         scale: factor for its images.
-        body: body to track with, the tracker's own choice if empty.
-        note: why it is not the real recording; empty if it is.
+        body: body model, the default one if empty.
+        note: reason for not using the real recording; empty if it is used.
     """
 
     title: str
@@ -34,10 +34,10 @@ class Scene:
 
 
 def real_scene(folder: Path) -> Scene:
-    """The recording that ships in a wheel.
+    """The real recording.
 
     Raises:
-        DatasetError: it cannot be had.
+        DatasetError: it cannot be downloaded.
     """
     return Scene(
         "a real person, four cameras, 60 fps",
@@ -47,7 +47,7 @@ def real_scene(folder: Path) -> Scene:
 
 
 def made_up_scene(folder: Path, note: str) -> Scene:
-    """A made-up person, written unless it lies there already.
+    """A synthetic recording, written unless the folder has it.
 
     Raises:
         DatasetError: it cannot be written.
@@ -61,7 +61,7 @@ def made_up_scene(folder: Path, note: str) -> Scene:
         if status:
             raise DatasetError(f"{recording}: synthesize ended with status {status}")
     return Scene(
-        "a made-up person, four cameras, 60 fps",
+        "a synthetic person, four cameras, 60 fps",
         recording,
         1.0,
         body=MADE_UP_BODY,

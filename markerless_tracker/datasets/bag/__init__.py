@@ -1,4 +1,4 @@
 """Reading MCAP bags (rosbag2) without ROS.
 
-Messages in file order, image encodings, camera infos.
+Messages in file order, sets of one stamp, image encodings, camera infos.
 """

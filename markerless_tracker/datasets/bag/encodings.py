@@ -8,7 +8,7 @@ import numpy as np
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging import Image
 
-# Encoding -> channels and the OpenCV conversion to BGR (None: as it is).
+# Encoding -> channels, and the OpenCV conversion to BGR (None: no conversion).
 ENCODINGS: dict[str, tuple[int, int | None]] = {
     "bgr8": (3, None),
     "8UC3": (3, None),
@@ -24,7 +24,7 @@ ENCODINGS: dict[str, tuple[int, int | None]] = {
 def decode_raw(
     data: Any, *, encoding: str, width: int, height: int, step: int, where: str
 ) -> Image:
-    """The image of a raw message: (h, w, 3) BGR or (h, w) grey; no copy if nothing is to convert.
+    """The image of a raw message: (h, w, 3) BGR or (h, w) grey; not copied unless converted.
 
     Args:
         data: the bytes (any buffer, `array.array` or uint8 array).
@@ -39,7 +39,7 @@ def decode_raw(
     """
     if encoding not in ENCODINGS:
         raise ImageError(
-            f"{where}: image encoding {encoding!r} is not known, expected one of "
+            f"{where}: image encoding {encoding!r} is not supported, expected one of "
             f"{', '.join(ENCODINGS)}"
         )
     channels, conversion = ENCODINGS[encoding]

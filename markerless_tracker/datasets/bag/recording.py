@@ -1,4 +1,4 @@
-"""Bags (rosbag2, MCAP): a rig's images as topics, `calibration.toml` and `background/` beside."""
+"""Bags (rosbag2, MCAP): images as topics, `calibration.toml` and `background/` in the folder."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -14,7 +14,8 @@ from rosbags.typesys import Stores, get_typestore
 from markerless_tracker.camera import CameraRig, read_calibration
 from markerless_tracker.datasets.bag.calibration import rig_from_messages
 from markerless_tracker.datasets.bag.encodings import decode_compressed, decode_raw
-from markerless_tracker.datasets.bag.stream import McapFiles, RawMessage
+from markerless_tracker.datasets.bag.sets import SetGrouping, StampedSet
+from markerless_tracker.datasets.bag.stream import FIRST, IndexDamaged, McapFiles, Place, RawMessage
 from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.datasets.video.rates import tidy_fps
 from markerless_tracker.errors import DatasetError, ImageError
@@ -24,19 +25,17 @@ RAW_TYPE = "sensor_msgs/msg/Image"
 COMPRESSED_TYPE = "sensor_msgs/msg/CompressedImage"
 INFO_TYPE = "sensor_msgs/msg/CameraInfo"
 TF_TYPE = "tf2_msgs/msg/TFMessage"
-# Sets looked at to learn the rate.
+# Number of sets from which the rate is measured.
 RATE_SETS = 30
-# Stamps that may wait for their other cameras, so that a silent camera cannot fill the memory.
-MAX_PENDING = 32
 LONE_SET_FPS = 60.0
 
 
 class BagRecording(Recording):
     """A bag with the images of a rig on `NAME/image_raw` or `NAME/image_raw/compressed`.
 
-    Images of one stamp (of their headers) make a set; incomplete sets are skipped and counted in
-    `warnings`. Of a cut or damaged file everything before the damage is read. `frame_count` is an
-    upper bound unless the file is damaged. Without a `calibration.toml` beside it, the rig comes
+    Images whose headers have the same stamp form a set; incomplete sets are skipped and counted in
+    `warnings`. A cut or damaged file is read up to the damage. `frame_count` is an upper bound
+    unless the file is damaged. Without a `calibration.toml` in the bag's folder, the rig is read
     from `NAME/camera_info` and `/tf_static`.
 
     Args:
@@ -44,7 +43,7 @@ class BagRecording(Recording):
         scale: factor for all images.
 
     Raises:
-        DatasetError: not a bag of this kind, topics are missing, or no set is complete.
+        DatasetError: not an MCAP bag, topics are missing, or no set is complete.
         CalibrationError: the calibration is missing or malformed.
     """
 
@@ -53,7 +52,7 @@ class BagRecording(Recording):
         self._files = McapFiles(_mcap_files(path))
         self._store = get_typestore(Stores.ROS2_JAZZY)
         if self._files.counts is None:
-            for _ in self._files:  # a damaged bag tells its topics only while it is read
+            for _ in self._files:  # the topics of a damaged bag are known only after reading it
                 pass
         calibration = folder / "calibration.toml"
         if calibration.is_file():
@@ -63,17 +62,16 @@ class BagRecording(Recording):
             names = self._cameras_with_images(path)
             rig = self._rig_from_topics(path, names)
         self._topics = {self._image_topic(path, name): name for name in names}
-        self._incomplete: Counter[str] = Counter()
-        self._late: Counter[str] = Counter()
-        stamps = [stamp for stamp, _ in islice(self._sets(path), RATE_SETS)]
+        self._where = path
+        self._set_places: dict[int, tuple[int, Place]] = {}  # index -> stamp (ns), place
+        stamps = [found.stamp_ns for found in islice(self._stamped(), RATE_SETS)]
         if not stamps:
             raise DatasetError(
                 f"{path}: no set of images is complete, expected one image of each of "
                 f"{', '.join(names)} with the same stamp"
             )
-        super().__init__(folder, rig, scale=scale, fps=_rate(stamps), frame_count=self._count(path))
+        super().__init__(folder, rig, scale=scale, fps=_rate(stamps), frame_count=self._count())
         self._stored_rig = rig
-        self._where = path
         if len(stamps) == 1:
             self.warn(f"{self.name}: holds one set only, its rate is taken as {LONE_SET_FPS:g} fps")
         if self._files.damage:
@@ -82,62 +80,68 @@ class BagRecording(Recording):
             self.warn(f"{self.name}: the file has no index, it was read through to find its topics")
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
-        self._incomplete.clear()
-        self._late.clear()
+        first_ns, place = self._place_of(start)
+        grouping = SetGrouping(self._topics, self._where, first_ns)
         with ThreadPoolExecutor(len(self.rig), thread_name_prefix="decode") as pool:
-            for index, (stamp, messages) in enumerate(self._sets(self._where)):
-                if index >= start and (index - start) % every == 0:
-                    images = pool.map(self._image, messages.values())
-                    yield FrameSet(index, stamp, dict(zip(self.rig.names, images, strict=True)))
-        if self._incomplete:
+            sets = enumerate(grouping.sets(self._files.messages(place)), start=start)
+            for index, found in sets:
+                if (index - start) % every == 0:
+                    images = pool.map(self._image, found.messages.values())
+                    named = dict(zip(self.rig.names, images, strict=True))
+                    yield FrameSet(index, found.stamp_ns, named)
+        if grouping.incomplete:
             self.warn(
                 f"{self.name}: sets lacking a camera were skipped "
-                f"(missing: {_counts(self._incomplete)})"
+                f"(missing: {_counts(grouping.incomplete)})",
+                replaces="incomplete",
             )
-        if self._late:
+        if grouping.late:
             self.warn(
-                f"{self.name}: images that came after later ones were skipped "
-                f"({_counts(self._late)})"
+                f"{self.name}: images recorded after later ones were skipped "
+                f"({_counts(grouping.late)})",
+                replaces="late",
             )
         if self._files.damage:
             self.warn(self._files.damage)
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
         best = (0, 0)
-        for index, (stamp, _) in enumerate(self._sets(self._where)):
+        for index, found in enumerate(self._stamped()):
+            stamp = found.stamp_ns
             if index == 0 or abs(stamp - stamp_ns) < abs(best[1] - stamp_ns):
                 best = (index, stamp)
+                self._set_places = {index: (stamp, found.place)}
             if stamp >= stamp_ns:
                 break
         return best
 
-    def _sets(self, path: Path) -> Iterator[tuple[int, dict[str, RawMessage]]]:
-        """Complete sets by increasing stamp; `_incomplete` counts who was missing in others."""
-        pending: dict[int, dict[str, RawMessage]] = {}
-        done = None
-        for message in self._files:
-            name = self._topics.get(message.topic)
-            if name is None:
-                continue
-            stamp = _stamp(message, path)
-            if done is not None and stamp <= done:
-                self._late[name] += 1
-                continue
-            pending.setdefault(stamp, {})[name] = message
-            if len(pending[stamp]) == len(self._topics):
-                complete = pending.pop(stamp)
-                for earlier in [other for other in pending if other < stamp]:
-                    self._drop(pending.pop(earlier))
-                done = stamp
-                yield stamp, {camera: complete[camera] for camera in self._topics.values()}
-            elif len(pending) > MAX_PENDING:
-                done = min(pending)
-                self._drop(pending.pop(done))
-        for rest in pending.values():
-            self._drop(rest)
+    def _place_of(self, index: int) -> tuple[int | None, Place]:
+        """Stamp (ns) of a set and the place to read from; None and the first place for set 0.
 
-    def _drop(self, messages: dict[str, RawMessage]) -> None:
-        self._incomplete.update(name for name in self._topics.values() if name not in messages)
+        Raises:
+            DatasetError: the bag ends before.
+        """
+        if index == 0:
+            return None, FIRST
+        if index not in self._set_places:
+            found = next(islice(self._stamped(), index, None), None)
+            if found is None:
+                raise DatasetError(f"{self.name}: has no complete set {index} to start at")
+            self._set_places = {index: (found.stamp_ns, found.place)}
+        return self._set_places[index]
+
+    def _stamped(self) -> Iterator[StampedSet]:
+        """The complete sets, reading only their stamps where the bag has an index."""
+        count = 0
+        try:
+            for found in SetGrouping(self._topics, self._where).sets(
+                self._files.heads(self._topics)
+            ):
+                yield found
+                count += 1
+        except IndexDamaged:
+            forward = SetGrouping(self._topics, self._where).sets(self._files)
+            yield from islice(forward, count, None)
 
     def _image(self, message: RawMessage) -> Image:
         name = self._topics[message.topic]
@@ -165,7 +169,7 @@ class BagRecording(Recording):
     def _decoded(self, message: RawMessage) -> Any:
         try:
             return self._store.deserialize_cdr(message.data, message.type)
-        except Exception as error:  # hostile bytes raise whatever they like
+        except Exception as error:  # damaged bytes raise any exception
             raise DatasetError(
                 f"{self._files.paths[0]}: {message.topic}: a message cannot be decoded as "
                 f"{message.type}"
@@ -217,10 +221,10 @@ class BagRecording(Recording):
         damage = f"; {self._files.damage}" if self._files.damage else ""
         return (topics or "no topics") + damage
 
-    def _count(self, path: Path) -> int:
+    def _count(self) -> int:
         if self._files.counts is not None:
             return min(self._files.counts[topic] for topic in self._topics)
-        return sum(1 for _ in self._sets(path))
+        return sum(1 for _ in self._stamped())
 
 
 def _mcap_files(path: Path) -> list[Path]:
@@ -259,18 +263,6 @@ def _counts(counter: Counter[str]) -> str:
 
 def _line(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
-
-
-def _stamp(message: RawMessage, path: Path) -> int:
-    """Stamp (ns) of a message that begins with a std_msgs/Header, without decoding the rest."""
-    if len(message.data) < 12:
-        raise DatasetError(
-            f"{path}: {message.topic}: a message of {len(message.data)} bytes has no header"
-        )
-    # Second byte of the encapsulation: 1 = little endian.
-    order: Any = "little" if message.data[1] & 1 else "big"
-    seconds = int.from_bytes(message.data[4:8], order, signed=True)
-    return seconds * 10**9 + int.from_bytes(message.data[8:12], order)
 
 
 def _rate(stamps: list[int]) -> float:

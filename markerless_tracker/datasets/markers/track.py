@@ -1,4 +1,4 @@
-"""Named marker positions over time: what a motion-capture file or a result holds."""
+"""Named marker positions over time, as in a motion-capture file or a result."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -56,18 +56,20 @@ class MarkerTrack:
 
     @property
     def tracked(self) -> NDArray[np.bool_]:
-        """(n,) whether a row holds any marker."""
+        """(n,) whether a row has any marker."""
         return np.asarray(np.isfinite(self.positions_m[..., 0]).any(axis=1))
 
     def selected(self, names: Sequence[str]) -> "MarkerTrack":
         """The track with those markers only, in the order given.
 
         Raises:
-            DatasetError: a marker is not there.
+            DatasetError: the track has no such marker.
         """
         missing = [name for name in names if name not in self.names]
         if missing:
-            raise DatasetError(f"no marker {', '.join(missing)}, there are {', '.join(self.names)}")
+            raise DatasetError(
+                f"no marker {', '.join(missing)}, expected names among {', '.join(self.names)}"
+            )
         columns = [self.names.index(name) for name in names]
         return MarkerTrack(tuple(names), self.stamps_ns, self.positions_m[:, columns])
 
@@ -76,7 +78,7 @@ class MarkerTrack:
         return MarkerTrack(self.names, self.stamps_ns[rows], self.positions_m[rows])
 
     def with_pelvis(self) -> "MarkerTrack":
-        """The track with a Pelvis: its own, or the midpoint of the hips if it names only those."""
+        """The track with a Pelvis: its own, else the midpoint of the hips if it has both."""
         if PELVIS in self.names or not set(HIPS) <= set(self.names):
             return self
         middle = self.positions_m[:, [self.names.index(name) for name in HIPS]].mean(axis=1)

@@ -1,5 +1,6 @@
 """OpenSim marker files (`.trc`), Y up as Pose2Sim writes them: world = (Z, X, Y) of the file."""
 
+from collections.abc import Sequence
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
@@ -10,10 +11,8 @@ from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-# Stamps beyond this would not fit 64 bits.
+# Largest Time in a file: stamps in ns must fit in 64 bits.
 LARGEST_TIME_S = Decimal(9_000_000_000)
-# The first line names a file; a constant keeps the content independent of where it is written.
-TITLE = "markerless_tracker.trc"
 
 
 def read_trc(path: str | Path) -> MarkerTrack:
@@ -42,7 +41,7 @@ def read_trc(path: str | Path) -> MarkerTrack:
             stamp, row = _row(path, number, line, len(names))
             if stamps and stamp <= stamps[-1]:
                 raise DatasetError(
-                    f"{path}: line {number}: Time {stamp / 1e9} s does not come after "
+                    f"{path}: line {number}: Time {stamp / 1e9} s is not later than "
                     f"{stamps[-1] / 1e9} s"
                 )
             stamps.append(stamp)
@@ -54,42 +53,76 @@ def read_trc(path: str | Path) -> MarkerTrack:
 def write_trc(path: str | Path, track: MarkerTrack, fps: float) -> None:
     """Write a `.trc` in m with 6 decimals (µm) and times with 9 (ns); missing markers are blank.
 
-    The text depends on the track and `fps` alone, not on the path.
+    The text depends on the track, `fps` and the file's name, not on its folder.
 
     Raises:
         DatasetError: the file cannot be written.
     """
     path = Path(path)
     try:
-        path.write_text(format_trc(track, fps), encoding="utf-8", newline="\n")
+        path.write_text(format_trc(track, fps, path.name), encoding="utf-8", newline="\n")
     except OSError as error:
         raise DatasetError(f"{path}: cannot be written: {error.strerror}") from error
 
 
-def format_trc(track: MarkerTrack, fps: float) -> str:
+def format_trc(track: MarkerTrack, fps: float, name: str) -> str:
     """The text of a `.trc`; see `write_trc`.
 
+    Args:
+        track: the markers.
+        fps: rate stated in the header, 1/s.
+        name: file name without folder; line 1 states it.
+
     Raises:
-        DatasetError: a marker's name cannot stand in the file (tab, line break or empty).
+        DatasetError: a marker's name cannot be written (tab, line break or empty).
     """
-    for name in track.names:
-        if not name.strip() or name != name.strip() or len(name.splitlines()) != 1 or "\t" in name:
-            raise DatasetError(f"marker name {name!r} cannot stand in a marker file")
-    count, rate = len(track.names), f"{fps:.10g}"
-    lines = [
-        f"PathFileType\t4\t(X/Y/Z)\t{TITLE}",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame"
-        "\tOrigNumFrames",
-        f"{rate}\t{rate}\t{len(track)}\t{count}\tm\t{rate}\t1\t{len(track)}",
-        "Frame#\tTime\t" + "".join(f"{name}\t\t\t" for name in track.names),
-        "\t\t" + "".join(f"X{i}\tY{i}\tZ{i}\t" for i in range(1, count + 1)),
-    ]
+    lines = format_header(track.names, len(track), fps, name)
     for index, (stamp, row) in enumerate(
         zip(track.stamps_ns, track.positions_m, strict=True), start=1
     ):
-        cells = "\t".join(_cells(point) for point in row)
-        lines.append(f"{index}\t{_seconds(int(stamp))}\t{cells}")
+        lines.append(format_row(index, int(stamp), row))
     return "\n".join(lines) + "\n"
+
+
+def format_header(names: Sequence[str], rows: int, fps: float, name: str) -> list[str]:
+    """The five header lines of a `.trc`, without line breaks; arguments as in `format_trc`.
+
+    Raises:
+        DatasetError: a marker's name cannot be written (tab, line break or empty).
+    """
+    for marker in names:
+        if (
+            not marker
+            or marker != marker.strip()
+            or len(marker.splitlines()) != 1
+            or "\t" in marker
+        ):
+            raise DatasetError(f"marker name {marker!r} cannot be written to a marker file")
+    count, rate = len(names), f"{fps:.10g}"
+    # File names may hold what a header line in UTF-8 cannot: tabs, line breaks, undecoded bytes.
+    title = " ".join(name.encode("utf-8", "replace").decode("utf-8").split())
+    return [
+        f"PathFileType\t4\t(X/Y/Z)\t{title}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame"
+        "\tOrigNumFrames",
+        f"{rate}\t{rate}\t{rows}\t{count}\tm\t{rate}\t1\t{rows}",
+        "Frame#\tTime\t" + "".join(f"{marker}\t\t\t" for marker in names),
+        "\t\t" + "".join(f"X{i}\tY{i}\tZ{i}\t" for i in range(1, count + 1)),
+    ]
+
+
+def format_row(index: int, stamp_ns: int, positions_m: FloatArray) -> str:
+    """One data line of a `.trc`, without its line break.
+
+    Args:
+        index: Frame#, from 1.
+        stamp_ns: time of the row.
+        positions_m: (m, 3) markers in the world frame (Z up); NaN = missing, written as blanks.
+    """
+    cells = [cell for point in positions_m for cell in _cells(point)]
+    line = "\t".join([str(index), _seconds(stamp_ns), *cells])
+    # OpenSim does not count an empty last cell unless a tab ends it.
+    return line if cells and cells[-1] else line + "\t"
 
 
 def _seconds(stamp_ns: int) -> str:
@@ -97,12 +130,12 @@ def _seconds(stamp_ns: int) -> str:
     return f"{sign}{abs(stamp_ns) // 10**9}.{abs(stamp_ns) % 10**9:09d}"
 
 
-def _cells(point: FloatArray) -> str:
+def _cells(point: FloatArray) -> tuple[str, ...]:
     if not np.isfinite(point).all():
-        return "\t\t"
+        return "", "", ""
     x, y, z = point
     # + 0.0 after rounding: no "-0.000000".
-    return "\t".join(f"{round(float(value), 6) + 0.0:.6f}" for value in (y, z, x))
+    return tuple(f"{round(float(value), 6) + 0.0:.6f}" for value in (y, z, x))
 
 
 def _units(path: Path, keys: str, values: str) -> str:

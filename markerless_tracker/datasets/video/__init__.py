@@ -1,4 +1,4 @@
 """Images of one camera or of several, from video files or numbered images.
 
-Decoding side by side, frame rates and stamps.
+Parallel decoding, frame rates and stamps.
 """

@@ -1,4 +1,4 @@
-"""Several cameras' images side by side, one thread and a short queue per camera."""
+"""Decoding the images of several cameras in parallel, with a short queue per camera."""
 
 from collections import deque
 from collections.abc import Iterator, Mapping
@@ -9,7 +9,7 @@ from markerless_tracker.datasets.video.images import ImageStream
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging import Image, scale_image
 
-# Images decoded ahead per camera; more only costs memory (6 MB each at 1080p).
+# Images decoded in advance per camera; each takes 6 MB at 1080p.
 PREFETCH = 3
 
 
@@ -22,8 +22,8 @@ def read_together(
 ) -> Iterator[tuple[int, dict[str, Image | None]]]:
     """Yield (index, camera -> image scaled to its size) for index = start, start + every, ...
 
-    The last item yielded is the first in which any camera has no image left (None). Decoding runs
-    ahead in threads, which end with the iterator; the streams are closed then, too.
+    The last item yielded is the first in which a camera has no image left (None). Threads decode in
+    advance; they end with the iterator, which also closes the streams.
 
     Raises:
         ImageError: an image's size differs from the first of its stream.
@@ -34,7 +34,7 @@ def read_together(
         workers = {}
         for name, stream in streams.items():
             cleanup.callback(stream.close)
-            # One worker per camera keeps its reads in order.
+            # A single worker per camera keeps its reads in order.
             worker = workers[name] = ThreadPoolExecutor(1, thread_name_prefix=f"decode-{name}")
             cleanup.callback(worker.shutdown, wait=True, cancel_futures=True)
             pending[name].append(worker.submit(_next, stream, sizes_px[name], start))

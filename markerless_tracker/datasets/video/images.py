@@ -20,14 +20,15 @@ class ImageStream(ABC):
     Attributes:
         path: the file or folder.
         size_px: (width, height) of its images.
-        fps: rate in 1/s, None if the source does not say.
-        frame_count: how many images it claims to hold.
+        fps: rate in 1/s, None if the source states none.
+        frame_count: number of images as stated by the source, None if it states none (streamed
+            files).
     """
 
     path: Path
     size_px: tuple[int, int]
     fps: float | None
-    frame_count: int
+    frame_count: int | None
 
     @abstractmethod
     def read(self) -> Image | None:
@@ -62,7 +63,9 @@ class VideoStream(ImageStream):
         self.size_px = (int(first.shape[1]), int(first.shape[0]))
         rate = float(self._capture.get(cv2.CAP_PROP_FPS))
         self.fps = tidy_fps(rate) if 0.0 < rate < 1e5 else None
-        self.frame_count = max(1, int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+        # OpenCV gives 0, a negative number or NaN where the container holds no duration.
+        count = float(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        self.frame_count = int(count) if 1.0 <= count < 2**62 else None
 
     def read(self) -> Image | None:
         """The next image (h, w, 3) BGR, None at the end."""
@@ -153,7 +156,7 @@ def open_stream(path: Path, *, input_fps: float | None = None) -> ImageStream:
 
     Args:
         path: file or folder.
-        input_fps: rate of numbered images, 1/s; a video's own rate gives way to it.
+        input_fps: rate of numbered images, 1/s; overrides the rate of a video.
     """
     if path.is_dir():
         return NumberedImages(path, input_fps)

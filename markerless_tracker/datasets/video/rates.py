@@ -1,4 +1,4 @@
-"""Rates and stamps: which rate is meant, when a frame was taken, which frames to keep."""
+"""Frame rates: nominal rates, stamps of frames, subsampling."""
 
 from markerless_tracker.errors import ConfigError
 
@@ -9,11 +9,11 @@ def stamp_of(index: int, fps: float) -> int:
 
 
 def tidy_fps(fps: float) -> float:
-    """The rate (1/s) meant by a measured or stored one.
+    """The nominal rate (1/s) of a measured or stored one.
 
-    Within 1e-4 of a whole number it is that, or of a whole number * 1000/1001 (29.97 and its kin)
-    that; otherwise it is rounded to 1/1000, so that a rate measured from stamps in ns and the
-    container's own are the same float.
+    Rates within 1e-4 of a whole number become that number, those within 1e-4 of a whole number
+    * 1000/1001 (such as 29.97) become that product; others are rounded to 1/1000. A rate measured
+    from stamps in ns and the container's own are then the same float.
     """
     for whole in (float(round(fps)), round(fps * 1.001) * 1000.0 / 1001.0):
         if whole > 0.0 and abs(fps - whole) < 1e-4 * whole:
@@ -25,7 +25,7 @@ def every_for_fps(source_fps: float, fps: float | None) -> int:
     """k such that every k-th frame of a source gives `fps`; 1 for None.
 
     Raises:
-        ConfigError: no k does; names the nearest rates that exist.
+        ConfigError: no k gives it; names the nearest rates that one gives.
     """
     if fps is None:
         return 1

@@ -1,4 +1,4 @@
-"""The demo end to end, short and on a made-up person: real processes, real middleware."""
+"""The demo end to end, short and on a synthetic person: real processes, real middleware."""
 
 import re
 import sys
@@ -18,7 +18,7 @@ def no_index(folder: Path) -> Path:
     raise DatasetError("pose2sim==0.10.49 cannot be downloaded: no network")
 
 
-def test_without_the_recording_a_made_up_person_is_tracked(
+def test_without_the_recording_a_synthetic_person_is_tracked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(scene, "fetch_recording", no_index)
@@ -27,7 +27,7 @@ def test_without_the_recording_a_made_up_person_is_tracked(
     monkeypatch.setattr(demo, "_TRIES", 1)
     assert demo.main(["--folder", str(tmp_path)]) == 0, capsys.readouterr().err
     out = capsys.readouterr().out
-    assert "cannot be downloaded: no network\nThe demo runs on a made-up person" in out
+    assert "cannot be downloaded: no network\nThe demo uses a synthetic person" in out
     overlaps = re.findall(r"cam\d\d (\d\.\d+)", out)
     assert len(overlaps) == 4
     assert min(map(float, overlaps)) > 0.8

@@ -53,7 +53,7 @@ def test_only_the_recording_is_unpacked(trusted: Path, tmp_path: Path) -> None:
     assert not list(tmp_path.parent.rglob("escaped.mp4"))
 
 
-def test_the_second_time_nothing_is_fetched(
+def test_nothing_is_downloaded_twice(
     trusted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     project = fetch.fetch_recording(tmp_path)

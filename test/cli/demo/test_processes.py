@@ -1,4 +1,4 @@
-"""Nodes as processes: parameters arrive as given, failures are told, nothing is left running."""
+"""Nodes as processes: parameters arrive as given, failures are summary, nothing is left running."""
 
 from pathlib import Path
 
@@ -53,7 +53,7 @@ def test_its_warnings_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         assert node.warnings() == ["lens[1]: late"]
 
 
-def test_it_is_asked_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_ends_on_sigint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module = write_module(
         tmp_path,
         monkeypatch,
@@ -73,7 +73,9 @@ def test_it_is_asked_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert node.stop() == 0
 
 
-def test_it_is_made_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_ignores_sigint_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     module = write_module(
         tmp_path,
         monkeypatch,

@@ -61,7 +61,7 @@ def test_unknown_encodings_are_named() -> None:
     st.integers(-2, 80),
     st.integers(0, 400),
 )
-def test_contradicting_sizes_are_refused_or_decoded_whole(encoding, width, height, step, size):
+def test_contradicting_sizes_are_refused_or_decoded_completely(encoding, width, height, step, size):
     try:
         image = decode_raw(
             bytes(size), encoding=encoding, width=width, height=height, step=step, where="cam01"

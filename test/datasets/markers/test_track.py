@@ -13,7 +13,7 @@ def track(names=("LHip", "RHip"), stamps=(0, 10)) -> MarkerTrack:
 
 
 @pytest.mark.parametrize(
-    ("names", "stamps", "shape", "said"),
+    ("names", "stamps", "shape", "reported"),
     [
         (("A",), [0, 1], (1, 1, 3), "shape"),
         (("A", "B"), [0], (1, 1, 3), "shape"),
@@ -21,8 +21,8 @@ def track(names=("LHip", "RHip"), stamps=(0, 10)) -> MarkerTrack:
         (("A",), [1, 1], (2, 1, 3), "increase"),
     ],
 )
-def test_contradictions_are_refused(names, stamps, shape, said) -> None:
-    with pytest.raises(DatasetError, match=said):
+def test_contradictions_are_refused(names, stamps, shape, reported) -> None:
+    with pytest.raises(DatasetError, match=reported):
         MarkerTrack(names, np.array(stamps), np.zeros(shape))
 
 

@@ -55,7 +55,7 @@ def test_a_blank_row_is_kept(tmp_path: Path, row: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "reported"),
     [
         ("", "line 1"),
         ("hello\n" + HEADER, "line 1"),
@@ -70,13 +70,13 @@ def test_a_blank_row_is_kept(tmp_path: Path, row: str) -> None:
         (HEADER + "1\tsoon\t1\t2\t3\t4\t5\t6\n", "line 6.*Time"),
         (HEADER + "1\tinf\t1\t2\t3\t4\t5\t6\n", "line 6.*Time"),
         (HEADER + "1\t1e99\t1\t2\t3\t4\t5\t6\n", "line 6.*Time"),
-        (HEADER + "1\t1\t\n2\t0.5\t\n", "line 7.*does not come after"),
-        (HEADER + "1\t1\t\n2\t1\t\n", "line 7.*does not come after"),
+        (HEADER + "1\t1\t\n2\t0.5\t\n", "line 7.*is not later than"),
+        (HEADER + "1\t1\t\n2\t1\t\n", "line 7.*is not later than"),
     ],
 )
-def test_malformed_files_are_refused_by_line(tmp_path: Path, text: str, said: str) -> None:
+def test_malformed_files_are_refused_by_line(tmp_path: Path, text: str, reported: str) -> None:
     path = saved(tmp_path, text)
-    with pytest.raises(DatasetError, match=said) as error:
+    with pytest.raises(DatasetError, match=reported) as error:
         read_trc(path)
     assert str(path) in str(error.value) and "\n" not in str(error.value)
 
@@ -92,24 +92,50 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
 def test_the_header_and_the_blanks_of_a_written_file() -> None:
     positions = np.array([[[1.0, 2.0, 3.0], [np.nan] * 3], [[-1e-9, 0.5, 0.0], [4.0, 5.0, 6.0]]])
     track = MarkerTrack(("LHip", "RHip"), np.array([0, 33366667]), positions)
-    lines = format_trc(track, 30000 / 1001).splitlines()
+    lines = format_trc(track, 30000 / 1001, "walk.trc").splitlines()
     assert lines[2].split("\t") == ["29.97002997"] * 2 + ["2", "2", "m", "29.97002997", "1", "2"]
     assert lines[3].split("\t")[2::3] == ["LHip", "RHip", ""]
-    assert lines[5] == "1\t0.000000000\t2.000000\t3.000000\t1.000000\t\t\t"
+    assert lines[5] == "1\t0.000000000\t2.000000\t3.000000\t1.000000\t\t\t\t"
     assert lines[6].startswith("2\t0.033366667\t0.500000\t0.000000\t0.000000\t5.000000")
 
 
-def test_the_content_does_not_depend_on_the_path(tmp_path: Path) -> None:
+def test_line_1_names_the_file_and_nothing_depends_on_its_folder(tmp_path: Path) -> None:
     track = MarkerTrack(("A",), np.array([5]), np.ones((1, 1, 3)))
-    write_trc(tmp_path / "a.trc", track, 60.0)
-    write_trc(tmp_path / "b.trc", track, 60.0)
-    assert (tmp_path / "a.trc").read_bytes() == (tmp_path / "b.trc").read_bytes()
+    (tmp_path / "folder").mkdir()
+    for path in (tmp_path / "a.trc", tmp_path / "folder" / "a.trc", tmp_path / "b.trc"):
+        write_trc(path, track, 60.0)
+    first = (tmp_path / "a.trc").read_bytes()
+    assert first.split(b"\n")[0] == b"PathFileType\t4\t(X/Y/Z)\ta.trc"
+    assert (tmp_path / "folder" / "a.trc").read_bytes() == first
+    assert (tmp_path / "b.trc").read_bytes() == first.replace(b"a.trc", b"b.trc")
+
+
+@pytest.mark.parametrize("name", ["a\tb.trc", "a\nb.trc", "\udcff.trc", "a\u2028b.trc", ""])
+def test_a_file_name_cannot_break_the_header(name: str) -> None:
+    text = format_trc(MarkerTrack(("A",), np.array([0]), np.ones((1, 1, 3))), 60.0, name)
+    assert len(text.encode("utf-8").decode("utf-8").splitlines()) == 6
+    assert text.splitlines()[0].count("\t") == 3
+
+
+def opensim_cells(line: str) -> list[str]:
+    """The cells that OpenSim's TRC reader sees: an empty last one counts only if a tab ends it."""
+    cells = line.split("\t")
+    return cells if cells[-1] else cells[:-1]
+
+
+@pytest.mark.parametrize("missing", [[], [0], [2], [0, 1, 2]])
+def test_opensim_counts_every_cell_of_a_row_with_missing_markers(missing: list[int]) -> None:
+    positions = np.ones((2, 3, 3))
+    positions[1, missing] = np.nan
+    track = MarkerTrack(("A", "B", "C"), np.array([0, 5]), positions)
+    rows = format_trc(track, 60.0, "a.trc").splitlines()[5:]
+    assert [len(opensim_cells(row)) for row in rows] == [2 + 3 * 3] * 2
 
 
 @pytest.mark.parametrize("name", ["", "a\tb", "a\nb", " a"])
 def test_names_that_would_break_the_file_are_refused(name: str) -> None:
     with pytest.raises(DatasetError, match="name"):
-        format_trc(MarkerTrack((name,), np.array([0]), np.zeros((1, 1, 3))), 60.0)
+        format_trc(MarkerTrack((name,), np.array([0]), np.zeros((1, 1, 3))), 60.0, "a.trc")
 
 
 names = st.lists(
@@ -134,14 +160,15 @@ def test_round_trip(tmp_path_factory, names, stamps, data) -> None:
     assert read.names == track.names
     assert read.stamps_ns.tolist() == stamps
     np.testing.assert_allclose(read.positions_m, track.positions_m, atol=5.1e-7)
-    again = path.with_name("again.trc")
+    again = path.with_name("again") / path.name
+    again.parent.mkdir()
     write_trc(again, read, 59.94)
     assert again.read_bytes() == path.read_bytes()
 
 
 @settings(max_examples=100)
 @given(st.text(max_size=200))
-def test_hostile_text_never_escapes_as_another_error(tmp_path_factory, tail: str) -> None:
+def test_arbitrary_text_raises_only_our_errors(tmp_path_factory, tail: str) -> None:
     path = saved(tmp_path_factory.mktemp("hostile"), HEADER + tail)
     try:
         read_trc(path)

@@ -21,7 +21,7 @@ from markerless_tracker.errors import ConfigError
         (0.5, 0.5),
     ],
 )
-def test_the_rate_that_is_meant(stored: float, meant: float) -> None:
+def test_nominal_rates(stored: float, meant: float) -> None:
     assert tidy_fps(stored) == meant
 
 
@@ -42,7 +42,7 @@ def test_every_kth_frame(wanted: float | None, every: int) -> None:
     assert every_for_fps(60.0, wanted) == every
 
 
-def test_rates_that_do_not_exist_name_those_that_do() -> None:
+def test_impossible_rates_name_the_nearest_possible() -> None:
     with pytest.raises(ConfigError, match="20 or 30|30 or 20"):
         every_for_fps(60.0, 25.0)
     for impossible in (0.0, -1.0, 120.0, float("nan")):

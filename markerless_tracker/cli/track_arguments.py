@@ -1,0 +1,120 @@
+"""Arguments of the verb `track`."""
+
+import argparse
+from pathlib import Path
+
+from markerless_tracker.tracking import OPTIMIZERS, PRESETS
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments, in groups."""
+    parser.add_argument(
+        "source", metavar="SOURCE", type=Path, help="recording folder, Pose2Sim project or bag"
+    )
+    parser.add_argument(
+        "-o",
+        dest="name",
+        type=Path,
+        required=True,
+        metavar="NAME",
+        help="path of the result files, without suffix",
+    )
+    parser.add_argument("--json", action="store_true", help="print a summary as JSON")
+    _person(parser.add_argument_group("the person (all optional)"))
+    _images(parser.add_argument_group("images"))
+    _search(parser.add_argument_group("search"))
+    _files(parser.add_argument_group("further files"))
+
+
+def _person(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--start",
+        type=Path,
+        metavar="TRC|YAML",
+        help="start pose: first row of a marker file, or named parameters (default: search)",
+    )
+    group.add_argument(
+        "--stature", type=float, metavar="M", help="body height in metres; scales the generic body"
+    )
+    group.add_argument(
+        "--subject",
+        type=Path,
+        metavar="FILE",
+        help="sizes of the person, such as NAME.subject.yaml of an earlier run",
+    )
+    group.add_argument(
+        "--subject-from",
+        type=Path,
+        metavar="TRC",
+        help="measure segment lengths on the first row of a marker file",
+    )
+
+
+def _images(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--fps",
+        type=float,
+        metavar="N",
+        help="track every k-th frame from the start frame on, to get this rate (default: all)",
+    )
+    group.add_argument(
+        "--scale",
+        type=float,
+        default=1.0,
+        metavar="S",
+        help="scale factor of the images, at most 1 (default 1)",
+    )
+    group.add_argument(
+        "--background",
+        type=Path,
+        metavar="DIR",
+        help="empty-scene images or learned backgrounds (.npz), one per camera",
+    )
+
+
+def _search(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--preset",
+        choices=tuple(PRESETS),
+        help="tuned (default: measures best) or paper (every setting as published)",
+    )
+    group.add_argument(
+        "--optimizer",
+        metavar="NAME",
+        help=f"search algorithm: {', '.join(OPTIMIZERS)} (default sppso)",
+    )
+    group.add_argument(
+        "--body", metavar="NAME|FILE", help="body model: balan31, person31, ... or a YAML file"
+    )
+    group.add_argument(
+        "--evaluations",
+        type=int,
+        metavar="N",
+        help="fitness evaluations per frame (default: depends on the optimizer)",
+    )
+    group.add_argument("--seed", type=int, metavar="N", help="seed of all random draws")
+    group.add_argument(
+        "--threads", type=int, metavar="N", help="number of threads; 0 (default): one per core"
+    )
+    group.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="settings as YAML; the options above take precedence",
+    )
+
+
+def _files(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--debug-images",
+        type=Path,
+        metavar="DIR",
+        help="write an image per frame and camera: input, background, foreground and shadow, "
+        "silhouette, edges, body",
+    )
+    group.add_argument(
+        "--refine-calibration",
+        type=Path,
+        metavar="OUT.toml",
+        help="write the calibration with the pose of disagreeing cameras corrected",
+    )

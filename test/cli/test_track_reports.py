@@ -1,0 +1,115 @@
+"""What `track` reports: warnings of frames, nobody found, and how often it reads a bag."""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import yaml
+
+from markerless_tracker.bags import write_bag
+from markerless_tracker.cli import track
+from markerless_tracker.cli.main import main
+from markerless_tracker.datasets import new_recording, open_recording, read_trc
+from markerless_tracker.datasets.bag.stream import McapFiles, RawMessage
+from markerless_tracker.results.run import TrackedFrame, track_recording
+from markerless_tracker.synthesis import SyntheticScene
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(search, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
+    """`run(source, *words)`: status, standard output, standard error; writes `out.*`."""
+    config = tmp_path / "settings.yaml"
+    quick = {**search, "evaluations": 200, "refinement": "none", "fit_shape": False}
+    config.write_text(yaml.safe_dump(quick), encoding="utf-8")
+
+    def call(source: Path, *words: object) -> tuple[int, str, str]:
+        given = ["track", source, "-o", tmp_path / "out", "--config", config, *words]
+        return main([str(word) for word in given]), *capsys.readouterr()
+
+    return call
+
+
+@pytest.fixture
+def warned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every frame from the third on has two warnings, one of which holds a number."""
+
+    def frames(*args, **kwargs) -> Iterator[TrackedFrame]:
+        for tracked in track_recording(*args, **kwargs):
+            number = tracked.images.index
+            texts = (f"cam02: {number} px left out", "turned round") if number > 1 else ()
+            yield replace(tracked, result=replace(tracked.result, warnings=texts))
+
+    monkeypatch.setattr(track, "track_recording", frames)
+
+
+def test_each_kind_of_warning_is_printed_once_with_its_first_frame(run: Run, warned, walk) -> None:
+    status, out, err = run(walk, "--start", walk / "ground_truth.trc")
+    assert status == 0 and "warning: " not in out
+    assert [line for line in err.splitlines() if line.startswith("warning: ")] == [
+        "warning: frame 2: cam02: 2 px left out",
+        "warning: frame 2: turned round",
+        "warning: 4 of 6 frames have warnings, 2 kinds of them",
+    ]
+
+
+def test_json_has_the_warnings_of_frames(run: Run, warned, walk) -> None:
+    _, out, _ = run(walk, "--start", walk / "ground_truth.trc", "--json")
+    assert json.loads(out)["frame_warnings"] == [
+        {"text": "cam02: 2 px left out", "first_frame": 2, "frames": 4},
+        {"text": "turned round", "first_frame": 2, "frames": 4},
+    ]
+
+
+@pytest.fixture
+def empty_room(tmp_path: Path) -> Path:
+    """Five frames of the synthetic room without a person."""
+    scene = SyntheticScene(
+        body="balan31", motion="walk", size_px=(192, 144), fps=30.0, seed=4, noise=2.0
+    )
+    images = scene.backgrounds(10)
+    with new_recording(tmp_path / "room", scene.rig, scene.fps, lossless=True) as recording:
+        for name in scene.rig.names:
+            recording.write_background(name, images[name][:5])
+        for index in range(5, 10):
+            recording.write({name: images[name][index] for name in scene.rig.names})
+    return tmp_path / "room"
+
+
+@pytest.mark.parametrize("json_flag", [(), ("--json",)])
+def test_nobody_found_is_no_success(run: Run, empty_room, tmp_path, json_flag) -> None:
+    status, out, err = run(empty_room, *json_flag)
+    assert status == 3
+    assert "nobody was found in 5 of 5 frames; no subject file was written" in err
+    if json_flag:
+        assert json.loads(out)["tracked"] == 0
+    else:
+        assert "out.trc: 5 frames, 0 tracked, 0 lost" in out
+    assert not (tmp_path / "out.subject.yaml").exists()
+    assert not read_trc(tmp_path / "out.trc").tracked.any()
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_a_bag_is_read_as_often_for_few_frames_as_for_many(
+    run: Run, walk, tmp_path, monkeypatch: pytest.MonkeyPatch, every: int
+) -> None:
+    write_bag(open_recording(walk), tmp_path / "bag")
+    passes = []
+    originals = {name: getattr(McapFiles, name) for name in ("messages", "heads")}
+
+    def counted(name: str) -> Callable[..., Iterator[RawMessage]]:
+        def read(self: McapFiles, *args) -> Iterator[RawMessage]:
+            passes.append(name)
+            return originals[name](self, *args)
+
+        return read
+
+    for name in originals:
+        monkeypatch.setattr(McapFiles, name, counted(name))
+    words = ("--start", walk / "ground_truth.trc", "--fps", 30 // every)
+    assert run(tmp_path / "bag", *words)[0] == 0
+    # Once to open, once each for the start and the number of frames, and once to track.
+    assert passes == ["heads", "heads", "heads", "messages"]
