@@ -123,15 +123,24 @@ class Observation:
             words = words | self.undecided_words
         return unpack_mask(words, self.width)
 
-    def full_frame(self, region: NDArray[Any]) -> NDArray[Any]:
-        """An array (h, w) of the region in the full frame (height, width), 0 outside."""
+    def in_full_frame(self, part: NDArray[Any]) -> NDArray[Any]:
+        """An array (h, w) of the region as one of the full frame, 0 outside the region.
+
+        The very same if the region is the full frame.
+        """
         width, height = self.size_px
-        if region.shape == (height, width):
-            return region
-        frame = np.zeros((height, width), dtype=region.dtype)
+        if part.shape == (height, width):
+            return part
         u, v = self.offset_px
-        frame[v : v + self.height, u : u + self.width] = region
+        frame = np.zeros((height, width), dtype=part.dtype)
+        frame[v : v + self.height, u : u + self.width] = part
         return frame
+
+    def words_in_full_frame(self, words: MaskWords) -> MaskWords:
+        """As `in_full_frame`, of a packed mask of the region."""
+        if self.edges.shape == self.size_px[::-1]:
+            return words
+        return pack_mask(self.in_full_frame(unpack_mask(words, self.width)))
 
     @classmethod
     def from_mask(
@@ -161,66 +170,127 @@ class Observation:
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
-    """One search over some parameters of a pose of p parameters, for a body of c cones.
+class Comparison:
+    """What a search compares with the evidence: for a pose of p parameters and a body of c cones.
 
     Attributes:
-        name: distinct within a frame; keys the random draws.
-        algorithm: registered name of the optimiser, or 'contour' for contour refinement.
         active: (d,) indices of the parameters that vary.
-        centre: (p,) pose the search starts from; the others stay at it.
-        sigma: (p,) spread of the search in m or rad; only the active ones are read. For 'contour'
-            the spread of the belief about the centre.
-        particles: particles per iteration; 0 for 'contour'.
-        iterations: iterations, of a swarm the initial sample being the first.
+        centre: (p,) pose that the other parameters stay at.
         silhouette_weight, edge_weight: weights of f_s and f_e.
         silhouette_cones, edge_cones: (c,) cones that each term uses.
-        min_improvement: where stages compete, a result is taken if f rises by more than this.
-        options: the algorithm's own settings by name.
+
+    Raises:
+        SearchError: the centre is no pose, or an active parameter is not one of it.
     """
 
-    name: str
-    algorithm: str
     active: NDArray[np.int64]
     centre: NDArray[np.float64]
-    sigma: NDArray[np.float64]
-    particles: int
-    iterations: int
     silhouette_weight: float
     edge_weight: float
     silhouette_cones: NDArray[np.bool_]
     edge_cones: NDArray[np.bool_]
-    min_improvement: float = 0.0
-    options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, dtype in (
             ("active", np.int64),
             ("centre", np.float64),
-            ("sigma", np.float64),
             ("silhouette_cones", np.bool_),
             ("edge_cones", np.bool_),
         ):
             object.__setattr__(self, name, locked(getattr(self, name), dtype))
-        if self.centre.ndim != 1 or self.sigma.shape != self.centre.shape:
-            raise SearchError(
-                f"stage {self.name}: centre {self.centre.shape} and sigma {self.sigma.shape} "
-                "must be (p,) both"
-            )
+        if self.centre.ndim != 1:
+            raise SearchError(f"comparison: centre is {self.centre.shape}, expected (p,)")
         if self.active.size == 0 or self.active.min() < 0 or self.active.max() >= self.centre.size:
             raise SearchError(
-                f"stage {self.name}: active parameters must be 0..{self.centre.size - 1}"
+                f"comparison: active parameters are {self.active.tolist()}, expected some of "
+                f"0..{self.centre.size - 1}"
             )
+
+    @classmethod
+    def whole(
+        cls,
+        centre: NDArray[np.float64],
+        cones: int,
+        *,
+        silhouette_weight: float = 1.0,
+        edge_weight: float = 0.0,
+    ) -> "Comparison":
+        """All parameters of a pose (p,) vary, and both terms use all cones of the body."""
+        every = np.ones(cones, dtype=np.bool_)
+        active = np.arange(len(centre))
+        return cls(active, centre, silhouette_weight, edge_weight, every, every)
+
+
+@dataclass(frozen=True, eq=False)
+class SearchPlan:
+    """How a search for a pose of p parameters proceeds.
+
+    Attributes:
+        algorithm: registered name of the optimiser, or 'contour' for contour refinement.
+        sigma: (p,) standard deviation of the first sample in m or rad; only the active ones are
+            read. For 'contour' that of the prior about the centre.
+        particles: particles per iteration; 0 for 'contour'.
+        iterations: iterations, of a swarm the initial sample being the first.
+        min_improvement: where stages compete, a result is taken if f rises by more than this.
+        options: the algorithm's own settings by name.
+
+    Raises:
+        SearchError: nothing to spend.
+    """
+
+    algorithm: str
+    sigma: NDArray[np.float64]
+    particles: int
+    iterations: int
+    min_improvement: float = 0.0
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sigma", locked(self.sigma, np.float64))
         if self.particles < (0 if self.algorithm == CONTOUR else 1) or self.iterations < 1:
             raise SearchError(
-                f"stage {self.name}: {self.particles} particles x {self.iterations} iterations, "
+                f"{self.algorithm}: {self.particles} particles x {self.iterations} iterations, "
                 "expected at least 1 of each"
             )
 
     @property
     def evaluations(self) -> int:
-        """Evaluations this stage spends."""
+        """Evaluations that the search spends."""
         return self.particles * self.iterations
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One search of a frame.
+
+    Attributes:
+        name: distinct within a frame; keys the random draws.
+        comparison: what is compared; its centre is where the search starts.
+        plan: how it is searched.
+
+    Raises:
+        SearchError: the two are of poses of another size.
+    """
+
+    name: str
+    comparison: Comparison
+    plan: SearchPlan
+
+    def __post_init__(self) -> None:
+        centre, sigma = self.comparison.centre, self.plan.sigma
+        if sigma.shape != centre.shape:
+            raise SearchError(
+                f"stage {self.name}: centre {centre.shape} and sigma {sigma.shape} "
+                "must be (p,) both"
+            )
+
+    def centred(self, pose: NDArray[np.float64]) -> "Stage":
+        """The same stage from another pose (p,)."""
+        return replace(self, comparison=replace(self.comparison, centre=pose))
+
+    def planned(self, **changes: Any) -> "Stage":
+        """The same stage with attributes of its plan changed."""
+        return replace(self, plan=replace(self.plan, **changes))
 
 
 class TrackState(Enum):

@@ -10,7 +10,9 @@ from hypothesis.extra import numpy as hnp
 
 from markerless_tracker.errors import ImageError, SearchError
 from markerless_tracker.records import (
+    Comparison,
     Observation,
+    SearchPlan,
     Stage,
     TrackResult,
     TrackState,
@@ -85,6 +87,22 @@ def test_observations_give_back_what_they_hold(
     assert seen.stamp_ns == 5 and not seen.edges.flags.writeable
 
 
+@given(masks, st.integers(0, 70), st.integers(0, 9), st.integers(0, 70), st.integers(0, 9))
+def test_a_region_in_the_full_frame(
+    mask: np.ndarray, u: int, v: int, right: int, below: int
+) -> None:
+    height, width = mask.shape
+    edges = np.full(mask.shape, 7, np.uint8)
+    size = (u + width + right, v + height + below)
+    seen = Observation.from_mask("cam01", 5, mask, edges, size_px=size, offset_px=(u, v))
+    frame = seen.in_full_frame(seen.mask)
+    np.testing.assert_array_equal(frame, np.pad(mask, ((v, below), (u, right))))
+    np.testing.assert_array_equal(seen.words_in_full_frame(seen.mask_words), pack_mask(frame))
+    assert seen.in_full_frame(edges).sum() == 7 * mask.size
+    if size == (width, height):
+        assert seen.in_full_frame(edges) is edges
+
+
 def test_the_region_is_the_frame_unless_given() -> None:
     seen = Observation.from_mask("cam01", 0, np.ones((4, 7)), np.zeros((4, 7), np.uint8))
     assert seen.size_px == (7, 4) and seen.offset_px == (0, 0)
@@ -108,37 +126,68 @@ def test_observations_that_contradict_themselves(
 
 # --- stages and results ----------------------------------------------------------------------
 
-GOOD_STAGE = {
-    "name": "one", "algorithm": "sppso", "active": [0, 2], "centre": np.zeros(3),
-    "sigma": np.ones(3), "particles": 10, "iterations": 20, "silhouette_weight": 1.0,
-    "edge_weight": 0.5, "silhouette_cones": [True], "edge_cones": [False],
+COMPARISON = {
+    "active": [0, 2], "centre": np.zeros(3), "silhouette_weight": 1.0, "edge_weight": 0.5,
+    "silhouette_cones": [True], "edge_cones": [False],
 }  # fmt: skip
+PLAN = {"algorithm": "sppso", "sigma": np.ones(3), "particles": 10, "iterations": 20}
 
 
-def test_a_stage_counts_its_evaluations_and_is_frozen() -> None:
-    stage = Stage(**GOOD_STAGE)
-    assert stage.evaluations == 200 and stage.active.dtype == np.int64
-    with pytest.raises(ValueError, match="read-only"):
-        stage.centre[0] = 1.0
+def test_a_stage_is_a_comparison_and_a_plan_both_frozen() -> None:
+    stage = Stage("one", Comparison(**COMPARISON), SearchPlan(**PLAN))
+    assert stage.plan.evaluations == 200 and stage.comparison.active.dtype == np.int64
+    for array in (stage.comparison.centre, stage.plan.sigma):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
     with pytest.raises(dataclasses.FrozenInstanceError):
-        stage.particles = 1  # type: ignore[misc]
+        stage.plan.particles = 1  # type: ignore[misc]
+
+
+def test_stages_change_in_one_part() -> None:
+    stage = Stage("one", Comparison(**COMPARISON), SearchPlan(**PLAN))
+    moved, longer = stage.centred(np.ones(3)), stage.planned(iterations=30, min_improvement=0.1)
+    assert moved.plan is stage.plan and longer.comparison is stage.comparison
+    np.testing.assert_array_equal(moved.comparison.centre, 1.0)
+    assert (longer.plan.iterations, longer.plan.min_improvement) == (30, 0.1)
+    assert (stage.plan.iterations, longer.plan.particles, longer.name) == (20, 10, "one")
+
+
+def test_the_whole_body_is_compared_with_every_cone() -> None:
+    whole = Comparison.whole(np.zeros(3), 2, edge_weight=0.5)
+    assert whole.active.tolist() == [0, 1, 2]
+    assert whole.silhouette_cones.tolist() == whole.edge_cones.tolist() == [True, True]
+    assert (whole.silhouette_weight, whole.edge_weight) == (1.0, 0.5)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"sigma": np.ones(4)}, r"stage one: centre \(3,\) and sigma \(4,\)"),
-        ({"centre": np.zeros((1, 3)), "sigma": np.ones((1, 3))}, "stage one: centre"),
-        ({"active": [0, 3]}, r"stage one: active parameters must be 0\.\.2"),
-        ({"active": [-1]}, "stage one: active"),
-        ({"active": []}, "stage one: active"),
-        ({"particles": 0}, "stage one: 0 particles x 20 iterations, expected at least 1"),
-        ({"iterations": 0}, "stage one: 10 particles x 0 iterations"),
+        ({"centre": np.zeros((1, 3))}, r"comparison: centre is \(1, 3\), expected \(p,\)"),
+        ({"active": [0, 3]}, r"active parameters are \[0, 3\], expected some of 0\.\.2"),
+        ({"active": [-1]}, r"comparison: active parameters are \[-1\]"),
+        ({"active": []}, r"comparison: active parameters are \[\]"),
     ],
 )
-def test_impossible_stages(change: dict[str, object], message: str) -> None:
+def test_impossible_comparisons(change: dict[str, object], message: str) -> None:
     with pytest.raises(SearchError, match=message):
-        Stage(**{**GOOD_STAGE, **change})
+        Comparison(**{**COMPARISON, **change})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"particles": 0}, "sppso: 0 particles x 20 iterations, expected at least 1"),
+        ({"iterations": 0}, "sppso: 10 particles x 0 iterations"),
+    ],
+)
+def test_impossible_plans(change: dict[str, object], message: str) -> None:
+    with pytest.raises(SearchError, match=message):
+        SearchPlan(**{**PLAN, **change})
+
+
+def test_both_parts_of_a_stage_are_of_one_pose() -> None:
+    with pytest.raises(SearchError, match=r"stage one: centre \(3,\) and sigma \(4,\)"):
+        Stage("one", Comparison(**COMPARISON), SearchPlan(**{**PLAN, "sigma": np.ones(4)}))
 
 
 def test_results_are_read_only_and_may_be_empty() -> None:
@@ -155,6 +204,6 @@ def test_a_region_in_its_full_frame() -> None:
     seen = Observation.from_mask("cam01", 0, mask, edges, size_px=(6, 5), offset_px=(2, 3))
     expected = np.zeros((5, 6), np.uint8)
     expected[3:5, 2:5] = mask
-    np.testing.assert_array_equal(seen.full_frame(mask), expected)
+    np.testing.assert_array_equal(seen.in_full_frame(mask), expected)
     whole = Observation.from_mask("cam01", 0, mask, edges)
-    assert whole.full_frame(mask) is mask
+    assert whole.in_full_frame(mask) is mask

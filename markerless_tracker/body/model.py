@@ -23,6 +23,10 @@ LIMB_MARKERS = tuple(name for name in MARKER_NAMES if name not in ("Pelvis", "Ne
 """The 12 limb joints."""
 
 
+FIRST_TRANSLATION = 3
+"""Kinds of nodes from here on are translations, the lower ones rotations."""
+
+
 @dataclass(frozen=True, eq=False)
 class BodyModel:
     """A body of p parameters, m nodes and c cones with one subject's sizes; metres, radians.
@@ -136,6 +140,11 @@ class BodyModel:
     def joints(self) -> IntArray:
         """Indices of the parameters that are joints, in order."""
         return np.setdiff1d(np.arange(self.size), self.root)
+
+    @cached_property
+    def translations(self) -> IntArray:
+        """Indices of the parameters that are translations, in m; the others are angles, in rad."""
+        return np.unique(self.node_parameter[self.node_kind >= FIRST_TRANSLATION])
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from markerless_tracker.errors import BodyModelError, ImageError
 from markerless_tracker.fitness.raster.bits import ALL, count_bits
 from markerless_tracker.fitness.raster.outline_arrays import LANES
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import MaskWords, Observation, pack_mask, unpack_mask
+from markerless_tracker.records import Observation
 
 
 class BodyArrays(NamedTuple):
@@ -111,12 +111,12 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
                 f"{camera.name}: observation of a {_size(observation.size_px)} frame, "
                 f"its calibration says {_size(camera.size_px)}"
             )
-        masks.append(_words(observation, observation.mask_words))
-        edges.append(observation.full_frame(observation.edges))
+        masks.append(observation.words_in_full_frame(observation.mask_words))
+        edges.append(observation.in_full_frame(observation.edges))
         if observation.undecided_words is None:
             known.append(np.full(masks[-1].shape, ALL))
         else:
-            known.append(~_words(observation, observation.undecided_words))
+            known.append(~observation.words_in_full_frame(observation.undecided_words))
     arrays = camera_arrays(seen)._replace(
         mask=np.concatenate([mask.T.ravel() for mask in masks]),
         mask_start=_starts(masks),
@@ -147,14 +147,6 @@ def camera_arrays(cameras: Sequence[CameraModel]) -> ViewArrays:
         observed=none,
         known=words,
     )
-
-
-def _words(observation: Observation, words: MaskWords) -> MaskWords:
-    """Words of the region as words (height, ceil(width / 64)) of the full frame."""
-    width, height = observation.size_px
-    if (observation.width, observation.height) == (width, height):
-        return words
-    return pack_mask(observation.full_frame(unpack_mask(words, observation.width)))
 
 
 def _starts(arrays: Sequence[NDArray[np.generic]]) -> NDArray[np.int64]:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,9 +22,9 @@ from markerless_tracker.fitness.raster import (
 )
 from markerless_tracker.fitness.raster.static_layer import Drawing, split_static
 from markerless_tracker.fitness.terms import OVERLAP, PROJECTED, CostRule, view_terms
-from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
+from markerless_tracker.fitness.threads import parallel, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation, Stage
+from markerless_tracker.records import Comparison, Observation
 
 EDGE_RULES = {"sides": SIDES, "visible": VISIBLE, "outline": OUTLINE}
 EDGE_TERMS = ("ssd", "mean")
@@ -118,9 +117,9 @@ class Fitness:
         """The observations as the kernels read them; see `lay_out_views`."""
         return lay_out_views(self.cameras, observations)
 
-    def prepare(self, views: Views, stage: Stage) -> "Evaluator":
-        """An evaluator of one stage's parameters against the views of one frame."""
-        return Evaluator(self, views, stage)
+    def prepare(self, views: Views, comparison: Comparison) -> "Evaluator":
+        """An evaluator of a comparison's active parameters against the views of one frame."""
+        return Evaluator(self, views, comparison)
 
     def count(
         self,
@@ -174,14 +173,13 @@ class Fitness:
         if not worth_waking(work_s, self.threads):
             evaluate(*args, 0, 1)
         else:
-            with ONE_CALLER:
-                numba.set_num_threads(self.threads)
+            with parallel(self.threads):
                 evaluate_parallel(*args)
         return counts, costs
 
 
 class Evaluator:
-    """Costs of one stage: its weighted silhouette and edge terms, averaged over the views.
+    """Costs of one comparison: its weighted silhouette and edge terms, averaged over the views.
 
     'overlap': sum of the weights - f, hence 2 - f with both weights one. H-MCPSO's costs (Saini et
     al., 2015, Eq 9) always have the squared edge term, mean (1 - M)² (Eq 10). 'one_sided' adds
@@ -190,31 +188,31 @@ class Evaluator:
     prints no formula; this reading [R] is 1 - f_s, so that with the squared term it equals
     'overlap'.
 
-    Called with points (n, d) of the stage's active parameters, returns costs (n,); NaN for points
-    that are not finite. Cones that the stage does not move are drawn when the evaluator is made.
+    Called with points (n, d) of the active parameters, returns costs (n,); NaN for points that are
+    not finite. Cones that these do not move are drawn when the evaluator is made.
     """
 
-    def __init__(self, fitness: Fitness, views: Views, stage: Stage) -> None:
+    def __init__(self, fitness: Fitness, views: Views, comparison: Comparison) -> None:
         self._fitness = fitness
         self._views = views
-        self._stage = stage
+        self._comparison = comparison
         self._cost = CostRule(
-            float(stage.silhouette_weight),
-            float(stage.edge_weight),
+            float(comparison.silhouette_weight),
+            float(comparison.edge_weight),
             fitness._rule.squared,
             fitness.cost == "one_sided",
         )
         self._drawing = split_static(
-            fitness.body, fitness._arrays, views.arrays, stage.active, stage.centre,
+            fitness.body, fitness._arrays, views.arrays, comparison.active, comparison.centre,
             # A term without weight is not computed.
-            stage.silhouette_cones, stage.edge_cones & (stage.edge_weight != 0.0),
+            comparison.silhouette_cones, comparison.edge_cones & (comparison.edge_weight != 0.0),
             fitness._rule, self._cost, fitness._scratch, fitness._outlines,
         )  # fmt: skip
 
     def poses(self, points: FloatArray) -> FloatArray:
-        """Full poses (n, p) of points (n, d): the other parameters stay at the stage's centre."""
-        poses = np.tile(self._stage.centre, (len(points), 1))
-        poses[:, self._stage.active] = points
+        """Full poses (n, p) of points (n, d): the other parameters stay at its centre."""
+        poses = np.tile(self._comparison.centre, (len(points), 1))
+        poses[:, self._comparison.active] = points
         return poses
 
     def __call__(self, points: FloatArray, cutoff_costs: FloatArray | None = None) -> FloatArray:
@@ -225,9 +223,9 @@ class Evaluator:
             cutoff_costs: (n,) cutoff per point: an evaluation may stop once its cost exceeds it,
                 and then returns a lower bound of the cost that is at least the cutoff.
         """
-        stage = self._stage
+        comparison = self._comparison
         cutoff_costs = np.full(len(points), np.inf) if cutoff_costs is None else cutoff_costs
         return self._fitness._run(
-            self._views, self._drawing, np.ascontiguousarray(points), stage.active, stage.centre,
-            cutoff_costs, self._cost,
+            self._views, self._drawing, np.ascontiguousarray(points), comparison.active,
+            comparison.centre, cutoff_costs, self._cost,
         )[1]  # fmt: skip

@@ -2,6 +2,8 @@
 
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 
 import numba
@@ -10,11 +12,9 @@ from numba import prange
 
 from markerless_tracker.compiled import compiled
 
-# The only threading layer without a further library. It allows one caller at a time.
-numba.config.THREADING_LAYER = "workqueue"
-ONE_CALLER = threading.Lock()
-"""Held while a parallel kernel runs."""
-
+_LAYER = "workqueue"
+"""The only threading layer without a library to install. It takes one caller at a time."""
+_ONE_CALLER = threading.Lock()
 _LAUNCHES = 30
 _MARGIN = 3.0
 """Factor for a busy interpreter: threads wake slower than during the measurement."""
@@ -23,6 +23,28 @@ _MARGIN = 3.0
 def usable_threads(wanted: int) -> int:
     """At least one thread, at most as many as numba started with."""
     return max(1, min(wanted, int(numba.config.NUMBA_NUM_THREADS)))
+
+
+@contextmanager
+def parallel(threads: int) -> Iterator[None]:
+    """Run a parallel kernel in this block: one caller at a time, with some threads.
+
+    The first block chooses numba's threading layer, which holds for the whole process, unless the
+    process has chosen or started one.
+    """
+    with _ONE_CALLER:
+        if numba.config.THREADING_LAYER == "default" and not _layer_started():
+            numba.config.THREADING_LAYER = _LAYER
+        numba.set_num_threads(threads)
+        yield
+
+
+def _layer_started() -> bool:
+    try:
+        numba.threading_layer()
+    except ValueError:
+        return False
+    return True
 
 
 def worth_waking(work_s: float, threads: int) -> bool:
@@ -39,8 +61,7 @@ def launch_cost_s(threads: int) -> float:
     """Time to wake that many threads on this machine; measured once."""
     ticks = np.zeros(threads)
     costs = []
-    with ONE_CALLER:
-        numba.set_num_threads(threads)
+    with parallel(threads):
         _nothing(ticks)
         for _ in range(_LAUNCHES):
             # Workers sleep between the swarm's steps.

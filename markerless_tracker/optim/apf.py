@@ -35,7 +35,7 @@ def diffused(
 
 
 def layer_sigma(sigma: FloatArray, layer: int, layers: int, shrink: float) -> FloatArray:
-    """Spread (d,) of the noise of layer m = layers .. 1: of variance shrink^(layers - m) sigma²."""
+    """Sigma (d,) of the noise of layer m = layers .. 1: of variance shrink^(layers - m) sigma²."""
     return np.asarray(sigma * shrink ** (0.5 * (layers - layer)))
 
 
@@ -44,7 +44,7 @@ class Apf(Optimizer):
 
     Args:
         problem: the search.
-        survival: share of the particles that survives a layer.
+        survival: fraction of the particles that survives a layer.
         shrink: α, factor of the noise's variance from layer to layer.
         estimate: 'mean': weighted mean of the last layer, unless that breaks a constraint; 'best':
             the best point.

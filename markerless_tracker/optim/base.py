@@ -15,14 +15,14 @@ Evaluate = Callable[..., FloatArray]
 
 
 class Optimizer(ABC):
-    """Minimises by turns of `ask` and `tell`.
+    """Minimises by alternating `ask` and `tell`.
 
     A subclass writes `_ask` (the points to evaluate next, (n, d)) and `_tell` (what it makes of
     their costs). This class counts evaluations, turns non-finite costs into infinity and counts
     them, lets no point that is marked infeasible win, and keeps the best.
 
     Attributes:
-        problem: bounds, centre, spread, feasibility, random source and budget.
+        problem: bounds, centre, sigma, feasibility, random source and budget.
         best_x: (d,) best point so far; the centre until one is found.
         best_cost: its cost; infinite until one is found.
         evaluations: points evaluated so far.

@@ -1,4 +1,4 @@
-"""Random draws keyed by what they are for, so that nothing shifts anybody else's stream."""
+"""Random draws keyed by what they are for, independent of all other draws."""
 
 import zlib
 

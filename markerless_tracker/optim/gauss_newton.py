@@ -1,6 +1,6 @@
-"""Levenberg-Marquardt with Gaussian priors, bounds, and a truncation that shrinks.
+"""Damped Gauss-Newton with Gaussian priors, bounds, and a truncation that shrinks.
 
-For robust least squares whose normal equations somebody else sums: contour refinement.
+For robust least squares whose normal equations the caller sums: contour refinement.
 """
 
 from collections.abc import Callable
@@ -20,11 +20,11 @@ _ACTIVE_SETS = 10
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """A Gaussian belief about each parameter.
+    """A Gaussian prior of each parameter.
 
     Attributes:
         mean: (p,).
-        precision: (p,) 1 / variance; 0 = no belief.
+        precision: (p,) 1 / variance; 0 = no prior.
     """
 
     mean: FloatArray

@@ -3,7 +3,7 @@
 Isard and Blake: "Condensation: conditional density propagation for visual tracking", IJCV 1998:
 resample the last frame's particles by weight, diffuse by N(0, Σ), weigh, normalise; the estimate is
 the weighted mean. That is one layer of the annealed particle filter, with a fixed likelihood
-p ∝ exp(-sharpness · cost): costs of poses a spread apart differ by a few hundredths only, so the
+p ∝ exp(-sharpness · cost): costs of poses one sigma apart differ by a few hundredths only, so the
 plain exp(-cost) would hardly prefer any. The sharpness is ours: no source gives one for this cost.
 """
 

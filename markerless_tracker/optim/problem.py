@@ -1,4 +1,4 @@
-"""What an optimiser is told: where to search, how far, with which budget and random source."""
+"""A search problem: bounds, first sample, budget, constraints and random source."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Problem:
     Attributes:
         bounds: (2, d) lower and upper bounds, infinite where free.
         centre: (d,) where the search starts.
-        sigma: (d,) spread of the first sample; velocities stay below twice it.
+        sigma: (d,) standard deviation of the first sample; velocities stay below twice it.
         particles, iterations: the budget is their product, the first sample being an iteration.
         feasible: constraints, bounds included.
         rng: the source of all random draws.

@@ -107,7 +107,7 @@ class Pso(Optimizer):
     @property
     def particle_sd_ratio(self) -> FloatArray:
         """(d,) standard deviation of the particles' own best positions."""
-        return np.asarray(self._swarm.best.std(axis=0))
+        return self._swarm.sd
 
     @property
     def cutoff_costs(self) -> FloatArray:

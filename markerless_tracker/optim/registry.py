@@ -16,7 +16,7 @@ ALGORITHMS: Mapping[str, Callable[..., Optimizer]] = {
     "apf": Apf,
     "pf": Pf,
 }
-"""What `Stage.algorithm` may name; `Stage.options` are the class' keyword arguments.
+"""What `SearchPlan.algorithm` may name; its `options` are the class' keyword arguments.
 
 HPSO, H-MCPSO and GLPSO are stages of these: see `tracking.partitions`.
 """

@@ -2,7 +2,7 @@
 
 Fleischmann, Austvoll, Kwolek: "Particle Swarm Optimization with Soft Search Space Partitioning for
 Video-Based Markerless Pose Tracking", ACIVS 2012, Eqs 1-3 and the algorithm of section 3. The soft
-partition itself, two such stages with their parameters and spreads, is made in `tracking`.
+partition itself, two such stages with their parameters and sigmas, is made in `tracking`.
 """
 
 import math
@@ -15,7 +15,8 @@ from markerless_tracker.errors import SearchError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim.base import Optimizer
 from markerless_tracker.optim.problem import Problem
-from markerless_tracker.optim.sampling import ATTEMPTS, gaussian_sample
+from markerless_tracker.optim.sampling import gaussian_sample
+from markerless_tracker.optim.swarm import Rows, Swarm
 
 UPDATES = ("iteration", "particle")
 
@@ -81,7 +82,7 @@ class Sppso(Optimizer):
 
     Every attempt to satisfy the constraints restarts from the particle's saved position and
     velocity with fresh draws. After the last failed one the particle moves all the same; it is
-    evaluated and counted, but cannot become anybody's best.
+    evaluated and counted, but cannot become a best.
 
     Args:
         problem: the search.
@@ -97,60 +98,42 @@ class Sppso(Optimizer):
         if update not in UPDATES:
             raise SearchError(f"update is {update!r}, expected one of {', '.join(UPDATES)}")
         self._batch = problem.particles if update == "iteration" else 1
-        n, d = problem.particles, problem.centre.size
         self._v_max = 2.0 * problem.sigma
-        self._x = gaussian_sample(problem)
-        self._v = problem.rng.uniform(-1.0, 1.0, (n, d)) * problem.sigma
-        self._best = self._x.copy()
-        self._best_costs = np.full(n, np.inf)
+        x = gaussian_sample(problem)
+        self._swarm = Swarm(x, problem.rng.uniform(-1.0, 1.0, x.shape) * problem.sigma)
         self._iteration = 1
         self._next = 0
 
     @property
     def particle_sd_ratio(self) -> FloatArray:
         """(d,) standard deviation of the particles' own best positions."""
-        return np.asarray(self._best.std(axis=0))
+        return self._swarm.sd
 
     @property
     def cutoff_costs(self) -> FloatArray:
         """Each particle's own best cost; one that broke a constraint cannot win at all."""
-        cutoff_costs = self._best_costs[self._rows].copy()
-        cutoff_costs[self._infeasible] = -np.inf
-        return cutoff_costs
+        return self._swarm.cutoff_costs[self._rows]
 
     @property
     def _rows(self) -> slice:
         return slice(self._next, self._next + self._batch)
 
     def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:
-        if self._iteration == 1:
-            return self._x[self._rows].copy(), np.zeros(self._batch, dtype=np.bool_)
-        return self._move(self._rows)
+        swarm, rows = self._swarm, self._rows
+        if self._iteration > 1:
+            swarm.move(self.problem, self._step, rows, confined=False)
+        return swarm.x[rows].copy(), swarm.infeasible[rows]
 
-    def _move(self, rows: slice) -> tuple[FloatArray, NDArray[np.bool_]]:
-        problem = self.problem
-        c = acceleration(self._iteration, problem.iterations)
-        x, v, best = self._x[rows], self._v[rows], self._best[rows]
-        r1, r2 = problem.rng.random((2, *x.shape))
-        new_x, new_v = constricted_step(x, v, best, self.best_x, r1, r2, c, self._v_max)
-        infeasible = ~problem.feasible(new_x)
-        for _ in range(ATTEMPTS - 1):
-            todo = np.flatnonzero(infeasible)
-            if todo.size == 0:
-                break
-            r1, r2 = problem.rng.random((2, todo.size, problem.centre.size))
-            new_x[todo], new_v[todo] = constricted_step(
-                x[todo], v[todo], best[todo], self.best_x, r1, r2, c, self._v_max
-            )
-            infeasible[todo] = ~problem.feasible(new_x[todo])
-        self._x[rows], self._v[rows] = new_x, new_v
-        return new_x, infeasible
+    def _step(self, rows: Rows) -> tuple[FloatArray, FloatArray]:
+        swarm = self._swarm
+        c = acceleration(self._iteration, self.problem.iterations)
+        r1, r2 = self.problem.rng.random((2, rows.size, self.problem.centre.size))
+        return constricted_step(
+            swarm.x[rows], swarm.v[rows], swarm.best[rows], self.best_x, r1, r2, c, self._v_max
+        )
 
     def _tell(self, points: FloatArray, costs: FloatArray) -> None:
-        rows = self._rows
-        better = costs < self._best_costs[rows]
-        self._best[rows][better] = points[better]
-        self._best_costs[rows][better] = costs[better]
+        self._swarm.learn(costs, self._rows)
         self._next += len(points)
         if self._next == self.problem.particles:
             self._next = 0

@@ -34,21 +34,30 @@ class Swarm:
         self.best_costs = np.full(len(x), np.inf)
         self.infeasible = np.zeros(len(x), dtype=np.bool_)
 
-    def move(self, problem: Problem, step: Step) -> None:
-        """Move all particles, confined to the bounds.
+    def move(
+        self, problem: Problem, step: Step, rows: slice = np.s_[:], *, confined: bool = True
+    ) -> None:
+        """Move some particles, or all.
 
         A move that breaks a constraint is tried again from where the particle was, with fresh
         draws, at most `ATTEMPTS` times; after the last it moves all the same and is infeasible.
+
+        Args:
+            problem: the search.
+            step: proposes moves.
+            rows: the particles to move.
+            confined: whether particles that leave the bounds stop on them.
         """
         x, v = self.x.copy(), self.v.copy()
-        todo = np.arange(len(x))
+        todo = np.arange(len(x))[rows]
+        self.infeasible[rows] = False
         for _ in range(ATTEMPTS):
-            x[todo], v[todo] = confine(*step(todo), problem.bounds)
+            moved = step(todo)
+            x[todo], v[todo] = confine(*moved, problem.bounds) if confined else moved
             todo = todo[~problem.feasible(x[todo])]
             if todo.size == 0:
                 break
         self.x, self.v = x, v
-        self.infeasible = np.zeros(len(x), dtype=np.bool_)
         self.infeasible[todo] = True
 
     @property
@@ -56,11 +65,17 @@ class Swarm:
         """(n,) own best costs; one that broke a constraint cannot win at all."""
         return np.where(self.infeasible, -np.inf, self.best_costs)
 
-    def learn(self, costs: FloatArray) -> None:
-        """Update the own bests by the costs (n,) of the positions."""
-        better = costs < self.best_costs
+    @property
+    def sd(self) -> FloatArray:
+        """(d,) standard deviation of the own bests."""
+        return np.asarray(self.best.std(axis=0))
+
+    def learn(self, costs: FloatArray, rows: slice = np.s_[:]) -> None:
+        """Update the own bests of some particles, or of all, by the costs (n,) of their places."""
+        better = np.zeros(len(self.x), dtype=np.bool_)
+        better[rows] = costs < self.best_costs[rows]
         self.best[better] = self.x[better]
-        self.best_costs[better] = costs[better]
+        self.best_costs[better] = costs[better[rows]]
 
     def leader(self, start: int = 0, stop: int | None = None) -> int:
         """Index of the particle with the best own best, of those from start to stop."""

@@ -1,8 +1,8 @@
 """Whether a camera disagrees with the others: its silhouettes sit beside the tracked body.
 
 Now and then the pose is refined without one camera, and the shift of that camera's image is
-estimated that lays the body's outline over its silhouette. What stays over a whole run is no
-motion and no mask: the camera stands or looks elsewhere than its calibration says.
+estimated that lays the body's outline over its silhouette. A shift that
+persists over a run is neither motion nor segmentation: the calibration of the camera is wrong.
 """
 
 from collections.abc import Mapping
@@ -12,18 +12,17 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel, CameraRig
-from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim import Prior, refine
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
 from markerless_tracker.tracking.search import Searcher
 
 DISAGREES_M = 0.030
 """A systematic shift of this much, at the body, is the calibration's."""
 EVERY_NS = 160_000_000
 LEAST_VIEWS = 3
-"""Of two cameras that disagree nobody knows which is wrong."""
+"""With two cameras that disagree, either may be wrong."""
 _FIRST_NS = 300_000_000
 _LEAST_CHECKS = 3
 _ITERATIONS = 4
@@ -104,7 +103,7 @@ class CameraCheck:
         return out
 
     def _suspect(self) -> None:
-        """Trust the camera that disagrees most no longer when others are judged."""
+        """Leave out the camera that disagrees most when the others are compared."""
         worst = max(self.shifts().items(), key=lambda item: item[1].length_m, default=None)
         if worst is None or worst[0] in self._suspects or not worst[1].disagrees:
             return
@@ -153,19 +152,14 @@ def _refined(
     """The result's pose (p,) as these views alone would have it."""
     assert result.pose is not None
     contours = searcher.frame(observations, result.stamp_ns, result.pose).contours
-    scale = 1.0 / (CORRELATION_M * searcher.config.refine.sigma_m**2)
-
-    def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
-        sums = contours.equations(pose, truncation_m)
-        return sums.hessian * scale, sums.slope * scale
-
-    return refine(
-        equations,
+    return refined_on_contours(
+        contours,
         result.pose,
-        priors=(Prior(searcher.body.prior_mean, 1.0 / searcher.body.prior_sd**2),),
-        bounds=searcher.limits,
+        searcher.config,
+        priors=(pose_prior(searcher.body),),
+        limits=searcher.limits,
         iterations=_ITERATIONS,
-        truncation=_TRUNCATION_M,
+        truncation_m=_TRUNCATION_M,
     )
 
 

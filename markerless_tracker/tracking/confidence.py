@@ -1,17 +1,16 @@
-"""How sure a pose is: from how firmly the contours hold it, and what the model cannot know.
+"""Uncertainty of a pose: posterior covariance of the contour refinement, and model error.
 
-The normal equations of the contour refinement say how far each parameter may move before the
-outlines fit worse (Gauss-Newton approximation of the posterior, noise as large as this frame's
-residuals). That is noise only. What views that disagree leave comes on top (a pose is a compromise
-between them), and what the images cannot tell: where in the flesh the joint's centre is, and for a
-person whom nobody measured how long the bones are.
+The inverse normal equations of the contour refinement are the Gauss-Newton approximation of the
+posterior covariance, with the variance of this frame's residuals. That is noise only. Added are the
+disagreement between the views, of which a pose is a compromise, and what images do not show: the
+joint's centre inside the limb and, for a person whose lengths were not measured, the lengths.
 """
 
 import numpy as np
 
 from markerless_tracker.body import BodyModel, markers, transforms
 from markerless_tracker.body.kinematics import carried
-from markerless_tracker.errors import SearchError
+from markerless_tracker.body.model import FIRST_TRANSLATION
 from markerless_tracker.fitness.contour import ContourFrame, OutlineRows, outline_rows
 from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
@@ -22,22 +21,22 @@ MEASURED_M = 0.0055
 UNMEASURED_M = 0.015
 """The same with lengths that were fitted, or that are those of a stature."""
 DISAGREEMENT = 2.7
-"""A pose hides most of what views disagree by: its error is so many times what still shows."""
+"""Error of a pose relative to the disagreement of the views that remains after the fit."""
 CORRELATED = 9.0
-"""A generic section is wrong along a whole limb: its residuals agree over some half a metre, not
-over the piece of outline that a refinement takes for independent."""
+"""Factor of the residuals' correlation length: a generic section is wrong along a whole limb, some
+half a metre, not along the piece of outline that the refinement takes for independent."""
 _LEVER_M = 0.25
-"""Errors of joints' centres turn limbs about as long as this."""
+"""Length of the limbs that an error of a joint's centre rotates."""
 _TRUNCATION_M = 0.06
 _LEAST_SIGMA_M = 0.002
-_SLIDES = 3
-"""Kinds of nodes from here on are translations."""
 
 
 def confidence_of(
     body: BodyModel, pose: FloatArray, contours: ContourFrame, *, measured: bool
 ) -> Confidence | None:
-    """Standard deviations of a pose (p,); None if the contours do not hold it at all.
+    """Standard deviations of a pose (p,); None if the contours do not determine it.
+
+    Never raises: what cannot be computed is unknown.
 
     Args:
         body: the tracked body.
@@ -48,9 +47,9 @@ def confidence_of(
     sums = contours.equations(pose, _TRUNCATION_M)
     rows = outline_rows(contours)
     total = float(rows.weight.sum())
-    if total <= 0.0:
-        return None
     weight, value = rows.weight, rows.value
+    if not (total > 0.0 and np.isfinite(value).all() and np.isfinite(sums.hessian).all()):
+        return None
     variance = max(float((weight * value**2).sum()) / total, _LEAST_SIGMA_M**2)
     precision = sums.hessian / (CORRELATED * CORRELATION_M * variance)
     precision[np.diag_indices_from(precision)] += 1.0 / body.prior_sd**2 + 1e-9
@@ -58,17 +57,16 @@ def confidence_of(
         covariance = np.linalg.inv(precision)
     except np.linalg.LinAlgError:
         return None
-    if not np.isfinite(covariance).all():
-        raise SearchError("the covariance of the pose is not finite")
+    if not (np.isfinite(covariance).all() and np.diag(covariance).min() >= 0.0):
+        return None
     unseen = MEASURED_M if measured else UNMEASURED_M
     floor = float(np.hypot(unseen, DISAGREEMENT * disagreement_m(contours, rows)))
     by_marker, by_root = _slopes(body, pose)
     of_markers = np.einsum("ij,jk,ik->i", by_marker, covariance, by_marker)
     of_root = by_root @ covariance @ by_root.T
     of_root[np.diag_indices(6)] += np.repeat([floor**2, (floor / _LEVER_M) ** 2], 3)
-    moving = body.node_kind[[int(np.flatnonzero(body.node_parameter == k)[0])
-                             for k in range(body.size)]] >= _SLIDES  # fmt: skip
-    floors = np.where(moving, floor, floor / _LEVER_M)
+    floors = np.full(body.size, floor / _LEVER_M)
+    floors[body.translations] = floor
     return Confidence(
         pose_sd=np.sqrt(np.diag(covariance) + floors**2),
         markers_sd_m=np.sqrt(of_markers + floor**2).reshape(-1, 3),
@@ -101,9 +99,9 @@ def disagreement_m(contours: ContourFrame, rows: OutlineRows) -> float:
 
 
 def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives by the parameters: of the markers (45, p), of the root's place and turn (6, p).
+    """Derivatives by the parameters: of the markers (45, p), of the root's pose (6, p).
 
-    The root's turn is a small rotation about the world's axes.
+    The root's rotation is a small one about the world's axes.
     """
     nodes = transforms(body, pose)
     root = body.frames[body.root_frame]
@@ -112,10 +110,10 @@ def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     kind, parameter = body.node_kind[moved], body.node_parameter[moved]
     axes = body.node_sign[moved, None] * nodes[moved, :, kind % 3]
     turned = np.cross(axes, points[:, None] - nodes[moved, :, 3])
-    moves = np.where((kind >= _SLIDES)[:, None], axes, turned)
+    moves = np.where((kind >= FIRST_TRANSLATION)[:, None], axes, turned)
     hang = carried(body, moved)[[*body.marker_node, root]]
     moves *= hang[:, :, None]
-    turning = axes * (hang[-1] * (kind < _SLIDES))[:, None]
+    turning = axes * (hang[-1] * (kind < FIRST_TRANSLATION))[:, None]
     slopes, turns = np.zeros((len(points), body.size, 3)), np.zeros((body.size, 3))
     for n, k in enumerate(parameter.tolist()):
         slopes[:, k] += moves[:, n]

@@ -1,9 +1,9 @@
-"""The joint limits that a configuration asks for."""
+"""The joint limits of a configuration, and whether a pose keeps them."""
 
 import numpy as np
 
 from markerless_tracker.body import BodyModel
-from markerless_tracker.errors import ConfigError
+from markerless_tracker.errors import BodyModelError, ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.config import TrackerConfig
 
@@ -25,3 +25,25 @@ def joint_limits(body: BodyModel, config: TrackerConfig) -> FloatArray:
             "expected 'anatomical', or a body with the published 31 parameters such as balan31"
         )
     return np.where(stated, body.walking_limits, body.limits)
+
+
+def check_pose(body: BodyModel, pose: FloatArray, limits: FloatArray | None) -> None:
+    """Raise a BodyModelError unless a start pose is one of the body.
+
+    Args:
+        body: the body.
+        pose: expected (p,) and finite.
+        limits: (2, p) that it must keep, if any.
+    """
+    if pose.shape != (body.size,) or not np.isfinite(pose).all():
+        raise BodyModelError(
+            f"start pose has shape {pose.shape}, body {body.name} expects "
+            f"{body.size} finite numbers"
+        )
+    if limits is None:
+        return
+    for name, value, low, high in zip(body.parameter_names, pose, *limits, strict=True):
+        if not low <= value <= high:
+            raise BodyModelError(
+                f"start pose: {name} is {value:.4g}, its limits are {low:.4g} to {high:.4g}"
+            )

@@ -1,7 +1,6 @@
 """Searching one frame: runs its stages, each from the estimate so far."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -9,7 +8,6 @@ from markerless_tracker.body import BodyModel, Feasibility
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.fitness import Fitness, ViewTerms
 from markerless_tracker.fitness.contour import ContourFrame
-from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import (
     ALGORITHMS,
@@ -17,12 +15,29 @@ from markerless_tracker.optim import (
     Prior,
     Problem,
     keyed_generator,
-    refine,
 )
-from markerless_tracker.records import CONTOUR, Observation, Stage
+from markerless_tracker.records import CONTOUR, Observation, SearchPlan, Stage
 from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.limits import joint_limits
+from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
 
 _NEAREST_M = 0.5
+
+
+def make_fitness(
+    body: BodyModel, rig: CameraRig, config: TrackerConfig, *, threads: int = 1
+) -> Fitness:
+    """The fitness of a body in a rig's views, with the terms that a configuration asks for."""
+    return Fitness(
+        body,
+        rig.cameras,
+        threads=threads,
+        edge_rule=config.edges.rule,
+        edge_term=config.edges.term,
+        edge_spacing_px=config.edges.spacing_px,
+        edge_step_px=config.edges.step_px,
+        cost=config.cost,
+    )
 
 
 class Searcher:
@@ -54,28 +69,28 @@ class Searcher:
         self.mapper = mapper
         self.cameras: Mapping[str, CameraModel] = {camera.name: camera for camera in rig}
         self.feasible = Feasibility(body, limits, config.collision)
-        self.fitness = Fitness(
-            body,
-            rig.cameras,
-            threads=threads,
-            edge_rule=config.edges.rule,
-            edge_term=config.edges.term,
-            edge_spacing_px=config.edges.spacing_px,
-            edge_step_px=config.edges.step_px,
-            cost=config.cost,
-        )
+        self.fitness = make_fitness(body, rig, config, threads=threads)
         self.particle_sets: dict[str, ParticleSet] = {}
         """What each stage left in the last frame, where its algorithm goes on from that."""
-
-    def forget(self) -> None:
-        """Forget the last frame."""
-        self.particle_sets.clear()
 
     def frame(
         self, observations: Mapping[str, Observation], stamp_ns: int, predicted: FloatArray
     ) -> "FrameSearch":
         """The search of one frame, around a predicted pose (p,)."""
         return FrameSearch(self, observations, stamp_ns, predicted)
+
+
+def make_searcher(
+    body: BodyModel,
+    *,
+    rig: CameraRig,
+    config: TrackerConfig,
+    threads: int,
+    mapper: Callable[..., object] = map,
+) -> Searcher:
+    """A searcher with the joint limits that the configuration asks for; arguments as there."""
+    limits = joint_limits(body, config)
+    return Searcher(rig, body, config, limits=limits, threads=threads, mapper=mapper)
 
 
 class FrameSearch:
@@ -131,17 +146,23 @@ class FrameSearch:
         that is stuck, the refinement sharpens the swarm. A stage may ask for a gain in f.
         """
         # A contour stage looks at every parameter and every cone.
-        whole = next((stage for stage in stages if stage.algorithm == CONTOUR), None)
-        judge = None if whole is None else self._searcher.fitness.prepare(self._views, whole)
-        cost = np.inf if judge is None else float(judge(self.pose[None])[0])
+        contour = next((stage for stage in stages if stage.plan.algorithm == CONTOUR), None)
+        costs_of = (
+            None
+            if contour is None
+            else self._searcher.fitness.prepare(self._views, contour.comparison)
+        )
+        cost = np.inf if costs_of is None else float(costs_of(self.pose[None])[0])
         for stage in stages:
-            centred = replace(stage, centre=self.pose)
-            found = self._refine(centred) if stage.algorithm == CONTOUR else self._swarm(centred)
-            if judge is None:
+            if stage.plan.algorithm == CONTOUR:
+                found = self._refine(stage.plan)
+            else:
+                found = self._swarm(stage.centred(self.pose))
+            if costs_of is None:
                 self.pose = found
                 continue
-            found_cost = float(judge(found[None])[0])
-            if found_cost < cost - stage.min_improvement:
+            found_cost = float(costs_of(found[None])[0])
+            if found_cost < cost - stage.plan.min_improvement:
                 self.pose, cost = found, found_cost
         return self.pose
 
@@ -150,49 +171,41 @@ class FrameSearch:
         return self._searcher.fitness.terms(self._views, self.pose)
 
     def _swarm(self, stage: Stage) -> FloatArray:
-        searcher = self._searcher
-        evaluator = searcher.fitness.prepare(self._views, stage)
+        searcher, plan = self._searcher, stage.plan
+        active, centre = stage.comparison.active, stage.comparison.centre
+        evaluator = searcher.fitness.prepare(self._views, stage.comparison)
         problem = Problem(
-            bounds=searcher.limits[:, stage.active],
-            centre=stage.centre[stage.active],
-            sigma=stage.sigma[stage.active],
-            particles=stage.particles,
-            iterations=stage.iterations,
+            bounds=searcher.limits[:, active],
+            centre=centre[active],
+            sigma=plan.sigma[active],
+            particles=plan.particles,
+            iterations=plan.iterations,
             feasible=searcher.feasible.around(
-                stage.active, stage.centre, forgive=searcher.config.collision == "elliptic"
+                active, centre, forgive=searcher.config.collision == "elliptic"
             ),
             rng=keyed_generator(searcher.config.seed, self._stamp_ns, stage.name),
             memory=searcher.particle_sets.get(stage.name),
         )
-        optimizer = ALGORITHMS[stage.algorithm](problem, **stage.options)
+        optimizer = ALGORITHMS[plan.algorithm](problem, **plan.options)
         best = optimizer.run(evaluator, early=True)
         self.evaluations += optimizer.evaluations
         with np.errstate(invalid="ignore", divide="ignore"):
-            self.particle_sd_ratio[stage.active] = optimizer.particle_sd_ratio / problem.sigma
+            self.particle_sd_ratio[active] = optimizer.particle_sd_ratio / problem.sigma
         if optimizer.memory is not None:
             searcher.particle_sets[stage.name] = optimizer.memory
         return np.asarray(evaluator.poses(best[None])[0])
 
-    def _refine(self, stage: Stage) -> FloatArray:
+    def _refine(self, plan: SearchPlan) -> FloatArray:
         searcher, config = self._searcher, self._searcher.config
-        scale = 1.0 / (CORRELATION_M * config.refine.sigma_m**2)
-        contours = self.contours
-
-        def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
-            sums = contours.equations(pose, truncation_m)
-            return sums.hessian * scale, sums.slope * scale
-
-        self.refinements += stage.iterations
-        return refine(
-            equations,
-            stage.centre,
-            priors=(
-                Prior(self._predicted, 1.0 / stage.sigma**2),
-                Prior(searcher.body.prior_mean, 1.0 / searcher.body.prior_sd**2),
-            ),
-            bounds=searcher.limits,
-            iterations=stage.iterations,
-            truncation=(config.refine.truncation_m, config.refine.truncation_end_m),
+        self.refinements += plan.iterations
+        return refined_on_contours(
+            self.contours,
+            self.pose,
+            config,
+            priors=(Prior(self._predicted, 1.0 / plan.sigma**2), pose_prior(searcher.body)),
+            limits=searcher.limits,
+            iterations=plan.iterations,
+            truncation_m=(config.refine.truncation_m, config.refine.truncation_end_m),
         )
 
     def _pixels_per_m(self) -> dict[str, float]:

@@ -1,25 +1,24 @@
-"""A causal filter that calms what stands and lets pass what moves.
+"""A causal low-pass filter whose cutoff rises with the motion.
 
 One Euro filter (Casiez, Roussel and Vogel, CHI 2012): an exponential filter of each parameter whose
-cutoff rises with the parameter's speed. Ours rises with the whole body's motion, too: in a walking
-person even what turns round just now is no jitter. A parameter's own speed alone let the pelvis of
-a jogging person, whose angles change little, trail by a frame.
+cutoff rises with the parameter's speed. Ours rises with the whole body's motion, too: while a
+person walks, a joint at a point of reversal is not at rest. A parameter's own speed alone let the
+pelvis of a jogging person, whose angles change little, trail by a frame.
 """
 
 import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.partitions.sppso import translations
 
 CUTOFF_HZ = 8.0
-"""Cutoff of what stands still: lower ones trail a swaying stander by more than a frame at 60 Hz."""
+"""Cutoff at rest: lower ones lag a standing, swaying person by more than a frame at 60 Hz."""
 RISE_ANGLE, RISE_PLACE = 4.0, 12.0
 """Hz of cutoff per rad/s and per m/s of the parameter."""
 RISE_MOTION = 200.0
 """Hz of cutoff per (m/s)², mean over the markers: 200 Hz, practically no filter, in a walk."""
 SPEED_CUTOFF_HZ = 2.0
-"""Cutoff of the speeds; jitter cancels out in them."""
+"""Cutoff of the speeds, in which jitter cancels out."""
 _GAP_NS = 300_000_000
 
 
@@ -33,7 +32,7 @@ class OneEuro:
     def __init__(self, body: BodyModel) -> None:
         self._body = body
         self._rise = np.full(body.size, RISE_ANGLE)
-        self._rise[translations(body)] = RISE_PLACE
+        self._rise[body.translations] = RISE_PLACE
         self.reset()
 
     def reset(self) -> None:
@@ -51,17 +50,17 @@ class OneEuro:
             self._points, self._points_speed = points, np.zeros_like(points)
             return pose
         seconds = elapsed_ns * 1e-9
-        calm = _share(SPEED_CUTOFF_HZ, seconds)
-        self._points_speed += calm * ((points - self._points) / seconds - self._points_speed)
+        rate = _gain(SPEED_CUTOFF_HZ, seconds)
+        self._points_speed += rate * ((points - self._points) / seconds - self._points_speed)
         self._points = points
-        self._speed += calm * ((pose - self._pose) / seconds - self._speed)
+        self._speed += rate * ((pose - self._pose) / seconds - self._speed)
         motion = float((self._points_speed**2).sum(axis=1).mean())
         cutoff = CUTOFF_HZ + self._rise * np.abs(self._speed) + RISE_MOTION * motion
-        self._pose = self._pose + _share(cutoff, seconds) * (pose - self._pose)
+        self._pose = self._pose + _gain(cutoff, seconds) * (pose - self._pose)
         return self._pose.copy()
 
 
-def _share(cutoff_hz: FloatArray | float, seconds: float) -> FloatArray:
-    """Share of a new value that an exponential filter of that cutoff takes."""
-    turn = 2.0 * np.pi * np.asarray(cutoff_hz, dtype=np.float64) * seconds
-    return np.asarray(turn / (turn + 1.0))
+def _gain(cutoff_hz: FloatArray | float, seconds: float) -> FloatArray:
+    """Fraction of a new value that an exponential filter of that cutoff takes."""
+    phase = 2.0 * np.pi * np.asarray(cutoff_hz, dtype=np.float64) * seconds
+    return np.asarray(phase / (phase + 1.0))

@@ -1,42 +1,36 @@
-"""The one door: `Tracker.step` turns the views of one time into a pose."""
+"""`Tracker.step`: from the views of one time to a pose."""
 
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.errors import BodyModelError
-from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
-from markerless_tracker.records import Confidence, Observation, TrackResult, TrackState
-from markerless_tracker.tracking.confidence import confidence_of
+from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.tracking.assess import Assessor, Found, Seen
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
-from markerless_tracker.tracking.limbs.watch import LimbWatch
-from markerless_tracker.tracking.limits import joint_limits
-from markerless_tracker.tracking.loss import Track, shared_overlap
-from markerless_tracker.tracking.person.body_fitting import BodyFitting, Unmeasured
-from markerless_tracker.tracking.person.first_frame import StartMarkers, shape_of_first_frame
-from markerless_tracker.tracking.search import FrameSearch, Searcher
-from markerless_tracker.tracking.smoothing import OneEuro
-from markerless_tracker.tracking.stages import frame_stages
+from markerless_tracker.tracking.limits import check_pose
+from markerless_tracker.tracking.motion import MotionModel
+from markerless_tracker.tracking.partitions.frame import frame_stages
+from markerless_tracker.tracking.person.body_fitting import Unmeasured
+from markerless_tracker.tracking.person.estimate import BodyEstimate
+from markerless_tracker.tracking.person.first_frame import StartMarkers
+from markerless_tracker.tracking.search import make_searcher
 from markerless_tracker.tracking.start.starter import Starter
-
-TRAINING_RATE_HZ = 60.0
-"""The published spreads are changes between frames at this rate."""
-LIMB_SPEED_M_S = 3.0
-"""How fast a hand or foot may move against its prediction; it is looked for that far away."""
+from markerless_tracker.tracking.states import Phase, Track
 
 
 class Tracker:
-    """Tracks one person, frame by frame, from a start pose or from where it finds somebody.
+    """Tracks one person frame by frame, from a start pose or from an automatic start.
 
     Knows no clock, no ROS and no files: results depend on the arguments alone, and the same ones
     give the same bytes with any number of threads. Calls must come from one thread at a time.
@@ -45,14 +39,14 @@ class Tracker:
         rig: the cameras; views are named after them.
         body: the body with the person's sizes.
         config: every setting.
-        start_pose: (p,) pose near which the first frame's search begins; None = look for
-            somebody, which takes some frames.
+        start_pose: (p,) pose near which the first frame is searched; None = find a person
+            automatically, which takes some frames.
         backgrounds: the empty scene per camera; cameras without one take ready-made observations
             only.
         shape_known: whether the body's sections are this person's; if not, and `fit_shape` is set,
             they are fitted to the first frame's silhouettes with the start pose held.
-        start_markers: the markers that gave the start pose; noisy ones are settled on the first
-            frame's silhouettes before the shape is fitted.
+        start_markers: the markers that the start pose was computed from; noisy ones are refined on
+            the first frame's silhouettes before the sections are fitted.
         person: what is known of a person whose lengths were not measured; None if they were.
 
     Raises:
@@ -76,100 +70,59 @@ class Tracker:
         self.rig = rig
         self._cameras = {camera.name: camera for camera in rig}
         self.config = config
-        self._person = person
-        self._smooth = OneEuro(body) if config.smoothing == "one_euro" else None
-        self._track = Track()
-        self._views = ViewWatch(rig)
-        self._limbs = LimbWatch(rig)
-        self._recovers = config.search_again and config.refinement != "none"
-        self._generic = body
         given = start_pose is not None
-        self._start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
-        if self._start.shape != (body.size,) or not np.isfinite(self._start).all():
-            raise BodyModelError(
-                f"start pose has shape {self._start.shape}, body {body.name} expects "
-                f"{body.size} finite numbers"
-            )
-        self._pose = self._start
-        self._velocity_per_ns = np.zeros(body.size)
-        self._stamp_ns: int | None = None
-        self._threads = config.threads or os.cpu_count() or 1
-        self._pool = ThreadPoolExecutor(max_workers=min(self._threads, len(rig)))
-        self._evidence = EvidenceMaker(rig, config, backgrounds or {}, self._pool)
-        self._fit_shape = config.fit_shape and not shape_known
-        self._shape_fitted = not self._fit_shape
-        self._start_markers = start_markers
-        self._searcher = self._searcher_for(body)
-        self._first_starter = None if given else Starter(
-            rig, body, self._searcher_for, self._evidence.select,
-            sized=None if person is None else person.sized, fit_shape=self._fit_shape,
-        )  # fmt: skip
-        self._starter = self._first_starter
-        self._fitting = self._new_fitting()
-        low, high = self._searcher.limits
-        for name, value, a, b in zip(body.parameter_names, self._start, low, high, strict=True):
-            if given and not a <= value <= b:
-                raise BodyModelError(
-                    f"start pose: {name} is {value:.4g}, its limits are {a:.4g} to {b:.4g}"
-                )
+        start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
+        self._body = BodyEstimate(
+            body, config, shape_known=shape_known, start_markers=start_markers, person=person
+        )
+        check_pose(body, start, self._body.limits if given else None)
         # Refuses a budget that cannot be spent before the first frame comes.
-        frame_stages(body, config, self._pose, body.sigma)
+        frame_stages(body, config, start, body.sigma)
+        threads = config.threads or os.cpu_count() or 1
+        pool = ThreadPoolExecutor(max_workers=min(threads, len(rig)))
+        self._searcher_for = partial(
+            make_searcher, rig=rig, config=config, threads=threads, mapper=pool.map
+        )
+        self._searcher = self._searcher_for(body)
+        self._evidence = EvidenceMaker(rig, config, backgrounds or {}, pool)
+        self._views = ViewWatch(rig)
+        self._motion = MotionModel(start, config)
+        self._assessor = Assessor(rig, body, config)
+        self._given = given
+        self._starter = None if given else self._new_starter()
 
     @property
     def state(self) -> TrackState:
         """State after the last step."""
-        return self._track.state
+        return self._assessor.track.state
 
     @property
     def body(self) -> BodyModel:
-        """The tracked body; from the first frame on with the fitted sections."""
-        return self._searcher.body
+        """The tracked body, as far as it has been fitted to the person."""
+        return self._body.body
 
     def reset(self) -> None:
-        """Forget the track: the next step searches around the start pose, or for somebody."""
-        self._pose = self._start
-        self._velocity_per_ns = np.zeros(self._generic.size)
-        self._stamp_ns = None
-        self._searcher.forget()
-        self._track = Track()
+        """Forget the track: the next step searches near the start pose, or for a person."""
         self._views.reset()
-        self._limbs.reset()
-        if self._smooth is not None:
-            self._smooth.reset()
-        self._starter = self._first_starter
-        if self._starter is not None:
-            self._starter.reset()
-        if self._fit_shape:
-            self._shape_fitted = False
-            self._searcher = self._searcher_for(self._generic)
-        self._fitting = self._new_fitting()
+        self._motion.reset()
+        self._body.reset()
+        self._assessor.reset()
+        self._searcher = self._searcher_for(self.body)
+        self._starter = None if self._given else self._new_starter()
 
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
-        blank: dict[str, Observation] = {}
-        for camera in self.rig:
-            width, height = camera.size_px
-            nothing = np.zeros((height, width), dtype=np.uint8)
-            segmenter = self._evidence.segmenters.get(camera.name)
-            if segmenter is not None:
-                channels = segmenter.background.channels
-                shape = (height, width) if channels == 1 else (height, width, channels)
-                segmenter.observe(np.zeros(shape, dtype=np.uint8), 0)
-                segmenter.reset()
-            nothing[height // 4 : height // 2, width // 4 : width // 2] = 1
-            blank[camera.name] = Observation.from_mask(camera.name, 0, nothing, nothing)
+        blank = self._evidence.warm_up()
         # The most work and the least: whether threads are woken depends on it.
         for views in (blank, dict(list(blank.items())[:1])):
-            self._starter = None
+            self._starter, self._assessor.track = None, Track(Phase.TRACKING)
             self.step(views, 0)
             self.reset()
-        if self._fitting is not None:
-            contours = self._searcher.frame(blank, 0, self._pose).contours
-            self._fitting.warm_up(self.body, contours, self._pose)
-            self.reset()
+        self._body.warm_up(self._searcher_for, blank, self._motion.pose)
+        self.reset()
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
-        """Tell the person from other empty scenes from now on; then `warm_up`, which resets.
+        """Segment against other empty scenes from now on; then `warm_up`, which resets.
 
         Args:
             backgrounds: by camera; cameras without one take ready-made observations only.
@@ -181,15 +134,15 @@ class Tracker:
         self.warm_up()
 
     def regions(self, stamp_ns: int) -> dict[str, Region | None]:
-        """Where in each camera's image `step` would look at a time; None for all of it.
+        """Region of each camera's image that `step` would use at a time; None for all of it.
 
-        Each camera's turn to be looked at whole comes besides (`region.full_frame_every`).
+        Besides, each camera's whole image is used once in `region.full_frame_every` steps.
         """
-        margin_m = self._region_margin(stamp_ns)
-        return self._evidence.regions(self.body, self._predict(stamp_ns), margin_m)
+        predicted = self._motion.predict(stamp_ns, self._body.limits)
+        return self._evidence.regions(self.body, predicted, self._motion.region_margin_m(stamp_ns))
 
     def segmenter(self, camera: str) -> Segmenter | None:
-        """What tells a camera's silhouettes from its background; None without one."""
+        """The segmenter of a camera; None without a background."""
         return self._evidence.segmenters.get(camera)
 
     def step(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> TrackResult:
@@ -204,216 +157,97 @@ class Tracker:
             ImageError, CalibrationError: no view, one of an unknown camera, or one that does not
                 fit its calibration or background; names the camera.
         """
-        result = self._step(views, stamp_ns)
+        if self.config.search_again and self._assessor.track.given_up:
+            self._assessor.give_up()
+            self._starter = self._new_starter(self._motion.pose)
+        predicted = self._motion.predict(stamp_ns, self._body.limits)
+        seen = self._observe(views, stamp_ns, predicted)
+        if self._starter is not None:
+            found = self._search_room(self._starter, seen)
+        else:
+            found = self._search_near(predicted, seen)
+        if found is None:
+            result = self._assessor.nobody(seen)
+            self._motion.lose()
+        else:
+            result = self._assessor.found(found, self.body, self._body.limits)
+            self._learn(found)
         return replace(result, exposure=self._evidence.exposure(views))
 
-    def _step(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> TrackResult:
-        predicted = self._predict(stamp_ns)
+    def _observe(
+        self, views: Mapping[str, Image | Observation], stamp_ns: int, predicted: FloatArray
+    ) -> Seen:
+        """The evidence near the predicted pose (p,); of the whole views without a track."""
         if self._starter is not None:
             observed = self._evidence.observe(views, stamp_ns)
             believed, notes = self._views.sort(observed, self.body, None)
-            if not anybody(believed):
-                return self._unseen(observed, stamp_ns, notes)
-            return self._seek(self._starter, believed, stamp_ns, notes)
-        observed, warnings = self._evidence.gather(
-            views, stamp_ns, self.body, predicted, margin_m=self._region_margin(stamp_ns)
+            return Seen(stamp_ns, observed, believed, notes)
+        observed, left_out = self._evidence.gather(
+            views, stamp_ns, self.body, predicted, margin_m=self._motion.region_margin_m(stamp_ns)
         )
         expected = predicted if self.state is TrackState.TRACKING else None
-        observations, notes = self._views.sort(observed, self.body, expected)
-        if not anybody(observations):
-            return self._unseen(observed, stamp_ns, notes)
+        believed, notes = self._views.sort(observed, self.body, expected)
         if self.state is not TrackState.LOST:
-            observations = decide(observations, self._cameras, self.body, predicted)
-        if not self._shape_fitted:
-            self._shape_fitted = True
-            predicted = self._take_shape(observations, stamp_ns)
-        search = self._searcher.frame(observations, stamp_ns, predicted)
-        sigma = self.body.sigma * self._rate_factor(stamp_ns)
+            believed = decide(believed, self._cameras, self.body, predicted)
+        return Seen(stamp_ns, observed, believed, notes, left_out)
+
+    def _search_room(self, starter: Starter, seen: Seen) -> Found | None:
+        """Search the whole views for a person; None for nobody."""
+        if not anybody(seen.believed):
+            starter.reset()
+            return None
+        start = starter.step(seen.believed, seen.stamp_ns)
+        if start is None:
+            return None
+        self._searcher = start.searcher
+        self._body.take_found(start.searcher.body, settled=start.settled)
+        search = self._searcher.frame(start.observations, seen.stamp_ns, start.pose)
+        if start.settled:
+            self._starter = None
+            search.run(frame_stages(self.body, self.config, start.pose, self.body.sigma))
+        return Found(
+            search, seen.stamp_ns, start.observations, seen.notes + start.notes,
+            anew=True, settling=not start.settled, jumped=np.arange(self.body.size),
+        )  # fmt: skip
+
+    def _search_near(self, predicted: FloatArray, seen: Seen) -> Found | None:
+        """Search near a predicted pose (p,); None for nobody."""
+        believed, stamp_ns = seen.believed, seen.stamp_ns
+        if not anybody(believed):
+            return None
+        if self._body.awaits_first_frame:
+            at = self._motion.pose
+            start = self._body.fit_first_frame(self._searcher_for, believed, stamp_ns, at)
+            if start is None:
+                return None
+            predicted = start
+            self._searcher = self._searcher_for(self.body)
+        search = self._searcher.frame(believed, stamp_ns, predicted)
+        sigma = self.body.sigma * self._motion.widening(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
-        elsewhere: tuple[str, ...] = ()
-        if self._recovers:
-            search.pose, elsewhere = self._limbs.recover(
-                self._searcher, search.contours, observations, stamp_ns, search.pose
+        names: tuple[str, ...] = ()
+        if self.config.search_again and self.config.refinement != "none":
+            search.pose, names = self._assessor.limbs.recover(
+                self._searcher, search.contours, believed, stamp_ns, search.pose
             )
-            notes += tuple(f"{name}: found elsewhere" for name in elsewhere)
-        result = self._conclude(search, stamp_ns, observations, notes + warnings)
-        # A limb found elsewhere has not moved there.
-        for name in elsewhere:
-            self._velocity_per_ns[self.body.subspaces[name]] = 0.0
-        if self._fitting is not None and self.state is TrackState.TRACKING:
-            self._fit_body(self._fitting, search)
-        if self.config.search_again and self._track.given_up(stamp_ns):
-            self._look_again()
-        return result
+        notes = self._body.take_warnings() + tuple(f"{name}: found elsewhere" for name in names)
+        jumped = np.array([i for name in names for i in self.body.subspaces[name]], dtype=np.int64)
+        warnings = seen.notes + notes + seen.left_out
+        return Found(search, stamp_ns, believed, warnings, jumped=jumped)
 
-    def _unseen(
-        self, observed: Mapping[str, Observation], stamp_ns: int, notes: tuple[str, ...]
-    ) -> TrackResult:
-        """Nobody, in any view that can be believed."""
-        if self._starter is not None:
-            self._starter.reset()
-        if self._starter is not None or self.state is TrackState.SEARCHING:
-            return self._nobody(observed, stamp_ns, notes)
-        self._track.note(0.0, stamp_ns)
-        self._velocity_per_ns = np.zeros(self.body.size)
-        if self.config.search_again and self._track.given_up(stamp_ns):
-            self._look_again()
-        return self._without_pose(observed, stamp_ns, notes)
-
-    def _look_again(self) -> None:
-        """From the next step on look for the body that was lost."""
-        if self._smooth is not None:
-            self._smooth.reset()
-        self._starter = Starter(
-            self.rig, self.body, self._searcher_for, self._evidence.select,
-            fit_shape=False, last_pose=self._pose,
-        )  # fmt: skip
-
-    def _nobody(
-        self, observed: Mapping[str, Observation], stamp_ns: int, notes: tuple[str, ...]
-    ) -> TrackResult:
-        self._track = Track()
-        return self._without_pose(observed, stamp_ns, notes)
-
-    def _without_pose(
-        self, observed: Mapping[str, Observation], stamp_ns: int, notes: tuple[str, ...]
-    ) -> TrackResult:
-        return TrackResult(
-            stamp_ns=stamp_ns, state=self.state, pose=None, markers_m=None,
-            fitness=float("nan"), evaluations=0, observations=observed, warnings=notes,
-            iou=dict.fromkeys(observed, 0.0) if self.state is TrackState.LOST else {},
-        )  # fmt: skip
-
-    def _seek(
-        self,
-        starter: Starter,
-        observed: Mapping[str, Observation],
-        stamp_ns: int,
-        notes: tuple[str, ...],
-    ) -> TrackResult:
-        """Look for somebody; no pose if nobody is there."""
-        found = starter.step(observed, stamp_ns)
-        if found is None:
-            return self._nobody(observed, stamp_ns, notes)
-        if self._smooth is not None:
-            # A person turned round, or found elsewhere, has not moved there.
-            self._smooth.reset()
-        self._searcher = found.searcher
-        search = self._searcher.frame(found.observations, stamp_ns, found.pose)
-        if found.settled:
-            self._starter, self._shape_fitted = None, True
-            search.run(frame_stages(self.body, self.config, found.pose, self.body.sigma))
-        result = self._conclude(search, stamp_ns, found.observations, notes + found.notes)
-        # Poses of a search jump, that is no motion.
-        self._velocity_per_ns = np.zeros(self.body.size)
-        return result
-
-    def _take_shape(self, observations: Mapping[str, Observation], stamp_ns: int) -> FloatArray:
-        """Fit the body's sections to the first frame; returns the start pose (p,) to go on from."""
-
-        def contours(body: BodyModel, pose: FloatArray) -> ContourFrame:
-            return self._searcher_for(body).frame(observations, stamp_ns, pose).contours
-
-        body, pose = shape_of_first_frame(
-            self._generic,
-            self._pose,
-            self._start_markers,
-            contours,
-            self.config,
-            self._searcher.limits,
-        )
-        self._searcher = self._searcher_for(body)
-        return pose
-
-    def _new_fitting(self) -> BodyFitting | None:
-        if self._person is None or not (self._fit_shape and self.config.fit_lengths):
-            return None
-        return BodyFitting(self._person, self._searcher.limits)
-
-    def _fit_body(self, fitting: BodyFitting, search: FrameSearch) -> None:
-        """Take a tracked frame for the fit of lengths and sections; go on with what they become."""
-        fitted = fitting.add(self.body, search.contours, search.pose)
-        if fitted is None:
+    def _learn(self, found: Found) -> None:
+        """Take a frame into the motion and, while the body is tracked, into its fit."""
+        pose, tracked = found.search.pose, self.state is TrackState.TRACKING
+        self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
+        if not tracked or found.anew:
             return
-        self._fitting = None
-        self._searcher = self._searcher_for(fitted.body)
-        self._pose = np.clip(self._pose + fitted.moved, *self._searcher.limits)
+        moved = self._body.fit_tracked_frame(found.search)
+        if moved is not None:
+            self._searcher = self._searcher_for(self.body)
+            self._motion.shift(moved, self._body.limits)
 
-    def _conclude(
-        self,
-        search: FrameSearch,
-        stamp_ns: int,
-        observations: Mapping[str, Observation],
-        warnings: tuple[str, ...],
-    ) -> TrackResult:
-        terms = search.terms()
-        self._track.note(shared_overlap(terms.values()), stamp_ns)
-        elapsed_ns = stamp_ns - self._stamp_ns if self._stamp_ns is not None else 0
-        moving = elapsed_ns > 0 and self.state is TrackState.TRACKING
-        change = search.pose - self._pose
-        self._velocity_per_ns = change / elapsed_ns if moving else np.zeros(change.size)
-        self._pose = search.pose
-        self._stamp_ns = stamp_ns
-        lost = self._limbs.lost
-        limbs = self._limbs.judge(self.body, search.pose, observations, search.particle_sd_ratio)
-        warnings += tuple(f"{name}: lost" for name in self._limbs.lost if name not in lost)
-        shown = search.pose
-        if self._smooth is not None:
-            shown = np.clip(self._smooth(shown, stamp_ns), *self._searcher.limits)
-        return TrackResult(
-            stamp_ns=stamp_ns,
-            state=self.state,
-            pose=shown,
-            markers_m=markers(self.body, shown),
-            fitness=float(np.mean([t.silhouette + t.edges for t in terms.values()])),
-            iou={name: t.overlap for name, t in terms.items()},
-            evaluations=search.evaluations,
-            refinements=search.refinements,
-            observations=observations,
-            warnings=warnings,
-            confidence=self._confidence(search),
-            limbs=limbs,
-        )
-
-    def _confidence(self, search: FrameSearch) -> Confidence | None:
-        if self.config.refinement == "none":
-            return None
-        return confidence_of(self.body, search.pose, search.contours, measured=self.body.measured)
-
-    def _predict(self, stamp_ns: int) -> FloatArray:
-        """The pose (p,) expected at a time: the last one moved on, with damped velocity."""
-        if self._stamp_ns is None or stamp_ns <= self._stamp_ns:
-            return self._pose
-        elapsed_ns = min(
-            stamp_ns - self._stamp_ns, self.config.sigma.rate_max / TRAINING_RATE_HZ * 1e9
-        )
-        moved = self._pose + self.config.prediction * elapsed_ns * self._velocity_per_ns
-        return np.asarray(np.clip(moved, *self._searcher.limits))
-
-    def _region_margin(self, stamp_ns: int) -> float | None:
-        """How far around the predicted body to look, m; None for the whole images."""
-        if (
-            self.state is not TrackState.TRACKING
-            or self._stamp_ns is None
-            or stamp_ns <= self._stamp_ns
-        ):
-            return None
-        elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
-        return self.config.region.margin_m + LIMB_SPEED_M_S * elapsed_s
-
-    def _rate_factor(self, stamp_ns: int) -> float:
-        """How much wider than at the training rate to search, by the time since the last step."""
-        if self._stamp_ns is None or stamp_ns <= self._stamp_ns:
-            return 1.0
-        frames = (stamp_ns - self._stamp_ns) * 1e-9 * TRAINING_RATE_HZ
-        return min(frames, self.config.sigma.rate_max)
-
-    def _searcher_for(self, body: BodyModel) -> Searcher:
-        return Searcher(
-            self.rig,
-            body,
-            self.config,
-            limits=joint_limits(body, self.config),
-            threads=self._threads,
-            mapper=self._pool.map,
-        )
+    def _new_starter(self, last_pose: FloatArray | None = None) -> Starter:
+        return Starter(
+            self.rig, self.body, self._searcher_for, self._evidence.select,
+            sized=self._body.sized, fit_shape=not self._body.sections_fitted, last_pose=last_pose,
+        )  # fmt: skip

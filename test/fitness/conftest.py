@@ -14,7 +14,7 @@ from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation, Stage
+from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.synthesis import ring_rig
 
 Mask = NDArray[np.bool_]
@@ -306,14 +306,11 @@ def observations(
 
 
 @pytest.fixture(scope="session")
-def make_stage() -> Callable[..., Stage]:
-    """`make_stage(body, centre, **changes)`: a stage that compares and searches everything."""
+def make_comparison() -> Callable[..., Comparison]:
+    """`make_comparison(body, centre, **changes)`: compares everything."""
 
-    def make(body: BodyModel, centre: FloatArray, **changes: object) -> Stage:
-        every = np.ones(len(body.cone_names), dtype=bool)
-        default = Stage(
-            "s", "sppso", np.arange(body.size), centre, body.sigma, 3, 2, 1.0, 1.0, every, every
-        )
+    def make(body: BodyModel, centre: FloatArray, **changes: object) -> Comparison:
+        default = Comparison.whole(centre, len(body.cone_names), edge_weight=1.0)
         return replace(default, **changes)  # type: ignore[arg-type]
 
     return make

@@ -17,7 +17,7 @@ def black(rig: CameraRig, make_observation) -> dict[str, Observation]:
 
 
 def test_the_cost_is_the_weights_sum_minus_the_mean_of_the_terms(
-    body, rig, pose, observations, make_stage
+    body, rig, pose, observations, make_comparison
 ):
     fitness = Fitness(body, rig.cameras)
     views = fitness.lay_out(observations)
@@ -28,7 +28,7 @@ def test_the_cost_is_the_weights_sum_minus_the_mean_of_the_terms(
     assert 0.1 < f_e < 0.99
     for silhouette, edges in ((1.0, 1.0), (1.0, 0.5), (0.0, 1.0), (2.0, 0.0)):
         evaluate = fitness.prepare(
-            views, make_stage(body, pose, silhouette_weight=silhouette, edge_weight=edges)
+            views, make_comparison(body, pose, silhouette_weight=silhouette, edge_weight=edges)
         )
         expected = silhouette + edges - silhouette * f_s - edges * f_e
         assert evaluate(pose[None])[0] == pytest.approx(expected, abs=1e-12)
@@ -36,12 +36,14 @@ def test_the_cost_is_the_weights_sum_minus_the_mean_of_the_terms(
 
 @pytest.mark.parametrize("term", EDGE_TERMS)
 @pytest.mark.parametrize("rule", EDGE_RULES)
-def test_without_edge_samples_f_e_is_zero(body, rig, pose, observations, rule, term, make_stage):
+def test_without_edge_samples_f_e_is_zero(
+    body, rig, pose, observations, rule, term, make_comparison
+):
     fitness = Fitness(body, rig.cameras, edge_rule=rule, edge_term=term)
     views = fitness.lay_out(observations)
     none = np.zeros(len(body.cone_names), dtype=bool)
     f_s = np.mean([t.silhouette for t in fitness.terms(views, pose).values()])
-    cost = fitness.prepare(views, make_stage(body, pose, edge_cones=none))(pose[None])[0]
+    cost = fitness.prepare(views, make_comparison(body, pose, edge_cones=none))(pose[None])[0]
     assert cost == pytest.approx(2.0 - f_s, abs=1e-12)
 
 
@@ -78,14 +80,16 @@ def test_unknown_rules_and_terms_are_refused(body, rig):
         Fitness(body, rig.cameras, edge_term="median")
 
 
-def test_h_mcpsos_costs_by_counted_pixels(body, rig, pose, observations, make_stage):
-    """B/(B+Y) one-sided, ½ B/(B+Y) + ½ R/(R+Y) else, beside mean (1 - M)²; view by view."""
+def test_h_mcpsos_costs_by_counted_pixels(body, rig, pose, observations, make_comparison):
+    """B/(B+Y) one-sided, ½ B/(B+Y) + ½ R/(R+Y) both ways, beside mean (1 - M)²; view by view."""
     every = np.ones(len(body.cone_names), dtype=bool)
     costs = {}
     for cost in COSTS:
         fitness = Fitness(body, rig.cameras, cost=cost, edge_term="mean")
         views = fitness.lay_out(observations)
-        costs[cost] = fitness.prepare(views, make_stage(body, pose, edge_weight=0.5))(pose[None])[0]
+        costs[cost] = fitness.prepare(views, make_comparison(body, pose, edge_weight=0.5))(
+            pose[None]
+        )[0]
     plain = Fitness(body, rig.cameras)
     counts = plain.count(views, pose[None], every, every)[0]
     projected, overlap = counts[:, kernels.PROJECTED], counts[:, kernels.OVERLAP]
@@ -96,19 +100,19 @@ def test_h_mcpsos_costs_by_counted_pixels(body, rig, pose, observations, make_st
     assert costs["one_sided"] == pytest.approx(one_sided, abs=1e-12)
     assert costs["bidirectional"] == pytest.approx(both, abs=1e-12)
     # SPPSO's cost with the squared edge term is the bidirectional one; with another it is not.
-    squared = plain.prepare(views, make_stage(body, pose, edge_weight=0.5))(pose[None])[0]
+    squared = plain.prepare(views, make_comparison(body, pose, edge_weight=0.5))(pose[None])[0]
     assert squared == pytest.approx(both, abs=1e-12)
     assert abs(costs["overlap"] - both) > 1e-3
 
 
 def test_one_sided_a_body_within_the_observed_costs_nothing_outside_everything(
-    twin, make_observation, body, rig, pose, make_stage
+    twin, make_observation, body, rig, pose, make_comparison
 ):
     fitness = Fitness(body, rig.cameras, cost="one_sided")
     full = {c.name: make_observation(c, np.ones(c.size_px[::-1], dtype=bool)) for c in rig}
     away = pose.copy()
     away[body.index("pelvis_tx")] = FAR_M
-    silhouettes = make_stage(body, pose, edge_weight=0.0)
+    silhouettes = make_comparison(body, pose, edge_weight=0.0)
     inside = fitness.prepare(fitness.lay_out(full), silhouettes)
     assert inside(np.stack([pose, away])).tolist() == [0.0, 1.0]
     nothing = fitness.prepare(fitness.lay_out(black(rig, make_observation)), silhouettes)
@@ -138,7 +142,7 @@ def test_a_black_view_is_fully_explained_by_a_body_outside_it(make_observation, 
 
 
 def test_an_observed_silhouette_is_not_explained_by_a_body_outside(
-    body, rig, pose, observations, make_stage
+    body, rig, pose, observations, make_comparison
 ):
     fitness = Fitness(body, rig.cameras)
     away = pose.copy()
@@ -147,4 +151,4 @@ def test_an_observed_silhouette_is_not_explained_by_a_body_outside(
     for name, terms in fitness.terms(views, away).items():
         assert (terms.silhouette, terms.edges, terms.overlap) == (0.0, 0.0, 0.0)
         assert terms.pixels == observations[name].mask.sum()
-    assert fitness.prepare(views, make_stage(body, away))(away[None])[0] == 2.0
+    assert fitness.prepare(views, make_comparison(body, away))(away[None])[0] == 2.0

@@ -16,29 +16,31 @@ FAR_M = 1000.0
 
 
 def test_the_pose_that_made_the_silhouettes_costs_least(
-    twin, make_observation, make_pose, body, rig, pose, make_stage
+    twin, make_observation, make_pose, body, rig, pose, make_comparison
 ):
     seen = {c.name: make_observation(c, twin(body, c, pose).silhouette()) for c in rig}
     fitness = Fitness(body, rig.cameras)
     views = fitness.lay_out(seen)
     assert min(t.silhouette for t in fitness.terms(views, pose).values()) > 0.98
-    evaluate = fitness.prepare(views, make_stage(body, pose, edge_weight=0.0))
+    evaluate = fitness.prepare(views, make_comparison(body, pose, edge_weight=0.0))
     rng = np.random.default_rng(0)
     others = pose + 3.0 * body.sigma * rng.standard_normal((20, body.size))
     costs = evaluate(np.concatenate([pose[None], others]))
     assert costs[0] < costs[1:].min()
 
 
-def test_only_active_parameters_leave_the_centre(body, rig, pose, observations, make_stage):
+def test_only_active_parameters_leave_the_centre(body, rig, pose, observations, make_comparison):
     active = np.array([3, 5, 9])
     fitness = Fitness(body, rig.cameras)
-    evaluate = fitness.prepare(fitness.lay_out(observations), make_stage(body, pose, active=active))
+    evaluate = fitness.prepare(
+        fitness.lay_out(observations), make_comparison(body, pose, active=active)
+    )
     points = np.array([[0.1, 0.9, -0.2], [-0.1, 1.0, 0.0]])
     poses = evaluate.poses(points)
     np.testing.assert_array_equal(poses[:, active], points)
-    held = np.setdiff1d(np.arange(body.size), active)
-    np.testing.assert_array_equal(poses[:, held], np.tile(pose[held], (2, 1)))
-    whole = fitness.prepare(fitness.lay_out(observations), make_stage(body, pose))
+    still = np.setdiff1d(np.arange(body.size), active)
+    np.testing.assert_array_equal(poses[:, still], np.tile(pose[still], (2, 1)))
+    whole = fitness.prepare(fitness.lay_out(observations), make_comparison(body, pose))
     np.testing.assert_array_equal(evaluate(points), whole(poses))
 
 
@@ -59,10 +61,10 @@ def test_a_body_behind_a_camera_is_not_in_its_view(make_observation, body, pose)
 
 
 def test_points_that_are_not_finite_cost_nan_and_spoil_no_other(
-    body, rig, pose, observations, make_stage
+    body, rig, pose, observations, make_comparison
 ):
     fitness = Fitness(body, rig.cameras)
-    evaluate = fitness.prepare(fitness.lay_out(observations), make_stage(body, pose))
+    evaluate = fitness.prepare(fitness.lay_out(observations), make_comparison(body, pose))
     good = evaluate(np.tile(pose, (2, 1)))
     batch = np.tile(pose, (5, 1))
     batch[1, 0], batch[2, 7], batch[3, 30] = np.nan, np.inf, -np.inf
@@ -73,7 +75,7 @@ def test_points_that_are_not_finite_cost_nan_and_spoil_no_other(
 
 @pytest.mark.parametrize("lens", [False, True], ids=["pinhole", "lens"])
 def test_finite_poses_cost_something_finite_however_far(
-    make_observation, smooth_edges, body, rig, lens_rig, pose, lens, make_stage
+    make_observation, smooth_edges, body, rig, lens_rig, pose, lens, make_comparison
 ):
     shown = lens_rig if lens else rig
     seen = {
@@ -81,7 +83,7 @@ def test_finite_poses_cost_something_finite_however_far(
         for c in shown
     }
     fitness = Fitness(body, shown.cameras)
-    evaluate = fitness.prepare(fitness.lay_out(seen), make_stage(body, pose))
+    evaluate = fitness.prepare(fitness.lay_out(seen), make_comparison(body, pose))
     rng = np.random.default_rng(1)
     poses = np.concatenate(
         [
@@ -99,7 +101,8 @@ def test_finite_poses_cost_something_finite_however_far(
 
 @pytest.mark.parametrize("rule", EDGE_RULES)
 def test_the_same_costs_with_any_number_of_threads(body, lens_rig, pose, make_observation, rule,
-                                                   smooth_edges, twin, make_stage):  # fmt: skip
+                                                   smooth_edges, twin,
+                                                   make_comparison):  # fmt: skip
     seen = {
         c.name: make_observation(c, twin(body, c, pose).silhouette(), smooth_edges(c, 5))
         for c in lens_rig
@@ -111,14 +114,14 @@ def test_the_same_costs_with_any_number_of_threads(body, lens_rig, pose, make_ob
     for threads in (1, 2, 7):
         fitness = Fitness(body, lens_rig.cameras, threads=threads, edge_rule=rule)
         assert fitness.threads <= numba.config.NUMBA_NUM_THREADS
-        evaluate = fitness.prepare(fitness.lay_out(seen), make_stage(body, pose))
+        evaluate = fitness.prepare(fitness.lay_out(seen), make_comparison(body, pose))
         costs[threads] = evaluate(poses).tobytes()
         singles = np.concatenate([evaluate(one[None]) for one in poses])
         assert singles.tobytes() == costs[threads]
     assert costs[1] == costs[2] == costs[7]
 
 
-def test_a_region_costs_the_same_as_the_full_frame(body, rig, pose, observations, make_stage):
+def test_a_region_costs_the_same_as_the_full_frame(body, rig, pose, observations, make_comparison):
     regions = {}
     for name, full in observations.items():
         rows, columns = np.nonzero(full.mask)
@@ -135,13 +138,15 @@ def test_a_region_costs_the_same_as_the_full_frame(body, rig, pose, observations
     fitness = Fitness(body, rig.cameras)
     poses = pose + body.sigma * np.random.default_rng(3).standard_normal((5, body.size))
     evaluate = [
-        fitness.prepare(fitness.lay_out(seen), make_stage(body, pose))
+        fitness.prepare(fitness.lay_out(seen), make_comparison(body, pose))
         for seen in (observations, regions)
     ]
     assert evaluate[0](poses).tobytes() == evaluate[1](poses).tobytes()
 
 
-def test_a_missing_camera_leaves_the_mean_of_the_others(body, rig, pose, observations, make_stage):
+def test_a_missing_camera_leaves_the_mean_of_the_others(
+    body, rig, pose, observations, make_comparison
+):
     fitness = Fitness(body, rig.cameras)
     full = fitness.terms(fitness.lay_out(observations), pose)
     missing = rig.names[1]
@@ -149,7 +154,7 @@ def test_a_missing_camera_leaves_the_mean_of_the_others(body, rig, pose, observa
     views = fitness.lay_out(observations)
     terms = fitness.terms(views, pose)
     assert terms == {name: full[name] for name in rig.names if name != missing}
-    cost = fitness.prepare(views, make_stage(body, pose))(pose[None])[0]
+    cost = fitness.prepare(views, make_comparison(body, pose))(pose[None])[0]
     mean = np.mean([t.silhouette + t.edges for t in terms.values()])
     assert cost == pytest.approx(2.0 - mean, abs=1e-12)
 

@@ -1,5 +1,7 @@
 """How sure a pose is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -123,3 +125,13 @@ def test_slopes_against_finite_differences(scene) -> None:
     turn = root_transform(body, pose + change)[:3, :3] @ root_transform(body, pose)[:3, :3].T
     small = np.array([turn[2, 1], turn[0, 2], turn[1, 0]])
     np.testing.assert_allclose(by_root[3:] @ change, small, atol=2e-5)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1e9])
+def test_equations_that_cannot_be_solved_leave_it_unknown(scene, monkeypatch, value) -> None:
+    pose, contours = frame_of(scene, scene.rig.names)
+    sums = contours.equations(pose, 0.06)
+    assert confidence_of(scene.body, pose, contours, measured=True) is not None
+    broken = replace(sums, hessian=np.full_like(sums.hessian, value))
+    monkeypatch.setattr(contours, "equations", lambda *_: broken)
+    assert confidence_of(scene.body, pose, contours, measured=True) is None

@@ -17,7 +17,7 @@ def test_particles_outlive_a_frame_and_reset_forgets_them(
     second = tracker.step(frames[1].observations, frames[1].stamp_ns)
     assert searcher.particle_sets["body"] is not particle_set
     tracker.reset()
-    assert not searcher.particle_sets
+    assert not tracker._searcher.particle_sets
     again = [tracker.step(f.observations, f.stamp_ns) for f in frames[:2]]
     for before, after in zip((first, second), again, strict=True):
         assert before.pose.tobytes() == after.pose.tobytes()

@@ -11,7 +11,7 @@ from markerless_tracker.tracking import OPTIMIZERS, TrackerConfig
 from markerless_tracker.tracking.config import PAPERS
 from markerless_tracker.tracking.partitions import STAGES
 from markerless_tracker.tracking.partitions.budget import SWARM_SHARE
-from markerless_tracker.tracking.stages import LIMB_SWARM, frame_stages
+from markerless_tracker.tracking.partitions.frame import LIMB_SWARM, frame_stages
 
 BODIES = {
     name: load_body(name, 1.75)
@@ -27,7 +27,7 @@ def stages(**settings):
 
 
 def spent(found):
-    return sum(stage.evaluations for stage in found)
+    return sum(stage.plan.evaluations for stage in found)
 
 
 @pytest.mark.parametrize("body", BODIES)
@@ -39,7 +39,7 @@ def spent(found):
 def test_the_published_evaluations_are_the_default(optimizer, evaluations, body):
     found = stages(optimizer=optimizer, body=body)
     assert spent(found) == evaluations
-    assert {stage.algorithm for stage in found} <= set(ALGORITHMS)
+    assert {stage.plan.algorithm for stage in found} <= set(ALGORITHMS)
     assert len({stage.name for stage in found}) == len(found)
 
 
@@ -48,8 +48,8 @@ def test_the_published_evaluations_are_the_default(optimizer, evaluations, body)
 def test_tables_3_and_4_scale_the_particles_of_h_mcpso(evaluations, sub_swarms):
     found = stages(optimizer="hmcpso", evaluations=evaluations, **{"hmcpso.sub_swarms": sub_swarms})
     assert spent(found) == evaluations
-    assert [(s.particles, s.iterations) for s in found] == [(evaluations // 180, 30)] * 6
-    assert {s.options["sub_swarms"] for s in found} == {sub_swarms}
+    assert [(s.plan.particles, s.plan.iterations) for s in found] == [(evaluations // 180, 30)] * 6
+    assert {s.plan.options["sub_swarms"] for s in found} == {sub_swarms}
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_tables_3_and_4_scale_the_particles_of_h_mcpso(evaluations, sub_swarms):
 )  # fmt: skip
 def test_other_budgets_keep_the_iterations(optimizer, evaluations, shape):
     found = stages(optimizer=optimizer, evaluations=evaluations)
-    assert [(s.particles, s.iterations) for s in found] == shape
+    assert [(s.plan.particles, s.plan.iterations) for s in found] == shape
 
 
 @pytest.mark.parametrize(
@@ -89,30 +89,30 @@ def test_h_mcpsos_six_steps_and_who_joins_softly():
     body = BODIES["humaneva34"]
     found = stages(optimizer="hmcpso")
     assert [s.name for s in found] == [f"step {name}" for name in SIX]
-    assert [s.active.size for s in found] == [6, 4 + 6, 7 + 3, 7 + 3, 5 + 6, 5 + 6]
-    plain = found[0].sigma
+    assert [s.comparison.active.size for s in found] == [6, 4 + 6, 7 + 3, 7 + 3, 5 + 6, 5 + 6]
+    plain = found[0].plan.sigma
     for stage, name in zip(found, SIX, strict=True):
         own = body.subspaces[name]
-        np.testing.assert_array_equal(stage.sigma[own], plain[own])
-        joined = np.setdiff1d(stage.active, own)
-        np.testing.assert_allclose(stage.sigma[joined], plain[joined] / 10.0)
+        np.testing.assert_array_equal(stage.plan.sigma[own], plain[own])
+        joined = np.setdiff1d(stage.comparison.active, own)
+        np.testing.assert_allclose(stage.plan.sigma[joined], plain[joined] / 10.0)
         expected = {"root": [], "torso_head": "root", "l_arm": "torso", "r_arm": "torso"}.get(
             name, "root"
         )
         np.testing.assert_array_equal(joined, np.sort(body.subspaces[expected]) if expected else [])
-        assert stage.silhouette_cones.all() and stage.edge_cones.all()
+        assert stage.comparison.silhouette_cones.all() and stage.comparison.edge_cones.all()
 
 
 @pytest.mark.parametrize("settings", [{"optimizer": "hpso"}, {"optimizer": "hmcpso"}])
 def test_a_hard_partition_varies_a_steps_own_parameters_alone(settings):
     found = stages(**settings, partition="hard")
-    assert [s.active.size for s in found] == [6, 4, 7, 7, 5, 5]
-    assert sorted(np.concatenate([s.active for s in found])) == list(range(34))
+    assert [s.comparison.active.size for s in found] == [6, 4, 7, 7, 5, 5]
+    assert sorted(np.concatenate([s.comparison.active for s in found])) == list(range(34))
 
 
 def test_sppsos_hard_partition_leaves_the_root():
     _, second = stages(optimizer="sppso", partition="hard")
-    np.testing.assert_array_equal(second.active, BODIES["balan31"].joints)
+    np.testing.assert_array_equal(second.comparison.active, BODIES["balan31"].joints)
 
 
 @pytest.mark.parametrize(
@@ -124,9 +124,9 @@ def test_sppsos_hard_partition_leaves_the_root():
 )
 def test_hpsos_own_twelve_steps(body, sizes):
     found = stages(optimizer="hpso", **{"hmcpso.hierarchy": "twelve"}, evaluations=7200, body=body)
-    assert [s.active.size for s in found] == sizes
-    assert {(s.particles, s.iterations) for s in found} == {(10, 60)}
-    assert sorted(np.concatenate([s.active for s in found])) == list(range(sum(sizes)))
+    assert [s.comparison.active.size for s in found] == sizes
+    assert {(s.plan.particles, s.plan.iterations) for s in found} == {(10, 60)}
+    assert sorted(np.concatenate([s.comparison.active for s in found])) == list(range(sum(sizes)))
 
 
 def test_a_body_without_the_hierarchy_is_refused():
@@ -142,7 +142,7 @@ def test_spreads_of_the_preset_paper():
     """A variance of 0.01 rad² for every angle; positions, and all of APF's, the body's own."""
     body = BODIES["humaneva34"]
     at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
-    swarm, apf = stages(optimizer="hmcpso")[0].sigma, stages(optimizer="apf")[0].sigma
+    swarm, apf = stages(optimizer="hmcpso")[0].plan.sigma, stages(optimizer="apf")[0].plan.sigma
     np.testing.assert_allclose(swarm[at], body.sigma[at])
     np.testing.assert_allclose(np.delete(swarm, at), 0.1)
     np.testing.assert_allclose(apf, body.sigma)
@@ -154,7 +154,8 @@ def test_spreads_grow_with_the_time_between_frames():
 
     def sigmas(**settings):
         config = TrackerConfig.from_mapping({"preset": "paper", "optimizer": "pso", **settings})
-        return [frame_stages(body, config, body.neutral, k * body.sigma)[0].sigma for k in (1, 3)]
+        found = [frame_stages(body, config, body.neutral, k * body.sigma)[0] for k in (1, 3)]
+        return [stage.plan.sigma for stage in found]
 
     one, three = sigmas(**{"sigma.angle": 0.0})
     np.testing.assert_allclose(three, 3.0 * one)
@@ -169,11 +170,11 @@ def test_spreads_grow_with_the_time_between_frames():
 def test_beside_a_refinement_every_swarm_keeps_its_share_and_must_gain(optimizer):
     found = stages(optimizer=optimizer, preset="tuned")
     budget = 1000 if optimizer == "sppso" else 3600
-    assert [found[0].algorithm, found[-1].algorithm] == [CONTOUR, CONTOUR]
+    assert [found[0].plan.algorithm, found[-1].plan.algorithm] == [CONTOUR, CONTOUR]
     swarms, limbs = found[1:-5], found[-5:-1]
     assert spent(swarms) == budget * SWARM_SHARE
-    assert {s.min_improvement for s in swarms + limbs} == {0.001}
-    assert [s.particles for s in limbs] == [LIMB_SWARM[0] * budget // 1000] * 4
+    assert {s.plan.min_improvement for s in swarms + limbs} == {0.001}
+    assert [s.plan.particles for s in limbs] == [LIMB_SWARM[0] * budget // 1000] * 4
     assert len({s.name for s in found}) == len(found)
 
 
@@ -182,14 +183,14 @@ def test_every_algorithm_of_a_stage_takes_the_stages_options():
 
     for optimizer in STAGES:
         for stage in stages(optimizer=optimizer):
-            d = stage.active.size
-            ALGORITHMS[stage.algorithm](
+            plan, active = stage.plan, stage.comparison.active
+            ALGORITHMS[plan.algorithm](
                 Problem(
-                    np.tile([[-9.0], [9.0]], (1, d)), stage.centre[stage.active],
-                    stage.sigma[stage.active], stage.particles, stage.iterations,
-                    everything_feasible, np.random.default_rng(0),
+                    np.tile([[-9.0], [9.0]], (1, active.size)), stage.comparison.centre[active],
+                    plan.sigma[active], plan.particles, plan.iterations, everything_feasible,
+                    np.random.default_rng(0),
                 ),
-                **stage.options,
+                **plan.options,
             )  # fmt: skip
 
 
@@ -218,11 +219,13 @@ def test_every_optimizer_has_its_stages_and_its_paper():
 @pytest.mark.parametrize("factor", [1, 4])
 def test_sppsos_ablation_spends_the_same_evaluations(settings, sizes, shape, factor):
     found = stages(optimizer="sppso", evaluations=1000 * factor, **settings)
-    assert [s.active.size for s in found] == sizes
-    assert [(s.particles, s.iterations) for s in found] == [(factor * n, k) for n, k in shape]
+    assert [s.comparison.active.size for s in found] == sizes
+    assert [(s.plan.particles, s.plan.iterations) for s in found] == [
+        (factor * n, k) for n, k in shape
+    ]
     assert spent(found) == 1000 * factor
     if settings.get("partition") == "hard":
-        assert sorted(np.concatenate([s.active for s in found])) == list(range(31))
+        assert sorted(np.concatenate([s.comparison.active for s in found])) == list(range(31))
 
 
 def test_what_earlier_stages_of_sppso_found_keeps_a_small_spread():
@@ -230,15 +233,16 @@ def test_what_earlier_stages_of_sppso_found_keeps_a_small_spread():
     body = BODIES["balan31"]
     at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
     root, trunk, whole = stages(optimizer="sppso", **{"sppso.stages": "three"})
-    np.testing.assert_array_equal(root.sigma, body.sigma)
+    np.testing.assert_array_equal(root.plan.sigma, body.sigma)
     expected = body.sigma.copy()
     expected[at] /= 10.0
-    np.testing.assert_allclose(trunk.sigma, expected)
+    np.testing.assert_allclose(trunk.plan.sigma, expected)
     expected[body.subspaces["torso_head"]] /= 10.0
-    np.testing.assert_allclose(whole.sigma, expected)
+    np.testing.assert_allclose(whole.plan.sigma, expected)
     (alone,) = stages(optimizer="sppso", **{"sppso.stages": "global"})
-    np.testing.assert_array_equal(alone.sigma, body.sigma)
-    assert not root.edge_cones.all() and trunk.edge_cones.all() and alone.edge_cones.all()
+    np.testing.assert_array_equal(alone.plan.sigma, body.sigma)
+    every = [stage.comparison.edge_cones.all() for stage in (root, trunk, alone)]
+    assert every == [False, True, True]
 
 
 @pytest.mark.parametrize("kind", ["two", "three", "global"])
@@ -246,7 +250,7 @@ def test_beside_a_refinement_the_ablation_looks_widely_for_its_share(kind):
     found = stages(optimizer="sppso", **{"sppso.stages": kind}, preset="tuned")
     swarms = found[1:-5]
     assert spent(swarms) == 1000 * SWARM_SHARE
-    assert max(s.iterations for s in swarms) == 10
+    assert max(s.plan.iterations for s in swarms) == 10
 
 
 def test_three_stages_need_a_subspace_for_the_second():

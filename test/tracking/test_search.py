@@ -13,10 +13,10 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Sppso
 from markerless_tracker.records import CONTOUR, Observation
 from markerless_tracker.synthesis import ring_rig
-from markerless_tracker.tracking import TrackerConfig, search
+from markerless_tracker.tracking import TrackerConfig, refinement
+from markerless_tracker.tracking.partitions.frame import contour_stage, frame_stages
 from markerless_tracker.tracking.partitions.sppso import sppso_stages
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.stages import contour_stage, frame_stages
 
 BODY = load_body("person31", 1.75)
 RIG = ring_rig(4, (320, 240))
@@ -79,7 +79,7 @@ def person() -> Person:
 def found(monkeypatch) -> list[tuple[str, FloatArray]]:
     """Every stage's own result, in order: poses of refinements, points of swarms."""
     results: list[tuple[str, FloatArray]] = []
-    plain_refine, plain_run = search.refine, Sppso.run
+    plain_refine, plain_run = refinement.refine, Sppso.run
 
     def refine(*args, **kwargs):
         results.append((CONTOUR, plain_refine(*args, **kwargs)))
@@ -90,7 +90,7 @@ def found(monkeypatch) -> list[tuple[str, FloatArray]]:
         results.append(("sppso", evaluate.poses(best[None])[0]))
         return best
 
-    monkeypatch.setattr(search, "refine", refine)
+    monkeypatch.setattr(refinement, "refine", refine)
     monkeypatch.setattr(Sppso, "run", run)
     return results
 
@@ -154,7 +154,7 @@ def test_parameters_that_the_first_stage_holds_count_in_the_comparison(person, m
         pose[arms] = person.pose[arms]
         return pose
 
-    monkeypatch.setattr(search, "refine", refine)
+    monkeypatch.setattr(refinement, "refine", refine)
     shown = replace(person, predicted=predicted)
     root, _ = sppso_stages(person.body, config, predicted, 0.1 * person.body.sigma)
     contour = contour_stage("align", person.body, config, predicted, person.body.sigma)
@@ -172,7 +172,7 @@ def test_a_refinement_that_goes_astray_is_left_behind(person, monkeypatch) -> No
         asked.append(start.copy())
         return person.body.neutral.copy()
 
-    monkeypatch.setattr(search, "refine", astray)
+    monkeypatch.setattr(refinement, "refine", astray)
     frame = searched(person, config)
     np.testing.assert_array_equal(asked[0], person.predicted)
     np.testing.assert_array_equal(asked[1], frame.pose)
@@ -182,7 +182,7 @@ def test_a_refinement_that_goes_astray_is_left_behind(person, monkeypatch) -> No
 
 def test_a_refinement_that_hits_is_not_spoilt_by_the_swarm(person, monkeypatch) -> None:
     config = settings(edge_weight=0.0)
-    monkeypatch.setattr(search, "refine", lambda *_, **__: person.pose.copy())
+    monkeypatch.setattr(refinement, "refine", lambda *_, **__: person.pose.copy())
     np.testing.assert_array_equal(searched(person, config).pose, person.pose)
 
 
@@ -195,7 +195,7 @@ def test_each_stage_starts_from_the_estimate_so_far(person, monkeypatch) -> None
         plain(self, problem, **kwargs)
 
     monkeypatch.setattr(Sppso, "__init__", watched)
-    monkeypatch.setattr(search, "refine", lambda *_, **__: person.pose.copy())
+    monkeypatch.setattr(refinement, "refine", lambda *_, **__: person.pose.copy())
     searched(person, config)
     np.testing.assert_array_equal(centres[0], person.pose[person.body.root])
 
@@ -211,7 +211,7 @@ def test_refinement_is_told_limits_beliefs_and_reach(person, monkeypatch) -> Non
         # Wherever the search went since, the belief is about the prediction.
         return person.pose.copy()
 
-    monkeypatch.setattr(search, "refine", refine)
+    monkeypatch.setattr(refinement, "refine", refine)
     searched(person, config)
     assert len(told) == 2
     for kwargs in told:
@@ -293,10 +293,13 @@ def test_scatter_is_that_of_the_last_swarm_that_varied_a_parameter(person) -> No
     limb = next(s for s in stages(person, config) if s.name == "l_arm")
     alone = searched(person, config, (root,)).particle_sd_ratio
     varied = np.zeros(person.body.size, dtype=bool)
-    varied[root.active] = True
+    varied[root.comparison.active] = True
     assert np.isnan(alone[~varied]).all() and (alone[varied] > 0.0).all()
     whole = searched(person, config, (root, body)).particle_sd_ratio
     assert np.isfinite(whole).all()
     both = searched(person, config, (root, body, limb)).particle_sd_ratio
     changed = both != whole
-    assert changed[limb.active].all() and not np.delete(changed, limb.active).any()
+    assert (
+        changed[limb.comparison.active].all()
+        and not np.delete(changed, limb.comparison.active).any()
+    )

@@ -37,7 +37,7 @@ def files(scene, tmp_path):
 
 def gap_mm(scene, tracker) -> float:
     """Mean distance of the start pose's markers from the truth."""
-    start = markers(tracker.body, tracker._start)
+    start = markers(tracker.body, tracker._motion.start)
     return float(1e3 * np.linalg.norm(start - scene.markers(0), axis=1).mean())
 
 
@@ -69,7 +69,7 @@ def test_a_pose_file_starts_with_the_first_frame_that_comes(scene, config, files
     ):
         setup = build_tracker(scene.rig, config, start_file=files / "start.yaml", **subject)
         assert setup.start_stamp_ns is None
-        np.testing.assert_array_equal(setup.tracker._start, scene.pose(0))
+        np.testing.assert_array_equal(setup.tracker._motion.start, scene.pose(0))
         assert gap_mm(scene, setup.tracker) < 1.0
 
 

@@ -11,8 +11,8 @@ from markerless_tracker.records import CONTOUR
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.partitions import STAGES
 from markerless_tracker.tracking.partitions.budget import SWARM_SHARE, scaled_particles
-from markerless_tracker.tracking.partitions.sppso import SPPSO_STAGES, sppso_stages, translations
-from markerless_tracker.tracking.stages import LIMB_SWARM, frame_stages
+from markerless_tracker.tracking.partitions.frame import LIMB_SWARM, frame_stages
+from markerless_tracker.tracking.partitions.sppso import SPPSO_STAGES, sppso_stages
 
 
 @pytest.fixture(scope="module")
@@ -63,36 +63,33 @@ def test_stage_1_moves_the_root_stage_2_everything(body, swarm_settings):
     sigma = np.linspace(1.0, 2.0, body.size)
     config = swarm(swarm_settings, edge_weight=0.3)
     first, second = sppso_stages(body, config, body.neutral, sigma)
-    assert (first.particles, first.iterations) == (10, 20)
-    assert (second.particles, second.iterations) == (20, 40)
-    assert first.evaluations + second.evaluations == 1000
+    assert (first.plan.particles, first.plan.iterations) == (10, 20)
+    assert (second.plan.particles, second.plan.iterations) == (20, 40)
+    assert first.plan.evaluations + second.plan.evaluations == 1000
     assert first.name != second.name
-    np.testing.assert_array_equal(np.sort(first.active), np.arange(6))
-    np.testing.assert_array_equal(second.active, np.arange(31))
+    np.testing.assert_array_equal(np.sort(first.comparison.active), np.arange(6))
+    np.testing.assert_array_equal(second.comparison.active, np.arange(31))
     for stage in (first, second):
-        assert (stage.silhouette_weight, stage.edge_weight) == (1.0, 0.3)
-        assert stage.algorithm == "sppso"
-        assert stage.silhouette_cones.all()
-        np.testing.assert_array_equal(stage.centre, body.neutral)
+        assert (stage.comparison.silhouette_weight, stage.comparison.edge_weight) == (1.0, 0.3)
+        assert stage.plan.algorithm == "sppso"
+        assert stage.comparison.silhouette_cones.all()
+        np.testing.assert_array_equal(stage.comparison.centre, body.neutral)
     # Edges of stage 1: the torso alone.
-    assert [n for n, e in zip(body.cone_names, first.edge_cones, strict=True) if e] == ["torso"]
-    assert second.edge_cones.all()
+    assert [n for n, e in zip(body.cone_names, first.comparison.edge_cones, strict=True) if e] == [
+        "torso"
+    ]
+    assert second.comparison.edge_cones.all()
     # Spreads of stage 2: the root's position a tenth, its orientation as it was.
-    np.testing.assert_array_equal(first.sigma, sigma)
+    np.testing.assert_array_equal(first.plan.sigma, sigma)
     expected = sigma.copy()
     expected[3:6] /= 10.0
-    np.testing.assert_allclose(second.sigma, expected, rtol=1e-15)
-
-
-def test_translations_are_the_pelvis_position(body):
-    names = [body.parameter_names[i] for i in translations(body)]
-    assert names == ["pelvis_tx", "pelvis_ty", "pelvis_tz"]
+    np.testing.assert_allclose(second.plan.sigma, expected, rtol=1e-15)
 
 
 def test_edges_of_stage_1_lie_on_every_cone_that_is_rigid_with_the_root(swarm_settings):
     body = load_body("person31", 1.75)
     first, _ = sppso_stages(body, swarm(swarm_settings), body.neutral, body.sigma)
-    chosen = {n for n, e in zip(body.cone_names, first.edge_cones, strict=True) if e}
+    chosen = {n for n, e in zip(body.cone_names, first.comparison.edge_cones, strict=True) if e}
     pelvis = body.frames[body.root_frame]
     rigid = {n for n, at in zip(body.cone_names, body.cone_node, strict=True) if at == pelvis}
     assert chosen == rigid
@@ -102,18 +99,18 @@ def test_edges_of_stage_1_lie_on_every_cone_that_is_rigid_with_the_root(swarm_se
 def test_the_swarm_alone_searches_with_scaled_spreads(body, swarm_settings):
     config = swarm(swarm_settings, **{"sigma.scale": 0.25})
     stages = frame_stages(body, config, body.neutral, body.sigma)
-    assert [s.algorithm for s in stages] == ["sppso", "sppso"]
-    np.testing.assert_allclose(stages[0].sigma, 0.25 * body.sigma, rtol=1e-15)
-    assert sum(s.evaluations for s in stages) == 1000
+    assert [s.plan.algorithm for s in stages] == ["sppso", "sppso"]
+    np.testing.assert_allclose(stages[0].plan.sigma, 0.25 * body.sigma, rtol=1e-15)
+    assert sum(s.plan.evaluations for s in stages) == 1000
 
 
 def test_refinement_stands_before_and_after_a_smaller_swarm(body, refined_settings):
     config = swarm(refined_settings, **{"refine.iterations": 7})
     stages = frame_stages(body, config, body.neutral, body.sigma)
-    assert [s.algorithm for s in stages] == [CONTOUR, *["sppso"] * 6, CONTOUR]
+    assert [s.plan.algorithm for s in stages] == [CONTOUR, *["sppso"] * 6, CONTOUR]
     assert len({s.name for s in stages}) == 8
-    assert sum(s.evaluations for s in stages[1:3]) == 1000 * SWARM_SHARE
-    assert stages[0].iterations == stages[-1].iterations == 7
+    assert sum(s.plan.evaluations for s in stages[1:3]) == 1000 * SWARM_SHARE
+    assert stages[0].plan.iterations == stages[-1].plan.iterations == 7
 
 
 def test_each_limb_has_a_small_wide_swarm_of_its_own(body, refined_settings):
@@ -121,20 +118,20 @@ def test_each_limb_has_a_small_wide_swarm_of_its_own(body, refined_settings):
     limbs = {s.name: s for s in frame_stages(body, config, body.neutral, body.sigma)[3:7]}
     assert list(limbs) == ["l_arm", "r_arm", "l_leg", "r_leg"]
     for name, stage in limbs.items():
-        np.testing.assert_array_equal(stage.active, body.subspaces[name])
-        np.testing.assert_allclose(stage.sigma, 3.0 * body.sigma)
-        assert (stage.particles, stage.iterations) == LIMB_SWARM
+        np.testing.assert_array_equal(stage.comparison.active, body.subspaces[name])
+        np.testing.assert_allclose(stage.plan.sigma, 3.0 * body.sigma)
+        assert (stage.plan.particles, stage.plan.iterations) == LIMB_SWARM
 
 
 def test_beside_a_refinement_every_swarm_must_gain(body, refined_settings, swarm_settings):
     stages = frame_stages(
         body, swarm(refined_settings, min_improvement=0.004), body.neutral, body.sigma
     )
-    assert [s.min_improvement for s in stages] == [0.0, *[0.004] * 6, 0.0]
+    assert [s.plan.min_improvement for s in stages] == [0.0, *[0.004] * 6, 0.0]
     alone = frame_stages(
         body, swarm(swarm_settings, min_improvement=0.004), body.neutral, body.sigma
     )
-    assert {s.min_improvement for s in alone} == {0.0}
+    assert {s.plan.min_improvement for s in alone} == {0.0}
 
 
 def test_a_budget_that_cannot_be_spent_is_refused_in_the_users_terms(

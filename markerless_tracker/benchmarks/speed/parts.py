@@ -21,15 +21,14 @@ from markerless_tracker.benchmarks.machine import machine, usable_cores
 from markerless_tracker.benchmarks.speed.reference import ReferenceFitness
 from markerless_tracker.benchmarks.speed.scene import SpeedScene
 from markerless_tracker.body import BodyModel
-from markerless_tracker.fitness import Fitness
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Segmenter, edge_map, learn_background
 from markerless_tracker.optim import keyed_generator
-from markerless_tracker.records import Observation
+from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.results.result import versions
 from markerless_tracker.tracking import Tracker, TrackerConfig
-from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.stages import contour_stage, frame_stages
+from markerless_tracker.tracking.partitions.frame import contour_stage, frame_stages
+from markerless_tracker.tracking.search import Searcher, make_fitness
 
 THOUSAND = 1000
 _ALONE = {"body": "balan31", "refinement": "none", "fit_shape": False, "edge_weight": 1.0}
@@ -129,12 +128,11 @@ def _view_evaluations(
         body = scene.body(name)
         pose = scene.pose(body)
         config = TrackerConfig.from_mapping({"body": name, "refinement": "none"})
-        fitness = _fitness(scene, body, config, threads=1)
+        fitness = make_fitness(body, scene.rig, config)
         seen = fitness.lay_out(observations)
         poses = poses_around(body, pose, _POSES)
-        # The second stage of SPPSO: all parameters, all cones.
-        stage = replace(frame_stages(body, config, pose, body.sigma)[-1], edge_weight=1.0)
-        timed[key] = (fitness.prepare(seen, stage), poses)
+        whole = Comparison.whole(pose, len(body.cone_names), edge_weight=1.0)
+        timed[key] = (fitness.prepare(seen, whole), poses)
         if key != "full":
             continue
         reference = ReferenceFitness(
@@ -143,7 +141,7 @@ def _view_evaluations(
         timed["reference"] = (reference, poses_around(body, pose, _REFERENCE_POSES))
         for part, active in _ARM.items():
             indices = np.sort([body.index(parameter) for parameter in active])
-            limb = fitness.prepare(seen, replace(stage, active=indices))
+            limb = fitness.prepare(seen, replace(whole, active=indices))
             timed[part] = (limb, np.ascontiguousarray(poses[:, indices]))
     best = dict.fromkeys(timed, np.inf)
     for repeat in range(repeats + 1):
@@ -203,7 +201,7 @@ def _refinement(
                 setup = min(setup, seconds)
             for iterations in best:
                 search.pose = pose
-                stages = (replace(stage, iterations=iterations),)
+                stages = (stage.planned(iterations=iterations),)
                 seconds = _seconds(lambda s=search, st=stages: s.run(st))  # type: ignore[misc]
                 if repeat:
                     best[iterations] = min(best[iterations], seconds)
@@ -277,8 +275,8 @@ def _frames(
 def _thousand(
     scene: SpeedScene, body: BodyModel, config: TrackerConfig
 ) -> Callable[[Mapping[str, Observation]], float]:
-    """A function that returns the time in s of 1000 evaluations of a body on a frame's evidence."""
-    fitness = _fitness(scene, body, config, threads=config.threads)
+    """Seconds that 1000 evaluations of a body take on a frame's evidence."""
+    fitness = make_fitness(body, scene.rig, config, threads=config.threads)
     poses = poses_around(body, scene.pose(body), THOUSAND)
     every = np.ones(len(body.cone_names), dtype=np.bool_)
 
@@ -287,18 +285,6 @@ def _thousand(
         return _seconds(lambda: fitness.count(views, poses, every, every))
 
     return run
-
-
-def _fitness(scene: SpeedScene, body: BodyModel, config: TrackerConfig, *, threads: int) -> Fitness:
-    return Fitness(
-        body,
-        scene.rig.cameras,
-        threads=threads,
-        edge_rule=config.edges.rule,
-        edge_term=config.edges.term,
-        edge_spacing_px=config.edges.spacing_px,
-        edge_step_px=config.edges.step_px,
-    )
 
 
 @contextmanager

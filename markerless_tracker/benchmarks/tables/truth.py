@@ -10,6 +10,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import TrackResult
 from markerless_tracker.results.score import match_rows
 from markerless_tracker.tracking import Tracker
+from markerless_tracker.tracking.search import make_fitness
 
 
 class TruthScore:
@@ -61,13 +62,5 @@ class TruthScore:
 
     def _fitness_of(self, body: BodyModel) -> Fitness:
         if self._fitness is None or self._fitness.body is not body:
-            config = self._tracker.config
-            self._fitness = Fitness(
-                body,
-                self._tracker.rig.cameras,
-                edge_rule=config.edges.rule,
-                edge_term=config.edges.term,
-                edge_spacing_px=config.edges.spacing_px,
-                edge_step_px=config.edges.step_px,
-            )
+            self._fitness = make_fitness(body, self._tracker.rig, self._tracker.config)
         return self._fitness

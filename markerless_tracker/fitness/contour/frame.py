@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from markerless_tracker.body import BodyModel
@@ -22,7 +21,7 @@ from markerless_tracker.fitness.contour.silhouette_contour import (
     join_edges,
 )
 from markerless_tracker.fitness.raster import Outlines, make_outlines
-from markerless_tracker.fitness.threads import ONE_CALLER, usable_threads, worth_waking
+from markerless_tracker.fitness.threads import parallel, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
@@ -116,6 +115,5 @@ class ContourFrame:
         if not worth_waking(len(self.views.names) * _VIEW_S, self._threads):
             equations_serial(*args)
             return
-        with ONE_CALLER:
-            numba.set_num_threads(self._threads)
+        with parallel(self._threads):
             equations_parallel(*args)

@@ -9,13 +9,10 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, cone_transforms, transforms
 from markerless_tracker.body.kinematics import carried
-from markerless_tracker.body.model import IntArray
+from markerless_tracker.body.model import FIRST_TRANSLATION, IntArray
 from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.geometry import FloatArray
-
-_TRANSLATIONS = 3
-"""Node kinds of this value and above are translations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +96,8 @@ def _pose_slopes(  # type: ignore[no-untyped-def]
             if hang[cone[n], m] == 0.0:
                 continue
             x, y, z = axes[m, 0], axes[m, 1], axes[m, 2]
-            if kind[m] < _TRANSLATIONS:
-                # A rotation about the axis moves a point P by axis x (P - origin).
+            if kind[m] < FIRST_TRANSLATION:
+                # A turn about the axis moves a point P by axis x (P - origin).
                 u, v = points[n, 0] - origins[m, 0], points[n, 1] - origins[m, 1]
                 w = points[n, 2] - origins[m, 2]
                 x, y, z = y * w - z * v, z * u - x * w, x * v - y * u

@@ -74,7 +74,7 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
     are no points within `UNDECIDED_PX` of undecided pixels, and distances are very large where
     that border is the nearest.
     """
-    mask = observation.full_frame(observation.mask.view(np.uint8))
+    mask = observation.in_full_frame(observation.mask.view(np.uint8))
     undecided = observation.undecided
     height, width = mask.shape
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
@@ -93,7 +93,7 @@ def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteConto
     distance -= 0.5
     known, free = distance, None
     if undecided is not None:
-        frame = observation.full_frame(undecided.view(np.uint8))
+        frame = observation.in_full_frame(undecided.view(np.uint8))
         known, free = _without_undecided(
             distance, window, np.ascontiguousarray(frame[top:bottom, left:right])
         )

@@ -60,9 +60,12 @@ class Adaptation:
         self._first_row = 0
 
     def pass_over(self, stamp_ns: int) -> None:
-        """Note the stamp of an image from which nothing is learned."""
+        """Note the stamp of an image from which nothing is learned.
+
+        One image may come twice: first a region of it, then the whole.
+        """
         before, self._seen_ns = self._seen_ns, stamp_ns
-        if before is None or not 0 < stamp_ns - before <= GAP_NS:
+        if before is None or not 0 <= stamp_ns - before <= GAP_NS:
             self._followed_ns = None
             self._first_row = 0
 

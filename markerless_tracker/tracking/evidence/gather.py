@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
+
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import ImageError
@@ -85,6 +87,22 @@ class EvidenceMaker:
             return self._segmenter(name).observe(view, stamp_ns)
 
         return dict(zip(views, self._pool.map(evidence, views.items()), strict=True))
+
+    def warm_up(self) -> dict[str, Observation]:
+        """Compile the imaging; returns made-up observations with a rectangle as silhouette."""
+        made_up = {}
+        for camera in self._rig:
+            width, height = camera.size_px
+            segmenter = self.segmenters.get(camera.name)
+            if segmenter is not None:
+                channels = segmenter.background.channels
+                shape = (height, width) if channels == 1 else (height, width, channels)
+                segmenter.observe(np.zeros(shape, dtype=np.uint8), 0)
+                segmenter.reset()
+            mask = np.zeros((height, width), dtype=np.uint8)
+            mask[height // 4 : height // 2, width // 4 : width // 2] = 1
+            made_up[camera.name] = Observation.from_mask(camera.name, 0, mask, mask)
+        return made_up
 
     def select(
         self, observed: Mapping[str, Observation], body: BodyModel, predicted: FloatArray

@@ -1,4 +1,4 @@
-"""Which views can be believed: a blinded camera shows silhouette everywhere, or nobody at all."""
+"""Which views are usable: a blinded camera shows silhouette everywhere, or none at all."""
 
 from collections.abc import Mapping
 
@@ -10,13 +10,14 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
 MOST_COVER = 0.6
-"""Silhouettes that cover more of the frame are no person's: the light or the camera changed."""
+"""A silhouette that covers a larger fraction of the frame is no person's: the light or the camera
+changed."""
 IN_FRAME = 0.7
-"""Share of the markers that must be in the frame for a view without silhouette to be wrong."""
+"""Fraction of the markers that must be in the frame for a view without silhouette to be wrong."""
 
 
 class ViewWatch:
-    """Sorts out views that cannot be right, and says when a camera is left out or taken back.
+    """Leaves out views that cannot be right, and reports when a camera is left out or used again.
 
     Args:
         rig: the cameras.
@@ -36,12 +37,12 @@ class ViewWatch:
         body: BodyModel,
         expected: FloatArray | None,
     ) -> tuple[dict[str, Observation], tuple[str, ...]]:
-        """The views to believe, and a line for each camera that goes or comes back.
+        """The usable views, and a line for each camera that is left out from now on or used again.
 
         Args:
             observed: what the cameras saw.
             body: the tracked body.
-            expected: (p,) where it should be, None if that is unknown.
+            expected: (p,) predicted pose, None if unknown.
         """
         reasons: dict[str, str] = {}
         for camera in self._rig:
@@ -55,7 +56,7 @@ class ViewWatch:
                 reasons[camera.name] = f"silhouette over {cover:.0%} of the frame"
         believed = {name: seen for name, seen in observed.items() if name not in reasons}
         empty = [name for name, seen in believed.items() if not seen.mask_words.any()]
-        # If nobody is in any view, he left.
+        # No silhouette in any view: the person left, no camera is wrong.
         if expected is not None and len(empty) < len(believed):
             points = markers(body, expected)
             for name in empty:

@@ -1,4 +1,4 @@
-"""Looking for one limb alone, all over where it may be, while the rest of the body stays."""
+"""Search of one limb alone over its whole range, while the rest of the body stays."""
 
 import numpy as np
 
@@ -8,9 +8,9 @@ from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.recombination import Recombiner
 
 DRAWS = 120
-"""Limbs drawn at first: half of them as people hold them, half anywhere."""
+"""First draws of a limb: half from the pose prior, half uniform."""
 LAYERS = (0.4, 0.2)
-"""Then the best are scattered, twice, by these shares of how far people's joints scatter."""
+"""Then the best are varied, twice, by these fractions of the prior's standard deviations."""
 _PARENTS, _CHILDREN = 6, 10
 _REFINE = (3, (0.12, 0.035))
 """Iterations of the refinement of the best, and truncation (m) of the first and the last."""
@@ -38,7 +38,7 @@ def other_limb(
     half = DRAWS // 2
     poses = np.concatenate(
         [
-            recombiner.with_usual_limb(pose, limb, half, rng),
+            recombiner.with_prior_limb(pose, limb, half, rng),
             recombiner.with_limb(pose, limb, DRAWS - half, rng),
         ]
     )

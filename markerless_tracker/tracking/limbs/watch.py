@@ -1,7 +1,7 @@
-"""Limbs that are lost while the rest is tracked: which they are, and finding them again.
+"""Lost limbs: detecting them, and searching for them while the rest of the body stays.
 
-A limb outside the silhouettes is seen to be lost. One that lies inside them and is wrong all the
-same is not, so all limbs take turns to be looked for elsewhere.
+A limb outside the silhouettes is detected. A wrong limb inside the silhouettes goes undetected, so
+all limbs are searched elsewhere in rotation.
 """
 
 from collections.abc import Mapping
@@ -22,13 +22,13 @@ from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.recombination import Recombiner
 
-TURN_NS = 60_000_000
-"""A limb that is not lost is looked for elsewhere this often: every fourth frame at 60 frames/s."""
+ROTATION_NS = 60_000_000
+"""One limb that is not lost is searched elsewhere this often: every fourth frame at 60 frames/s."""
 _ALONG = np.linspace(0.1, 0.9, 5)
 
 
 class LimbWatch:
-    """Tells which limbs are lost, and looks for limbs alone: for lost ones, and for all in turn.
+    """Detects lost limbs, and searches limbs alone: the lost ones, and all in rotation.
 
     Args:
         rig: the cameras.
@@ -41,15 +41,15 @@ class LimbWatch:
     def reset(self) -> None:
         """Forget the limbs so far."""
         self._tracks: dict[str, LimbTrack] = {}
-        self._turn = 0
-        self._turned_ns: int | None = None
+        self._next = 0
+        self._rotated_ns: int | None = None
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Limbs that were lost when last judged."""
+        """Limbs that were lost when last assessed."""
         return tuple(n for n, track in self._tracks.items() if track.state is TrackState.LOST)
 
-    def judge(
+    def assess(
         self,
         body: BodyModel,
         pose: FloatArray,
@@ -82,7 +82,7 @@ class LimbWatch:
         stamp_ns: int,
         pose: FloatArray,
     ) -> tuple[FloatArray, tuple[str, ...]]:
-        """Look for limbs that `judge` called lost, and for the one whose turn it is.
+        """Search the limbs that `assess` found lost, and the next one in rotation.
 
         A limb is taken from elsewhere if f_s rises as clearly as a swarm's result must
         (`min_improvement`).
@@ -108,15 +108,15 @@ class LimbWatch:
         return pose, tuple(found)
 
     def _due(self, body: BodyModel, stamp_ns: int, unexplained: tuple[str, ...]) -> list[str]:
-        """Limbs to search: lost ones, those near unexplained silhouette, and one more by turns."""
+        """Limbs to search: lost, near unexplained silhouette, and at times the next in rotation."""
         if not body.limbs:
             return []
         lost = [*self.lost, *(name for name in unexplained[:2] if name not in self.lost)]
-        if self._turned_ns is not None and 0 <= stamp_ns - self._turned_ns < TURN_NS:
+        if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < ROTATION_NS:
             return lost
-        self._turned_ns = stamp_ns
-        name = body.limbs[self._turn % len(body.limbs)]
-        self._turn += 1
+        self._rotated_ns = stamp_ns
+        name = body.limbs[self._next % len(body.limbs)]
+        self._next += 1
         return lost if name in lost else [*lost, name]
 
 

@@ -26,7 +26,7 @@ def hierarchical_stages(
         body, config, centre, sigma: as for `frame_stages`.
         algorithm: what searches each step.
         budget: published particles and iterations per step.
-        soft: whether the subspaces that a step names after its own join, with their spreads divided
+        soft: whether the subspaces that a step names after its own join, with their sigmas divided
             by `sigma.soft_factor`.
 
     Raises:
@@ -38,12 +38,12 @@ def hierarchical_stages(
     for step, shares in zip(steps, shared_out((budget,) * len(steps), config), strict=True):
         own = body.subspaces[step[0]]
         joining = [body.subspaces[name] for name in step[1:]] if soft else []
-        spread = sigma.copy()
+        widths = sigma.copy()
         for members in joining:
-            spread[members] /= config.sigma.soft_factor
-        spread[own] = sigma[own]
+            widths[members] /= config.sigma.soft_factor
+        widths[own] = sigma[own]
         active = np.unique(np.concatenate([own, *joining]))
         stages.append(
-            swarm_stage(body, config, f"step {step[0]}", algorithm, active, centre, spread, shares)
+            swarm_stage(body, config, f"step {step[0]}", algorithm, active, centre, widths, shares)
         )
     return tuple(stages)

@@ -6,9 +6,9 @@ sub-swarms x 5 and a master of 5 particles, 30 iterations, 3600 evaluations. The
 Algorithm 1, are `optim.mcpso`.
 
 Readings [R]: the soft variation is not quantified; the root joins the torso's and the legs' steps,
-the torso joins the arms' steps, with spreads divided by 10 (SPPSO's factor); other limbs stay. The
-body's description says who joins. "Covariance 0.01" is a variance in rad², the least at every rate
-(`stages.swarm_sigma`); positions have the body's own spreads.
+the torso joins the arms' steps, with sigmas divided by 10 (SPPSO's factor); other limbs stay. The
+body's description says which subspaces join. "Covariance 0.01" is a variance in rad², the least at
+every rate (`frame.swarm_sigma`); positions have the body's own sigmas.
 """
 
 from markerless_tracker.body import BodyModel
@@ -35,7 +35,7 @@ def hmcpso_stages(
     stages = hierarchical_stages(
         body, config, centre, sigma, algorithm="mcpso", budget=STEP, soft=config.partition == "soft"
     )
-    check_swarms(stages[0].particles, config)
+    check_swarms(stages[0].plan.particles, config)
     return stages
 
 

@@ -33,7 +33,6 @@ RESCUE_STAGES: Mapping[str, tuple[tuple[int, int], ...]] = {
     "global": ((100, 10),),
 }
 """The same evaluations beside contour refinement: it homes in, so the swarm may look widely."""
-_TRANSLATION = 3
 
 
 def sppso_stages(
@@ -42,7 +41,7 @@ def sppso_stages(
     """SPPSO's soft partition (section 3): the root first, then everything, the root nearly fixed.
 
     Stage 1 varies the root's six parameters and samples edges on the cones that are rigid with it;
-    the last stage varies all from stage 1's estimate, with the root's position spread, and that of
+    the last stage varies all from stage 1's estimate, with the root's position sigma, and that of
     a step in between, divided by `sigma.soft_factor`. In the hard partition every stage varies its
     own parameters alone. Beside a refinement the swarm keeps `SWARM_SHARE` of the budget.
 
@@ -57,20 +56,20 @@ def sppso_stages(
     trunk = body.cone_node == body.frames[body.root_frame]
     stages: list[Stage] = []
     earlier = np.empty(0, dtype=np.int64)
-    spread = sigma.copy()
+    widths = sigma.copy()
     for (name, own), count, (_, iterations) in zip(
         _parts(body, config.sppso.stages).items(), particles, published, strict=True
     ):
         active = own if config.partition == "hard" else np.union1d(earlier, own)
         budget = (count, iterations)
-        changes = {"edge_cones": trunk} if name == "root" else {}
         stages.append(
             swarm_stage(
-                body, config, name, "sppso", active, centre, spread.copy(), budget, **changes
+                body, config, name, "sppso", active, centre, widths.copy(), budget,
+                edge_cones=trunk if name == "root" else None,
             )
-        )
-        settled = translations(body) if name == "root" else own
-        spread[settled] /= config.sigma.soft_factor
+        )  # fmt: skip
+        settled = body.translations if name == "root" else own
+        widths[settled] /= config.sigma.soft_factor
         earlier = active
     return tuple(stages)
 
@@ -87,9 +86,3 @@ def _parts(body: BodyModel, stages: str) -> dict[str, IntArray]:
         )
     trunk = body.subspaces["torso_head"]
     return {"root": body.root, "trunk": trunk, "body": np.setdiff1d(body.joints, trunk)}
-
-
-def translations(body: BodyModel) -> IntArray:
-    """Indices of the parameters that are translations."""
-    moving = body.node_kind >= _TRANSLATION
-    return np.sort(body.node_parameter[moving])

@@ -1,14 +1,15 @@
 """What all swarms' stages share: the whole body explains the whole view."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Stage
+from markerless_tracker.records import Comparison, SearchPlan, Stage
 from markerless_tracker.tracking.config import TrackerConfig
 
 
@@ -21,35 +22,25 @@ def swarm_stage(
     centre: FloatArray,
     sigma: FloatArray,
     budget: tuple[int, int],
-    **changes: Any,
+    *,
+    edge_cones: NDArray[np.bool_] | None = None,
 ) -> Stage:
-    """A stage of a swarm with every cone in both terms.
+    """A stage of a swarm that compares the whole body.
 
     Args:
         body, config: as for `frame_stages`.
-        name, algorithm, active, centre, sigma: as in `Stage`.
+        name, algorithm, active, centre, sigma: as in `Stage` and its parts.
         budget: particles and iterations.
-        changes: other attributes of the stage.
+        edge_cones: (c,) cones whose edges are compared; all if None.
     """
-    every_cone = np.ones(len(body.cone_names), dtype=np.bool_)
-    attributes: dict[str, Any] = {
-        "silhouette_cones": every_cone,
-        "edge_cones": every_cone,
-        "options": options(algorithm, config),
-        **changes,
-    }
-    return Stage(
-        name=name,
-        algorithm=algorithm,
+    comparison = Comparison.whole(centre, len(body.cone_names), edge_weight=config.edge_weight)
+    comparison = replace(
+        comparison,
         active=active,
-        centre=centre,
-        sigma=sigma,
-        particles=budget[0],
-        iterations=budget[1],
-        silhouette_weight=1.0,
-        edge_weight=config.edge_weight,
-        **attributes,
+        edge_cones=comparison.edge_cones if edge_cones is None else edge_cones,
     )
+    plan = SearchPlan(algorithm, sigma, *budget, options=options(algorithm, config))
+    return Stage(name, comparison, plan)
 
 
 def options(algorithm: str, config: TrackerConfig) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The body of a person whom nobody measured: fitted over the first tracked frames, then kept."""
+"""Lengths that were not measured: fitted over the first tracked frames, then kept."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from markerless_tracker.geometry import FloatArray
 FRAMES = 10
 """Frames that a body is fitted to; poses change over them."""
 EVERY = 2
-"""Of the tracked frames every so many-th is taken."""
+"""One of so many tracked frames is taken."""
 POLISH = 5
 """Iterations after the last frame was taken; there is one with each frame before."""
 TRUNCATION_M = (0.10, 0.05)
@@ -77,8 +77,8 @@ class BodyFitting:
         """
         if self._fit is None:
             sizes = self._person.sizes
-            belief = sizes.prior(self._person.stature_m)
-            self._fit = BodyFit(sizes, body, belief, self._limits)
+            prior = sizes.prior(self._person.stature_m)
+            self._fit = BodyFit(sizes, body, prior, self._limits)
         self._seen += 1
         if self._seen <= EVERY * FRAMES:
             if self._seen % EVERY:

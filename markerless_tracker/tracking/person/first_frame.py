@@ -14,17 +14,18 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.sizes import Sizes
 from markerless_tracker.fitness.contour import ContourFrame, normal_equations, outline_rows, surface
-from markerless_tracker.fitness.shape import CORRELATION_M, fit_shape
+from markerless_tracker.fitness.shape import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.refinement import data_precision
 
 TRUSTED_M = 0.003
-"""Start markers at most this far off are taken as they are."""
+"""Start markers with at most this deviation are taken as they are."""
 _TIGHT = 3.0
 _ITERATIONS = 8
 _STEP = 1e-6
-_LENGTH_SPREAD = 0.15
+_LENGTH_SD = 0.15
 _LENGTH_RANGE = (0.7, 1.4)
 
 ContourMaker = Callable[[BodyModel, FloatArray], ContourFrame]
@@ -47,10 +48,10 @@ class StartMarkers:
 
 
 def start_noise_m(lengths_m: Mapping[str, float]) -> float:
-    """How far the markers of a row are off, per coordinate, judged by its segment lengths, m.
+    """Standard deviation of a row's markers per coordinate, estimated from segment lengths, m.
 
     Left and right segments of a person are alike, so their differences are noise: each holds four
-    markers' errors along the segment, hence twice the spread of one coordinate. 0 without pairs.
+    markers' errors along the segment, hence twice the deviation of one coordinate. 0 without pairs.
     """
     pairs = [
         (value, lengths_m["r_" + name[2:]])
@@ -96,7 +97,7 @@ def _settled(
     limits: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Free lengths (k,) and pose (p,) that fit contours and markers."""
-    scale = 1.0 / (CORRELATION_M * config.refine.sigma_m**2)
+    scale = data_precision(config)
     begin = start.sizes.of(body)
     seen = np.isfinite(start.positions_m).all(axis=1)
     p = body.size
@@ -126,7 +127,7 @@ def _settled(
         priors=(
             Prior(
                 np.concatenate([body.neutral, begin]),
-                np.concatenate([1.0 / body.prior_sd**2, 1.0 / (_LENGTH_SPREAD * begin) ** 2]),
+                np.concatenate([1.0 / body.prior_sd**2, 1.0 / (_LENGTH_SD * begin) ** 2]),
             ),
         ),
         bounds=np.concatenate([limits, np.outer(_LENGTH_RANGE, begin)], axis=1),

@@ -1,4 +1,4 @@
-"""Where somebody is: a coarse visual hull of the silhouettes, and the trunk in it.
+"""Where a person is: a coarse visual hull of the silhouettes, and the trunk in it.
 
 The hull is what all silhouettes agree on: a point of the room belongs to it if no camera that looks
 there sees background (Laurentini 1994, on a grid of points). Undecided pixels never carve it, since
@@ -27,7 +27,7 @@ FINE_M = 0.03
 LEAST_VIEWS = 2
 """Cameras that must look at a point for it to count."""
 LEAST_HEIGHT_M = 0.45
-"""A lump that reaches less far, in any direction, is nobody."""
+"""A lump with a smaller extent in every direction is no person."""
 LEAST_VOLUME_M3 = 0.015
 MOST_VOLUME_M3 = 1.5
 """A person of two metres with the slack of two views; more is a room, not a person."""
@@ -58,7 +58,7 @@ class Hull:
 
     @property
     def low_m(self) -> float:
-        """Height of its lowest point: the floor, for somebody who stands."""
+        """Height of its lowest point: the floor, for a standing person."""
         return float(self.points_m[:, 2].min()) - 0.5 * FINE_M
 
     @property
@@ -86,7 +86,7 @@ def find_hulls(
         cameras: cameras by name.
         observations: silhouettes of some of them.
     """
-    # A view without any silhouette says nothing about who is there: perhaps it is broken.
+    # A view without any silhouette is left out: the camera may be broken.
     seen = [
         (cameras[name], observation)
         for name, observation in observations.items()
@@ -202,7 +202,7 @@ class _View:
     def of(cls, camera: CameraModel, observation: Observation, middle: FloatArray) -> "_View":
         """The view, its silhouette grown by half a grid spacing at the room's middle."""
         either = observation.not_background.view(np.uint8) + observation.mask.view(np.uint8)
-        mask = observation.full_frame(either)
+        mask = observation.in_full_frame(either)
         depth = float(camera.T_cam_world[2, :3] @ middle + camera.T_cam_world[2, 3])
         scale = float(camera.matrix[0, 0]) / max(depth, 1.0)
         masks = {}

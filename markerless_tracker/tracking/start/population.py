@@ -8,10 +8,10 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.fitness.contour import ContourFrame
-from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim import Prior, keyed_generator, refine
-from markerless_tracker.records import CONTOUR, Observation, Stage
+from markerless_tracker.optim import keyed_generator
+from markerless_tracker.records import Comparison, Observation
+from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.postures import first_guesses
@@ -25,8 +25,8 @@ _CHILDREN = 480
 _REFINED = 10
 _ALIKE_M = 0.07
 """Poses whose markers lie nearer to each other than this, on average, are the same."""
-_PRIOR = 4.0
-"""Weight of the belief in usual poses: a generic body's outline fits by some centimetres only."""
+_PRIOR_WEIGHT = 4.0
+"""Weight of the pose prior: a generic body's outline fits within some centimetres only."""
 _INITIALISE = (6, (0.25, 0.08))
 _RECOMBINE = (5, (0.15, 0.05))
 _PROPAGATE = (3, (0.12, 0.05))
@@ -66,7 +66,7 @@ class FramePopulation:
         searcher: the body, the cameras and the settings.
         observations: the evidence.
         stamp_ns: keys the draws, together with the seed.
-        near: (p,) a pose whose root is about where the body is.
+        near: (p,) a pose whose root is near the body.
         contours: the frame's contour evidence, if it was made already.
     """
 
@@ -82,13 +82,9 @@ class FramePopulation:
         self._searcher = searcher
         self._stamp_ns = stamp_ns
         self.contours = contours or searcher.frame(observations, stamp_ns, near).contours
-        every = np.ones(len(searcher.body.cone_names), dtype=np.bool_)
-        stage = Stage(
-            name="start", algorithm=CONTOUR, active=np.arange(near.size), centre=near,
-            sigma=searcher.body.sigma, particles=0, iterations=1, silhouette_weight=1.0,
-            edge_weight=0.0, silhouette_cones=every, edge_cones=every,
-        )  # fmt: skip
-        self._costs = searcher.fitness.prepare(self.contours.views, stage)
+        self._costs = searcher.fitness.prepare(
+            self.contours.views, Comparison.whole(near, len(searcher.body.cone_names))
+        )
         self._recombiner = Recombiner(searcher.body, searcher.limits)
 
     def initialised(self, hull: Hull, hints: FloatArray | None = None) -> Population:
@@ -110,9 +106,9 @@ class FramePopulation:
         """One more generation.
 
         Args:
-            population: the parents, who stay if they are good enough.
+            population: the parents; they stay if they are good enough.
             generation: keys the draws.
-            share: of the usual number of children.
+            share: fraction of the full number of children.
         """
         rng = keyed_generator(
             self._searcher.config.seed, self._stamp_ns, f"generation {generation}"
@@ -137,34 +133,28 @@ class FramePopulation:
     ) -> FloatArray:
         """Poses (n, p), each refined on the contours."""
         searcher = self._searcher
-        scale = 1.0 / (CORRELATION_M * searcher.config.refine.sigma_m**2)
-        usual = Prior(searcher.body.prior_mean, _PRIOR / searcher.body.prior_sd**2)
-
-        def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
-            sums = self.contours.equations(pose, truncation_m)
-            return sums.hessian * scale, sums.slope * scale
-
+        prior = pose_prior(searcher.body, _PRIOR_WEIGHT)
         return np.array(
             [
-                refine(
-                    equations, pose, priors=(usual,), bounds=searcher.limits,
-                    iterations=iterations, truncation=truncation,
+                refined_on_contours(
+                    self.contours, pose, searcher.config, priors=(prior,),
+                    limits=searcher.limits, iterations=iterations, truncation_m=truncation,
                 )
                 for pose in poses
             ]
         )  # fmt: skip
 
     def selected(self, poses: FloatArray) -> Population:
-        """The best of poses (n, p) that differ; some facing the other way among them."""
+        """The best of poses (n, p) that differ, among them some of each quarter of the headings."""
         costs = self.costs(poses)
         order = [int(i) for i in np.argsort(costs, kind="stable") if np.isfinite(costs[i])]
         points = {i: markers(self._searcher.body, poses[i]) for i in order}
-        ways = {i: heading(points[i]) for i in order}
+        headings = {i: heading(points[i]) for i in order}
         kept: list[int] = []
         quarters = [0, 0, 0, 0]
         for i in order:
-            turn = ways[i] - ways[kept[0]] if kept else 0.0
-            quarter = round(turn / (0.5 * np.pi)) % 4
+            rotation = headings[i] - headings[kept[0]] if kept else 0.0
+            quarter = round(rotation / (0.5 * np.pi)) % 4
             if quarters[quarter] == PER_QUARTER:
                 continue
             gaps = (np.linalg.norm(points[i] - points[j], axis=1).mean() for j in kept)
@@ -172,7 +162,7 @@ class FramePopulation:
                 kept.append(i)
                 quarters[quarter] += 1
         rows = np.array(kept, dtype=np.int64)
-        return Population(poses[rows], costs[rows], np.array([ways[i] for i in kept]))
+        return Population(poses[rows], costs[rows], np.array([headings[i] for i in kept]))
 
 
 def scaled_to(body: BodyModel, other: BodyModel, poses: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """New poses from good ones: whole limbs exchanged, taken from a posture, or drawn anew.
 
-A refinement homes in on the nearest optimum, and a limb's optimum is far from where another limb
-is drawn on the same silhouette: so limbs change as wholes, and the good ones are refined.
+A refinement converges to the nearest optimum, and a limb's optimum is far from where another limb
+explains the same silhouette: so limbs change as wholes, and the good ones are refined.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ _TURNED = 0.4
 _TURN_RAD, _TILT_RAD = 0.5, 0.15
 _FREE_RAD = 2.8
 _FEW = 0.3
-"""A narrower belief than this (rad) marks a joint that hardly moves: clavicles, thorax."""
+"""A smaller prior standard deviation (rad) marks a joint that hardly moves: clavicles, thorax."""
 _RANK = 0.15
 """Parents are drawn by rank; each is this much likelier to be taken than passed over."""
 
@@ -36,12 +36,12 @@ class Recombiner:
     def __init__(self, body: BodyModel, limits: FloatArray) -> None:
         self._body = body
         self._limits = limits
-        self._spread = joint_spread(body)
+        self._sd = joint_spread(body)
         self._known = postures(body)
         self._limbs = [body.subspaces[step[0]] for step in body.steps("six")[1:]]
-        reach = np.where(self._spread < _FEW, _FEW, _FREE_RAD)
-        self._low = np.maximum(limits[0], body.neutral - reach)
-        self._high = np.minimum(limits[1], body.neutral + reach)
+        radius = np.where(self._sd < _FEW, _FEW, _FREE_RAD)
+        self._low = np.maximum(limits[0], body.neutral - radius)
+        self._high = np.minimum(limits[1], body.neutral + radius)
         self._turn = body.index("pelvis_rz")
         self._tilt = [body.index("pelvis_rx"), body.index("pelvis_ry")]
 
@@ -59,26 +59,26 @@ class Recombiner:
     def with_limb(
         self, pose: FloatArray, limb: IntArray, count: int, rng: np.random.Generator
     ) -> FloatArray:
-        """Poses (count, p): one with a limb's parameters drawn anew, all alike likely."""
+        """Poses (count, p): one with a limb's parameters drawn anew, uniformly."""
         low, high = self._low[limb], self._high[limb]
         out = np.tile(pose, (count, 1))
         out[:, limb] = low + (high - low) * rng.random((count, len(limb)))
         return out
 
-    def with_usual_limb(
+    def with_prior_limb(
         self, pose: FloatArray, limb: IntArray, count: int, rng: np.random.Generator
     ) -> FloatArray:
-        """Poses (count, p): one with a limb as people usually hold it."""
-        usual = np.tile(pose, (count, 1))
-        usual[:, limb] = self._body.neutral[limb]
-        return self.with_limb_near(usual, limb, 1.0, rng)
+        """Poses (count, p): one with a limb drawn about its prior mean."""
+        poses = np.tile(pose, (count, 1))
+        poses[:, limb] = self._body.neutral[limb]
+        return self.with_limb_near(poses, limb, 1.0, rng)
 
     def with_limb_near(
         self, poses: FloatArray, limb: IntArray, share: float, rng: np.random.Generator
     ) -> FloatArray:
-        """Poses (n, p), each with its limb moved by a share of how far people's joints scatter."""
+        """Poses (n, p), each with its limb varied by a fraction of the prior's deviations."""
         out = poses.copy()
-        out[:, limb] += share * self._spread[limb] * rng.standard_normal((len(poses), len(limb)))
+        out[:, limb] += share * self._sd[limb] * rng.standard_normal((len(poses), len(limb)))
         return np.clip(out, self._limits[0], self._limits[1], out=out)
 
     def _draw(self, child: FloatArray, limb: IntArray, rng: np.random.Generator) -> None:
@@ -96,7 +96,7 @@ class Recombiner:
                 child[limb] = self._known[rng.integers(len(self._known))][limb]
             else:
                 scale = (0.5, 1.0)[rng.integers(2)]
-                child[limb] += scale * self._spread[limb] * rng.standard_normal(len(limb))
+                child[limb] += scale * self._sd[limb] * rng.standard_normal(len(limb))
         if rng.random() < _TURNED:
             child[self._turn] += _TURN_RAD * rng.standard_normal()
             child[self._tilt] += _TILT_RAD * rng.standard_normal(2)

@@ -1,8 +1,8 @@
-"""Whether enough of a body is in view to start from: who comes in at the edge is waited for.
+"""Whether enough of a body is in view to start from.
 
 One outline and a hand in another view leave depth, heading and most of the limbs open, and two
-whole outlines may still be explained by somebody who faces the other way. A start from too little
-is wrong and, worse, goes on to fit the body's sections to what is seen.
+whole outlines may fit a person who faces the other way. A start from too little is wrong, and the
+body's sections are fitted to it. So a person who enters at the image border is waited for.
 """
 
 from collections.abc import Iterable
@@ -14,31 +14,43 @@ from markerless_tracker.camera import CameraModel, project_camera
 from markerless_tracker.geometry import FloatArray
 
 LEAST_IN_VIEW = 0.7
-"""Share of the markers that must be in view: eleven of fifteen are so from the hips up."""
+"""Fraction of the markers that must be in view: eleven of fifteen are so from the hips up."""
 ENOUGH_CAMERAS, LEAST_CAMERAS = 3, 2
+"""Cameras that allow a start at once, and after `PATIENCE_NS`."""
 PATIENCE_NS = 2_000_000_000
-"""How long somebody whom two cameras see is waited for to come into a third one's view."""
+"""How long a person in two cameras' views may take to come into a third one's."""
+GAP_NS = 500_000_000
+"""After so long without a person in two cameras' views the next one is another visit."""
 
 
 class StartGate:
-    """Tells when to start from somebody: at once if three cameras see him, else after a while."""
+    """Allows a start at once if three cameras see the person, else after a while."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Nobody is there."""
+        """Nobody is in view."""
         self._since_ns: int | None = None
+        self._last_ns = 0
 
     def enough(
         self, body: BodyModel, pose: FloatArray, cameras: Iterable[CameraModel], stamp_ns: int
     ) -> bool:
-        """Whether so much of a pose (p,) is in view at a time that it is no more waited for."""
+        """Whether a search may start from a pose at a time.
+
+        Args:
+            body: the body.
+            pose: (p,) about where the person is.
+            cameras: those that have an image.
+            stamp_ns: the time; in order, except where a recording begins anew.
+        """
         seeing = list(cameras)
         if share_in_view(body, pose, seeing, LEAST_CAMERAS) < LEAST_IN_VIEW:
             return False
-        if self._since_ns is None or stamp_ns < self._since_ns:
+        if self._since_ns is None or not 0 <= stamp_ns - self._last_ns <= GAP_NS:
             self._since_ns = stamp_ns
+        self._last_ns = stamp_ns
         if stamp_ns - self._since_ns >= PATIENCE_NS:
             return True
         wanted = min(ENOUGH_CAMERAS, len(seeing))
@@ -48,7 +60,7 @@ class StartGate:
 def share_in_view(
     body: BodyModel, pose: FloatArray, cameras: Iterable[CameraModel], count: int
 ) -> float:
-    """Share of the markers of a pose (p,) that lie in the frames of so many cameras or more."""
+    """Fraction of the markers of a pose (p,) that lie in the frames of so many cameras or more."""
     points = markers(body, pose)
     seen = np.zeros(len(points), dtype=np.int64)
     for camera in cameras:

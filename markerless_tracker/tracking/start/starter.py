@@ -1,4 +1,4 @@
-"""Starting by itself, over some frames: found in the first, sure of the heading in the last."""
+"""The automatic start: a person is found in one frame, the heading is confirmed over some more."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from markerless_tracker.fitness.shape import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.evidence.undecided import decide
+from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull, decided_by_hull, find_hulls, hulls_part
 from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
@@ -33,14 +34,12 @@ STANDING_M = 1.45
 """A lower hull is that of a person who does not stand upright."""
 _STATURE_RANGE_M = (1.2, 2.1)
 _STATURE_SD_M = 0.10
-_STATURE_BELIEF = 0.002
-"""A stature one standard deviation from the usual one must raise f_s by this much more."""
-LEAST_FIT = 0.62
-"""f_s that a pose needs at least to be somebody's: other things than people reach less."""
+_STATURE_WEIGHT = 0.002
+"""A stature one standard deviation from the mean must raise f_s by this much more."""
 _FLIP_MARGIN = 0.005
-"""How much better, on average, the other way must explain the views before the settling ends."""
+"""Mean gain in f_s that the opposite heading needs before the settling ends."""
 _WALKED_M, _WALK_M_S, _WALK_BONUS = 0.05, 0.25, 0.01
-"""People walk forwards: worth this much of f, from that way and speed on."""
+"""People walk forwards: added to f_s beyond that distance and speed."""
 _GENERATION_SHARE = 0.5
 _SHAPE_FRAMES = 5
 _SHAPE_SLACK = 0.01
@@ -57,12 +56,12 @@ SearcherFor = Callable[[BodyModel], Searcher]
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What the starter found in one frame.
+    """What the automatic start found in one frame.
 
     Attributes:
         searcher: searches with the body found so far.
         pose: (p,).
-        observations: the silhouettes' parts that are this person's.
+        observations: the parts of the silhouettes that are this person's.
         settled: whether the start is over.
         notes: what the user should know, one line each.
     """
@@ -76,7 +75,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """One frame as one way of facing explains it."""
+    """One frame as the best pose of one heading explains it."""
 
     contours: ContourFrame
     pose: FloatArray
@@ -84,7 +83,7 @@ class _Seen:
 
 
 class Starter:
-    """Finds somebody in the views, without any start pose.
+    """Finds a person in the views, without a start pose.
 
     From a body of the right stature (tried, if unknown) in many postures and headings the best are
     refined, recombined and refined again. A person facing the opposite way gives nearly the same
@@ -124,7 +123,7 @@ class Starter:
         self.reset()
 
     def reset(self) -> None:
-        """Forget whom it was about to find."""
+        """Forget the frames so far."""
         self._start_gate.reset()
         self._population: Population | None = None
         self._searcher: Searcher | None = None
@@ -136,7 +135,7 @@ class Starter:
         self._from_m = np.zeros(3)
 
     def step(self, observed: Mapping[str, Observation], stamp_ns: int) -> Found | None:
-        """Look at one frame; None for nobody."""
+        """Search one frame; None for nobody."""
         if self._population is None or self._searcher is None:
             return self._begin(observed, stamp_ns)
         population = self._population
@@ -164,7 +163,7 @@ class Starter:
     def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> Found | None:
         looking = [self._cameras[name] for name in observed]
         for hull in find_hulls(self._cameras, observed):
-            # A search takes long: not for somebody who is hardly in view yet.
+            # A search takes long: not for a person who is hardly in view yet.
             stands = put_at(self._body, hull, self._body.neutral)
             if not self._start_gate.enough(self._body, stands, looking, stamp_ns):
                 continue
@@ -207,7 +206,7 @@ class Starter:
         population: Population,
         observations: Mapping[str, Observation],
     ) -> Population:
-        """Search the second frame from nothing, too: what one search missed, another finds."""
+        """Search the second frame independently, too: another search finds what one missed."""
         hull = next(find_hulls(self._cameras, observations), None)
         if hull is None:
             return population
@@ -250,7 +249,7 @@ class Starter:
         """Try other statures; the one whose best pose explains the views best is kept."""
         assert self._sized is not None and self._searcher is not None
         best = (
-            float(population.costs[0]) + _unusual(height_m), frame, population, self._searcher
+            float(population.costs[0]) + _stature_cost(height_m), frame, population, self._searcher
         )  # fmt: skip
         statures = {share * height_m for share in STATURES} | set(USUAL_STATURES_M)
         for stature_m in sorted({float(np.clip(s, *_STATURE_RANGE_M)) for s in statures}):
@@ -258,7 +257,7 @@ class Starter:
             moved = scaled_to(self._searcher.body, searcher.body, population.poses)
             other = FramePopulation(searcher, observations, stamp_ns, moved[0])
             cost = float(other.costs(other.refined(moved[:1], *_RESIZE))[0])
-            cost += _unusual(stature_m)
+            cost += _stature_cost(stature_m)
             if cost < best[0]:
                 best = (cost, other, Population(moved, population.costs, population.headings),
                         searcher)  # fmt: skip
@@ -275,7 +274,7 @@ class Starter:
             )
 
     def _turn(self, stamp_ns: int) -> tuple[str, ...]:
-        """Change to the other way of facing, at most once, if it explains the frames better."""
+        """Change to the opposite heading, at most once, if it explains the frames better."""
         other = 1 - self._leading
         both = [
             (a.cost, b.cost)
@@ -301,7 +300,7 @@ class Starter:
         return ("start: the person faces the other way than first thought, turned round",)
 
     def _best(self, population: Population) -> Population:
-        """The part of a population that faces the leading way, or all if none does."""
+        """The part of a population that has the leading heading, or all if none has."""
         facing = population.facing(self._way + self._leading * np.pi)
         return facing if len(facing) else population
 
@@ -321,6 +320,6 @@ class Starter:
         return np.asarray(markers(self._searcher.body, pose)[_TRUNK_MARKERS].mean(axis=0))
 
 
-def _unusual(stature_m: float) -> float:
-    """What a stature costs for being unusual, in units of f_s."""
-    return _STATURE_BELIEF * ((stature_m - MEAN_STATURE_M) / _STATURE_SD_M) ** 2
+def _stature_cost(stature_m: float) -> float:
+    """Cost of a stature by its distance from the mean, in units of f_s."""
+    return _STATURE_WEIGHT * ((stature_m - MEAN_STATURE_M) / _STATURE_SD_M) ** 2

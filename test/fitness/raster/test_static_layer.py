@@ -1,5 +1,7 @@
 """Static layer and early termination: the same numbers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,14 +10,14 @@ from hypothesis import strategies as st
 from markerless_tracker.fitness import EDGE_RULES, Fitness
 from markerless_tracker.fitness.raster.kernels import evaluate as evaluate_some
 from markerless_tracker.optim import Problem, Sppso
-from markerless_tracker.records import Stage
+from markerless_tracker.records import Comparison
 
 PARTS = ("root", "torso_head", "l_arm", "r_leg")
 
 
-def limb_stage(body, active, centre, *, edge_weight: float) -> Stage:
-    every = np.ones(len(body.cone_names), dtype=bool)
-    return Stage("s", "sppso", active, centre, body.sigma, 3, 2, 1.0, edge_weight, every, every)
+def of_part(body, active, centre, *, edge_weight: float) -> Comparison:
+    whole = Comparison.whole(centre, len(body.cone_names), edge_weight=edge_weight)
+    return replace(whole, active=active)
 
 
 @pytest.fixture(scope="module")
@@ -46,9 +48,9 @@ def test_a_part_costs_what_the_whole_body_costs(
     rng = np.random.default_rng(1)
     points = pose[active] + 3.0 * body.sigma[active] * rng.standard_normal((12, active.size))
     for weight in (0.0, 1.0):
-        partly = fitness.prepare(views, limb_stage(body, active, pose, edge_weight=weight))
+        partly = fitness.prepare(views, of_part(body, active, pose, edge_weight=weight))
         everything = np.arange(body.size)
-        whole = fitness.prepare(views, limb_stage(body, everything, pose, edge_weight=weight))
+        whole = fitness.prepare(views, of_part(body, everything, pose, edge_weight=weight))
         np.testing.assert_array_equal(partly(points), whole(partly.poses(points)))
 
 
@@ -58,8 +60,8 @@ def test_only_moving_parts_are_drawn_for_every_pose(scene, body, rig):
     views = fitness.lay_out(seen)
 
     def drawn(active) -> int:
-        stage = limb_stage(body, active, pose, edge_weight=1.0)
-        return fitness.prepare(views, stage)._drawing.silhouette_cones.size
+        comparison = of_part(body, active, pose, edge_weight=1.0)
+        return fitness.prepare(views, comparison)._drawing.silhouette_cones.size
 
     assert drawn(body.subspaces["l_arm"]) == 2
     assert drawn(body.root) == drawn(np.arange(body.size)) == len(body.cone_names)
@@ -73,8 +75,8 @@ def test_a_cost_below_its_cutoff_is_exact_and_above_it_a_bound(
     pose, seen = scene(body, rig.cameras, 5)
     fitness = Fitness(body, rig.cameras)
     active = body.subspaces[part]
-    stage = limb_stage(body, active, pose, edge_weight=edge_weight)
-    evaluate = fitness.prepare(fitness.lay_out(seen), stage)
+    comparison = of_part(body, active, pose, edge_weight=edge_weight)
+    evaluate = fitness.prepare(fitness.lay_out(seen), comparison)
     rng = np.random.default_rng(seed)
     points = pose[active] + 2.0 * body.sigma[active] * rng.standard_normal((15, active.size))
     full = evaluate(points)
@@ -90,7 +92,7 @@ def test_points_that_are_not_finite_cost_nan_at_any_cutoff(scene, body, rig):
     pose, seen = scene(body, rig.cameras, 6)
     fitness = Fitness(body, rig.cameras)
     evaluate = fitness.prepare(
-        fitness.lay_out(seen), limb_stage(body, body.root, pose, edge_weight=0.0)
+        fitness.lay_out(seen), of_part(body, body.root, pose, edge_weight=0.0)
     )
     points = np.tile(pose[body.root], (3, 1))
     points[1, 2] = np.nan
@@ -104,7 +106,7 @@ def test_a_swarm_that_stops_evaluations_early_finds_the_same(scene, body, rig, p
     fitness = Fitness(body, rig.cameras)
     views = fitness.lay_out(seen)
     active = np.arange(body.size) if part == "everything" else body.subspaces[part]
-    stage = limb_stage(body, active, pose, edge_weight=0.5)
+    comparison = of_part(body, active, pose, edge_weight=0.5)
 
     def found(early: bool):
         optimizer = Sppso(
@@ -116,8 +118,8 @@ def test_a_swarm_that_stops_evaluations_early_finds_the_same(scene, body, rig, p
                 rng=np.random.default_rng(0),
             )
         )  # fmt: skip
-        best = optimizer.run(fitness.prepare(views, stage), early=early)
-        return best, optimizer.best_cost, optimizer.evaluations, optimizer._best_costs
+        best = optimizer.run(fitness.prepare(views, comparison), early=early)
+        return best, optimizer.best_cost, optimizer.evaluations, optimizer._swarm.best_costs
 
     for ours, theirs in zip(found(True), found(False), strict=True):
         np.testing.assert_array_equal(ours, theirs)
@@ -127,7 +129,7 @@ def test_early_termination_saves_views(scene, body, rig):
     pose, seen = scene(body, rig.cameras, 8)
     fitness = Fitness(body, rig.cameras)
     views = fitness.lay_out(seen)
-    evaluate = fitness.prepare(views, limb_stage(body, body.root, pose, edge_weight=0.0))
+    evaluate = fitness.prepare(views, of_part(body, body.root, pose, edge_weight=0.0))
     point = pose[body.root] + 3.0
     assert 0.0 < evaluate(point[None])[0] <= 1.0
     # No view is drawn for particles that cannot win.

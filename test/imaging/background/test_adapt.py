@@ -82,3 +82,17 @@ def test_regions_in_between_do_not_count_as_a_gap() -> None:
         levels[every] = float(segmenter._labeller.background.mean[0, :, :, :40].mean())
     assert levels[0] == pytest.approx(110.0, abs=0.5)
     assert levels[20] == pytest.approx(116.0, abs=0.5)
+
+
+def test_an_image_whose_region_was_looked_at_first_is_followed_too() -> None:
+    """As where a body leaves the region around its prediction: the whole image is used then."""
+    empty = [shot(0.0, False, i, 3) for i in range(10)]
+    once, twice, never = (Segmenter("cam01", learn_background(empty), FOLLOW) for _ in range(3))
+    for i in range(40):
+        image = shot(0.2 * i, True, 100 + i, 3)
+        once.observe(image, i * 100_000_000)
+        twice.observe(image, i * 100_000_000, Region(40, 5, 75, 55))
+        twice.observe(image, i * 100_000_000)
+    means = [segmenter._labeller.background.mean for segmenter in (never, once, twice)]
+    assert (means[0] != means[1]).any()
+    np.testing.assert_array_equal(means[1], means[2])

@@ -9,7 +9,7 @@ from markerless_tracker.body import MARKER_NAMES, markers
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
-from markerless_tracker.tracking.limbs.watch import TURN_NS, LimbWatch, inside_fractions
+from markerless_tracker.tracking.limbs.watch import ROTATION_NS, LimbWatch, inside_fractions
 from markerless_tracker.tracking.loss import LIMB_LOST_BELOW, LIMB_REGAINED_ABOVE
 from markerless_tracker.tracking.search import Searcher
 
@@ -75,7 +75,7 @@ def test_states_name_the_limb_that_is_off(standing) -> None:
     watch = LimbWatch(scene.rig)
     particle_sd_ratio = np.full(scene.body.size, 0.25)
     for at, expected in ((pose, TRACKING), (raised, LOST), (pose, TRACKING)):
-        states = watch.judge(scene.body, at, seen, particle_sd_ratio)
+        states = watch.assess(scene.body, at, seen, particle_sd_ratio)
         assert states.pop("l_arm").state is expected
         assert {limb.state for limb in states.values()} == {TRACKING}
         assert watch.lost == (("l_arm",) if expected is LOST else ())
@@ -86,23 +86,23 @@ def test_a_lost_arm_is_found_alone(standing) -> None:
     scene, seen, pose, raised = standing
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
-    watch.judge(scene.body, raised, seen, np.full(scene.body.size, np.nan))
+    watch.assess(scene.body, raised, seen, np.full(scene.body.size, np.nan))
     found, names = watch.recover(searcher, contours_of(searcher, seen, raised), seen, 0, raised)
     assert names == ("l_arm",)
     assert gaps(scene.body, raised, pose)[ARM].min() > 0.3
     assert gaps(scene.body, found, pose)[ARM].max() < 0.10
 
 
-def test_an_arm_that_is_wrong_inside_the_silhouettes_is_found_at_its_turn(balancing) -> None:
+def test_a_wrong_arm_inside_the_silhouettes_is_found_in_rotation(balancing) -> None:
     scene, seen, pose, hidden = balancing
     body = scene.body
     assert gaps(body, hidden, pose)[ARM].max() > 0.3
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
-    states = watch.judge(body, hidden, seen, np.full(body.size, np.nan))
+    states = watch.assess(body, hidden, seen, np.full(body.size, np.nan))
     assert states["l_arm"].state is TRACKING
     at, taken = hidden, []
-    for stamp_ns in range(0, 8 * TURN_NS, TURN_NS):
+    for stamp_ns in range(0, 8 * ROTATION_NS, ROTATION_NS):
         at, names = watch.recover(searcher, contours_of(searcher, seen, at), seen, stamp_ns, at)
         taken += names
     assert taken[0] == "l_arm"
@@ -113,7 +113,7 @@ def test_limbs_in_their_place_are_left_alone(balancing) -> None:
     scene, seen, pose, _ = balancing
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
-    for stamp_ns in range(0, 4 * TURN_NS, TURN_NS):
+    for stamp_ns in range(0, 4 * ROTATION_NS, ROTATION_NS):
         contours = contours_of(searcher, seen, pose)
         assert watch.recover(searcher, contours, seen, stamp_ns, pose) == (pose, ())
 
@@ -123,7 +123,7 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
     body = replace(scene.body, hierarchies={"twelve": scene.body.hierarchies["twelve"]})
     searcher = Searcher(scene.rig, body, TrackerConfig(threads=1), limits=body.limits, threads=1)
     watch = LimbWatch(scene.rig)
-    assert watch.judge(body, pose, seen, np.zeros(body.size)) == {}
+    assert watch.assess(body, pose, seen, np.zeros(body.size)) == {}
     contours = contours_of(searcher, seen, pose)
     assert watch.recover(searcher, contours, seen, 0, pose) == (pose, ())
 
@@ -138,8 +138,8 @@ def test_turns_come_by_time_and_depend_on_nothing_else(balancing) -> None:
         return [watch.recover(searcher, contours, seen, stamp, hidden)[1] for stamp in stamps]
 
     # The arm is first in the order of turns, and nobody's turn comes again so soon.
-    assert found([0, 1, TURN_NS - 1]) == [("l_arm",), (), ()]
-    assert found([0, TURN_NS], threads=2) == found([0, TURN_NS])
+    assert found([0, 1, ROTATION_NS - 1]) == [("l_arm",), (), ()]
+    assert found([0, ROTATION_NS], threads=2) == found([0, ROTATION_NS])
     assert scene.body.limbs[0] == "l_arm"
 
 

@@ -1,4 +1,4 @@
-"""Who is hardly in view is waited for."""
+"""A person who is hardly in view is waited for."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,12 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.synthesis.rig import ring_rig
 from markerless_tracker.tracking import TrackerConfig, build_tracker
-from markerless_tracker.tracking.start.start_gate import PATIENCE_NS, StartGate, share_in_view
+from markerless_tracker.tracking.start.start_gate import (
+    GAP_NS,
+    PATIENCE_NS,
+    StartGate,
+    share_in_view,
+)
 
 
 @pytest.fixture(scope="module")
@@ -49,12 +54,35 @@ def test_a_third_camera_is_waited_for_a_while(body) -> None:
     # Others do not look: two are all there are.
     assert StartGate().enough(body, pose, rig.cameras[:2], 0)
     start_gate = StartGate()
-    assert not start_gate.enough(body, aside, rig, 5)
-    assert not start_gate.enough(body, aside, rig, PATIENCE_NS)
+    for stamp_ns in range(5, 5 + PATIENCE_NS, GAP_NS):
+        assert not start_gate.enough(body, aside, rig, stamp_ns)
     assert start_gate.enough(body, aside, rig, 5 + PATIENCE_NS)
     start_gate.reset()
     assert not start_gate.enough(body, aside, rig, 6 + PATIENCE_NS)
     assert not start_gate.enough(body, standing(body, 9.0), rig, 9 * PATIENCE_NS)
+
+
+def test_the_next_person_is_waited_for_as_the_first_was(body) -> None:
+    """The first leaves without an empty frame in between: things stay in view."""
+    rig, away, aside = ring_rig(4), standing(body, 9.0), standing(body, 2.6)
+    gate = StartGate()
+    for stamp_ns in range(0, PATIENCE_NS, GAP_NS):
+        assert not gate.enough(body, aside, rig, stamp_ns)
+        assert not gate.enough(body, away, rig, stamp_ns)
+    assert gate.enough(body, aside, rig, PATIENCE_NS)
+    later = 10 * PATIENCE_NS
+    assert not gate.enough(body, aside, rig, later)
+    for stamp_ns in range(later, later + PATIENCE_NS, GAP_NS):
+        assert not gate.enough(body, aside, rig, stamp_ns)
+    assert gate.enough(body, aside, rig, later + PATIENCE_NS)
+
+
+def test_a_recording_that_begins_anew_is_another_visit(body) -> None:
+    rig, aside = ring_rig(4), standing(body, 2.6)
+    gate = StartGate()
+    for stamp_ns in range(0, PATIENCE_NS + 1, GAP_NS):
+        gate.enough(body, aside, rig, stamp_ns)
+    assert not gate.enough(body, aside, rig, PATIENCE_NS - 1)
 
 
 def test_nobody_is_started_from_an_outline_and_a_hand() -> None:

@@ -1,15 +1,12 @@
 """Which searches a frame is made of: an optimiser's stages, and refinement around them."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import CONTOUR, Stage
+from markerless_tracker.records import CONTOUR, Comparison, SearchPlan, Stage
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.partitions import STAGES
-from markerless_tracker.tracking.partitions.sppso import translations
 from markerless_tracker.tracking.partitions.stage import swarm_stage
 
 LIMB_SWARM = (6, 4)
@@ -28,18 +25,18 @@ def frame_stages(
         body: the body.
         config: names the optimiser and how the budget is shared out.
         centre: (p,) predicted pose.
-        sigma: (p,) published spreads, widened for the time since the last frame.
+        sigma: (p,) published standard deviations, widened for the time since the last frame.
 
     Raises:
         ConfigError: the budget cannot be spent exactly.
     """
-    spread = swarm_sigma(body, config, sigma)
-    swarm = STAGES[config.optimizer](body, config, centre, spread)
+    widened = swarm_sigma(body, config, sigma)
+    swarm = STAGES[config.optimizer](body, config, centre, widened)
     if config.refinement == "none":
         return swarm
     return (
         contour_stage("align", body, config, centre, sigma),
-        *(replace(stage, min_improvement=config.min_improvement) for stage in swarm),
+        *(stage.planned(min_improvement=config.min_improvement) for stage in swarm),
         *limb_stages(body, config, centre, sigma),
         contour_stage("polish", body, config, centre, sigma),
     )
@@ -51,7 +48,7 @@ def limb_stages(
     """A small, wide swarm for each limb alone: finds one that the refinement has lost."""
     particles, iterations = LIMB_SWARM
     budget = (max(1, particles * config.evaluations // 1000), iterations)
-    return tuple(
+    stages = (
         swarm_stage(
             body,
             config,
@@ -61,40 +58,31 @@ def limb_stages(
             centre,
             config.refine.limb_spread * sigma,
             budget,
-            min_improvement=config.min_improvement,
-        )  # fmt: skip
+        )
         for name in body.limbs
     )
+    return tuple(stage.planned(min_improvement=config.min_improvement) for stage in stages)
 
 
 def swarm_sigma(body: BodyModel, config: TrackerConfig, sigma: FloatArray) -> FloatArray:
-    """Spreads (p,) of swarms: the body's, scaled; of an angle `sigma.angle` at least.
+    """Sigma (p,) of swarms: the body's, scaled; of an angle `sigma.angle` at least.
 
     Saini et al. (2015) print one covariance of 0.01 for all joints and name no rate. Reading: its
     root, 0.1 rad, is wider than what any joint moves between frames at 60 frames/s, so that it
-    stands at every rate, until a joint's own spread, which grows with the time, exceeds it.
+    stands at every rate, until a joint's own sigma, which grows with the time, exceeds it.
     """
-    spread = config.sigma.scale * sigma
-    angles = np.setdiff1d(np.arange(body.size), translations(body))
-    spread[angles] = np.maximum(spread[angles], config.sigma.angle)
-    return spread
+    scaled = config.sigma.scale * sigma
+    angles = np.setdiff1d(np.arange(body.size), body.translations)
+    scaled[angles] = np.maximum(scaled[angles], config.sigma.angle)
+    return scaled
 
 
 def contour_stage(
     name: str, body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> Stage:
     """A contour refinement of all parameters."""
-    every_cone = np.ones(len(body.cone_names), dtype=np.bool_)
     return Stage(
-        name=name,
-        algorithm=CONTOUR,
-        active=np.arange(body.size),
-        centre=centre,
-        sigma=config.refine.prior * sigma,
-        particles=0,
-        iterations=config.refine.iterations,
-        silhouette_weight=1.0,
-        edge_weight=config.edge_weight,
-        silhouette_cones=every_cone,
-        edge_cones=every_cone,
+        name,
+        Comparison.whole(centre, len(body.cone_names), edge_weight=config.edge_weight),
+        SearchPlan(CONTOUR, config.refine.prior * sigma, 0, config.refine.iterations),
     )

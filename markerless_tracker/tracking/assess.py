@@ -1,0 +1,146 @@
+"""From the search of a frame to its result: whether the body is tracked, and how well."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body.model import IntArray
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.tracking.confidence import confidence_of
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.limbs.watch import LimbWatch
+from markerless_tracker.tracking.loss import event_of, shared_overlap
+from markerless_tracker.tracking.search import FrameSearch
+from markerless_tracker.tracking.smoothing import OneEuro
+from markerless_tracker.tracking.states import Event, Track
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The evidence of one frame.
+
+    Attributes:
+        stamp_ns: its time.
+        observed: what each camera saw.
+        believed: the observations that are used.
+        notes: a line for each camera that is left out from now on, or used again.
+        left_out: a line for each camera of whose silhouette parts are left out.
+    """
+
+    stamp_ns: int
+    observed: Mapping[str, Observation]
+    believed: Mapping[str, Observation]
+    notes: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The pose that a search found in a frame.
+
+    Attributes:
+        search: the search, with its estimate.
+        stamp_ns: time of the frame.
+        observations: the evidence that it used.
+        warnings: what the user should know, one line each.
+        anew: whether an automatic start found the pose: it does not follow the last one.
+        settling: whether that start needs further frames.
+        jumped: parameters that were found elsewhere.
+    """
+
+    search: FrameSearch
+    stamp_ns: int
+    observations: Mapping[str, Observation]
+    warnings: tuple[str, ...] = ()
+    anew: bool = False
+    settling: bool = False
+    jumped: IntArray | None = None
+
+
+class Assessor:
+    """Keeps the phase of the track and of each limb; makes the results.
+
+    Args:
+        rig: the cameras.
+        body: the body whose poses are smoothed.
+        config: `refinement` and `smoothing`.
+
+    Attributes:
+        track: phase after the last frame.
+        limbs: the limbs' states, and the search for lost ones.
+    """
+
+    def __init__(self, rig: CameraRig, body: BodyModel, config: TrackerConfig) -> None:
+        self.limbs = LimbWatch(rig)
+        self._with_confidence = config.refinement != "none"
+        self._smooth = OneEuro(body) if config.smoothing == "one_euro" else None
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all frames."""
+        self.track = Track()
+        self.limbs.reset()
+        self.jump()
+
+    def jump(self) -> None:
+        """The next pose does not follow the last one: do not smooth across the gap."""
+        if self._smooth is not None:
+            self._smooth.reset()
+
+    def give_up(self) -> None:
+        """Take the body for gone: it was lost for too long."""
+        self.track = self.track.after(Event.GIVEN_UP)
+        self.jump()
+
+    def nobody(self, seen: Seen) -> TrackResult:
+        """The result of a frame without a pose."""
+        self.track = self.track.after(Event.NOBODY, seen.stamp_ns)
+        lost = self.track.state is TrackState.LOST
+        return TrackResult(
+            stamp_ns=seen.stamp_ns, state=self.track.state, pose=None, markers_m=None,
+            fitness=float("nan"), evaluations=0, observations=seen.observed, warnings=seen.notes,
+            iou=dict.fromkeys(seen.observed, 0.0) if lost else {},
+        )  # fmt: skip
+
+    def found(self, found: Found, body: BodyModel, limits: FloatArray) -> TrackResult:
+        """The result of a frame with a pose.
+
+        Args:
+            found: the pose and its evidence.
+            body: the body it was searched with.
+            limits: (2, p) joint limits.
+        """
+        search, warnings = found.search, found.warnings
+        terms = search.terms()
+        confidence = None
+        if self._with_confidence:
+            confidence = confidence_of(body, search.pose, search.contours, measured=body.measured)
+        overlap = shared_overlap(terms.values())
+        event = Event.FOUND if found.settling else event_of(overlap, self.track.mean_overlap)
+        self.track = self.track.after(event, found.stamp_ns, overlap)
+        lost = self.limbs.lost
+        limbs = self.limbs.assess(body, search.pose, found.observations, search.particle_sd_ratio)
+        warnings += tuple(f"{name}: lost" for name in self.limbs.lost if name not in lost)
+        pose = search.pose
+        if found.anew:
+            self.jump()
+        if self._smooth is not None:
+            pose = np.clip(self._smooth(pose, found.stamp_ns), *limits)
+        return TrackResult(
+            stamp_ns=found.stamp_ns,
+            state=self.track.state,
+            pose=pose,
+            markers_m=markers(body, pose),
+            fitness=float(np.mean([t.silhouette + t.edges for t in terms.values()])),
+            iou={name: t.overlap for name, t in terms.items()},
+            evaluations=search.evaluations,
+            refinements=search.refinements,
+            observations=found.observations,
+            warnings=warnings,
+            confidence=confidence,
+            limbs=limbs,
+        )

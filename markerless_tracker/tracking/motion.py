@@ -1,0 +1,96 @@
+"""Motion of the tracked pose: prediction with damped constant velocity, and its uncertainty."""
+
+import numpy as np
+
+from markerless_tracker.body.model import IntArray
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.config import TrackerConfig
+
+TRAINING_RATE_HZ = 60.0
+"""Frame rate at which the published sigmas, changes of a parameter between frames, hold."""
+LIMB_SPEED_M_S = 3.0
+"""Greatest speed of a hand or foot relative to its prediction: widens the image regions."""
+
+
+class MotionModel:
+    """The pose of the last frame, its velocity, and what follows from them for the next frame.
+
+    Args:
+        start: (p,) pose before the first frame.
+        config: `prediction`, `sigma.rate_max` and `region.margin_m`.
+
+    Attributes:
+        start: (p,) the same.
+        pose: (p,) of the last frame.
+        velocity_per_ns: (p,) change per nanosecond.
+        stamp_ns: time of the last frame; None before the first.
+    """
+
+    def __init__(self, start: FloatArray, config: TrackerConfig) -> None:
+        self.start = start
+        self._config = config
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the start pose, at rest, before the first frame."""
+        self.pose = self.start
+        self.velocity_per_ns = np.zeros(self.start.size)
+        self.stamp_ns: int | None = None
+        self._tracked = False
+
+    def predict(self, stamp_ns: int, limits: FloatArray) -> FloatArray:
+        """The pose (p,) expected at a time, within joint limits (2, p)."""
+        elapsed_ns = self._elapsed_ns(stamp_ns)
+        if elapsed_ns == 0:
+            return self.pose
+        bounded_ns = min(elapsed_ns, self._config.sigma.rate_max / TRAINING_RATE_HZ * 1e9)
+        moved = self.pose + self._config.prediction * bounded_ns * self.velocity_per_ns
+        return np.asarray(np.clip(moved, *limits))
+
+    def widening(self, stamp_ns: int) -> float:
+        """Factor of sigma at a time: frames of the training rate since the last one, bounded."""
+        elapsed_ns = self._elapsed_ns(stamp_ns)
+        if elapsed_ns == 0:
+            return 1.0
+        return min(elapsed_ns * 1e-9 * TRAINING_RATE_HZ, self._config.sigma.rate_max)
+
+    def region_margin_m(self, stamp_ns: int) -> float | None:
+        """Margin around the predicted body that holds the person, m; None while not tracked."""
+        elapsed_ns = self._elapsed_ns(stamp_ns)
+        if elapsed_ns == 0 or not self._tracked:
+            return None
+        return self._config.region.margin_m + LIMB_SPEED_M_S * (elapsed_ns * 1e-9)
+
+    def update(
+        self, pose: FloatArray, stamp_ns: int, *, tracked: bool, jumped: IntArray | None = None
+    ) -> None:
+        """Take the pose (p,) of a frame.
+
+        Args:
+            pose: the estimate.
+            stamp_ns: its time.
+            tracked: whether it agrees with the silhouettes; if not, its change is no motion.
+            jumped: parameters that were found elsewhere: their change is no motion either.
+        """
+        elapsed_ns = self._elapsed_ns(stamp_ns)
+        change = pose - self.pose
+        moved = tracked and elapsed_ns > 0
+        self.velocity_per_ns = change / elapsed_ns if moved else np.zeros(change.size)
+        if jumped is not None:
+            self.velocity_per_ns[jumped] = 0.0
+        self.pose = pose
+        self.stamp_ns = stamp_ns
+        self._tracked = tracked
+
+    def lose(self) -> None:
+        """A frame shows nobody: the pose stays, at rest."""
+        self.velocity_per_ns = np.zeros(self.pose.size)
+        self._tracked = False
+
+    def shift(self, change: FloatArray, limits: FloatArray) -> None:
+        """Move the last pose (p,) within limits (2, p); its velocity stays."""
+        self.pose = np.clip(self.pose + change, *limits)
+
+    def _elapsed_ns(self, stamp_ns: int) -> int:
+        """Time since the last frame; 0 before the first and if time did not go on."""
+        return 0 if self.stamp_ns is None else max(0, stamp_ns - self.stamp_ns)

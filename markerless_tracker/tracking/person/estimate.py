@@ -1,0 +1,176 @@
+"""The body of the tracked person: what is known of it, and what is still to be fitted."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.shape.section_fit import fit_shape
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.limits import joint_limits
+from markerless_tracker.tracking.loss import LEAST_FIT, silhouette_fit
+from markerless_tracker.tracking.partitions.frame import frame_stages
+from markerless_tracker.tracking.person.body_fitting import BodyFitting, Unmeasured
+from markerless_tracker.tracking.person.first_frame import StartMarkers, shape_of_first_frame
+from markerless_tracker.tracking.search import FrameSearch, Searcher
+
+START_FRAMES = 30
+"""Frames that may disagree with a given start pose before tracking goes on without a fit."""
+
+SearcherFor = Callable[[BodyModel], Searcher]
+
+
+class BodyEstimate:
+    """A body that becomes the person's: first its sections, then its lengths are fitted.
+
+    Sections are fitted in one frame with the pose held, lengths over several tracked frames. Only
+    frames whose silhouettes agree with the body are used: f_s of at least `LEAST_FIT`.
+
+    Args:
+        body: with generic sections, and lengths that were measured or follow from a stature.
+        config: `fit_shape`, `fit_lengths` and the settings of the refinement.
+        shape_known: whether the sections are the person's already.
+        start_markers: the markers that a given start pose was computed from.
+        person: what is known of a person whose lengths were not measured; None if they were.
+
+    Attributes:
+        generic: the body before any fit.
+        body: the body so far.
+        limits: (2, p) its joint limits.
+        sections_fitted: whether the sections are the person's, or are not to be fitted.
+        sized: makes the body of a stature, m, while the stature is to be found; else None.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        config: TrackerConfig,
+        *,
+        shape_known: bool = False,
+        start_markers: StartMarkers | None = None,
+        person: Unmeasured | None = None,
+    ) -> None:
+        self.generic = body
+        self.limits = joint_limits(body, config)
+        self._config = config
+        self._start_markers = start_markers
+        self._person = person
+        self._fits_sections = config.fit_shape and not shape_known
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the generic body."""
+        self.body = self.generic
+        self.sections_fitted = not self._fits_sections
+        self.sized = None if self._person is None else self._person.sized
+        self._disagreeing = 0
+        self._reported = False
+        self._lengths: BodyFitting | None = None
+        if self._person is not None and self._fits_sections and self._config.fit_lengths:
+            self._lengths = BodyFitting(self._person, self.limits)
+
+    @property
+    def awaits_first_frame(self) -> bool:
+        """Whether tracking from a given start waits for a frame to fit the sections to."""
+        return not self.sections_fitted and self._disagreeing < START_FRAMES
+
+    def fit_first_frame(
+        self,
+        searcher_for: SearcherFor,
+        observations: Mapping[str, Observation],
+        stamp_ns: int,
+        start: FloatArray,
+    ) -> FloatArray | None:
+        """Fit the sections to a frame, if its silhouettes agree with the body.
+
+        They must agree at the start pose, or where a search from there leads.
+
+        Args:
+            searcher_for: makes a searcher of a body.
+            observations: the evidence.
+            stamp_ns: its time.
+            start: (p,) given pose.
+
+        Returns:
+            The pose (p,) that the sections were fitted at; None if the frame disagrees.
+        """
+        search = searcher_for(self.body).frame(observations, stamp_ns, start)
+        if not _agrees(search):
+            search.run(frame_stages(self.body, self._config, start, self.body.sigma))
+        if not _agrees(search):
+            self._disagreeing += 1
+            return None
+        return self._fit_sections(searcher_for, observations, stamp_ns, search.pose)
+
+    def take_warnings(self) -> tuple[str, ...]:
+        """What the user should know and was not yet reported, one line each."""
+        warn = not self.sections_fitted and self._disagreeing == START_FRAMES
+        if not warn or self._reported:
+            return ()
+        self._reported = True
+        return (
+            f"start: the silhouettes of {START_FRAMES} frames disagree with the start pose; "
+            "tracking goes on with the body's generic shape",
+        )
+
+    def take_found(self, body: BodyModel, *, settled: bool) -> None:
+        """Take the body of an automatic start; once settled its sections are fitted."""
+        self.body = body
+        if settled:
+            self.sections_fitted, self.sized = True, None
+
+    def fit_tracked_frame(self, search: FrameSearch) -> FloatArray | None:
+        """Use a tracked frame for what is still to be fitted, if it agrees with the body.
+
+        Returns:
+            If `body` has changed: how far (p,) its poses lie from those tracked so far.
+        """
+        if (self.sections_fitted and self._lengths is None) or not _agrees(search):
+            return None
+        if not self.sections_fitted:
+            self.body = fit_shape(self.body, [(search.contours, search.pose)])
+            self.sections_fitted = True
+            return np.zeros(self.body.size)
+        assert self._lengths is not None
+        fitted = self._lengths.add(self.body, search.contours, search.pose)
+        if fitted is None:
+            return None
+        self._lengths = None
+        self.body = fitted.body
+        return fitted.moved
+
+    def warm_up(
+        self,
+        searcher_for: SearcherFor,
+        observations: Mapping[str, Observation],
+        pose: FloatArray,
+    ) -> None:
+        """Compile what the fits need; then `reset`. Arguments as of `fit_first_frame`."""
+        if self._fits_sections:
+            self._fit_sections(searcher_for, observations, 0, pose)
+        if self._lengths is not None:
+            contours = searcher_for(self.body).frame(observations, 0, pose).contours
+            self._lengths.warm_up(self.body, contours, pose)
+
+    def _fit_sections(
+        self,
+        searcher_for: SearcherFor,
+        observations: Mapping[str, Observation],
+        stamp_ns: int,
+        pose: FloatArray,
+    ) -> FloatArray:
+        def contours(body: BodyModel, at: FloatArray) -> ContourFrame:
+            return searcher_for(body).frame(observations, stamp_ns, at).contours
+
+        self.body, pose = shape_of_first_frame(
+            self.generic, pose, self._start_markers, contours, self._config, self.limits
+        )
+        self.sections_fitted = True
+        return pose
+
+
+def _agrees(search: FrameSearch) -> bool:
+    return silhouette_fit(search.terms().values()) >= LEAST_FIT

@@ -1,0 +1,88 @@
+"""Prediction, widening and region margin of the motion model, without images."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.motion import LIMB_SPEED_M_S, MotionModel
+
+FRAME_NS = 16_666_667
+FREE = np.array([[-np.inf] * 3, [np.inf] * 3])
+
+
+@pytest.fixture
+def motion() -> MotionModel:
+    config = TrackerConfig.from_mapping(
+        {"prediction": 0.5, "sigma.rate_max": 6.0, "region.margin_m": 0.2}
+    )
+    return MotionModel(np.array([1.0, 2.0, 3.0]), config)
+
+
+def moved(motion, by: float, stamp_ns: int, **changes) -> None:
+    motion.update(motion.pose + by, stamp_ns, **{"tracked": True, **changes})
+
+
+def test_before_the_first_frame_the_start_is_predicted(motion):
+    assert motion.predict(10**12, FREE) is motion.start
+    assert motion.widening(10**12) == 1.0
+    assert motion.region_margin_m(10**12) is None
+
+
+def test_the_prediction_moves_on_by_a_fraction_of_the_last_change(motion):
+    moved(motion, 9.0, 0)
+    np.testing.assert_array_equal(motion.velocity_per_ns, 0.0)
+    moved(motion, 0.1, FRAME_NS)
+    predicted = motion.predict(3 * FRAME_NS, FREE) - motion.pose
+    np.testing.assert_allclose(predicted, 0.5 * 0.1 * 2, rtol=1e-12)
+
+
+def test_predictions_keep_the_limits(motion):
+    moved(motion, 0.0, 0)
+    moved(motion, 1.0, FRAME_NS)
+    limits = np.array([[-9.0] * 3, [2.1, 9.0, 9.0]])
+    np.testing.assert_allclose(motion.predict(2 * FRAME_NS, limits), [2.1, 3.5, 4.5])
+
+
+def test_what_did_not_move_there_has_no_velocity(motion):
+    moved(motion, 0.0, 0)
+    moved(motion, 0.1, FRAME_NS, jumped=np.array([1]))
+    assert motion.velocity_per_ns[1] == 0.0 and motion.velocity_per_ns[0] > 0.0
+    moved(motion, 0.1, 2 * FRAME_NS, tracked=False)
+    np.testing.assert_array_equal(motion.velocity_per_ns, 0.0)
+    moved(motion, 0.1, 3 * FRAME_NS)
+    motion.lose()
+    np.testing.assert_array_equal(motion.velocity_per_ns, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("elapsed_s", "factor"), [(1 / 60, 1.0), (3 / 60, 3.0), (0.5 / 60, 0.5), (9.0, 6.0), (-1.0, 1)]
+)
+def test_sigma_widens_with_the_time_up_to_a_bound(motion, elapsed_s, factor):
+    moved(motion, 0.0, 5 * 10**9)
+    stamp_ns = 5 * 10**9 + round(elapsed_s * 1e9)
+    assert motion.widening(stamp_ns) == pytest.approx(factor, rel=1e-6)
+
+
+def test_the_region_grows_with_the_time_while_tracked(motion):
+    moved(motion, 0.0, 0)
+    assert motion.region_margin_m(10**9) == pytest.approx(0.2 + LIMB_SPEED_M_S)
+    assert motion.region_margin_m(0) is None
+    motion.lose()
+    assert motion.region_margin_m(10**9) is None
+
+
+def test_a_shift_keeps_limits_and_velocity(motion):
+    moved(motion, 0.0, 0)
+    moved(motion, 0.1, FRAME_NS)
+    before = motion.velocity_per_ns.copy()
+    motion.shift(np.full(3, 0.5), np.array([[-9.0] * 3, [1.2, 9.0, 9.0]]))
+    np.testing.assert_allclose(motion.pose, [1.2, 2.6, 3.6])
+    np.testing.assert_array_equal(motion.velocity_per_ns, before)
+
+
+def test_reset_is_the_beginning(motion):
+    moved(motion, 0.5, 0)
+    moved(motion, 0.5, FRAME_NS)
+    motion.reset()
+    assert motion.predict(2 * FRAME_NS, FREE) is motion.start
+    assert motion.stamp_ns is None
