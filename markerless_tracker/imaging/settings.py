@@ -77,8 +77,8 @@ class ShadowSettings(SettingsGroup):
         "not counted; false: they are background",
     )
     weak_sigmas: float = setting(
-        6.0,
-        "patches whose mean differs from the background by so many standard errors are undecided; "
+        2.0,
+        "patches whose mean differs from the background by so many sigmas of its noise are undecided; "
         "0 = none",
         least=0.0,
         most=1000.0,
@@ -87,7 +87,7 @@ class ShadowSettings(SettingsGroup):
         4.0, "least difference of such a patch, grey levels", least=0.0, most=255.0
     )
     undecided_value_min: float = setting(
-        0.35,
+        0.42,
         "value_min where shadows are undecided, of colour and grey cameras alike",
         least=0.0,
         most=1.0,

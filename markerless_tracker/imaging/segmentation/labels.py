@@ -60,6 +60,12 @@ class PixelLabeller:
         self._uses_texture = (
             settings.texture.radius_px > 0 and settings.shadow.removal and not background.modes
         )
+        # A single still does not tell its noise, and holds errors that patches do not average out.
+        self._uses_patches = (
+            settings.shadow.undecided
+            and settings.shadow.weak_sigmas > 0.0
+            and background.variance.min() < background.variance.max()
+        )
         width, height = gaussians.size_px
         self._memory = np.empty(height * width, dtype=np.uint8)
 
@@ -95,7 +101,7 @@ class PixelLabeller:
         )  # fmt: skip
         if self._uses_texture:
             self._correct_by_texture(image, labels, window, corrected)
-        if self._settings.shadow.undecided and self._settings.shadow.weak_sigmas > 0.0:
+        if self._uses_patches:
             self._mark_weak(image, labels, window)
         return labels
 
@@ -110,10 +116,8 @@ class PixelLabeller:
         mean = background.mean[0][:, window.top : window.bottom, window.left : window.right]
         plain = labels == 0
         side = 2 * WEAK_RADIUS_PX + 1
-        limit = max(
-            self._settings.shadow.weak_least,
-            self._settings.shadow.weak_sigmas * background.sigma / side,
-        )
+        options = self._settings.shadow
+        limit = max(options.weak_least, options.weak_sigmas * background.sigma)
         # Pixels that differ by themselves would smear over those beside them.
         share = cv2.boxFilter(plain.astype(np.float32), cv2.CV_32F, (side, side))
         weak = np.zeros(part.shape[:2], dtype=np.bool_)
