@@ -139,14 +139,14 @@ def first_frames(folder: Path, *, scale: float, **settings) -> float:
     return found.mean_mm
 
 
-def test_a_real_person_is_followed(balance_real):
+def test_a_real_person_is_tracked(balance_real):
     assert first_frames(balance_real, scale=0.5, preset="tuned", evaluations=1000) <= 60.0
 
 
-def test_a_rendered_person_is_followed(render_walk):
+def test_a_rendered_person_is_tracked(render_walk):
     assert first_frames(render_walk, scale=1.0, preset="tuned", evaluations=1000) <= 50.0
 
 
-def test_a_rendered_person_is_followed_as_published(render_walk):
+def test_a_rendered_person_is_tracked_as_published(render_walk):
     """The published search is less exact: 41 to 80 mm over the whole recording, by seed."""
     assert first_frames(render_walk, scale=1.0, preset="paper", evaluations=1000) <= 90.0
