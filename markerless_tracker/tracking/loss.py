@@ -126,4 +126,5 @@ class Track:
 
     def given_up(self, stamp_ns: int) -> bool:
         """Whether it has been lost for too long to be found near where it was."""
-        return self.lost_since_ns is not None and stamp_ns - self.lost_since_ns >= PATIENCE_NS
+        # Stamps may be set back: then too, it was long ago.
+        return self.lost_since_ns is not None and abs(stamp_ns - self.lost_since_ns) >= PATIENCE_NS
