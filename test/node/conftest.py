@@ -132,6 +132,12 @@ class Process:
     def pid(self) -> int:
         return self._popen.pid
 
+    def shared_memory(self) -> set[Path]:
+        """Its files in /dev/shm that no other process uses; ports belong to the domain."""
+        lines = Path(f"/proc/{self.pid}/maps").read_text().splitlines()
+        paths = {Path(line.split()[5]) for line in lines if "/dev/shm/fastrtps" in line}
+        return {path for path in paths if "port" not in path.name}
+
     @property
     def running(self) -> bool:
         return self._popen.poll() is None

@@ -94,13 +94,6 @@ def test_arguments_outside_ros_args_are_refused() -> None:
         init_context(["--ros-args", "-p", "seed"])
 
 
-def shared_memory(pid: int) -> set[Path]:
-    """Files in /dev/shm that only that process uses; the ports belong to the domain."""
-    lines = Path(f"/proc/{pid}/maps").read_text().splitlines()
-    paths = {Path(line.split()[5]) for line in lines if "/dev/shm/fastrtps" in line}
-    return {path for path in paths if "port" not in path.name}
-
-
 def test_a_signal_while_compiling_leaves_nothing_in_shared_memory(
     world: Any, other_domain: None, start: Any, tmp_path: Path
 ) -> None:
@@ -110,7 +103,7 @@ def test_a_signal_while_compiling_leaves_nothing_in_shared_memory(
     while "compiling" not in process.output:
         assert process.running and time.monotonic() < end_s, process.output
         time.sleep(0.05)
-    used = shared_memory(process.pid)
+    used = process.shared_memory()
     assert used and all(path.exists() for path in used)
     process.signal(signal.SIGINT)
     assert process.wait() == 0, process.output
