@@ -30,6 +30,7 @@ def read_background(
     rig: CameraRig,
     *,
     stored_sizes_px: Mapping[str, tuple[int, int]] | None = None,
+    ignore_others: bool = False,
 ) -> dict[str, list[Image]]:
     """Read the empty-scene images of a rig, at most `MAX_FRAMES` (the first) per camera.
 
@@ -39,6 +40,7 @@ def read_background(
         rig: the cameras of the (scaled) images wanted.
         stored_sizes_px: size of each camera's images before scaling; images may have that size
             or the rig's.
+        ignore_others: whether files of other cameras are left alone instead of refused.
 
     Returns:
         Camera name -> images in the rig's size; a camera without any is omitted.
@@ -54,6 +56,8 @@ def read_background(
         if not (path.is_dir() or path.suffix.lower() in IMAGE_SUFFIXES + VIDEO_SUFFIXES):
             continue
         name = path.name if path.is_dir() else path.stem
+        if ignore_others and name not in rig.names:
+            continue
         _check_name(path, name, rig)
         if name in sources:
             raise DatasetError(f"{path}: {name} has another background, {sources[name].name}")
@@ -71,6 +75,7 @@ def read_background_models(
     rig: CameraRig,
     *,
     stored_sizes_px: Mapping[str, tuple[int, int]] | None = None,
+    ignore_others: bool = False,
 ) -> dict[str, BackgroundModel]:
     """Read the learned backgrounds (`NAME.npz`) among the empty scenes of a rig.
 
@@ -81,6 +86,7 @@ def read_background_models(
         folder: as in `read_background`.
         rig: the cameras of the (scaled) images wanted.
         stored_sizes_px: as in `read_background`; a model of images in that size is scaled down.
+        ignore_others: as in `read_background`.
 
     Returns:
         Camera name -> model in the rig's size; a camera without one is omitted.
@@ -91,6 +97,8 @@ def read_background_models(
     """
     models: dict[str, BackgroundModel] = {}
     for path in sorted(_existing(folder).glob(f"*{MODEL_SUFFIX}")):
+        if ignore_others and path.stem not in rig.names:
+            continue
         _check_name(path, path.stem, rig)
         model = read_background_model(path)
         size_px = rig[path.stem].size_px

@@ -1,4 +1,4 @@
-"""Following a running tracker's `state` from another process."""
+"""Subscription to the `state` of a running tracker from another process."""
 
 import os
 from types import TracebackType
@@ -8,7 +8,7 @@ from markerless_tracker.node.ros.process import require_ros
 
 
 class StateWatch:
-    """Hears what a tracker of one ROS domain says about itself; a context manager.
+    """Receives the `state` of the tracker in one ROS domain; a context manager.
 
     Args:
         domain_id: the ROS domain, 0..101.
@@ -50,12 +50,12 @@ class StateWatch:
         self._context.try_shutdown()
 
     def listen(self, seconds: float) -> dict[str, str]:
-        """Wait up to so long for news; the last that was heard, {} before the first."""
+        """Wait up to that many seconds for a message; the last values, {} before the first."""
         self._executor.spin_once(timeout_sec=seconds)
         return self._values
 
     def forget(self) -> None:
-        """What was heard so far came from a tracker that is gone."""
+        """Discard the values of a tracker that has ended."""
         self._values = {}
 
     def _hear(self, message: Any) -> None:

@@ -4,11 +4,12 @@ NAME.subject.yaml holds the sizes of the tracked body, fitted ones included, for
 of the same person.
 """
 
-import json
 import math
 import platform
-from collections.abc import Mapping
-from dataclasses import replace
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -17,106 +18,206 @@ import numpy as np
 
 from markerless_tracker import __version__
 from markerless_tracker.body import MARKER_NAMES, BodyModel, Subject, write_subject
-from markerless_tracker.datasets import MarkerTrack, write_trc
+from markerless_tracker.datasets import tidy_fps
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.records import TrackResult, TrackState
+from markerless_tracker.results.appended import check_writable, not_written
+from markerless_tracker.results.journal import Journal
+from markerless_tracker.results.trc_stream import TrcStream
 from markerless_tracker.tracking import TrackerConfig
 
 _DEPENDENCIES = ("numpy", "numba", "opencv-python-headless", "scipy")
+_SUFFIXES = (".trc", ".json", ".jsonl")
+_UNKNOWN_FPS = 60.0
+_STEPS = 1000
+_MISSING = np.full((len(MARKER_NAMES), 3), np.nan)
 
 
 class ResultWriter:
-    """Collects results and writes them when closed; also usable as a context manager.
+    """Writes each result as it comes; also usable as a context manager.
+
+    While a run goes on, NAME.trc has every row so far and NAME.jsonl, the journal, everything
+    else. `close` makes NAME.json of the journal and removes it. Memory does not grow with the
+    frames. Files of an earlier result stay until the first row comes.
+
+    A stamp that is not later than the one before begins NAME.2.trc, then NAME.3.trc: the rows of
+    one file are in the order of time, and none that was written is ever removed. The frames in
+    NAME.json then carry `segment`, the number of their file.
 
     Args:
-        name: path without suffix; NAME.trc, NAME.json and, if a frame was tracked,
-            NAME.subject.yaml are written, their folder is made.
-        body: the tracked body; also an attribute, for a tracker that fits it on the way.
+        name: path without suffix; the folder is made.
+        body: the tracked body; also an attribute, for a tracker that fits it during the run.
         config: the tracker's settings.
-        fps: rate of the results, 1/s.
+        fps: rate of the results, 1/s; None = as the stamps show.
         source: what was tracked, for the reader of the JSON file.
+        overwrite: whether an earlier result of that name may be replaced.
+
+    Attributes:
+        trc_path, json_path, journal_path, subject_path: the files.
+        frames: frames written.
+        not_written: frames that the disk had no room for.
 
     Raises:
-        DatasetError: the folder cannot be made or written to; found out at once.
+        DatasetError: the files cannot be written, or there is an earlier result and `overwrite` is
+            not set; found out at once.
     """
 
     def __init__(
-        self, name: Path, body: BodyModel, config: TrackerConfig, *, fps: float, source: str = ""
+        self,
+        name: Path,
+        body: BodyModel,
+        config: TrackerConfig,
+        *,
+        fps: float | None,
+        source: str = "",
+        overwrite: bool = True,
     ) -> None:
-        self.trc_path = name.with_name(name.name + ".trc")
-        self.json_path = name.with_name(name.name + ".json")
-        self.subject_path = name.with_name(name.name + ".subject.yaml")
-        try:
-            name.parent.mkdir(parents=True, exist_ok=True)
-            self.json_path.write_text("{}\n", encoding="utf-8")
-        except OSError as error:
-            raise DatasetError(f"{self.json_path}: cannot be written: {error.strerror}") from error
+        self._name = name
+        self.trc_path = _path(name, ".trc")
+        self.json_path = _path(name, ".json")
+        self.journal_path = _path(name, ".jsonl")
+        self.subject_path = _path(name, ".subject.yaml")
+        self._earlier = earlier_files(name)
+        check_target(name, overwrite=overwrite)
         self.body = body
+        self.frames, self.not_written = 0, 0
+        self._tracked = False
         self._config = config
         self._fps = fps
         self._source = source
-        self._results: list[TrackResult] = []
+        self._steps_ns: deque[int] = deque(maxlen=_STEPS)
         self._notes: dict[str, Any] = {}
-        write_trc(self.trc_path, self.track(), fps)
+        self._journal: Journal | None = None
+        self._trc: TrcStream | None = None
+        self._segment = 1
+        self._noted_body: BodyModel | None = None
 
     def __enter__(self) -> "ResultWriter":
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        try:
+            self.close()
+        except DatasetError:
+            # What came first says more.
+            if kind is None:
+                raise
 
     def add(self, result: TrackResult) -> None:
-        """Take one frame; a frame that is not later than the last replaces all from its time on."""
-        while self._results and self._results[-1].stamp_ns >= result.stamp_ns:
-            self._results.pop()
-        # Evidence is large and not written.
-        self._results.append(replace(result, observations={}))
+        """Write one frame.
+
+        Raises:
+            DatasetError: it cannot be written, such as for a full disk. The files hold every frame
+                before it, whole, and the next may be tried.
+        """
+        try:
+            self._add(result)
+        except DatasetError:
+            self.not_written += 1
+            raise
+        self.frames += 1
+        self._tracked = self._tracked or result.state is TrackState.TRACKING
 
     def note(self, notes: Mapping[str, Any]) -> None:
         """Add entries to the JSON file, such as counts of skipped frames."""
         self._notes.update(notes)
 
     def close(self) -> None:
-        """Write the files.
+        """Complete the files; without any frame an earlier result stays.
 
         Raises:
-            DatasetError: a file cannot be written.
+            DatasetError: a file cannot be completed; the rows and the journal stay as they are.
         """
-        write_trc(self.trc_path, self.track(), self._fps)
-        try:
-            self.json_path.write_text(
-                json.dumps(self._summary(), indent=1) + "\n", encoding="utf-8"
-            )
-            if any(r.state is TrackState.TRACKING for r in self._results):
-                write_subject(self.subject_path, self._subject())
-            else:
-                # Nobody was measured; a file of an earlier run would pass for this one's.
-                self.subject_path.unlink(missing_ok=True)
-        except OSError as error:
-            raise DatasetError(f"{error.filename}: cannot be written: {error.strerror}") from error
-
-    def track(self) -> MarkerTrack:
-        """The markers so far; frames without an estimate are rows without markers."""
-        missing = np.full((len(MARKER_NAMES), 3), np.nan)
-        rows = [missing if r.markers_m is None else r.markers_m for r in self._results]
-        return MarkerTrack(
-            MARKER_NAMES,
-            np.array([r.stamp_ns for r in self._results], dtype=np.int64),
-            np.array(rows).reshape(len(rows), len(MARKER_NAMES), 3),
+        if self._journal is None and self._earlier:
+            return
+        journal, trc = self._begun()
+        steps: tuple[Callable[[], None], ...] = (
+            partial(trc.finish, self._rate()),
+            partial(journal.add, self._last_entries()),
+            partial(journal.compose, self.json_path),
+            self._write_subject,
         )
+        failed: DatasetError | None = None
+        for finish in steps:
+            try:
+                finish()
+            except DatasetError as error:
+                failed = failed or error
+        if failed is not None:
+            raise failed
 
-    def _subject(self) -> Subject:
+    def _add(self, result: TrackResult) -> None:
+        journal, trc = self._begun()
+        if trc.last_ns is not None:
+            if result.stamp_ns > trc.last_ns:
+                self._steps_ns.append(result.stamp_ns - trc.last_ns)
+            else:
+                trc = self._next_segment(trc)
+        if self._noted_body is not self.body:
+            journal.add(self._body_entry())
+            self._noted_body = self.body
+        before = journal.size
+        journal.add(_frame(result, self._segment))
+        try:
+            markers_m = _MISSING if result.markers_m is None else result.markers_m
+            trc.add(result.stamp_ns, markers_m, self._rate())
+        except DatasetError:
+            journal.cut(before)
+            raise
+
+    def _begun(self) -> tuple[Journal, TrcStream]:
+        """The files of the run, made with its first frame."""
+        if self._journal is None or self._trc is None:
+            trc = TrcStream(self.trc_path, MARKER_NAMES, self._rate())
+            self._journal, self._trc = Journal(self.journal_path), trc
+            self._journal.add(self._summary())
+            # From here on the journal is what there is to read.
+            self.json_path.unlink(missing_ok=True)
+            number = 2
+            while (path := _path(self._name, f".{number}.trc")).exists():
+                path.unlink()
+                number += 1
+        return self._journal, self._trc
+
+    def _next_segment(self, trc: TrcStream) -> TrcStream:
+        path = _path(self._name, f".{self._segment + 1}.trc")
+        self._trc = TrcStream(path, MARKER_NAMES, self._rate())
+        self._segment += 1
+        with suppress(DatasetError):
+            # Its rows are there; only the short form of its header has no room.
+            trc.finish(self._rate())
+        return self._trc
+
+    def _rate(self) -> float:
+        """Rate of the results, 1/s; by the stamps, the median of the latest steps."""
+        if self._fps is not None:
+            return self._fps
+        if not self._steps_ns:
+            return _UNKNOWN_FPS
+        return tidy_fps(1e9 / float(np.median(self._steps_ns)))
+
+    def _write_subject(self) -> None:
+        if not self._tracked:
+            # Nobody was measured; a file of an earlier run would pass for this one's.
+            self.subject_path.unlink(missing_ok=True)
+            return
         shapes = zip(self.body.cone_names, self.body.cone_shape, strict=True)
-        return Subject(
+        subject = Subject(
             self._source or "tracked", dict(self.body.lengths_m), dict(shapes), self.body.measured
         )
+        try:
+            write_subject(self.subject_path, subject)
+        except OSError as error:
+            raise not_written(self.subject_path, error) from error
 
-    def _summary(self) -> dict[str, Any]:
+    def _last_entries(self) -> dict[str, Any]:
+        entries = {**self._body_entry(), **self._notes}
+        if self.not_written:
+            entries["not_written"] = self.not_written
+        return entries
+
+    def _body_entry(self) -> dict[str, Any]:
         return {
-            "source": self._source,
-            "seed": self._config.seed,
-            "settings": self._config.as_mapping(),
-            "versions": versions(),
             "body": {
                 "name": self.body.name,
                 "parameters": list(self.body.parameter_names),
@@ -125,24 +226,61 @@ class ResultWriter:
                     name: shape.tolist()
                     for name, shape in zip(self.body.cone_names, self.body.cone_shape, strict=True)
                 },
-            },
-            **self._notes,
-            "frames": [
-                {
-                    "stamp_ns": r.stamp_ns,
-                    "state": r.state.value,
-                    "fitness": r.fitness if math.isfinite(r.fitness) else None,
-                    "evaluations": r.evaluations,
-                    "refinements": r.refinements,
-                    "iou": dict(r.iou),
-                    "exposure": {name: list(gain) for name, gain in r.exposure.items()},
-                    "parameters": None if r.pose is None else r.pose.tolist(),
-                    **_confidence(r),
-                    **_limbs(r),
-                }
-                for r in self._results
-            ],
+            }
         }
+
+    def _summary(self) -> dict[str, Any]:
+        return {
+            "source": self._source,
+            "seed": self._config.seed,
+            "settings": self._config.as_mapping(),
+            "versions": versions(),
+        }
+
+
+def earlier_files(name: Path) -> list[Path]:
+    """Files of an earlier result of that name."""
+    paths = (_path(name, suffix) for suffix in _SUFFIXES)
+    return [path for path in paths if path.exists()]
+
+
+def check_target(name: Path, *, overwrite: bool) -> None:
+    """Make sure that a result can be written, without changing an earlier one; makes the folder.
+
+    Raises:
+        DatasetError: it cannot, or there is an earlier result and `overwrite` is not set.
+    """
+    earlier = earlier_files(name)
+    if earlier and not overwrite:
+        raise DatasetError(f"{earlier[0]}: exists already, expected a new name or `overwrite`")
+    try:
+        name.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise not_written(_path(name, ".json"), error) from error
+    for suffix in _SUFFIXES:
+        check_writable(_path(name, suffix))
+
+
+def _path(name: Path, suffix: str) -> Path:
+    return name.with_name(name.name + suffix)
+
+
+def _frame(result: TrackResult, segment: int) -> dict[str, Any]:
+    """A frame's entry of the JSON file."""
+    return {
+        "stamp_ns": result.stamp_ns,
+        **({"segment": segment} if segment > 1 else {}),
+        "state": result.state.value,
+        "fitness": result.fitness if math.isfinite(result.fitness) else None,
+        "evaluations": result.evaluations,
+        "refinements": result.refinements,
+        "iou": dict(result.iou),
+        "exposure": {name: list(gain) for name, gain in result.exposure.items()},
+        "parameters": None if result.pose is None else result.pose.tolist(),
+        **({"warnings": list(result.warnings)} if result.warnings else {}),
+        **_confidence(result),
+        **_limbs(result),
+    }
 
 
 def _confidence(result: TrackResult) -> dict[str, Any]:

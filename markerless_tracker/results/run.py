@@ -13,7 +13,7 @@ from markerless_tracker.tracking import TrackerSetup
 
 @dataclass(frozen=True, eq=False)
 class TrackedFrame:
-    """A set of images and what the tracker made of it."""
+    """A set of images and its result."""
 
     images: FrameSet
     result: TrackResult
@@ -22,12 +22,12 @@ class TrackedFrame:
 def recording_backgrounds(
     recording: Recording, settings: ImagingSettings, folder: Path | None = None
 ) -> dict[str, BackgroundModel]:
-    """Background models of all cameras: from a folder, or as the recording's own images allow.
+    """Background models of all cameras, from a folder or the recording's own images.
 
-    Learned ones (`NAME.npz`) are taken as they are, before images.
+    Learned models (`NAME.npz`) take precedence over images.
 
     Raises:
-        DatasetError, ImageError: files of backgrounds that cannot be used.
+        DatasetError, ImageError: a background file cannot be used.
     """
     models = recording.background_models(folder)
     if len(models) == len(recording.rig):

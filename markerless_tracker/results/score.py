@@ -1,4 +1,4 @@
-"""How far one marker track lies from another, in mm."""
+"""Errors of one marker track against another, in mm."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -72,11 +72,11 @@ class Score:
 def score(result: MarkerTrack, reference: MarkerTrack) -> Score:
     """Compare two tracks, rows by time (within half a frame of the finer one), markers by name.
 
-    A missing Pelvis is the midpoint of the hips in either. Rows and markers that one of them does
-    not hold are left out.
+    A missing Pelvis is the midpoint of the hips. Rows and markers that one of the tracks lacks are
+    omitted.
 
     Raises:
-        DatasetError: no common marker, or no common frame; says what each holds.
+        DatasetError: no common marker, or no common frame; lists those of each.
     """
     result, reference = result.with_pelvis(), reference.with_pelvis()
     names = tuple(name for name in reference.names if name in result.names)

@@ -110,7 +110,8 @@ class Track:
         """Whether the body was lost for `PATIENCE_NS` at the last frame."""
         if self.lost_since_ns is None or self.stamp_ns is None:
             return False
-        return self.stamp_ns - self.lost_since_ns >= PATIENCE_NS
+        # Stamps may be set back: that gap counts as well.
+        return abs(self.stamp_ns - self.lost_since_ns) >= PATIENCE_NS
 
     def after(self, event: Event, stamp_ns: int | None = None, overlap: float = 0.0) -> "Track":
         """The track after an event.

@@ -157,3 +157,12 @@ def test_a_bag_keeps_the_learned_models(make_recording, tmp_path: Path) -> None:
     found = open_recording(tmp_path / "bag").background_models()
     assert list(found) == ["cam01"]
     np.testing.assert_array_equal(found["cam01"].variance, learned(40.0).variance)
+
+
+def test_other_cameras_may_be_ignored(tmp_path: Path, rig) -> None:
+    write_image(tmp_path / "bg" / "cam9.png", IMAGE)
+    write_image(tmp_path / "bg" / "cam01.png", IMAGE)
+    write_background_model(tmp_path / "bg" / "cam8.npz", learned(40.0))
+    write_background_model(tmp_path / "bg" / "cam02.npz", learned(40.0))
+    assert set(read_background(tmp_path / "bg", rig, ignore_others=True)) == {"cam01"}
+    assert set(read_background_models(tmp_path / "bg", rig, ignore_others=True)) == {"cam02"}

@@ -1,4 +1,4 @@
-"""A ROS graph of its own for every test process, and a node to talk from."""
+"""A ROS graph of its own for every test process, and a node in it."""
 
 import os
 import signal
@@ -17,8 +17,8 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 
 ROOT = Path(__file__).resolve().parents[2]
-DEADLINE_S = 30.0
-"""Discovery takes up to 3 s, more on a busy machine."""
+DEADLINE_S = 120.0
+"""Discovery takes up to 3 s, far more on a busy machine."""
 
 
 def _domain() -> int:
@@ -44,7 +44,7 @@ def _ros_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
 
 
 class Peer:
-    """A node of the test's own, and a way to wait for things."""
+    """A node of the test's own, which can wait for conditions."""
 
     def __init__(self, context: Any) -> None:
         from rclpy.executors import SingleThreadedExecutor
@@ -107,7 +107,13 @@ def run_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 class Process:
     """An executable of this package as a process of its own."""
 
-    def __init__(self, node: str, log: Path, parameters: dict[str, Any]) -> None:
+    def __init__(
+        self,
+        node: str,
+        log: Path,
+        parameters: dict[str, Any],
+        environment: dict[str, str] | None = None,
+    ) -> None:
         arguments = ["--ros-args"]
         for name, value in parameters.items():
             text = str(value).lower() if isinstance(value, bool) else str(value)
@@ -119,8 +125,18 @@ class Process:
                 stdin=subprocess.DEVNULL,
                 stdout=sink,
                 stderr=subprocess.STDOUT,
-                env={**os.environ, "PYTHONPATH": str(ROOT)},
+                env={**os.environ, "PYTHONPATH": str(ROOT), **(environment or {})},
             )
+
+    @property
+    def pid(self) -> int:
+        return self._popen.pid
+
+    def shared_memory(self) -> set[Path]:
+        """Its files in /dev/shm that no other process uses; ports belong to the domain."""
+        lines = Path(f"/proc/{self.pid}/maps").read_text().splitlines()
+        paths = {Path(line.split()[5]) for line in lines if "/dev/shm/fastrtps" in line}
+        return {path for path in paths if "port" not in path.name}
 
     @property
     def running(self) -> bool:
@@ -130,7 +146,7 @@ class Process:
     def output(self) -> str:
         return self.log.read_text(errors="replace")
 
-    def wait(self, timeout_s: float = 60.0) -> int:
+    def wait(self, timeout_s: float = 120.0) -> int:
         return self._popen.wait(timeout_s)
 
     def signal(self, number: int) -> None:
@@ -140,7 +156,7 @@ class Process:
         if self.running:
             self._popen.send_signal(signal.SIGINT)
             try:
-                self._popen.wait(20)
+                self._popen.wait(60)
             except subprocess.TimeoutExpired:
                 self._popen.kill()
                 self._popen.wait()
@@ -150,9 +166,10 @@ class Process:
 def start(tmp_path: Path) -> Iterator[Callable[..., Process]]:
     started: list[Process] = []
 
-    def begin(node: str, **parameters: Any) -> Process:
+    def begin(node: str, *, environment: Any = None, **parameters: Any) -> Process:
         pytest.importorskip("rclpy", reason="ROS 2 is not installed")
-        process = Process(node, tmp_path / f"{node}{len(started)}.log", parameters)
+        log = tmp_path / f"{node}{len(started)}.log"
+        process = Process(node, log, parameters, environment)
         started.append(process)
         return process
 

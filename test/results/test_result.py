@@ -10,7 +10,7 @@ from markerless_tracker import __version__
 from markerless_tracker.body import MARKER_NAMES, load_body, read_subject
 from markerless_tracker.datasets import read_trc
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.records import Confidence, LimbState, Observation, TrackResult, TrackState
+from markerless_tracker.records import Confidence, LimbState, TrackResult, TrackState
 from markerless_tracker.results.result import ResultWriter, versions
 from markerless_tracker.tracking import TrackerConfig
 
@@ -89,7 +89,7 @@ def test_the_summary_is_json_that_others_read_as_well(tmp_path, body, config):
     json.loads(text, parse_constant=refuse)
 
 
-def test_the_body_may_be_fitted_on_the_way(tmp_path, body, config):
+def test_the_body_may_be_fitted_during_the_run(tmp_path, body, config):
     grown = load_body("balan31", 1.9)
     with ResultWriter(tmp_path / "out", body, config, fps=60.0) as writer:
         writer.add(result(0))
@@ -106,25 +106,6 @@ def test_the_content_does_not_depend_on_where_it_is_written(tmp_path, body, conf
         texts += [name.parent / f"{name.name}{suffix}" for suffix in (".trc", ".json")]
     assert texts[0].read_bytes() == texts[2].read_bytes()
     assert texts[1].read_bytes() == texts[3].read_bytes()
-
-
-def test_going_back_in_time_replaces_what_came_after(tmp_path, body, config):
-    writer = ResultWriter(tmp_path / "out", body, config, fps=60.0)
-    for stamp_ns, value in ((10, 1.0), (20, 2.0), (30, 3.0), (20, 4.0), (20, 5.0), (40, 6.0)):
-        writer.add(result(stamp_ns, value))
-    track = writer.track()
-    np.testing.assert_array_equal(track.stamps_ns, [10, 20, 40])
-    np.testing.assert_array_equal(track.positions_m[:, 0, 0], [1.0, 5.0, 6.0])
-    writer.add(result(0, 7.0))
-    np.testing.assert_array_equal(writer.track().stamps_ns, [0])
-
-
-def test_the_evidence_is_not_kept(tmp_path, body, config):
-    mask = np.zeros((4, 4), np.uint8)
-    writer = ResultWriter(tmp_path / "out", body, config, fps=60.0)
-    seen = {"cam01": Observation.from_mask("cam01", 0, mask, mask)}
-    writer.add(result(0, observations=seen))
-    assert not writer._results[0].observations
 
 
 def test_exposure_is_written(tmp_path, body, config):
@@ -152,7 +133,7 @@ def test_what_was_found_before_an_error_is_written(tmp_path, body, config):
 
 
 @pytest.mark.parametrize("taken", ["parent", "trc", "json"])
-def test_a_target_that_cannot_be_written_is_found_out_at_once(tmp_path, body, config, taken):
+def test_a_target_that_cannot_be_written_is_refused_at_once(tmp_path, body, config, taken):
     name = tmp_path / "folder" / "out"
     if taken == "parent":
         name.parent.write_text("a file", encoding="utf-8")
@@ -183,7 +164,7 @@ def test_the_subject_it_writes_gives_the_same_body_again(tmp_path) -> None:
     assert again.lengths_m == fitted.lengths_m
 
 
-def test_nobody_tracked_leaves_no_subject_not_even_an_old_one(tmp_path, body, config) -> None:
+def test_without_a_tracked_person_there_is_no_subject_file(tmp_path, body, config) -> None:
     path = tmp_path / "walk.subject.yaml"
     path.write_text("of an earlier run", encoding="utf-8")
     with ResultWriter(tmp_path / "walk", body, config, fps=60.0) as writer:

@@ -13,7 +13,7 @@ from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import rotation_from_rodrigues
 from markerless_tracker.results.score import LIMBS, body_frames, match_rows, score
 
-# A person who faces +x, left is +y.
+# A person facing +x, left is +y.
 POSE = {
     "LHip": (0.0, 0.1, 1.0),
     "RHip": (0.0, -0.1, 1.0),
@@ -65,10 +65,10 @@ angles = st.floats(-3.0, 3.0)
 
 @given(st.tuples(angles, angles, angles), st.tuples(angles, angles, angles))
 def test_bias_does_not_depend_on_where_the_body_faces(rotation, shift) -> None:
-    turn = rotation_from_rodrigues(rotation)
-    pose = {name: turn @ np.array(point) + np.array(shift) for name, point in POSE.items()}
+    matrix = rotation_from_rodrigues(rotation)
+    pose = {name: matrix @ np.array(point) + np.array(shift) for name, point in POSE.items()}
     reference = track([0, FRAME_NS], pose=pose)
-    result = track([0, FRAME_NS], pose=pose, offset_mm=turn @ np.array([10.0, -20.0, 30.0]))
+    result = track([0, FRAME_NS], pose=pose, offset_mm=matrix @ np.array([10.0, -20.0, 30.0]))
     assert score(result, reference).bias["Head"] == pytest.approx((10.0, -20.0, 30.0), abs=1e-6)
 
 
@@ -117,9 +117,9 @@ def test_blank_rows_and_missing_markers_are_left_out() -> None:
 def test_a_joint_never_compared_is_null_in_json() -> None:
     reference = edited(track([0]), 0, "Head", np.nan)
     figures = score(track([0]), reference)
-    told = json.loads(json.dumps(figures.as_dict(), allow_nan=False))
-    assert told["joints"]["Head"] is None and "Head" not in told["bias"]
-    assert list(told) == [
+    figures_back = json.loads(json.dumps(figures.as_dict(), allow_nan=False))
+    assert figures_back["joints"]["Head"] is None and "Head" not in figures_back["bias"]
+    assert list(figures_back) == [
         "mean_mm",
         "max_mm",
         "worst_joint_mm",
@@ -145,7 +145,7 @@ def test_the_shoulders_stand_in_for_the_neck() -> None:
     np.testing.assert_allclose(body_frames(track([0]))[0], np.eye(3), atol=1e-12)
 
 
-def test_what_cannot_be_compared_is_told() -> None:
+def test_what_cannot_be_compared_is_reported() -> None:
     with pytest.raises(DatasetError, match="no common marker.*Nose.*Head"):
         score(track([0], pose={"Nose": (0, 0, 0)}), track([0]))
     with pytest.raises(DatasetError, match=r"no common frame.*5\.000 to 5\.017 s.*0\.000 s"):

@@ -79,7 +79,7 @@ def replay(
     apply_profile()
     node = NodeProcess(
         "markerless_tracker.node.tracker.executable",
-        {**tracker, "result_file": result},
+        {**tracker, "result_file": result, "overwrite": True},
         log=log_dir / f"tracker_{result.name}.log",
         domain_id=domain_id,
     )
@@ -138,17 +138,19 @@ def _until_through(
     """Wait until the player has ended and the tracker has finished all sets it received."""
     deadline_s = time.monotonic() + lasts_s + 60.0
     changed_s, seen = time.monotonic(), -1
+    # The rate falls once the last set is tracked.
+    latest: Mapping[str, str] = {}
     while True:
         values = watch.listen(0.1)
         done = _dealt_with(values)
         now_s = time.monotonic()
         if done != seen:
-            changed_s, seen = now_s, done
+            changed_s, seen, latest = now_s, done, values
         report("tracking", min(done, sets))
         node.check()
         player.check()
         if not player.running and (done >= sets or now_s - changed_s > _QUIET_S):
-            return values
+            return latest
         if now_s > deadline_s:
             raise NodeError(
                 f"{'player' if player.running else 'tracker'}: not through {sets} sets after "

@@ -1,6 +1,5 @@
 """The body of a result drawn over the images of all views, and its overlap with the person."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from markerless_tracker.datasets import open_recording
 from markerless_tracker.drawing import draw_overlay, overlay_sheet
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.records import TrackState
+from markerless_tracker.results.journal import read_summary
 
 Frame = Mapping[str, Any]
 
@@ -32,16 +32,16 @@ class Outcome:
 
 
 def read_outcome(result: Path) -> Outcome:
-    """Read `result`.json.
+    """Read `result`.json, or the journal of a run that did not end.
 
     Raises:
         DatasetError: the file is missing, not a result, or has no tracked frame.
     """
     path = result.with_name(result.name + ".json")
+    content = read_summary(result)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
         body, frames = content["settings"]["body"], content["frames"]
-    except (OSError, ValueError, KeyError) as error:
+    except KeyError as error:
         raise DatasetError(f"{path}: no result of a tracker ({error})") from error
     tracked = [frame for frame in frames if frame["state"] == TrackState.TRACKING.value]
     if not tracked:

@@ -4,13 +4,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.imaging.background.model import BackgroundModel, learn_background
-from markerless_tracker.imaging.images import Image, grey_of
+from markerless_tracker.errors import ImageError
+from markerless_tracker.imaging.background.model import (
+    BackgroundModel,
+    learn_background,
+    model_from_moments,
+)
+from markerless_tracker.imaging.images import Image, check_image, grey_of
 from markerless_tracker.imaging.settings import ImagingSettings
 
 MOVING_SHARE = 0.002
 """Part of an image from which on something moves in it: 630 px of 644x488, where a person has some
 thousands; leaves and screens may have more, and an empty scene with them is refused."""
+
+SAMPLES = 20
+"""Images that are kept for a mixture: 0.5 GB of four 1080p cameras."""
 
 _BLUR_PX = (5, 5)
 _LEAST_CHANGE = 10.0
@@ -21,7 +29,10 @@ _FROM_MEDIAN = 1.4826
 
 
 class LiveBackground:
-    """Images of one camera that are to become its background.
+    """Images of one camera that become its background; memory does not grow with their number.
+
+    For one Gaussian per pixel sums are kept, as `learn_background` makes them. For a mixture
+    images are kept, at most `SAMPLES`, evenly spaced.
 
     Args:
         camera: name for messages.
@@ -30,19 +41,37 @@ class LiveBackground:
 
     def __init__(self, camera: str, settings: ImagingSettings | None = None) -> None:
         self._camera = camera
-        self._settings = settings
-        self._images: list[Image] = []
+        self._settings = settings or ImagingSettings()
+        self._count = 0
+        self._shape: tuple[int, ...] = ()
+        self._samples: list[Image] = []
+        self._every = 1
+        self._mean = self._moment = np.zeros(0, dtype=np.float32)
         self._first: NDArray[np.float32] | None = None
 
     def __len__(self) -> int:
-        return len(self._images)
+        return self._count
 
     def add(self, image: Image) -> float:
-        """Take an image (h, w) or (h, w, 3); returns the part of it that moved since the first."""
-        # Messages' memory may be used again.
-        self._images.append(image.copy())
+        """Take an image (h, w) or (h, w, 3).
+
+        Returns:
+            The part of the image that moved since the first one.
+
+        Raises:
+            ImageError: it differs from the first in size or channels.
+        """
+        check_image(image, f"{self._camera}: background frame {self._count}")
+        if self._count == 0:
+            self._shape = image.shape
+        elif image.shape != self._shape:
+            raise ImageError(
+                f"{self._camera}: background frame {self._count} is {image.shape}, the first was "
+                f"{self._shape}"
+            )
+        self._learn_from(image)
         smooth = np.asarray(cv2.blur(grey_of(image), _BLUR_PX), dtype=np.float32)
-        if self._first is None or self._first.shape != smooth.shape:
+        if self._first is None:
             self._first = smooth
             return 0.0
         return moved_share(self._first, smooth)
@@ -51,10 +80,29 @@ class LiveBackground:
         """The background.
 
         Raises:
-            ImageError: no image came, or images that differ in size or channels.
+            ImageError: no image came.
         """
-        note = f"learned live from {len(self._images)} images"
-        return learn_background(self._images, self._settings, camera=self._camera, note=note)
+        note = f"learned live from {self._count} images"
+        if self._settings.background.modes > 1 or not self._count:
+            return learn_background(self._samples, self._settings, camera=self._camera, note=note)
+        return model_from_moments(self._mean, self._moment, self._count, self._settings, note=note)
+
+    def _learn_from(self, image: Image) -> None:
+        if self._settings.background.modes > 1:
+            if self._count % self._every == 0:
+                # The memory of a message may be used again.
+                self._samples.append(image.copy())
+            if len(self._samples) > SAMPLES:
+                self._samples, self._every = self._samples[::2], 2 * self._every
+            self._count += 1
+            return
+        value = image.reshape(*image.shape[:2], -1).astype(np.float32)
+        if self._count == 0:
+            self._mean, self._moment = np.zeros_like(value), np.zeros_like(value)
+        self._count += 1
+        change = value - self._mean
+        self._mean += change / np.float32(self._count)
+        self._moment += change * (value - self._mean)
 
 
 def moved_share(before: NDArray[np.float32], now: NDArray[np.float32]) -> float:

@@ -1,5 +1,6 @@
 """A learned background as a file, to be kept beside the calibration."""
 
+import os
 import zipfile
 from pathlib import Path
 
@@ -14,6 +15,8 @@ _VERSION = 1
 
 def write_background_model(path: Path, model: BackgroundModel) -> None:
     """Write a model (NumPy's `.npz`, compressed; the same model gives the same bytes).
+
+    The file appears when it is complete; until then an earlier one stays.
 
     Raises:
         ImageError: the file cannot be written.
@@ -30,11 +33,17 @@ def write_background_model(path: Path, model: BackgroundModel) -> None:
             f"mean_{k}": mode.mean,
             f"variance_{k}": mode.variance,
         }
+    part = path.with_name(f"{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Through a file, or NumPy appends its own suffix to other names.
-        with path.open("wb") as file:
-            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+        try:
+            # Through a file, or NumPy appends its own suffix to other names.
+            with part.open("wb") as file:
+                np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+            os.replace(part, path)
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise
     except OSError as error:
         raise ImageError(f"{path}: cannot be written: {error.strerror}") from error
 

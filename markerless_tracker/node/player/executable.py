@@ -15,7 +15,7 @@ from markerless_tracker.node.ros.process import (
 
 _SUMMARY = "Plays a bag's images and camera infos to topics, with their own stamps."
 _EXAMPLE = "player --ros-args -p bag:=bag -p rate:=0.5 -p wait_for_subscribers:=true"
-# A signal is noticed at the latest after this.
+# Longest time until a signal is noticed.
 _NOTICE_S = 0.1
 
 

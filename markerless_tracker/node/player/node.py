@@ -1,4 +1,4 @@
-"""The node `player`: a bag's images to topics, with their own stamps, at the bag's own pace."""
+"""The node `player`: publishes the images of a bag, with their stamps, at the recorded rate."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -6,7 +6,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
-from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, Image
 
 from markerless_tracker.datasets import FrameSet, Recording, detect_format, open_recording
@@ -20,20 +19,20 @@ from markerless_tracker.node.player.parameters import (
 )
 from markerless_tracker.node.player.prefetch import prefetch
 from markerless_tracker.node.ros.camera_info import info_of
-from markerless_tracker.node.ros.declared import declare_effective, given_parameters
+from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
 from markerless_tracker.node.ros.images import fill_image
 from markerless_tracker.node.ros.messages import header, optical_frame
 from markerless_tracker.node.ros.qos import image_qos, latched_qos
 
-_AHEAD = 8
+_PREFETCH_SETS = 8
 _REMIND_S = 10.0
 _DISCOVERY_S = 1.0
 _ACKNOWLEDGE_S = 3.0
-# A subscriber that has acknowledged an image may yet have to look at it.
+# An acknowledged image may not have reached the subscriber's callback yet.
 _LINGER_S = 0.5
 
 
-class PlayerNode(Node):
+class PlayerNode(GivenNode):
     """Publishes ``NAME/image_raw`` and ``NAME/camera_info`` of every camera of a bag.
 
     Args:
@@ -44,9 +43,7 @@ class PlayerNode(Node):
     """
 
     def __init__(self, **node_arguments: Any) -> None:
-        super().__init__(
-            "player", automatically_declare_parameters_from_overrides=True, **node_arguments
-        )
+        super().__init__("player", **node_arguments)
         self.settings = read_player_settings(given_parameters(self))
         declare_effective(self, player_values(self.settings), descriptions())
         self._recording = _open_bag(self.settings)
@@ -60,7 +57,7 @@ class PlayerNode(Node):
         self.sets_played = 0
 
     def waiting_for(self) -> list[str]:
-        """What `wait_for_subscribers` still waits for, in words; empty when all is there."""
+        """What `wait_for_subscribers` waits for, in words; empty when nothing is missing."""
         missing = [
             f"a subscriber of {name}/image_raw"
             for name, publisher in self._images.items()
@@ -71,14 +68,14 @@ class PlayerNode(Node):
         return missing
 
     def play(self, spin: Callable[[float], bool]) -> None:
-        """Play the bag, or for ever if it loops.
+        """Play the bag once, or repeatedly if it loops.
 
         Args:
             spin: lets the node's callbacks run for about that many seconds (0: only those due);
                 returns False when it is time to end.
 
         Raises:
-            TrackerError: the bag turns out to be unreadable.
+            TrackerError: the bag cannot be read.
         """
         going = self._wait(spin) if self.settings.wait_for_subscribers else self._discover(spin)
         if not going:
@@ -95,14 +92,14 @@ class PlayerNode(Node):
             self.get_logger().warning(warning)
 
     def finish(self, spin: Callable[[float], bool]) -> None:
-        """Wait, within reason, until subscribers have got the last set."""
+        """Wait up to `_ACKNOWLEDGE_S` per topic until subscribers have received the last set."""
         for publisher in (*self._images.values(), *self._infos.values()):
             if publisher.get_subscription_count():
                 publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGE_S))
         spin(_LINGER_S)
 
     def _discover(self, spin: Callable[[float], bool]) -> bool:
-        """Give those who listen a moment to be found: what is sent before is lost to them."""
+        """Wait up to `_DISCOVERY_S` for subscribers: images sent before discovery are lost."""
         until_s = time.monotonic() + _DISCOVERY_S
         while time.monotonic() < until_s:
             if all(publisher.get_subscription_count() for publisher in self._images.values()):
@@ -112,12 +109,12 @@ class PlayerNode(Node):
         return True
 
     def _wait(self, spin: Callable[[float], bool]) -> bool:
-        said, said_s = "", 0.0
+        logged, logged_s = "", 0.0
         while missing := self.waiting_for():
             now_s, text = time.monotonic(), f"waiting for {', '.join(missing)}"
-            if text != said or now_s - said_s > _REMIND_S:
+            if text != logged or now_s - logged_s > _REMIND_S:
                 self.get_logger().info(text)
-                said, said_s = text, now_s
+                logged, logged_s = text, now_s
             if not spin(0.1):
                 return False
         return True
@@ -126,7 +123,7 @@ class PlayerNode(Node):
         """Play once; returns whether to go on."""
         pace = Pace(self.settings.rate, clock=time.monotonic)
         began_s, first_ns, last_ns = time.monotonic(), None, 0
-        with prefetch(self._sets, _AHEAD) as sets:
+        with prefetch(self._sets, _PREFETCH_SETS) as sets:
             for frame_set in sets:
                 first_ns = frame_set.stamp_ns if first_ns is None else first_ns
                 last_ns = frame_set.stamp_ns

@@ -1,18 +1,18 @@
-"""When each set of a recording is due."""
+"""Publication times of the sets of a recording."""
 
 from collections.abc import Callable
 
 
 class Pace:
-    """Due times that keep a recording's own pace, times a rate.
+    """Publication times from the stamps of a recording and a rate.
 
-    Falling behind by more than `slack_s` moves all later due times: a burst of late images helps
-    nobody. What was lost that way adds up in `late_s`.
+    A delay above `slack_s` shifts all later times, so that no burst of late images follows. The
+    delays add up in `late_s`.
 
     Args:
         rate: 2 plays twice as fast as recorded.
-        clock: seconds that only go forward.
-        slack_s: lateness that is caught up with.
+        clock: monotonic time in s.
+        slack_s: delay that is caught up with.
     """
 
     def __init__(self, rate: float, *, clock: Callable[[], float], slack_s: float = 0.05) -> None:
@@ -35,5 +35,5 @@ class Pace:
         return max(0.0, due_s - now_s)
 
     def begin(self) -> None:
-        """The next set is due at once, whatever its stamp."""
+        """Publish the next set at once, whatever its stamp."""
         self._origin = None

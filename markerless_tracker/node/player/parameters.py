@@ -11,13 +11,13 @@ from markerless_tracker.node.ros import declared
 
 @dataclass(frozen=True, kw_only=True)
 class PlayerSettings:
-    """What a player does.
+    """Parameters of the player.
 
     Attributes:
         bag: the bag's folder, or its `.mcap`.
         rate: 1 is the bag's own pace.
-        loop: begin anew at the end.
-        start_offset: s of the bag to leave out.
+        loop: start again at the end.
+        start_offset: s to skip at the beginning of the bag.
         wait_for_subscribers: wait until every image topic has a subscriber and `state` says ready.
     """
 
@@ -52,7 +52,7 @@ def read_player_settings(given: Mapping[str, Any]) -> PlayerSettings:
 
 
 def player_values(settings: PlayerSettings) -> dict[str, Any]:
-    """What every parameter is, as ROS can hold it."""
+    """Value of every parameter in a type that ROS supports."""
     return {**asdict(settings), "bag": str(settings.bag)}
 
 

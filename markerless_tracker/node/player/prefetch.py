@@ -1,4 +1,4 @@
-"""Reading prefetch in a thread, so that decoding and publishing overlap."""
+"""Prefetching in a thread, so that decoding and publishing overlap."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,9 +13,9 @@ _POLL_S = 0.1
 
 @contextmanager
 def prefetch(source: Callable[[], Iterator[Item]], depth: int) -> Iterator[Iterator[Item]]:
-    """The items of an iterator that a thread makes and reads, at most `depth` of them prefetch.
+    """Iterate in a thread; at most `depth` items wait for the caller.
 
-    What the iterator raises is raised to whoever reads the items. Leaving the context ends the
+    Exceptions of the iterator are raised where the items are read. Leaving the context ends the
     thread.
     """
     queue: Queue[tuple[str, Item | None, BaseException | None]] = Queue(depth)

@@ -1,4 +1,4 @@
-"""What both nodes need of ROS: messages, images, camera info, QoS, stamps, parameters.
+"""ROS code shared by both nodes: messages, images, camera info, QoS, stamps, parameters, logs.
 
-Nothing here knows the tracker or the player.
+Independent of the tracker and the player.
 """

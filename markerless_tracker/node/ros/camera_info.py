@@ -4,56 +4,75 @@ import numpy as np
 from sensor_msgs.msg import CameraInfo
 
 from markerless_tracker.camera import CameraModel
+from markerless_tracker.camera.ros_fields import camera_info_fields, lens_of
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.node.ros.messages import header, optical_frame
 
+TOLERANCE = 0.01
+"""K and D of a camera info may differ by this fraction from the calibration file."""
+
 
 def info_of(camera: CameraModel, stamp_ns: int) -> CameraInfo:
     """The CameraInfo (REP-104) of a camera's unrectified images."""
-    message = CameraInfo(header=header(stamp_ns, optical_frame(camera.name)))
-    message.width, message.height = camera.size_px
-    message.distortion_model = "plumb_bob"
-    message.d = camera.distortion.tolist()
-    message.k = camera.matrix.ravel().tolist()
-    message.r = np.eye(3).ravel().tolist()
-    message.p = np.hstack([camera.matrix, np.zeros((3, 1))]).ravel().tolist()
-    return message
+    return CameraInfo(
+        header=header(stamp_ns, optical_frame(camera.name)), **camera_info_fields(camera)
+    )
 
 
 def camera_of(name: str, info: CameraInfo, T_cam_world: FloatArray) -> CameraModel:
-    """The camera that a CameraInfo describes, standing where it is said to.
-
-    Binning and regions of interest are not supported.
+    """The camera that a CameraInfo describes.
 
     Raises:
         CalibrationError: uncalibrated, cropped, or a lens model other than plumb_bob; names the
             topic.
     """
     topic = f"{name}/camera_info"
-    if not info.k[0]:
-        raise CalibrationError(f"{topic}: K is zero (uncalibrated), expected a calibrated camera")
-    if info.distortion_model not in ("plumb_bob", "") and any(info.d):
-        raise CalibrationError(
-            f"{topic}: distortion model {info.distortion_model!r} is not supported, "
-            "expected plumb_bob"
-        )
-    if info.binning_x > 1 or info.binning_y > 1 or info.roi.width or info.roi.height:
-        raise CalibrationError(f"{topic}: binning or a region of interest, expected full images")
-    distortion = list(info.d) or [0.0] * 5
-    matrix = np.array(info.k, dtype=np.float64).reshape(3, 3)
-    return CameraModel(name, (info.width, info.height), matrix, np.array(distortion), T_cam_world)
+    matrix, distortion = lens_of(info, topic)
+    try:
+        return CameraModel(name, (info.width, info.height), matrix, distortion, T_cam_world)
+    except CalibrationError as error:
+        raise CalibrationError(f"{topic}: {error}") from error
 
 
-def check_info(info: CameraInfo, camera: CameraModel) -> None:
-    """Make sure that a CameraInfo is of the size that the calibration gives; size 0 says nothing.
+def check_info(info: CameraInfo, camera: CameraModel) -> str:
+    """Compare a CameraInfo with the calibration file.
+
+    A size of 0 and a K of zeros (uncalibrated) say nothing.
+
+    Returns:
+        How its K and D differ from the calibration file by more than `TOLERANCE`, in one line;
+        empty if they do not.
 
     Raises:
-        CalibrationError: it is of another; names the topic and both sizes.
+        CalibrationError: the images cannot be those that the calibration file describes: another
+            size, another lens model, binning or a region of interest, or K or D is not finite.
     """
+    topic, ignored = f"{camera.name}/camera_info", f"; {camera.name} is left out until it is right"
     width, height = camera.size_px
     if info.width and info.height and (info.width, info.height) != (width, height):
         raise CalibrationError(
-            f"{camera.name}/camera_info: says {info.width}x{info.height} px, the calibration file "
-            f"says {width}x{height} px; {camera.name} is ignored until they agree"
+            f"{topic}: says {info.width}x{info.height} px, the calibration file says "
+            f"{width}x{height} px{ignored}"
         )
+    if not np.any(info.k) and not np.any(info.d):
+        return ""
+    try:
+        matrix, distortion = lens_of(info, topic)
+    except CalibrationError as error:
+        raise CalibrationError(f"{error}{ignored}") from error
+    notes = []
+    if np.abs(matrix - camera.matrix).max() > TOLERANCE * camera.matrix[[0, 1], [0, 1]].min():
+        notes.append(_difference("K", matrix[:2].ravel(), camera.matrix[:2].ravel()))
+    if np.abs(distortion - camera.distortion).max() > TOLERANCE * max(
+        np.abs(camera.distortion).max(), TOLERANCE
+    ):
+        notes.append(_difference("D", distortion, camera.distortion))
+    if not notes:
+        return ""
+    return f"{topic}: {', '.join(notes)}; the calibration file is used"
+
+
+def _difference(name: str, came: FloatArray, expected: FloatArray) -> str:
+    listed = [" ".join(f"{value:.5g}" for value in values) for values in (came, expected)]
+    return f"{name} is [{listed[0]}], the calibration file says [{listed[1]}]"

@@ -1,4 +1,4 @@
-"""Parameters of a node: the names and values a user gave, checked, and what is in effect."""
+"""Parameters of a node: checks of the given names and values, declaration of those in effect."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -14,8 +14,35 @@ ROS_OWN = ("use_sim_time", "start_type_description_service")
 """Parameters that every ROS node has."""
 
 
+class GivenNode(Node):
+    """A node that declares all parameters that are given.
+
+    Args:
+        name: the node's name.
+        node_arguments: passed on to ``rclpy.node.Node`` (context, parameter_overrides, ...).
+
+    Raises:
+        ConfigError: a parameter without a value or type, such as an empty list; names it.
+    """
+
+    def __init__(self, name: str, **node_arguments: Any) -> None:
+        try:
+            super().__init__(
+                name, automatically_declare_parameters_from_overrides=True, **node_arguments
+            )
+        except (ValueError, TypeError) as error:
+            given = getattr(self, "_parameter_overrides", {})
+            empty = [key for key, value in given.items() if value.value is None]
+            if not empty:
+                raise ConfigError(f"parameters: {' '.join(str(error).split())}") from error
+            raise ConfigError(
+                f"{', '.join(empty)}: an empty list, expected at least one value, or the "
+                "parameter left out"
+            ) from error
+
+
 def given_parameters(node: Node) -> dict[str, Any]:
-    """What a user gave to a node that declares its parameters from overrides, by name."""
+    """The given parameters of a node that declares them from overrides, by name."""
     return {
         name: parameter.value
         for name, parameter in node.get_parameters_by_prefix("").items()
@@ -29,7 +56,7 @@ def declare_effective(
     lines: Mapping[str, str],
     settings: Iterable[Setting] = (),
 ) -> None:
-    """Replace what was given by what is in effect, with a description each, fixed from here on.
+    """Declare the parameters in effect, read-only and described, in place of the given ones.
 
     Args:
         node: the node.
@@ -44,16 +71,16 @@ def declare_effective(
         descriptor = ParameterDescriptor(
             description=lines.get(name, ""), read_only=True, dynamic_typing=value is None
         )
-        if name in held:
+        if name in held and value is not None:
             _hold(descriptor, held[name])
         node.declare_parameter(name, value, descriptor, ignore_override=True)
 
 
 def check_names(given: Iterable[str], known: Sequence[str]) -> None:
-    """Make sure that all names given are parameters: rclpy itself ignores the others.
+    """Check that all given names are parameters: rclpy itself ignores others.
 
     Raises:
-        ConfigError: one is not; names the nearest that is.
+        ConfigError: one is not; names the most similar parameter.
     """
     for name in given:
         if name not in known:
@@ -63,15 +90,15 @@ def check_names(given: Iterable[str], known: Sequence[str]) -> None:
 
 
 def present(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The values that say something: neither None nor an empty text."""
+    """The values that are neither None nor an empty text."""
     return {name: value for name, value in given.items() if value is not None and value != ""}
 
 
 def attribute_lines(owner: type) -> dict[str, str]:
-    """What a class' docstring says about each attribute, by name (lines ``name: what it is``)."""
+    """Descriptions of attributes from a class' docstring, by name (lines ``name: text``)."""
     attributes = (owner.__doc__ or "").partition("Attributes:")[2]
     pairs = (line.strip().partition(": ") for line in attributes.splitlines())
-    return {name: said for name, colon, said in pairs if colon and name.isidentifier()}
+    return {name: line for name, colon, line in pairs if colon and name.isidentifier()}
 
 
 def _hold(descriptor: ParameterDescriptor, setting: Setting) -> None:
@@ -90,7 +117,7 @@ def _hold(descriptor: ParameterDescriptor, setting: Setting) -> None:
 
 
 def text(name: str, value: Any) -> str:
-    """The value, if it is a text.
+    """The value, checked to be a text.
 
     Raises:
         ConfigError: it is not; names the parameter.
@@ -101,7 +128,7 @@ def text(name: str, value: Any) -> str:
 
 
 def flag(name: str, value: Any) -> bool:
-    """The value, if it is true or false.
+    """The value, checked to be true or false.
 
     Raises:
         ConfigError: it is not; names the parameter.
@@ -112,7 +139,7 @@ def flag(name: str, value: Any) -> bool:
 
 
 def names(name: str, value: Any) -> tuple[str, ...]:
-    """The value, if it is a list of distinct names; a single name is a list of one.
+    """The value, checked to be a list of distinct names; a single name is a list of one.
 
     Raises:
         ConfigError: it is not; names the parameter.
@@ -130,7 +157,7 @@ def names(name: str, value: Any) -> tuple[str, ...]:
 
 
 def count(name: str, value: Any, least: int, most: int) -> int:
-    """The value, if it is a whole number in that range.
+    """The value, checked to be a whole number in a range.
 
     Raises:
         ConfigError: it is not; names the parameter.
@@ -141,7 +168,7 @@ def count(name: str, value: Any, least: int, most: int) -> int:
 
 
 def number(name: str, value: Any, least: float, most: float) -> float:
-    """The value, if it is a number in that range.
+    """The value, checked to be a number in a range.
 
     Raises:
         ConfigError: it is not; names the parameter.

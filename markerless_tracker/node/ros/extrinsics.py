@@ -1,46 +1,40 @@
-"""Where the cameras stand, from the transforms of a ROS graph (/tf and /tf_static)."""
+"""Extrinsics of the cameras from the transforms of a ROS graph (/tf and /tf_static)."""
 
 from collections.abc import Iterable
 from typing import Any
 
-from markerless_tracker.geometry import (
-    FloatArray,
-    inverse,
-    rotation_from_quaternion,
-    transform,
-)
+from markerless_tracker.camera.ros_fields import FrameTree
+from markerless_tracker.errors import CalibrationError
+from markerless_tracker.geometry import FloatArray, inverse
 from markerless_tracker.node.ros.messages import WORLD_FRAME, optical_frame
 
 
 class TransformTree:
-    """The newest transform from each frame to its parent."""
+    """The newest transform from each frame to its parent, from TF messages."""
 
     def __init__(self) -> None:
-        self._parents: dict[str, tuple[str, FloatArray]] = {}
+        self._frames = FrameTree()
 
     def update(self, transforms: Iterable[Any]) -> None:
-        """Take geometry_msgs/TransformStamped messages in."""
+        """Take geometry_msgs/TransformStamped messages.
+
+        Raises:
+            CalibrationError: one of them is no transform (an all-zero quaternion, NaN); those
+                before it are taken.
+        """
         for stamped in transforms:
             q, t = stamped.transform.rotation, stamped.transform.translation
-            T_parent_child = transform(
-                rotation_from_quaternion((q.w, q.x, q.y, q.z)), (t.x, t.y, t.z)
-            )
-            parent, child = stamped.header.frame_id, stamped.child_frame_id
-            self._parents[child.lstrip("/")] = (parent.lstrip("/"), T_parent_child)
+            parent, child = stamped.header.frame_id.lstrip("/"), stamped.child_frame_id.lstrip("/")
+            self._frames.put(parent, child, (q.w, q.x, q.y, q.z), (t.x, t.y, t.z))
 
     def T_cam_world(self, camera: str) -> FloatArray | None:
         """(4, 4), takes world points to the optical frame of a camera; None while unknown.
 
-        The world is the frame ``map``; it must be an ancestor of the optical frame.
+        The world is the frame ``map``; it must be an ancestor of the optical frame. Frames in a
+        cycle have none.
         """
-        frame = optical_frame(camera)
-        T_frame_cam = transform(((1, 0, 0), (0, 1, 0), (0, 0, 1)), (0, 0, 0))
-        # A tree has no cycle; a graph that claims one must not hang us.
-        for _ in range(len(self._parents) + 1):
-            if frame == WORLD_FRAME:
-                return inverse(T_frame_cam)
-            if frame not in self._parents:
-                return None
-            frame, T_parent_frame = self._parents[frame]
-            T_frame_cam = T_parent_frame @ T_frame_cam
-        return None
+        try:
+            root, T_map_cam = self._frames.up(optical_frame(camera), WORLD_FRAME)
+        except CalibrationError:
+            return None
+        return inverse(T_map_cam) if root == WORLD_FRAME else None

@@ -11,6 +11,9 @@ from markerless_tracker.errors import ImageError
 
 Array = NDArray[np.uint8]
 
+# Characters of a received text that error messages show.
+_SHOWN = 80
+
 
 class ImageLike(Protocol):
     """The fields of sensor_msgs/Image that are read here."""
@@ -23,18 +26,18 @@ class ImageLike(Protocol):
 
 
 def check_layout(message: ImageLike, topic: str) -> None:
-    """Make sure that a sensor_msgs/Image can be decoded; looks at no pixel.
+    """Make sure that a sensor_msgs/Image can be decoded, without reading its pixels.
 
     Args:
         message: the message.
-        topic: where it came from, for error messages.
+        topic: its topic, for error messages.
 
     Raises:
-        ImageError: unknown encoding, or width, height, step and data that do not fit each other.
+        ImageError: unknown encoding, or inconsistent width, height, step and data.
     """
     if message.encoding not in ENCODINGS:
         raise ImageError(
-            f"{topic}: image encoding {message.encoding!r} is not known, expected one of "
+            f"{topic}: image encoding {message.encoding[:_SHOWN]!r} is not known, expected one of "
             f"{', '.join(ENCODINGS)}"
         )
     channels = ENCODINGS[message.encoding][0]
@@ -44,6 +47,11 @@ def check_layout(message: ImageLike, topic: str) -> None:
             f"{topic}: {size} bytes in rows of {step} are no image of {width}x{height} px "
             f"{message.encoding}, expected {height} rows of at least {width * channels} bytes"
         )
+
+
+def channels_of(message: ImageLike) -> int:
+    """Channels of the decoded image of a checked message: 1 (grey) or 3 (BGR)."""
+    return 1 if ENCODINGS[message.encoding][0] == 1 else 3
 
 
 def decode_image(message: ImageLike, topic: str) -> Array:
@@ -70,12 +78,12 @@ def fill_image(message: Any, image: Array, topic: str) -> Any:
     """Fill height, width, encoding, step and data of a sensor_msgs/Image; returns the message.
 
     Args:
-        message: a sensor_msgs/Image; its header is left alone.
+        message: a sensor_msgs/Image; its header is not changed.
         image: uint8, (h, w) becomes mono8, (h, w, 3) bgr8.
-        topic: where it goes, for the error message.
+        topic: its topic, for the error message.
 
     Raises:
-        ImageError: an array that is no such image.
+        ImageError: another type or shape.
     """
     channels = image.shape[2] if image.ndim == 3 else 1
     good = image.dtype == np.uint8 and image.ndim in (2, 3) and channels == 2 * image.ndim - 3
@@ -88,7 +96,7 @@ def fill_image(message: Any, image: Array, topic: str) -> Any:
     message.encoding = "mono8" if image.ndim == 2 else "bgr8"
     message.is_bigendian = 0
     message.step = message.width * channels
-    # Assigning the ndarray itself is checked byte by byte: a hundred times slower.
+    # rclpy checks an assigned ndarray byte by byte, which is a hundred times slower.
     data = array.array("B")
     data.frombytes(np.ascontiguousarray(image).data.cast("B"))
     message.data = data

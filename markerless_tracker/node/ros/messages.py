@@ -1,4 +1,4 @@
-"""Results as ROS messages: pure functions, plain Python numbers in every field."""
+"""Results as ROS messages. Fields hold plain Python numbers."""
 
 from collections.abc import Mapping
 
@@ -12,8 +12,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from markerless_tracker.body import BodyModel, cone_transforms, root_transform
 from markerless_tracker.geometry import quaternion_from_rotation
+from markerless_tracker.node.health import Health, Level
 from markerless_tracker.node.ros.stamps import time_message
-from markerless_tracker.records import Confidence, TrackState
+from markerless_tracker.records import Confidence
 
 WORLD_FRAME = "map"
 """Frame of everything in world coordinates (REP-105)."""
@@ -23,6 +24,11 @@ FloatArray = NDArray[np.float64]
 _BODY_COLOUR = ColorRGBA(r=0.35, g=0.6, b=0.9, a=0.7)
 _JOINT_COLOUR = ColorRGBA(r=1.0, g=0.45, b=0.1, a=1.0)
 _JOINT_DIAMETER_M = 0.05
+_LEVELS = {
+    Level.OK: DiagnosticStatus.OK,
+    Level.WARN: DiagnosticStatus.WARN,
+    Level.STALE: DiagnosticStatus.STALE,
+}
 
 
 def optical_frame(camera: str) -> str:
@@ -31,7 +37,7 @@ def optical_frame(camera: str) -> str:
 
 
 def header(stamp_ns: int, frame: str = WORLD_FRAME) -> Header:
-    """A header with the images' time."""
+    """A header with the stamp of the images."""
     return Header(stamp=time_message(stamp_ns), frame_id=frame)
 
 
@@ -56,7 +62,7 @@ def root_pose(
 
 
 def joint_deviations(body: BodyModel, confidence: Confidence, stamp_ns: int) -> JointState:
-    """Standard deviation of every joint, rad, where a joint state has the position."""
+    """Standard deviation of every joint, rad, in the field `position`."""
     return JointState(
         header=header(stamp_ns, ""),
         name=list(body.joint_names),
@@ -65,7 +71,7 @@ def joint_deviations(body: BodyModel, confidence: Confidence, stamp_ns: int) -> 
 
 
 def marker_poses(markers_m: FloatArray, stamp_ns: int) -> PoseArray:
-    """The 15 markers in order, world frame, with no rotation of their own."""
+    """The 15 markers in order, world frame, identity orientation."""
     return PoseArray(
         header=header(stamp_ns), poses=[Pose(position=_point(row)) for row in markers_m]
     )
@@ -96,27 +102,25 @@ def body_markers(
 
 
 def no_markers(stamp_ns: int) -> MarkerArray:
-    """Takes the body out of viewers."""
+    """Deletes the body from viewers."""
     return MarkerArray(markers=[Marker(header=header(stamp_ns), action=Marker.DELETEALL)])
 
 
 def state_message(
-    name: str, values: Mapping[str, str], state: TrackState, stamp_ns: int, *, ready: bool
+    name: str, values: Mapping[str, str], health: Health, stamp_ns: int
 ) -> DiagnosticArray:
-    """A tracker's state: OK while it tracks, WARN otherwise.
+    """A tracker's state.
 
     Args:
-        name: the node's name.
+        name: the node's name with its namespace.
         values: what `TrackerStatus.values` gives.
-        state: state after the last frame.
-        stamp_ns: time of the images of which it speaks, 0 before the first.
-        ready: whether the tracker is ready.
+        health: level and message.
+        stamp_ns: time of the images of the last result, 0 before the first.
     """
-    fine = ready and state is TrackState.TRACKING
     status = DiagnosticStatus(
-        level=DiagnosticStatus.OK if fine else DiagnosticStatus.WARN,
-        name=f"{name}: tracking",
-        message=f"{state.value}: {values['activity']}" if not fine else state.value,
+        level=_LEVELS[health.level],
+        name=f"{name.lstrip('/')}: tracking",
+        message=health.message,
         hardware_id="markerless_tracker",
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )

@@ -25,7 +25,7 @@ _NEEDED = (
 
 
 class RosMissingError(TrackerError):
-    """A ROS node was asked for where ROS 2 cannot be imported."""
+    """ROS 2 cannot be imported."""
 
 
 def require_ros() -> None:
@@ -43,13 +43,13 @@ def require_ros() -> None:
 
 
 class StopSignals:
-    """Notes SIGINT and SIGTERM instead of letting them break into whatever runs; a context manager.
+    """Records SIGINT and SIGTERM instead of interrupting running code; a context manager.
 
-    An exception in the midst of writing a result would cut it, and one in the midst of an import
-    can make Python report a failure at its end although it was caught.
+    An exception during the writing of a result would cut it; one during an import can make Python
+    exit with an error although it was caught.
 
     Attributes:
-        asked: whether one has come.
+        asked: whether a signal was received.
     """
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class StopSignals:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """The process is about to end: what comes now changes nothing."""
+        """Ignore further signals while the process ends."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)
 
@@ -76,8 +76,8 @@ def run_executable(
 
     Args:
         name: the executable's, for its messages.
-        body: called with the arguments after ROS is known to be there, and with what tells it that
-            it is time to end; returns the exit code.
+        body: called with the arguments and the stop signals once ROS is known to be installed;
+            returns the exit code.
         argv: arguments without the program's name; those of this process if None.
     """
     with StopSignals() as stop:
@@ -91,7 +91,7 @@ def run_executable(
 
 
 def print_help(name: str, summary: str, example: str, lines: Mapping[str, str]) -> None:
-    """Print what an executable does, an example, and its parameters with a line about each."""
+    """Print a summary of an executable, an example, and a line about each parameter."""
     width = max(map(len, lines)) + 2
     listed = "\n".join(f"  {key:{width}}{line}" for key, line in lines.items())
     print(
@@ -131,6 +131,6 @@ def init_context(arguments: Sequence[str]) -> Any:
         )
     except ConfigError:
         raise
-    except Exception as error:  # rclpy has no common root for what it finds wrong in arguments
+    except Exception as error:  # rclpy has no common base class for errors in arguments
         raise ConfigError(f"ROS arguments: {' '.join(str(error).split())}") from error
     return context

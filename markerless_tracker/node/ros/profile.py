@@ -1,4 +1,4 @@
-"""The middleware's settings without which camera images are lost between processes."""
+"""Middleware settings that prevent the loss of camera images between processes."""
 
 import os
 from collections.abc import MutableMapping
@@ -7,10 +7,10 @@ from pathlib import Path
 from markerless_tracker.resources import config_dir
 
 VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
-"""Where rmw_fastrtps of Jazzy looks for a profile."""
+"""Environment variable that names the profile for rmw_fastrtps in Jazzy."""
 
 USERS_OWN = (VARIABLE, "FASTDDS_DEFAULT_PROFILES_FILE")
-"""Variables by which users name a profile of their own."""
+"""Environment variables by which users name their own profile."""
 
 
 def profile_file() -> Path:
@@ -19,10 +19,10 @@ def profile_file() -> Path:
 
 
 def apply_profile(environment: MutableMapping[str, str] | None = None) -> bool:
-    """Let Fast DDS use the shipped profile, unless the user chose an own one.
+    """Make Fast DDS use the shipped profile unless the user chose another.
 
     Must run before ``rclpy.init``. Fast DDS' own default file in the working directory
-    (``DEFAULT_FASTRTPS_PROFILES.xml``) counts as a choice too.
+    (``DEFAULT_FASTRTPS_PROFILES.xml``) counts as a choice.
 
     Args:
         environment: environment to change; this process's own if None.

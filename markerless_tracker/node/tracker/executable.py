@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from markerless_tracker.errors import ConfigError
+from markerless_tracker.errors import ConfigError, TrackerError
 from markerless_tracker.node.ros.process import (
     StopSignals,
     init_context,
@@ -18,8 +18,8 @@ _EXAMPLE = (
     "tracker --ros-args -p calibration_file:=bag/calibration.toml "
     "-p background_dir:=bag/background -p stature:=1.75"
 )
-_CLOSE_S = 5.0
-# A signal is noticed at the latest after this.
+_CLOSE_S = 3.0
+# Longest time until a signal is noticed.
 _NOTICE_S = 0.1
 
 
@@ -61,18 +61,22 @@ def _serve(context: Any, stop: StopSignals) -> int:
     executor.add_node(node)
     while node.fatal is None and not stop.asked:
         executor.spin_once(timeout_sec=_NOTICE_S)
-    ended = node.close(_CLOSE_S)
-    code = 0
-    if node.fatal is not None:
-        print(f"tracker: {node.fatal}", file=sys.stderr, flush=True)
-        code = 1
-    if not ended:
-        # The compiler cannot be interrupted, and Python would wait for it.
-        sys.stdout.flush()
-        os._exit(code)
+    trouble, ended = node.fatal, False
+    try:
+        ended = node.close(_CLOSE_S)
+    except TrackerError as unfinished:
+        trouble = trouble or str(unfinished)
+    if trouble is not None:
+        print(f"tracker: {trouble}", file=sys.stderr, flush=True)
+    # Destroying the node removes the shared memory of the middleware.
     executor.shutdown(timeout_sec=0)
     node.destroy_node()
-    return code
+    if not ended:
+        # The compiler cannot be interrupted, and Python would wait for it.
+        context.try_shutdown()
+        sys.stdout.flush()
+        os._exit(0 if trouble is None else 1)
+    return 0 if trouble is None else 1
 
 
 if __name__ == "__main__":

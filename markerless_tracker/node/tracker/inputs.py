@@ -1,32 +1,35 @@
-"""One camera's topics: what comes is checked and stored, nothing else."""
+"""Topics of one camera: messages are checked and stored, images are not decoded."""
 
 from collections.abc import Callable
 from typing import Any
 
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ImageError, TrackerError
+from markerless_tracker.node.health import QUIET_S
 from markerless_tracker.node.ros.camera_info import check_info
-from markerless_tracker.node.ros.images import check_layout
+from markerless_tracker.node.ros.images import channels_of, check_layout
 from markerless_tracker.node.ros.stamps import stamp_of
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 
-PATIENCE_S = 2.0
-"""How long a topic may stay silent while others speak before that is reported."""
-
 _GAP_MAX = 1000
+_KINDS = {1: "grey", 3: "colour"}
 
 
 class CameraInput:
-    """Receives one camera's images and calibration messages.
+    """Receives one camera's images and camera infos.
+
+    An unusable image is dropped. A camera without usable images is left out of the sets (see
+    `Synchronizer`).
 
     Args:
         name: the camera's name.
         camera: its calibration for full-size images, None while unknown.
         sets: gets the images (as messages) that can be used.
-        status: told of those that cannot.
-        report: called with each new trouble, one line.
-        clock: seconds that only go forward.
+        status: gets the counts and errors.
+        report: called with one line when a problem begins and when it ends.
+        clock: monotonic time in s.
+        channels: number of channels of the camera's background, None if there is none to match.
     """
 
     def __init__(
@@ -38,6 +41,7 @@ class CameraInput:
         *,
         report: Callable[[str], None],
         clock: Callable[[], float],
+        channels: Callable[[str], int | None] = lambda _: None,
     ) -> None:
         self.name = name
         self.camera = camera
@@ -48,99 +52,117 @@ class CameraInput:
         self._status = status
         self._report = report
         self._clock = clock
+        self._channels = channels
         self._first_image_s: float | None = None
-        self._disagrees = False
-        self._trouble = ""
+        self._info_refusal = ""
+        self._info_note = ""
+        self._refusal = ""
+        self._refused_s = 0.0
         self._sequence: int | None = None
         self._info_reported = False
-        self._silence_reported = False
+        self._silent_since_s: float | None = None
+
+    @property
+    def refusal(self) -> str:
+        """Reason why the last image could not be used; empty if it could, or if it is old."""
+        return self._refusal if self._clock() - self._refused_s < QUIET_S else ""
 
     def on_image(self, message: Any, sequence: int | None = None) -> None:
-        """Take a sensor_msgs/Image; one that cannot be used is counted and reported.
+        """Store a sensor_msgs/Image; an unusable one is counted and reported.
 
         Args:
             message: the image.
-            sequence: its number at the publisher; gaps are images that the middleware lost.
+            sequence: its sequence number at the publisher; gaps are images lost by the middleware.
         """
         now_s = self._clock()
         self._count_lost(sequence)
         if self._first_image_s is None:
             self._first_image_s = now_s
         try:
-            check_layout(message, self.image_topic)
-            self._check_size(message)
+            self._check(message)
         except ImageError as error:
-            self._refuse(str(error))
-            return
-        if self._disagrees:
             self._status.refused(self.name)
+            self._refused_s, self._refusal = now_s, str(error)
+            self._say(self._refusal)
             return
-        self._trouble = ""
-        self._silence_reported = False
+        self._refusal = ""
+        if self._silent_since_s is not None:
+            self._report(
+                f"{self.image_topic}: usable images again after "
+                f"{now_s - self._silent_since_s:.1f} s"
+            )
+            self._silent_since_s = None
         self._sets.add(self.name, stamp_of(message), message, now_s=now_s)
 
     def on_info(self, message: Any) -> None:
-        """Take a sensor_msgs/CameraInfo; one that contradicts the calibration is reported."""
+        """Compare a sensor_msgs/CameraInfo with the calibration; differences are reported."""
         self.info = message
         if self.camera is None:
             return
         try:
-            check_info(message, self.camera)
-            self._disagrees = False
+            note, refusal = check_info(message, self.camera), ""
         except TrackerError as error:
-            if not self._disagrees:
-                self._disagrees = True
-                self._say(str(error))
+            note, refusal = "", str(error)
+        if refusal and refusal != self._info_refusal:
+            self._say(refusal)
+        if note and note != self._info_note:
+            self._report(note)
+        if self._info_refusal and not refusal:
+            self._report(f"{self.info_topic}: agrees with the calibration file again")
+        self._info_refusal, self._info_note = refusal, note
 
-    def missing(self, silent: bool, others_speak: bool, now_s: float) -> list[str]:
-        """Topics that are waited for; reports each once when it is due.
+    def missing(self, silent: bool, left_out: bool, others_send: bool, now_s: float) -> list[str]:
+        """Topics without messages; each is reported once.
 
         Args:
-            silent: whether no usable image has come lately.
-            others_speak: whether other cameras' images come.
+            silent: whether no usable image was received for `QUIET_S`.
+            left_out: whether sets are complete without this camera.
+            others_send: whether other cameras' images are received.
             now_s: the time.
         """
         topics = []
         if silent:
             topics.append(self.image_topic)
-            if others_speak and not self._silence_reported:
-                self._silence_reported = True
+            if others_send and left_out and self._silent_since_s is None:
+                self._silent_since_s = now_s - QUIET_S
                 self._say(
-                    f"{self.image_topic}: no usable image for {PATIENCE_S:g} s while other cameras "
-                    "send; no set is complete without it"
+                    f"{self.image_topic}: no usable image for {QUIET_S:g} s while other cameras "
+                    f"send; {self.name} is left out until one comes"
                 )
         if self.info is None:
             topics.append(self.info_topic)
-            due = self._first_image_s is not None and now_s - self._first_image_s > PATIENCE_S
+            due = self._first_image_s is not None and now_s - self._first_image_s > QUIET_S
             if due and not self._info_reported:
                 self._info_reported = True
                 source = "waiting for it" if self.camera is None else "using the calibration file"
                 self._say(f"{self.info_topic}: no camera info comes with the images; {source}")
         return topics
 
+    def _check(self, message: Any) -> None:
+        check_layout(message, self.image_topic)
+        if self._info_refusal:
+            raise ImageError(self._info_refusal)
+        if self.camera is not None:
+            width, height = self.camera.size_px
+            if (message.width, message.height) != (width, height):
+                raise ImageError(
+                    f"{self.image_topic}: an image of {message.width}x{message.height} px came, "
+                    f"the calibration of {self.name} expects {width}x{height} px"
+                )
+        expected, came = self._channels(self.name), channels_of(message)
+        if expected is not None and came != expected:
+            raise ImageError(
+                f"{self.image_topic}: a {_KINDS[came]} image ({message.encoding}) came, the "
+                f"background of {self.name} is {_KINDS[expected]}"
+            )
+
     def _count_lost(self, sequence: int | None) -> None:
         before, self._sequence = self._sequence, sequence
         if sequence is not None and before is not None:
             gap = sequence - before - 1
-            # Another publisher counts from elsewhere.
+            # A restarted publisher begins another count.
             if 0 < gap < _GAP_MAX:
                 self._status.lost(self.name, gap)
-
-    def _check_size(self, message: Any) -> None:
-        if self.camera is None:
-            return
-        width, height = self.camera.size_px
-        if (message.width, message.height) != (width, height):
-            raise ImageError(
-                f"{self.image_topic}: an image of {message.width}x{message.height} px came, the "
-                f"calibration of {self.name} expects {width}x{height} px"
-            )
-
-    def _refuse(self, message: str) -> None:
-        self._status.refused(self.name)
-        if message != self._trouble:
-            self._trouble = message
-            self._say(message)
 
     def _say(self, message: str) -> None:
         self._status.failed(message)

@@ -1,9 +1,9 @@
-"""A request to learn the backgrounds anew, from its first set of images to its answer."""
+"""A request to learn the backgrounds, from its first set of images to its answer."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from threading import Event
+from threading import Event, Lock
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,22 +15,21 @@ from markerless_tracker.imaging.background import MODEL_SUFFIX, MOVING_SHARE, Li
 from markerless_tracker.records import TrackState
 
 PATIENCE_S = 10.0
-"""How long the next set may take to come before the request is given up."""
+"""Longest wait for the next set before the request fails."""
 
 
 class TakesBackgrounds(Protocol):
-    """What gets the backgrounds: a `tracking.Tracker`."""
+    """Receiver of the backgrounds: a `tracking.Tracker`."""
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
-        """Tell the person from these from now on."""
+        """Use these backgrounds from now on."""
 
 
 class Learning:
     """Collects sets of images of the empty scene, and refuses if it is not empty.
 
-    The scene is not empty while the person is tracked, in the first or the last set, or while
-    something moves between the sets. Somebody whom the tracker does not find and who stands quite
-    still is not noticed.
+    The scene is not empty if a person is tracked in the first or the last set, or if something
+    moves between the sets. A motionless person that the tracker does not find goes undetected.
 
     One thread collects; any thread may wait for the answer.
 
@@ -39,7 +38,7 @@ class Learning:
         sets: how many sets to collect.
         settings: as in `learn_background`.
         folder: where `NAME.npz` are written; None writes none.
-        clock: seconds that only go forward.
+        clock: monotonic time in s.
 
     Attributes:
         success, message: the answer, once `answered`.
@@ -69,39 +68,38 @@ class Learning:
 
     @property
     def looks(self) -> bool:
-        """Whether the tracker has to look for somebody in the set just taken."""
+        """Whether the tracker must search the last set for a person."""
         return self._taken in (1, self._sets)
 
     def take(self, images: Mapping[str, NDArray[np.uint8]]) -> None:
-        """Take a set of images in, by camera; refuses if something moved since the first."""
+        """Add a set of images, by camera; refuses if something moved since the first."""
         self._heard_s = self._clock()
         self._taken += 1
         for name, image in images.items():
             share = self._scenes[name].add(image)
             if share > MOVING_SHARE:
                 self.refuse(
-                    f"{name}: something moves in {share:.1%} of the image; the scene must be empty "
-                    "and still"
+                    f"{name}: {share:.1%} of the image changes; the scene must be empty and static"
                 )
                 return
 
     def saw(self, state: TrackState) -> None:
-        """What the tracker said of the set just taken; refuses if that is somebody."""
+        """Take the tracker's state for the last set; refuses if a person is tracked."""
         if state is TrackState.TRACKING:
-            self.refuse("somebody stands there and is tracked; the scene must be empty")
+            self.refuse("a person is tracked; the scene must be empty")
 
     def finish_if_complete(self, tracker: TakesBackgrounds) -> bool:
-        """With the last set: learn, hand over, write, answer. Returns whether it was handed over.
+        """After the last set: learn, use, write and answer; returns whether they are used.
 
         Raises:
-            Exception: whatever the tracker raises; the request is then not answered.
+            Exception: from the tracker; the request is then not answered.
         """
         if self.answered or self._taken < self._sets:
             return False
         few = [name for name, scene in self._scenes.items() if len(scene) < self._sets]
         if few:
             count = len(self._scenes[few[0]])
-            self.refuse(f"{few[0]}: {count} of {self._sets} images came, expected all")
+            self.refuse(f"{few[0]}: {count} of {self._sets} images were received, expected all")
             return False
         models = {name: scene.learn() for name, scene in self._scenes.items()}
         tracker.take_backgrounds(models)
@@ -119,20 +117,20 @@ class Learning:
         return True
 
     def refuse(self, why: str) -> None:
-        """Answer that nothing is learned, and why, in one line; the first reason counts."""
+        """Answer that nothing is learned, with the reason in one line; the first reason counts."""
         if not self.answered:
             self.message = f"nothing learned: {why}"
             self._answered.set()
 
     def refuse_if_overdue(self, activity: str) -> None:
-        """Give up if no set came for long.
+        """Refuse if no set was received for `PATIENCE_S`.
 
         Args:
-            activity: what the tracker is at, for the message.
+            activity: what the tracker is doing, for the message.
         """
         if self._clock() - self._heard_s > PATIENCE_S:
             self.refuse(
-                f"{self._taken} of {self._sets} sets of images came, then none for "
+                f"{self._taken} of {self._sets} sets of images were received, then none for "
                 f"{PATIENCE_S:g} s ({activity})"
             )
 
@@ -140,3 +138,27 @@ class Learning:
         """Fill in a std_srvs/Trigger response."""
         response.success, response.message = self.success, self.message
         return response
+
+
+class OpenRequest:
+    """The request that is being answered, one at a time. Safe to use from several threads."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._learning: Learning | None = None
+
+    @property
+    def current(self) -> Learning | None:
+        """The request, None without one or once it is answered."""
+        with self._lock:
+            if self._learning is not None and self._learning.answered:
+                self._learning = None
+            return self._learning
+
+    def open(self, learning: Learning) -> None:
+        """Take a request; refuses it while there is another."""
+        with self._lock:
+            if self._learning is not None and not self._learning.answered:
+                learning.refuse("the backgrounds are being learned already")
+                return
+            self._learning = learning

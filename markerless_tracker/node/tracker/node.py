@@ -1,4 +1,4 @@
-"""The node `tracker`: four image topics in, one person's pose out."""
+"""The node `tracker`: image topics in, the pose of one person out."""
 
 import time
 from collections.abc import Callable, Generator, Sequence
@@ -8,39 +8,42 @@ from types import coroutine
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.node import Node
-from sensor_msgs.msg import CameraInfo, Image, JointState
-from std_msgs.msg import String
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from sensor_msgs.msg import CameraInfo, Image
 from std_srvs.srv import Trigger
-from visualization_msgs.msg import MarkerArray
 
-from markerless_tracker.body import BodyModel
-from markerless_tracker.body.urdf import urdf
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.imaging import scale_image
+from markerless_tracker.node.health import QUIET_S, Facts, assess
 from markerless_tracker.node.ros import messages
-from markerless_tracker.node.ros.declared import declare_effective, given_parameters
+from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
 from markerless_tracker.node.ros.images import decode_image
-from markerless_tracker.node.ros.qos import image_qos, latched_qos, output_qos
+from markerless_tracker.node.ros.notices import Notices
+from markerless_tracker.node.ros.qos import FollowingSubscription, latched_qos
 from markerless_tracker.node.tracker import parameters
-from markerless_tracker.node.tracker.inputs import PATIENCE_S, CameraInput
+from markerless_tracker.node.tracker.announcer import Announcer
+from markerless_tracker.node.tracker.inputs import CameraInput
 from markerless_tracker.node.tracker.learning import Learning
 from markerless_tracker.node.tracker.outputs import Pictures, ResultFile
+from markerless_tracker.node.tracker.publishers import ResultPublishers
 from markerless_tracker.node.tracker.setup import RigSource, build
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, TrackWorker
-from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking import Tracker
 
 STATE_PERIOD_S = 0.5
-_TURN_S = 0.002
+_POLL_S = 0.002
 
 _NOTED = (
     "tracked",
     "skipped",
     "incomplete",
+    "late",
+    "duplicates",
+    "restarts",
     "dropped_before_ready",
     "dropped_before_start",
     "dropped_while_learning",
@@ -51,60 +54,65 @@ _NOTED = (
 )
 
 
-class TrackerNode(Node):
-    """Subscribes, stores, and publishes what its worker thread finds.
+class TrackerNode(GivenNode):
+    """Receives images, and publishes the results of its worker thread.
 
-    Callbacks only store; `TrackWorker` does the work. Call `close` before `destroy_node`.
+    Callbacks only store; `TrackWorker` does the work, the reading of files included: what is wrong
+    with them is in `fatal`. Call `close` before `destroy_node`.
 
     Args:
         node_arguments: passed on to ``rclpy.node.Node`` (context, parameter_overrides, ...).
 
     Raises:
-        TrackerError: unknown or impossible parameters, or files that cannot be used.
+        TrackerError: unknown or impossible parameters, no calibration, or a result file that
+            cannot be written.
     """
 
     def __init__(self, **node_arguments: Any) -> None:
-        super().__init__(
-            "tracker", automatically_declare_parameters_from_overrides=True, **node_arguments
-        )
+        super().__init__("tracker", **node_arguments)
         self._settings = parameters.read_settings(given_parameters(self))
         declare_effective(
             self,
             parameters.effective_values(self._settings),
             parameters.descriptions(),
-            TrackerConfig.settings(),
+            parameters.held_settings(),
         )
         self._seconds: Callable[[], float] = time.monotonic
+        self._notices = Notices(self._log_warning, self._seconds)
+        self._announcer = Announcer(self._inform, self._notices)
         self._source = RigSource(self._settings)
-        names = self._source.names
-        tolerance_ns = round(self._settings.sync_tolerance * 1e9)
         self._status = TrackerStatus()
-        self._sets: Synchronizer[Image] = Synchronizer(names, tolerance_ns=tolerance_ns)
-        self._inputs = [self._input(name) for name in names]
-        self._fitting: TrackerHandle | None = None
-        self._described: BodyModel | None = None
-        self._no_pose_shown = False
+        self._sets: Synchronizer[Image] = Synchronizer(
+            self._source.names, tolerance_ns=round(self._settings.sync_tolerance * 1e9)
+        )
+        self._tracker: Tracker | None = None
+        self._handle: TrackerHandle | None = None
         self._missing: Sequence[str] = ()
+        self._repeated = (0, 0.0)
         self._state_lock = Lock()
-        self._result_file = ResultFile(self._settings.result_file)
-        self._create_publishers()
-        # With a calibration file all mistakes come to light before anything is started.
-        if self._source.rig is not None:
-            self._build(self._source.rig)
-        self._listen()
+        self._started_s = self._seconds()
+        self._result_file = ResultFile(
+            self._settings.result_file, overwrite=self._settings.overwrite, report=self._warn
+        )
+        self._results = ResultPublishers(self)
+        self._states = self.create_publisher(DiagnosticArray, "state", latched_qos())
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._worker = TrackWorker(
             self._sets,
             self._status,
             prepare=self._prepare,
             publish=self._publish,
             report=self._warn,
+            inform=self._inform,
             clock=self._seconds,
         )
+        self._inputs = [self._input(name) for name in self._source.names]
+        self._listen()
         self._worker.start()
 
     @property
     def fatal(self) -> str | None:
-        """Why the tracker cannot work at all, None while it can."""
+        """Reason why the tracker cannot start; None otherwise."""
         return self._worker.fatal
 
     @property
@@ -112,60 +120,58 @@ class TrackerNode(Node):
         """Counts and times."""
         return self._status
 
-    def close(self, timeout_s: float = 5.0) -> bool:
-        """Stop the worker and complete the result files; returns whether the worker ended."""
+    def close(self, timeout_s: float = 3.0) -> bool:
+        """Stop the worker and complete the result files; returns whether the worker ended.
+
+        Raises:
+            DatasetError: the result files cannot be completed.
+        """
         ended = self._worker.stop(timeout_s)
+        self._notices.flush()
         counts = self._status.values(self._sets.counts, (), ())
-        self._result_file.close({"node": {key: counts[key] for key in _NOTED}})
+        written = self._result_file.close({"node": {key: counts[key] for key in _NOTED}})
+        if written is not None:
+            self._inform(written)
         return ended
 
     # inputs
 
     def _input(self, name: str) -> CameraInput:
-        camera = None if self._source.rig is None else self._source.rig[name]
         return CameraInput(
-            name, camera, self._sets, self._status, report=self._warn, clock=self._seconds
+            name,
+            None if self._source.rig is None else self._source.rig[name],
+            self._sets,
+            self._status,
+            report=self._warn,
+            clock=self._seconds,
+            channels=self._background_channels,
         )
 
     def _listen(self) -> None:
-        self._image_subscriptions: dict[str, Any] = {}
+        self._subscriptions_followed = []
         for source in self._inputs:
-            self._listen_to(source, reliable=True)
-            self.create_subscription(
-                CameraInfo, source.info_topic, source.on_info, image_qos(depth=1)
-            )
-        self._source.listen(self)
+            self._subscriptions_followed += [
+                FollowingSubscription(self, Image, source.image_topic, _numbered(source.on_image)),
+                FollowingSubscription(self, CameraInfo, source.info_topic, source.on_info, depth=1),
+            ]
+        self._source.listen(self, self._warn)
         self.create_service(Trigger, "~/reset", self._on_reset)
-        # Images have to come in while this one is being answered.
+        # Images must be received while the request is answered.
         self.create_service(
             Trigger,
             "~/learn_background",
             self._on_learn,
             callback_group=ReentrantCallbackGroup(),
         )
-        self.create_timer(STATE_PERIOD_S, self._tick)
+        # A steady clock: without /clock simulated time stops, and the state must be published.
+        self.create_timer(STATE_PERIOD_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def _listen_to(self, source: CameraInput, *, reliable: bool) -> None:
-        old = self._image_subscriptions.pop(source.name, None)
-        if old is not None:
-            self.destroy_subscription(old)
-
-        def take(message: Image, info: Any) -> None:
-            source.on_image(message, info["publication_sequence_number"])
-
-        self._image_subscriptions[source.name] = self.create_subscription(
-            Image, source.image_topic, take, image_qos(reliable=reliable)
-        )
-
-    def _hear_best_effort(self, source: CameraInput) -> None:
-        """A reliable subscription hears no best-effort camera; follow what the camera offers."""
-        reliability = image_qos().reliability
-        if self._image_subscriptions[source.name].qos_profile.reliability != reliability:
-            return
-        offers = self.get_publishers_info_by_topic(source.image_topic)
-        if any(offer.qos_profile.reliability != reliability for offer in offers):
-            self.get_logger().info(f"{source.image_topic} is best effort, listening likewise")
-            self._listen_to(source, reliable=False)
+    def _background_channels(self, camera: str) -> int | None:
+        """Channels of a camera's background; None without one, or while one is learned."""
+        if self._tracker is None or self._worker.learning:
+            return None
+        segmenter = self._tracker.segmenter(camera)
+        return None if segmenter is None else segmenter.background.channels
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._worker.reset()
@@ -183,34 +189,35 @@ class TrackerNode(Node):
         )
         self._worker.learn(learning)
         while not learning.answered:
-            # The executor asks a waiting coroutine again after every callback, without a pause.
-            time.sleep(_TURN_S)
-            await _next_turn()
-        self.get_logger().info(f"learn_background: {learning.message}")
+            # The executor polls a waiting coroutine after every callback, without a pause.
+            time.sleep(_POLL_S)
+            await _yield_to_executor()
+        self._inform(f"learn_background: {learning.message}")
         return learning.answer(response)
 
-    # work, in the worker's thread unless there is a calibration file
+    # work, in the worker's thread
 
     def _prepare(self) -> TrackerHandle | None:
-        if self._fitting is None:
+        if self._handle is None:
             rig = self._source.try_rig({source.name: source.info for source in self._inputs})
             if rig is None:
                 self._status.doing("waiting for calibration")
                 return None
             for source in self._inputs:
                 source.camera = rig[source.name]
-            self._build(rig)
-        return self._fitting
+            self._handle = self._build(rig)
+        return self._handle
 
-    def _build(self, rig: CameraRig) -> None:
+    def _build(self, rig: CameraRig) -> TrackerHandle:
+        self._status.doing("reading the backgrounds and the start")
         scaled = rig.scaled(self._settings.scale)
         setup = build(self._settings, rig, scaled)
         sizes_px = {camera.name: camera.size_px for camera in scaled}
-        self._tracker = setup.tracker
-        self._result_file.open(setup.tracker)
         self._pictures = Pictures(self, scaled)
-        self._describe(setup.tracker.body)
-        self._fitting = TrackerHandle(
+        self._results.describe(setup.tracker.body)
+        self._tracker = setup.tracker
+        self._result_file.begin(setup.tracker)
+        return TrackerHandle(
             setup.tracker,
             setup.start_stamp_ns,
             partial(_decode, sizes_px),
@@ -219,82 +226,102 @@ class TrackerNode(Node):
 
     # outputs
 
-    def _create_publishers(self) -> None:
-        latched = latched_qos()
-        self._states = self.create_publisher(DiagnosticArray, "state", latched)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._descriptions = self.create_publisher(String, "robot_description", latched)
-        self._joint_states = self.create_publisher(JointState, "joint_states", output_qos())
-        self._deviations = self.create_publisher(JointState, "joint_deviations", output_qos())
-        self._root_poses = self.create_publisher(
-            PoseWithCovarianceStamped, "root_pose", output_qos()
-        )
-        self._marker_poses = self.create_publisher(PoseArray, "marker_poses", output_qos())
-        self._markers = self.create_publisher(MarkerArray, "markers", output_qos())
-
-    def _publish(self, fitted: TrackedSet) -> None:
-        result, stamp_ns = fitted.result, fitted.result.stamp_ns
-        self._result_file.add(result)
-        if not self.context.ok():  # a signal came while this set was fitted
+    def _publish(self, tracked: TrackedSet) -> None:
+        assert self._tracker is not None
+        self._result_file.add(tracked.result)
+        self._announcer.result(tracked.result)
+        if not self.context.ok():  # a signal was received while this set was tracked
             return
-        # The tracker may have learned more of the person's shape meanwhile.
-        body = self._tracker.body
-        self._describe(body)
-        if result.pose is not None and result.markers_m is not None:
-            pose, points = result.pose, result.markers_m
-            self._joint_states.publish(messages.joint_state(body, pose, stamp_ns))
-            sure = result.confidence
-            self._root_poses.publish(messages.root_pose(body, pose, stamp_ns, sure))
-            if sure is not None:
-                self._deviations.publish(messages.joint_deviations(body, sure, stamp_ns))
-            self._marker_poses.publish(messages.marker_poses(points, stamp_ns))
-            if self._markers.get_subscription_count():
-                self._markers.publish(messages.body_markers(body, pose, points, stamp_ns))
-            self._no_pose_shown = False
-        elif not self._no_pose_shown:
-            self._markers.publish(messages.no_markers(stamp_ns))
-            self._no_pose_shown = True
-        self._pictures.publish(fitted, self._tracker)
+        self._results.publish(tracked.result, self._tracker.body)
+        self._pictures.publish(tracked, self._tracker)
         self._publish_state()
 
-    def _describe(self, body: BodyModel) -> None:
-        if body is not self._described:
-            self._descriptions.publish(String(data=urdf(body)))
-            self._described = body
-
     def _publish_state(self, missing: Sequence[str] | None = None) -> DiagnosticArray:
+        now_s = self._seconds()
         with self._state_lock:
             if missing is not None:
                 self._missing = list(missing)
-            status = self._status
-            values = status.values(self._sets.counts, self._sets.cameras, self._missing)
-            message = messages.state_message(
-                self.get_name(), values, status.state, status.stamp_ns, ready=status.ready
+            health = assess(self._facts(now_s))
+            values = self._status.values(
+                self._sets.counts, self._sets.cameras, self._missing, now_s=now_s
             )
+            message = messages.state_message(
+                self.get_fully_qualified_name(), values, health, self._status.stamp_ns
+            )
+            self._announcer.health(health)
             self._states.publish(message)
             return message
 
+    def _facts(self, now_s: float) -> Facts:
+        def age(then_s: float | None) -> float | None:
+            return None if then_s is None else now_s - then_s
+
+        duplicates = self._sets.counts.duplicates
+        if duplicates != self._repeated[0]:
+            self._repeated = (duplicates, now_s)
+        refusals = {source.name: source.refusal for source in self._inputs if source.refusal}
+        set_age_s = age(self._sets.complete_s)
+        simulated = bool(self.get_parameter("use_sim_time").value)
+        return Facts(
+            ready=self._status.ready,
+            activity=self._status.activity,
+            state=self._status.state,
+            cameras=self._sets.cameras,
+            silent=self._sets.silent(now_s, QUIET_S),
+            left_out=self._sets.left_out(now_s),
+            refusals=refusals,
+            ready_age_s=age(self._status.became_ready_s()),
+            set_age_s=set_age_s,
+            result_age_s=age(self._status.finished_s()),
+            offsets_ns=self._sets.offsets_ns() if set_age_s is None or set_age_s > QUIET_S else {},
+            tolerance_s=self._settings.sync_tolerance,
+            repeating=self._repeated[0] > 0 and now_s - self._repeated[1] < QUIET_S,
+            last_error=self._status.set_error(),
+            clock_missing=simulated
+            and now_s - self._started_s > QUIET_S
+            and self.get_clock().now().nanoseconds == 0,
+        )
+
     def _tick(self) -> None:
         now_s = self._seconds()
-        silent = self._sets.silent(now_s, PATIENCE_S)
-        others_speak = len(silent) < len(self._inputs)
+        silent = self._sets.silent(now_s, QUIET_S)
+        left_out = self._sets.left_out(now_s)
+        others_send = len(silent) < len(self._inputs)
         missing: list[str] = []
         for source in self._inputs:
-            missing += source.missing(source.name in silent, others_speak, now_s)
-            self._hear_best_effort(source)
+            name = source.name
+            missing += source.missing(name in silent, name in left_out, others_send, now_s)
+        for subscription in self._subscriptions_followed:
+            subscription.follow()
         missing += self._source.missing()
         message = self._publish_state(missing)
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
+        self._notices.flush()
 
     def _warn(self, text: str) -> None:
+        self._notices.say(text)
+
+    def _log_warning(self, text: str) -> None:
         self.get_logger().warning(text)
+
+    def _inform(self, text: str) -> None:
+        self.get_logger().info(text)
 
 
 @coroutine
-def _next_turn() -> Generator[None, None, None]:
-    """Let the executor do other things."""
+def _yield_to_executor() -> Generator[None, None, None]:
+    """Return to the executor."""
     yield
+
+
+def _numbered(take: Callable[[Any, int | None], None]) -> Callable[[Any, Any], None]:
+    """A callback with the publisher's sequence number of each message."""
+
+    def callback(message: Any, info: Any) -> None:
+        take(message, info["publication_sequence_number"])
+
+    return callback
 
 
 def _decode(sizes_px: dict[str, tuple[int, int]], name: str, message: Image) -> Any:

@@ -1,86 +1,117 @@
-"""What the tracker node gives besides its messages: result files, pictures for those who look."""
+"""Outputs of the tracker node besides result topics: result files and debug images."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from threading import Lock
 from typing import Any
 
-import numpy as np
 from sensor_msgs.msg import Image
 
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.datasets import tidy_fps
 from markerless_tracker.drawing import draw_overlay
 from markerless_tracker.drawing.steps import draw_steps
+from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image as Picture
 from markerless_tracker.node.ros.images import fill_image
 from markerless_tracker.node.ros.messages import header, optical_frame
 from markerless_tracker.node.ros.qos import output_qos
 from markerless_tracker.node.tracker.worker import TrackedSet
 from markerless_tracker.records import TrackResult
-from markerless_tracker.results.result import ResultWriter
+from markerless_tracker.results.result import ResultWriter, check_target
 from markerless_tracker.tracking import Tracker
-
-_LONE_RESULT_FPS = 60.0
 
 
 class ResultFile:
-    """NAME.trc and NAME.json, written when the node ends; nothing if there is no NAME.
+    """NAME.trc and NAME.json of a live run, written frame by frame; nothing if there is no NAME.
 
-    The rate of a live stream is known at its end only. Safe to use from several threads.
+    Safe to use from several threads.
 
     Args:
         name: path without suffix, None for no files.
+        overwrite: whether an earlier result of that name may be replaced.
+        report: called with a line if a frame cannot be written; tracking goes on.
+
+    Raises:
+        DatasetError: the files cannot be written, or there is an earlier result; names the
+            parameter.
     """
 
-    def __init__(self, name: Path | None) -> None:
+    def __init__(
+        self, name: Path | None, *, overwrite: bool, report: Callable[[str], None]
+    ) -> None:
         self._name = name
+        self._report = report
         self._lock = Lock()
+        self._writer: ResultWriter | None = None
         self._tracker: Tracker | None = None
-        self._results: list[TrackResult] = []
+        self._written_ns: int | None = None
+        self._refused = self._closed = False
+        if name is None:
+            return
+        try:
+            check_target(name, overwrite=overwrite)
+        except DatasetError as error:
+            raise DatasetError(f"result_file: {error}") from error
 
-    def open(self, tracker: Tracker) -> None:
-        """Find out at once whether the files can be written.
-
-        Raises:
-            DatasetError: they cannot.
-        """
-        if self._name is not None:
-            ResultWriter(self._name, tracker.body, tracker.config, fps=_LONE_RESULT_FPS)
-            self._tracker = tracker
+    def begin(self, tracker: Tracker) -> None:
+        """Set the tracker whose results are written."""
+        self._tracker = tracker
 
     def add(self, result: TrackResult) -> None:
-        """Take a result; too late after `close`."""
+        """Write a result and the body as it is now; too late after `close`."""
         with self._lock:
-            if self._tracker is not None:
-                # The evidence would fill the memory.
-                self._results.append(replace(result, observations={}))
+            writer = self._opened()
+            if writer is None or self._tracker is None:
+                return
+            writer.body = self._tracker.body
+            try:
+                writer.add(result)
+            except DatasetError as error:
+                if not self._refused:
+                    self._report(f"result_file: {error}; {self._complete()}; tracking goes on")
+                self._refused = True
+                return
+            if self._refused:
+                self._report(f"result_file: {writer.trc_path}: is written again")
+            self._refused, self._written_ns = False, result.stamp_ns
 
-    def close(self, notes: Mapping[str, Any]) -> None:
-        """Write the files, once, with notes such as counts of skipped sets.
+    def close(self, notes: Mapping[str, Any]) -> str | None:
+        """Complete the files, once, with notes such as counts of skipped sets.
+
+        Returns:
+            What was written, in words; None if there are no files.
 
         Raises:
-            DatasetError: they cannot be written.
+            DatasetError: they cannot be completed; what was written so far stays.
         """
         with self._lock:
-            tracker, self._tracker = self._tracker, None
-            if tracker is None or self._name is None:
-                return
-            steps_ns = np.diff([result.stamp_ns for result in self._results])
-            forward_ns = steps_ns[steps_ns > 0]
-            fps = 1e9 / float(np.median(forward_ns)) if forward_ns.size else _LONE_RESULT_FPS
-            writer = ResultWriter(
-                self._name, tracker.body, tracker.config, fps=tidy_fps(fps), source="live"
-            )
-            for result in self._results:
-                writer.add(result)
+            writer, self._closed = self._opened(), True
+            if writer is None:
+                return None
             writer.note(notes)
-            writer.close()
+            try:
+                writer.close()
+            except DatasetError as error:
+                raise DatasetError(f"result_file: {error}; {self._complete()}") from error
+            return f"{writer.trc_path}: {writer.frames} frames written"
+
+    def _opened(self) -> ResultWriter | None:
+        if self._closed or self._name is None or self._tracker is None:
+            return None
+        if self._writer is None:
+            self._writer = ResultWriter(
+                self._name, self._tracker.body, self._tracker.config, fps=None, source="live"
+            )
+        return self._writer
+
+    def _complete(self) -> str:
+        if self._written_ns is None:
+            return "no frame is written"
+        return f"complete up to stamp {self._written_ns}"
 
 
 class Pictures:
-    """Pictures of each camera, drawn only while subscribed.
+    """Debug images of each camera, drawn only while subscribed.
 
     ``debug/NAME/overlay`` is the body over the image; ``debug/NAME/evidence`` the image, its
     background, foreground (white) and shadow (grey), silhouette, edges and the body, side by side.
@@ -99,7 +130,7 @@ class Pictures:
         }
 
     def publish(self, fitted: TrackedSet, tracker: Tracker) -> None:
-        """Draw and publish those that somebody wants to see."""
+        """Draw and publish the debug images that have subscribers."""
         for (name, kind), publisher in self._publishers.items():
             if not publisher.get_subscription_count() or name not in fitted.images:
                 continue
@@ -116,7 +147,7 @@ class Pictures:
         return draw_overlay(image, self._rig[name], tracker.body, fitted.result.pose)
 
     def _evidence(self, name: str, fitted: TrackedSet, tracker: Tracker) -> Picture | None:
-        """None where nothing was made of the image."""
+        """None for an image without evidence."""
         observation = fitted.result.observations.get(name)
         if observation is None:
             return None

@@ -7,25 +7,27 @@ from typing import Any
 
 from markerless_tracker.datasets.background import MAX_FRAMES
 from markerless_tracker.node.ros import declared
+from markerless_tracker.settings import Setting
 from markerless_tracker.tracking import TrackerConfig
 
 
 @dataclass(frozen=True, kw_only=True)
 class NodeSettings:
-    """What the node itself is told; everything else is the tracker's.
+    """Parameters of the node itself; `config` holds the tracker's.
 
     Attributes:
-        cameras: names of the cameras, all of `calibration_file` if empty.
-        calibration_file: `calibration.toml` of the images as they come; camera_info and TF if None.
+        cameras: names of the cameras, all of `calibration_file` if left out.
+        calibration_file: `calibration.toml` of the images as they come; else camera_info and TF.
         background_dir: the empty scene: an image, clip, folder or learned NAME.npz per camera.
         subject_file: sizes of the person.
-        stature: the person's stature in m, for those who have no subject file.
-        start_file: TRC or pose YAML to begin with; without one, somebody is looked for.
+        stature: the person's stature in m, without a subject file.
+        start_file: TRC or pose YAML of the start pose; left out, the person is found automatically.
         scale: factor by which images are made smaller on arrival.
-        result_file: NAME of NAME.trc and NAME.json; none are written if None.
+        result_file: NAME of NAME.trc and NAME.json; left out, nothing is written.
+        overwrite: replace an earlier result of that NAME, once the first frame is tracked.
         wait_for_background: start without backgrounds and wait for the service learn_background.
         learn_background_sets: sets of images that the service learn_background learns from.
-        sync_tolerance: s by which the stamps of one set may differ; 0 means equal stamps.
+        sync_tolerance: largest difference of the stamps of one set in s; 0 means equal stamps.
         config: the tracker's settings.
     """
 
@@ -37,6 +39,7 @@ class NodeSettings:
     start_file: Path | None = None
     scale: float = 1.0
     result_file: Path | None = None
+    overwrite: bool = False
     wait_for_background: bool = False
     learn_background_sets: int = 20
     sync_tolerance: float = 0.0
@@ -44,12 +47,39 @@ class NodeSettings:
 
 
 _OWN = tuple(entry.name for entry in fields(NodeSettings) if entry.name != "config")
+_FIRST = (
+    "calibration_file",
+    "background_dir",
+    "stature",
+    "sync_tolerance",
+    "start_file",
+    "result_file",
+)
 _FILES = ("calibration_file", "background_dir", "subject_file", "start_file", "result_file")
+
+
+RANGES: Mapping[str, tuple[float, float]] = {
+    "stature": (0.5, 2.5),
+    "scale": (0.01, 1.0),
+    "sync_tolerance": (0.0, 1.0),
+    "learn_background_sets": (2, MAX_FRAMES),
+}
+"""Least and largest value of the node's own parameters."""
 
 
 def parameter_names() -> tuple[str, ...]:
     """Every parameter of the tracker node that is not ROS' own."""
     return (*_OWN, *(setting.name for setting in TrackerConfig.settings()))
+
+
+def held_settings() -> tuple[Setting, ...]:
+    """The parameters that have a range or choices."""
+    lines = declared.attribute_lines(NodeSettings)
+    own = (
+        Setting(name, type(least), least, lines[name], None, least, most)
+        for name, (least, most) in RANGES.items()
+    )
+    return (*own, *TrackerConfig.settings())
 
 
 def read_settings(given: Mapping[str, Any]) -> NodeSettings:
@@ -67,37 +97,33 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
     }
     if "cameras" in values:
         own["cameras"] = declared.names("cameras", values["cameras"])
-    ranges = {"stature": (0.5, 2.5), "scale": (0.01, 1.0), "sync_tolerance": (0.0, 1.0)}
-    for name, (least, most) in ranges.items():
+    for name in ("stature", "scale", "sync_tolerance"):
         if name in values:
-            own[name] = declared.number(name, values[name], least, most)
-    if "wait_for_background" in values:
-        own["wait_for_background"] = declared.flag(
-            "wait_for_background", values["wait_for_background"]
-        )
+            own[name] = declared.number(name, values[name], *RANGES[name])
+    for name in ("overwrite", "wait_for_background"):
+        if name in values:
+            own[name] = declared.flag(name, values[name])
     if "learn_background_sets" in values:
-        own["learn_background_sets"] = declared.count(
-            "learn_background_sets", values["learn_background_sets"], 2, MAX_FRAMES
-        )
+        name = "learn_background_sets"
+        own[name] = declared.count(name, values[name], *map(int, RANGES[name]))
     rest = {name: value for name, value in values.items() if name not in _OWN}
     return NodeSettings(config=TrackerConfig.from_mapping(rest), **own)
 
 
 def effective_values(settings: NodeSettings) -> dict[str, Any]:
-    """What every parameter is now, as ROS can hold it (None where there is no value)."""
+    """Value of every parameter in effect, in a type that ROS supports (None = no value)."""
     own = {name: getattr(settings, name) for name in _OWN}
     chosen = settings.config.by_name()
     return {name: _as_parameter(value) for name, value in {**chosen, **own}.items()}
 
 
 def descriptions() -> dict[str, str]:
-    """One line about every parameter."""
-    lines = {}
+    """One line about every parameter: the most used first, then the node's, then the tracker's."""
+    own = declared.attribute_lines(NodeSettings)
+    lines = {name: own[name] for name in dict.fromkeys((*_FIRST, *_OWN))}
     for setting in TrackerConfig.settings():
         choices = f" ({', '.join(map(str, setting.choices))})" if setting.choices else ""
         lines[setting.name] = f"{setting.doc}{choices}"
-    own = declared.attribute_lines(NodeSettings)
-    lines.update({name: own[name] for name in _OWN})
     return lines
 
 

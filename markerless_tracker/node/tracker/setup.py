@@ -1,35 +1,41 @@
-"""From the node's settings to a rig and a tracker."""
+"""Construction of the rig and the tracker from the node's settings."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
+from markerless_tracker.body import load_body, read_pose, read_subject
+from markerless_tracker.body.sizes import MEAN_STATURE_M
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.calibration import read_calibration
 from markerless_tracker.datasets.background import read_background, read_background_models
-from markerless_tracker.errors import ConfigError
+from markerless_tracker.errors import CalibrationError, ConfigError, TrackerError
 from markerless_tracker.imaging import BackgroundModel, learn_background
 from markerless_tracker.node.tracker.parameters import NodeSettings
 from markerless_tracker.tracking import TrackerSetup, build_tracker
+from markerless_tracker.tracking.setup import first_row
 
 
 class RigSource:
-    """Where the rig comes from: the calibration file, or camera infos and TF.
+    """Source of the rig: the calibration file, or camera infos and TF.
 
     Attributes:
         names: the cameras.
         rig: the rig of full-size images, None while it is not known.
 
     Raises:
-        CalibrationError: the calibration file cannot be used or lacks a camera.
-        ConfigError: there is neither a calibration file nor another way to learn the rig.
+        ConfigError: the calibration file cannot be used or lacks a camera, or there is neither one
+            nor TF; names the parameter.
     """
 
     def __init__(self, settings: NodeSettings) -> None:
         self.rig: CameraRig | None = None
         self._tree: Any = None
         if settings.calibration_file is not None:
-            rig = read_calibration(settings.calibration_file)
-            self.rig = rig.selected(settings.cameras or rig.names)
+            with _named("calibration_file"):
+                rig = read_calibration(settings.calibration_file)
+            with _named("cameras"):
+                self.rig = rig.selected(settings.cameras or rig.names)
             self.names = self.rig.names
             return
         if not settings.cameras:
@@ -49,8 +55,13 @@ class RigSource:
 
         self._tree = TransformTree()
 
-    def listen(self, node: Any) -> None:
-        """Subscribe to TF if that is needed."""
+    def listen(self, node: Any, report: Callable[[str], None]) -> None:
+        """Subscribe to TF if that is needed.
+
+        Args:
+            node: creates the subscriptions.
+            report: called with a line about a transform that cannot be used.
+        """
         if self._tree is None:
             return
         from tf2_msgs.msg import TFMessage
@@ -58,7 +69,10 @@ class RigSource:
         from markerless_tracker.node.ros.qos import image_qos, latched_qos
 
         def take(message: Any) -> None:
-            self._tree.update(message.transforms)
+            try:
+                self._tree.update(message.transforms)
+            except CalibrationError as error:
+                report(f"TF: {error}")
 
         static = latched_qos()
         static.depth = 100
@@ -66,7 +80,7 @@ class RigSource:
         node.create_subscription(TFMessage, "/tf", take, image_qos(depth=100))
 
     def try_rig(self, infos: Mapping[str, Any]) -> CameraRig | None:
-        """The rig if everything for it has come.
+        """The rig, None while a message for it is missing.
 
         Args:
             infos: sensor_msgs/CameraInfo of each camera, None for those that sent none.
@@ -88,7 +102,7 @@ class RigSource:
         return self.rig
 
     def missing(self) -> list[str]:
-        """Transforms that are waited for."""
+        """Transforms that are missing."""
         if self._tree is None or self.rig is not None:
             return []
         from markerless_tracker.node.ros.messages import WORLD_FRAME, optical_frame
@@ -109,16 +123,53 @@ def build(settings: NodeSettings, rig: CameraRig, scaled: CameraRig) -> TrackerS
         scaled: cameras of the images as the tracker gets them.
 
     Raises:
-        TrackerError: a file cannot be read, or does not fit the rig.
+        TrackerError: a file cannot be read, or does not fit the rig; names the parameter.
     """
+    _check_person(settings)
+    with _named("background_dir"):
+        backgrounds = _backgrounds(settings, rig, scaled)
     return build_tracker(
         scaled,
         settings.config,
-        backgrounds=_backgrounds(settings, rig, scaled),
+        backgrounds=backgrounds,
         subject_file=settings.subject_file,
         stature=settings.stature,
         start_file=settings.start_file,
     )
+
+
+def _check_person(settings: NodeSettings) -> None:
+    """Make sure that the files of the start and the person can be used.
+
+    Raises:
+        ConfigError: they cannot; names the parameter.
+    """
+    if settings.subject_file is not None:
+        with _named("subject_file"):
+            read_subject(settings.subject_file)
+    start = settings.start_file
+    if start is None:
+        return
+    with _named("start_file"):
+        if start.suffix.lower() == ".trc":
+            first_row(start)
+            return
+        with _named("no start pose"):
+            read_pose(start, load_body(settings.config.body, MEAN_STATURE_M))
+        if settings.subject_file is None and settings.stature is None:
+            raise ConfigError(
+                f"{start} gives a pose without the person's sizes, expected subject_file or "
+                "stature besides, or a TRC"
+            )
+
+
+@contextmanager
+def _named(what: str) -> Iterator[None]:
+    """Prefix errors with the parameter."""
+    try:
+        yield
+    except TrackerError as error:
+        raise ConfigError(f"{what}: {error}") from error
 
 
 def _backgrounds(
@@ -129,19 +180,20 @@ def _backgrounds(
         return {}
     if folder is None:
         raise ConfigError(
-            "background_dir: not given, expected a folder with an image, clip or learned model of "
+            "not given, expected a folder with an image, clip or learned model of "
             f"the empty scene for each of {', '.join(rig.names)}"
         )
     sizes_px = {camera.name: camera.size_px for camera in rig}
-    models = read_background_models(folder, scaled, stored_sizes_px=sizes_px)
-    frames = read_background(folder, scaled, stored_sizes_px=sizes_px)
+    # The folder may hold the backgrounds of cameras that are not used.
+    models = read_background_models(folder, scaled, stored_sizes_px=sizes_px, ignore_others=True)
+    frames = read_background(folder, scaled, stored_sizes_px=sizes_px, ignore_others=True)
     missing = [name for name in rig.names if name not in models and name not in frames]
     if missing and settings.wait_for_background:
-        # What some have would be replaced together with what the others lack.
+        # Learning replaces all backgrounds, those that are there included.
         return {}
     if missing:
         raise ConfigError(
-            f"background_dir: {folder} holds nothing for {', '.join(missing)}, "
+            f"{folder} holds nothing for {', '.join(missing)}, "
             "expected an image, clip or learned model (.npz) named after each camera"
         )
     learned = {

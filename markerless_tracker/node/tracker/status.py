@@ -1,4 +1,4 @@
-"""What a running tracker says about itself; collected by several threads, read by one."""
+"""Counts, times and errors of a running tracker, for its diagnostics."""
 
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
@@ -10,15 +10,18 @@ from markerless_tracker.node.tracker.synchronizer import SyncCounts
 from markerless_tracker.records import LimbState, TrackResult, TrackState
 
 WINDOW = 300
-"""Frames over which latency and rate are taken."""
+"""Number of frames over which latency and rate are computed."""
+RATE_S = 5.0
+"""Time over which the rate of a running stream is computed."""
 
 
 class TrackerStatus:
-    """Counts, times and troubles of a tracker since it began. Safe to use from several threads."""
+    """Counts, times and errors since the start. Safe to use from several threads."""
 
     def __init__(self) -> None:
         self._lock = Lock()
         self._ready = False
+        self._ready_s: float | None = None
         self._activity = "starting"
         self._tracked = 0
         self._dropped: Counter[str] = Counter()
@@ -28,6 +31,7 @@ class TrackerStatus:
         self._finished_s: deque[float] = deque(maxlen=WINDOW)
         self._result: TrackResult | None = None
         self._last_error = ""
+        self._set_error = ""
 
     @property
     def ready(self) -> bool:
@@ -49,46 +53,69 @@ class TrackerStatus:
 
     @property
     def activity(self) -> str:
-        """What goes on, in a few words."""
+        """What the tracker is doing, in a few words."""
         with self._lock:
             return self._activity
 
-    def doing(self, activity: str, *, ready: bool | None = None) -> None:
-        """Say in a few words what goes on, and whether the tracker is ready."""
+    def doing(self, activity: str) -> None:
+        """Set the activity."""
         with self._lock:
             self._activity = activity
-            if ready is not None:
-                self._ready = ready
+
+    def became_ready(self, activity: str, *, now_s: float) -> None:
+        """Images are tracked as they arrive from now on."""
+        with self._lock:
+            self._activity, self._ready, self._ready_s = activity, True, now_s
 
     def tracked(self, result: TrackResult, *, arrived_s: float, finished_s: float) -> None:
-        """Note a result and its times, both of one clock that only goes forward."""
+        """Record a result and its times of one monotonic clock."""
         with self._lock:
             self._tracked += 1
             self._result = result
+            self._set_error = ""
             self._latencies_s.append(finished_s - arrived_s)
             self._finished_s.append(finished_s)
 
     def dropped(self, reason: str, sets: int = 1) -> None:
-        """Note complete sets that were not tracked, e.g. ``before_ready``."""
+        """Count complete sets that were not tracked, by reason such as ``before_ready``."""
         with self._lock:
             self._dropped[reason] += sets
 
     def refused(self, camera: str) -> None:
-        """Note an image that could not be used."""
+        """Count an unusable image."""
         with self._lock:
             self._refused[camera] += 1
 
     def lost(self, camera: str, images: int) -> None:
-        """Note images that were sent and never came."""
+        """Count images that were sent and not received."""
         with self._lock:
             self._lost[camera] += images
 
-    def failed(self, message: str) -> bool:
-        """Note an error; returns whether it differs from the last one."""
+    def failed(self, message: str) -> None:
+        """Record an error."""
         with self._lock:
-            new = message != self._last_error
             self._last_error = message
-            return new
+
+    def set_failed(self, message: str) -> None:
+        """Record a set that could not be tracked."""
+        with self._lock:
+            self._dropped["error"] += 1
+            self._last_error = self._set_error = message
+
+    def set_error(self) -> str:
+        """Reason why the last set could not be tracked; empty if it could."""
+        with self._lock:
+            return self._set_error
+
+    def finished_s(self) -> float | None:
+        """Time of the last result; None before the first."""
+        with self._lock:
+            return self._finished_s[-1] if self._finished_s else None
+
+    def became_ready_s(self) -> float | None:
+        """Time at which the tracker became ready; None before."""
+        with self._lock:
+            return self._ready_s
 
     def restarted(self) -> None:
         """Forget the last result; the counts stay."""
@@ -96,14 +123,20 @@ class TrackerStatus:
             self._result = None
 
     def values(
-        self, counts: SyncCounts, cameras: Sequence[str], missing: Sequence[str]
+        self,
+        counts: SyncCounts,
+        cameras: Sequence[str],
+        missing: Sequence[str],
+        *,
+        now_s: float | None = None,
     ) -> dict[str, str]:
         """Everything as text, by key, in a fixed order.
 
         Args:
-            counts: what became of the sets of images.
+            counts: of the sets of images.
             cameras: names, in order.
-            missing: topics or cameras that are waited for.
+            missing: topics or transforms that are missing.
+            now_s: the time, for `fps` over the last `RATE_S`; None = over the last `WINDOW` frames.
         """
         with self._lock:
             result = self._result
@@ -115,6 +148,8 @@ class TrackerStatus:
                 "tracked": str(self._tracked),
                 "skipped": str(counts.skipped if self._ready else 0),
                 "incomplete": str(counts.incomplete),
+                "late": str(counts.late),
+                "duplicates": str(counts.duplicates),
                 "restarts": str(counts.restarts),
                 "dropped_before_ready": str(
                     self._dropped["before_ready"] if self._ready else counts.complete
@@ -126,7 +161,7 @@ class TrackerStatus:
                 "latency_p95_ms": _number(
                     np.percentile(latencies, 95) if latencies.size else None, 1
                 ),
-                "fps": _number(self._rate(), 2),
+                "fps": _number(self._rate(now_s), 2),
                 "stamp_ns": "" if result is None else str(result.stamp_ns),
                 "fitness": _number(None if result is None else result.fitness, 4),
                 "evaluations": "0" if result is None else str(result.evaluations),
@@ -150,11 +185,15 @@ class TrackerStatus:
             values["last_error"] = self._last_error
             return values
 
-    def _rate(self) -> float | None:
-        if len(self._finished_s) < 2:
+    def _rate(self, now_s: float | None) -> float | None:
+        if not self._finished_s:
             return None
-        span = self._finished_s[-1] - self._finished_s[0]
-        return (len(self._finished_s) - 1) / span if span > 0.0 else None
+        times = [t for t in self._finished_s if now_s is None or now_s - t <= RATE_S]
+        if not times:
+            return 0.0
+        # Of a running stream the time since the last frame counts: the rate falls without frames.
+        span = (times[-1] if now_s is None else now_s) - times[0]
+        return (len(times) - 1) / span if span > 0.0 else None
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -1,8 +1,9 @@
-"""Matching the cameras' images by their stamps; the newest complete set wins."""
+"""Matching the cameras' images by their stamps; the newest complete set is handed out."""
 
 from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import median_low
 from threading import Condition
 from typing import Generic, NamedTuple, TypeVar
 
@@ -10,10 +11,16 @@ from markerless_tracker.errors import ConfigError
 
 View = TypeVar("View")
 
-
 STOPPED_VIEWS = 12
+"""Views that another camera sends before a silent one is left out."""
 STOPPED_S = 0.5
+"""Least silence of a camera that was heard before it is left out."""
+ABSENT_S = 5.0
+"""Time after the first view of all before a camera that was never heard is left out: discovery of
+a publisher may take 3 s."""
 LEAST_CAMERAS = 2
+RESTART_SETS = 3
+"""Consecutive sets, in order, that lie before the newest one: time was set back. Fewer are late."""
 
 
 class _Entry(NamedTuple, Generic[View]):
@@ -29,7 +36,7 @@ class MatchedSet(Generic[View]):
         stamp_ns: the earliest of their stamps.
         views: by camera, in the order of the cameras.
         arrived_s: when the last of them came, in the caller's clock.
-        restarted: its stamp lies before that of a set handed out earlier (a bag began anew).
+        restarted: stamps were set back since the last set handed out (a bag was played again).
     """
 
     stamp_ns: int
@@ -40,41 +47,48 @@ class MatchedSet(Generic[View]):
 
 @dataclass(frozen=True)
 class SyncCounts:
-    """What became of the sets so far.
+    """Counts of sets and views.
 
     Attributes:
-        complete: sets of which every camera's view came.
+        complete: sets of which every camera's view came, in order of time.
         skipped: complete sets that a newer one replaced before they were taken.
-        incomplete: sets given up because a view of them never came.
-        restarts: times that the sets' stamps went backwards.
+        incomplete: sets dropped because a view of them never came.
+        late: complete sets dropped because a newer one was complete before.
+        duplicates: views dropped because their camera had sent that stamp just before.
+        restarts: times that the stamps were set back.
     """
 
     complete: int = 0
     skipped: int = 0
     incomplete: int = 0
+    late: int = 0
+    duplicates: int = 0
     restarts: int = 0
 
 
 class Synchronizer(Generic[View]):
-    """Collects views as they arrive and hands out the newest set that is complete.
+    """Collects views as they arrive and hands out the newest complete set.
 
     Each camera's views are kept in the order they arrived. The middleware keeps each camera's
     order, so once a set is complete, whatever arrived before its members can never be completed
-    and is let go; stamps are compared for being equal, never for being old. A bag that begins
-    anew, or one stamp far in the future, therefore cannot block it. Nothing queues up behind a
-    slow consumer: at most one complete set waits, and at most `depth` views per camera.
+    and is dropped. Views are matched by equal stamps, not by their age: one stamp far in the future
+    cannot block the next sets. At most one complete set waits, and at most `depth` views per
+    camera, however slow the consumer is.
 
-    A camera that stops after it was heard is waited for no longer once another has sent
-    `STOPPED_VIEWS` views since, over `STOPPED_S` at least: sets are then complete without it, as
-    long as `LEAST_CAMERAS` are left. Its next view takes it back.
+    A set that is not newer than the last one is late and dropped. After `RESTART_SETS` of them in a
+    row, in order, time was set back, and sets are handed out from there on.
+
+    A camera that stops sending is not waited for once another has sent `STOPPED_VIEWS` views since,
+    over `STOPPED_S` at least; one that never sent, after `ABSENT_S`. Sets are then complete without
+    it, as long as `LEAST_CAMERAS` are left. Its next view takes it back.
 
     Safe to use from several threads; no callback is ever called.
 
     Args:
         cameras: names, distinct.
-        tolerance_ns: how far the stamps of one set may lie apart; 0 means equal stamps. More than
-            half the time between two images would mix sets.
-        depth: views kept per camera while the others' are on their way.
+        tolerance_ns: largest difference between the stamps of one set; 0 means equal stamps. More
+            than half the time between two images would mix sets.
+        depth: views kept per camera while views of the others are missing.
 
     Raises:
         ConfigError: no cameras, two of one name, or impossible numbers.
@@ -92,16 +106,20 @@ class Synchronizer(Generic[View]):
         self._tolerance_ns = tolerance_ns
         self._depth = depth
         self._pending: dict[str, deque[_Entry[View]]] = {name: deque() for name in cameras}
+        self._last_stamps: dict[str, int] = {}
         self._heard_s: dict[str, float] = {}
+        self._first_s: float | None = None
         self._since: dict[str, Counter[str]] = {name: Counter() for name in cameras}
         self._waiting: MatchedSet[View] | None = None
-        self._last_ns: int | None = None
-        self._counts = {"complete": 0, "skipped": 0, "incomplete": 0, "restarts": 0}
+        self._newest_ns: int | None = None
+        self._late_ns: list[int] = []
+        self._complete_s: float | None = None
+        self._counts: Counter[str] = Counter()
         self._changed = Condition()
 
     @property
     def counts(self) -> SyncCounts:
-        """What became of the sets so far."""
+        """Counts since the start, or since `start_counting`."""
         with self._changed:
             return SyncCounts(**self._counts)
 
@@ -112,29 +130,41 @@ class Synchronizer(Generic[View]):
             waiting = len(self._waiting.views) if self._waiting is not None else 0
             return waiting + sum(len(queue) for queue in self._pending.values())
 
+    @property
+    def complete_s(self) -> float | None:
+        """Time at which the last set became complete, late or not; None before the first."""
+        with self._changed:
+            return self._complete_s
+
     def add(self, camera: str, stamp_ns: int, view: View, *, now_s: float) -> bool:
         """Store one view; never blocks and does no work on it.
 
         Args:
             camera: its name, one of `cameras`.
             stamp_ns: its time of capture.
-            view: whatever is to be handed out again.
-            now_s: the time of its arrival, in any clock that only goes forward.
+            view: the object to hand out.
+            now_s: time of its arrival in s, of a monotonic clock.
 
         Returns:
             Whether it completed a set.
         """
         with self._changed:
+            if self._first_s is None:
+                self._first_s = now_s
+            if self._last_stamps.get(camera) == stamp_ns:
+                self._counts["duplicates"] += 1
+                return False
+            self._last_stamps[camera] = stamp_ns
             self._heard_s[camera] = now_s
             self._since[camera].clear()
             for name in self.cameras:
                 if name != camera:
                     self._since[name][camera] += 1
             self._pending[camera].append(_Entry(stamp_ns, view))
-            positions = self._match(camera, stamp_ns, self._stopped(now_s))
+            positions = self._match(camera, stamp_ns, self._left_out(now_s))
             if positions is None:
                 if len(self._pending[camera]) > self._depth:
-                    self._give_up(camera)
+                    self._drop_oldest(camera)
                 return False
             self._complete(positions, now_s)
             self._changed.notify_all()
@@ -146,17 +176,15 @@ class Synchronizer(Generic[View]):
             if self._waiting is None and timeout_s > 0.0:
                 self._changed.wait(timeout_s)
             taken, self._waiting = self._waiting, None
-            if taken is not None:
-                self._last_ns = taken.stamp_ns
             return taken
 
     def wake(self) -> None:
-        """Let a waiting `take` return at once."""
+        """Make a waiting `take` return."""
         with self._changed:
             self._changed.notify_all()
 
     def silent(self, now_s: float, after_s: float = 1.0) -> tuple[str, ...]:
-        """Cameras of which nothing came for that long, or ever, in the order of the cameras."""
+        """Cameras of which no new view came for that long, or ever, in the order of the cameras."""
         with self._changed:
             return tuple(
                 name
@@ -164,33 +192,57 @@ class Synchronizer(Generic[View]):
                 if name not in self._heard_s or now_s - self._heard_s[name] > after_s
             )
 
-    def start_counting(self) -> SyncCounts:
-        """Forget the waiting set and begin all counts anew; returns what they were.
+    def left_out(self, now_s: float) -> tuple[str, ...]:
+        """Cameras without which sets are complete now, in the order of the cameras."""
+        with self._changed:
+            left_out = self._left_out(now_s)
+            return tuple(name for name in self.cameras if name in left_out)
 
-        Views of sets not yet complete stay: they complete the first set of the new count.
+    def offsets_ns(self) -> dict[str, int]:
+        """Offset of each camera's stamps from the nearest ones of the other cameras.
+
+        The median over the views that wait for their set, relative to the camera in best agreement
+        with the others; cameras without such views are absent.
+        """
+        with self._changed:
+            stamps = {name: [e.stamp_ns for e in queue] for name, queue in self._pending.items()}
+        stamps = {name: queue for name, queue in stamps.items() if queue}
+        candidates = [
+            {name: _median_offset(queue, reference) for name, queue in stamps.items()}
+            for reference in stamps.values()
+        ]
+        return min(candidates, key=lambda offsets: sum(map(abs, offsets.values())), default={})
+
+    def start_counting(self) -> SyncCounts:
+        """Discard the waiting set and reset all counts; returns the counts before.
+
+        Views of incomplete sets are kept.
         """
         with self._changed:
             counts = SyncCounts(**self._counts)
-            self._counts = dict.fromkeys(self._counts, 0)
+            self._counts.clear()
             self._waiting = None
             return counts
 
-    def _stopped(self, now_s: float) -> frozenset[str]:
-        """Cameras that are waited for no longer."""
-        stopped = frozenset(
+    def _left_out(self, now_s: float) -> frozenset[str]:
+        left_out = frozenset(
             name
             for name, since in self._since.items()
-            if name in self._heard_s
-            and now_s - self._heard_s[name] >= STOPPED_S
-            and max(since.values(), default=0) >= STOPPED_VIEWS
+            if max(since.values(), default=0) >= STOPPED_VIEWS and self._gone(name, now_s)
         )
-        return stopped if len(self.cameras) - len(stopped) >= LEAST_CAMERAS else frozenset()
+        return left_out if len(self.cameras) - len(left_out) >= LEAST_CAMERAS else frozenset()
 
-    def _match(self, camera: str, stamp_ns: int, stopped: frozenset[str]) -> dict[str, int] | None:
+    def _gone(self, camera: str, now_s: float) -> bool:
+        heard_s = self._heard_s.get(camera)
+        if heard_s is not None:
+            return now_s - heard_s >= STOPPED_S
+        return self._first_s is not None and now_s - self._first_s >= ABSENT_S
+
+    def _match(self, camera: str, stamp_ns: int, left_out: frozenset[str]) -> dict[str, int] | None:
         """Positions of a set's members in the cameras' queues, if that view completes one."""
         positions: dict[str, int] = {}
         for name, queue in self._pending.items():
-            if name in stopped:
+            if name in left_out:
                 continue
             if name == camera:
                 positions[name] = len(queue) - 1
@@ -208,23 +260,39 @@ class Synchronizer(Generic[View]):
             if name not in positions:
                 continue
             for _ in range(positions[name]):
-                self._give_up(name)
+                self._drop_oldest(name)
             members[name] = self._pending[name].popleft()
+        self._complete_s = now_s
         stamp_ns = min(entry.stamp_ns for entry in members.values())
-        newest_ns = self._last_ns
-        restarted = False
+        if not self._accepts(stamp_ns):
+            self._counts["late"] += 1
+            return
+        restarted = self._newest_ns is not None and stamp_ns <= self._newest_ns
+        if restarted:
+            self._counts["restarts"] += 1
         if self._waiting is not None:
             self._counts["skipped"] += 1
-            newest_ns, restarted = self._waiting.stamp_ns, self._waiting.restarted
-        if newest_ns is not None and stamp_ns < newest_ns:
-            self._counts["restarts"] += 1
-            restarted = True
+            restarted = restarted or self._waiting.restarted
         self._counts["complete"] += 1
+        self._newest_ns = stamp_ns
         views = {name: entry.view for name, entry in members.items()}
         self._waiting = MatchedSet(stamp_ns, views, now_s, restarted)
 
-    def _give_up(self, camera: str) -> None:
-        """Drop a camera's oldest view; the last view of a set to go counts it as incomplete."""
+    def _accepts(self, stamp_ns: int) -> bool:
+        """Whether a set is the next in time, by itself or after time was set back."""
+        if self._newest_ns is None or stamp_ns > self._newest_ns:
+            self._late_ns.clear()
+            return True
+        if self._late_ns and stamp_ns <= self._late_ns[-1]:
+            self._late_ns.clear()
+        self._late_ns.append(stamp_ns)
+        if len(self._late_ns) < RESTART_SETS:
+            return False
+        self._late_ns.clear()
+        return True
+
+    def _drop_oldest(self, camera: str) -> None:
+        """Drop a camera's oldest view; the set is incomplete once its last view is dropped."""
         stamp_ns = self._pending[camera].popleft().stamp_ns
         others = (queue for name, queue in self._pending.items() if name != camera)
         if not any(_nearest(queue, stamp_ns, self._tolerance_ns) is not None for queue in others):
@@ -240,3 +308,10 @@ def _nearest(queue: Iterable[_Entry[View]], stamp_ns: int, tolerance_ns: int) ->
         if gap <= best_gap:
             best, best_gap = position, gap
     return best
+
+
+def _median_offset(stamps_ns: Sequence[int], reference_ns: Sequence[int]) -> int:
+    """Median over stamps of the signed distance to the nearest reference stamp."""
+    return median_low(
+        min((stamp - other for other in reference_ns), key=abs) for stamp in stamps_ns
+    )

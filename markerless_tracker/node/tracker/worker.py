@@ -1,4 +1,4 @@
-"""The one thread that fits: takes the newest complete set, steps, hands on the result."""
+"""The tracking thread: takes the newest complete set, tracks it, publishes the result."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -9,9 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.errors import TrackerError
+from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.imaging import BackgroundModel
-from markerless_tracker.node.tracker.learning import Learning
+from markerless_tracker.node.tracker.learning import Learning, OpenRequest
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
 from markerless_tracker.records import TrackResult
@@ -19,17 +19,17 @@ from markerless_tracker.records import TrackResult
 Images = Mapping[str, NDArray[np.uint8]]
 
 START_TOLERANCE_NS = 4_000_000
-"""A frame this much before the start row's time is the start frame: marker files round their times,
-and frames lie further apart (8.3 ms at 120 fps)."""
+"""Tolerance when a frame is compared with the start row's time: marker files round their times, and
+frames are further apart (8.3 ms at 120 fps)."""
 
 _POLL_S = 0.2
 
 
 class Stepper(Protocol):
-    """What the worker needs of a `tracking.Tracker`."""
+    """The part of `tracking.Tracker` that the worker uses."""
 
     def warm_up(self) -> None:
-        """Compile everything a step needs."""
+        """Compile all kernels of a step."""
 
     def step(self, views: Mapping[str, Any], stamp_ns: int) -> TrackResult:
         """Track one set of images."""
@@ -38,14 +38,14 @@ class Stepper(Protocol):
         """Forget the person."""
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
-        """Tell the person from other empty scenes from now on, and forget him."""
+        """Use other backgrounds from now on, and forget the person."""
 
 
 class StartGate:
-    """Lets sets through from the start row's time on.
+    """Drops sets before the start row's time, once.
 
-    "Arrives" means: a set no later than that time comes first. A stream that is already past it,
-    or no time at all, begins with its first complete set.
+    A stream that begins later than that time, or a start without a time, begins with its first
+    complete set.
 
     Args:
         start_ns: the start row's time, None if there is none.
@@ -61,10 +61,6 @@ class StartGate:
             self._open = stamp_ns >= self._start_ns - START_TOLERANCE_NS
         return self._open
 
-    def close(self) -> None:
-        """Wait for the start again."""
-        self._open = self._start_ns is None
-
 
 @dataclass(frozen=True)
 class TrackedSet:
@@ -76,13 +72,13 @@ class TrackedSet:
 
 @dataclass(frozen=True)
 class TrackerHandle:
-    """What the worker works with, once it can be made.
+    """Tracker and inputs of the worker.
 
     Attributes:
         tracker: steps on the images.
         start_ns: see `StartGate`.
-        decode: a set's view of a camera to the image that the tracker wants.
-        waits: the tracker has no backgrounds; sets are dropped until they are learned.
+        decode: makes the tracker's image of a camera's view.
+        waits: whether the tracker has no backgrounds; sets are dropped until they are learned.
     """
 
     tracker: Stepper
@@ -92,18 +88,19 @@ class TrackerHandle:
 
 
 class TrackWorker:
-    """A thread that compiles, then tracks whatever set is newest.
+    """A thread that compiles, then tracks the newest set, again and again.
 
-    No exception leaves the thread: what goes wrong with one set is reported and costs that set;
-    what goes wrong before the first set ends the worker and is kept in `fatal`.
+    No exception leaves the thread: an error in one set is reported and costs that set; an error
+    before the first set ends the worker and is kept in `fatal`.
 
     Args:
-        sets: where the complete sets come from.
-        status: told of everything.
+        sets: source of the complete sets.
+        status: receives counts, times and errors.
         prepare: makes the `TrackerHandle`; None while an input is missing, then called again.
         publish: called in the worker's thread with each result.
-        report: called with each new error, one line.
-        clock: seconds that only go forward, the clock of the sets' arrival.
+        report: called with each error, one line.
+        inform: called with a line for the log when a phase begins.
+        clock: monotonic time in s, the clock of the sets' arrival.
     """
 
     def __init__(
@@ -114,6 +111,7 @@ class TrackWorker:
         prepare: Callable[[], TrackerHandle | None],
         publish: Callable[[TrackedSet], None],
         report: Callable[[str], None],
+        inform: Callable[[str], None] = lambda _: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._sets = sets
@@ -121,95 +119,104 @@ class TrackWorker:
         self._prepare = prepare
         self._publish = publish
         self._report = report
+        self._inform = inform
         self._clock = clock
         self._stop = Event()
         self._reset = Event()
-        self._learning: Learning | None = None
+        self._request = OpenRequest()
         self._waits = False
         self.fatal: str | None = None
-        # A compiler at work cannot be interrupted; it must not keep the process from ending.
+        # Compilation cannot be interrupted and must not keep the process alive.
         self._thread = Thread(target=self._run, name="fit", daemon=True)
+
+    @property
+    def learning(self) -> bool:
+        """Whether the backgrounds are being learned, or must be."""
+        return self._waits or self._request.current is not None
 
     def start(self) -> None:
         """Begin."""
         self._thread.start()
 
     def reset(self) -> None:
-        """Forget the person before the next set."""
+        """Forget the person before the next set, and begin from the start pose if there is one."""
         self._reset.set()
 
     def learn(self, learning: Learning) -> None:
-        """Let the next sets of images become the backgrounds.
+        """Learn the backgrounds from the next sets of images.
 
         The request is refused before the worker is ready and while there is another.
         """
         if not self._status.ready:
             learning.refuse("the tracker is not ready yet")
-        elif self._learning is not None and not self._learning.answered:
-            learning.refuse("the backgrounds are being learned already")
         else:
-            self._learning = learning
+            self._request.open(learning)
 
     def stop(self, timeout_s: float) -> bool:
-        """Finish the set at hand and end; returns whether the thread ended in time."""
+        """Finish the set at hand and end; returns whether the thread ended in time.
+
+        Before the worker is ready the thread is not waited for: it may be compiling.
+        """
         self._stop.set()
         self._sets.wake()
         if self._thread.ident is not None:
-            self._thread.join(timeout_s)
+            self._thread.join(timeout_s if self._status.ready else min(timeout_s, _POLL_S))
         return not self._thread.is_alive()
 
     def _run(self) -> None:
         try:
-            fitting = self._make()
-            if fitting is None:
+            handle = self._make()
+            if handle is None:
                 return
-            self._status.doing("compiling", ready=False)
-            fitting.tracker.warm_up()
+            self._status.doing("compiling")
+            self._inform("compiling, up to a minute on the first start")
+            handle.tracker.warm_up()
         except Exception as error:
             self.fatal = one_line(error)
             self._status.failed(self.fatal)
             return
-        # What came meanwhile is old by now.
+        # Sets received during compilation are old by now.
         self._status.dropped("before_ready", self._sets.start_counting().complete)
-        self._status.doing("waiting for images", ready=True)
-        gate = StartGate(fitting.start_ns)
-        self._waits = fitting.waits
+        self._waits = handle.waits
+        activity = "waiting for learn_background" if handle.waits else "waiting for images"
+        self._status.became_ready(activity, now_s=self._clock())
+        self._inform(f"ready, {activity}")
+        gate = StartGate(handle.start_ns)
         while not self._stop.is_set():
             matched = self._sets.take(_POLL_S)
             if matched is not None:
-                self._handle(fitting, gate, matched)
-            self._end_learning()
-        if self._learning is not None:
-            self._learning.refuse("the tracker ends")
-
-    def _end_learning(self) -> None:
-        if self._learning is not None:
-            self._learning.refuse_if_overdue(self._status.activity)
-            if self._learning.answered:
-                self._learning = None
+                self._handle(handle, gate, matched)
+            request = self._request.current
+            if request is not None:
+                request.refuse_if_overdue(self._status.activity)
+        request = self._request.current
+        if request is not None:
+            request.refuse("the tracker ends")
 
     def _make(self) -> TrackerHandle | None:
         while not self._stop.is_set():
-            fitting = self._prepare()
-            if fitting is not None:
-                return fitting
+            handle = self._prepare()
+            if handle is not None:
+                return handle
             self._stop.wait(_POLL_S)
         return None
 
-    def _handle(self, fitting: TrackerHandle, gate: StartGate, matched: MatchedSet[Any]) -> None:
+    def _handle(self, handle: TrackerHandle, gate: StartGate, matched: MatchedSet[Any]) -> None:
+        learning = self._request.current
         try:
             if matched.restarted:
-                gate.close()
-            if self._reset.is_set() or matched.restarted:
+                self._report(
+                    f"stamp {matched.stamp_ns}: the images' time was set back; the track goes on"
+                )
+            if self._reset.is_set():
                 self._reset.clear()
-                fitting.tracker.reset()
+                handle.tracker.reset()
                 self._status.restarted()
             if not gate.admits(matched.stamp_ns):
                 self._status.dropped("before_start")
                 self._status.doing("waiting for the start frame")
                 return
-            images = {name: fitting.decode(name, view) for name, view in matched.views.items()}
-            learning = self._learning
+            images = self._decoded(handle, matched)
             if learning is None and self._waits:
                 self._status.dropped("while_learning")
                 self._status.doing("waiting for learn_background")
@@ -219,17 +226,17 @@ class TrackWorker:
                 learning.take(images)
                 if self._waits or not (learning.looks or learning.answered):
                     self._status.dropped("while_learning")
-                    self._learn(fitting, learning, matched.stamp_ns)
+                    self._learn(handle, learning, matched.stamp_ns)
                     return
             else:
-                self._status.doing("tracking")
-            result = fitting.tracker.step(images, matched.stamp_ns)
+                self._status.doing("processing images")
+            result = handle.tracker.step(images, matched.stamp_ns)
             finished_s = self._clock()
         except Exception as error:
-            # Whatever one set provokes, the next may be fine; the node goes on and says so.
-            if self._learning is not None:
-                self._learning.refuse(one_line(error))
-            self._status.dropped("error")
+            # The next set may be fine.
+            if learning is not None:
+                learning.refuse(one_line(error))
+            self._status.set_failed(one_line(error))
             self._trouble(matched.stamp_ns, error)
             return
         self._status.tracked(result, arrived_s=matched.arrived_s, finished_s=finished_s)
@@ -239,11 +246,26 @@ class TrackWorker:
             self._trouble(matched.stamp_ns, error)
         if learning is not None:
             learning.saw(result.state)
-            self._learn(fitting, learning, matched.stamp_ns)
+            self._learn(handle, learning, matched.stamp_ns)
 
-    def _learn(self, fitting: TrackerHandle, learning: Learning, stamp_ns: int) -> None:
+    def _decoded(self, handle: TrackerHandle, matched: MatchedSet[Any]) -> Images:
+        """The set's images; one that cannot be decoded is left out, unless it is the last."""
+        images: dict[str, NDArray[np.uint8]] = {}
+        failed: ImageError | None = None
+        for name, view in matched.views.items():
+            try:
+                images[name] = handle.decode(name, view)
+            except ImageError as error:
+                failed = error
+                self._status.refused(name)
+                self._trouble(matched.stamp_ns, error)
+        if failed is not None and not images:
+            raise failed
+        return images
+
+    def _learn(self, handle: TrackerHandle, learning: Learning, stamp_ns: int) -> None:
         try:
-            if learning.finish_if_complete(fitting.tracker):
+            if learning.finish_if_complete(handle.tracker):
                 self._waits = False
                 self._status.restarted()
         except Exception as error:
@@ -252,11 +274,11 @@ class TrackWorker:
 
     def _trouble(self, stamp_ns: int, error: Exception) -> None:
         text = one_line(error)
-        if self._status.failed(text):
-            self._report(f"stamp {stamp_ns}: {text}")
+        self._status.failed(text)
+        self._report(f"stamp {stamp_ns}: {text}")
 
 
 def one_line(error: BaseException) -> str:
-    """An error in one line; ours speak for themselves, others are named."""
+    """An error in one line; the type is named unless it is a `TrackerError`."""
     text = " ".join(str(error).split())
     return text if isinstance(error, TrackerError) else f"{type(error).__name__}: {text}"

@@ -1,3 +1,4 @@
+import resource
 from pathlib import Path
 
 import numpy as np
@@ -46,3 +47,17 @@ def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
         read_background_model(tmp_path / "absent.npz")
     with pytest.raises(ImageError, match="cannot be written"):
         write_background_model(tmp_path, model())
+
+
+def test_an_earlier_file_stays_until_the_new_one_is_complete(tmp_path: Path) -> None:
+    path = tmp_path / "cam01.npz"
+    write_background_model(path, model())
+    before = path.read_bytes()
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limit[1]))
+    try:
+        with pytest.raises(ImageError, match=r"cam01.npz: cannot be written: File too large"):
+            write_background_model(path, model())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]

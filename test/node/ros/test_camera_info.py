@@ -1,6 +1,8 @@
+import re
+
 import numpy as np
 import pytest
-from sensor_msgs.msg import CameraInfo
+from sensor_msgs.msg import CameraInfo, RegionOfInterest
 
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import CalibrationError
@@ -41,6 +43,7 @@ def test_a_lens_may_be_left_out(camera: CameraModel) -> None:
         ({"binning_x": 2}, "binning"),
         ({"d": [0.1] * 8}, "8 distortion coefficients"),
         ({"width": 0}, "size 0x480"),
+        ({"d": [float("nan")] * 5}, "not finite"),
     ],
 )
 def test_what_cannot_be_used_names_the_camera(camera: CameraModel, change: dict, says: str) -> None:
@@ -51,8 +54,50 @@ def test_what_cannot_be_used_names_the_camera(camera: CameraModel, change: dict,
         camera_of("cam03", info, camera.T_cam_world)
 
 
-def test_sizes_must_agree_with_the_calibration_file(camera: CameraModel) -> None:
-    check_info(info_of(camera, 0), camera)
-    check_info(CameraInfo(), camera)
-    with pytest.raises(CalibrationError, match="cam03/camera_info.*320x240.*640x480"):
-        check_info(info_of(camera.scaled(0.5), 0), camera)
+def test_what_agrees_or_says_nothing_is_fine(camera: CameraModel) -> None:
+    assert check_info(info_of(camera, 0), camera) == ""
+    assert check_info(CameraInfo(), camera) == ""
+    near = info_of(camera, 0)
+    near.k[0] *= 1.005
+    near.d[0] *= 1.005
+    assert check_info(near, camera) == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (
+            {"k": [520.0, 0.0, 320.0, 0.0, 510.0, 240.0, 0.0, 0.0, 1.0]},
+            r"K is \[520 0 320 .*says \[500 0 320 ",
+        ),
+        ({"k": [500.0, 0.0, 320.0, 0.0, 510.0, 250.0, 0.0, 0.0, 1.0]}, "K is .* 250"),
+        ({"d": [0.1, -0.3, 0.01, 0.02, 0.3]}, r"D is \[0.1 -0.3 .*says \[0.1 -0.2 "),
+        ({"d": []}, r"D is \[0 0 0 0 0\]"),
+    ],
+)
+def test_what_differs_is_reported(camera: CameraModel, change: dict, says: str) -> None:
+    info = info_of(camera, 0)
+    for name, value in change.items():
+        setattr(info, name, value)
+    note = check_info(info, camera)
+    assert re.search(rf"^cam03/camera_info: {says}", note) and "\n" not in note
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"width": 320, "height": 240}, "says 320x240 px.*640x480"),
+        ({"d": [float("nan")] * 5}, "not finite"),
+        ({"k": [float("nan")] * 9}, "not finite"),
+        ({"distortion_model": "equidistant"}, "'equidistant'.*plumb_bob"),
+        ({"distortion_model": "x" * 2000}, "'x{80}'"),
+        ({"binning_y": 2}, "binning"),
+        ({"roi": RegionOfInterest(width=100, height=100)}, "region of interest"),
+    ],
+)
+def test_what_cannot_be_right_is_refused(camera: CameraModel, change: dict, says: str) -> None:
+    info = info_of(camera, 0)
+    for name, value in change.items():
+        setattr(info, name, value)
+    with pytest.raises(CalibrationError, match=rf"cam03/camera_info: .*{says}.*left out until"):
+        check_info(info, camera)

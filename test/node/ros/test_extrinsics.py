@@ -2,7 +2,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
+from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import (
     inverse,
     quaternion_from_rotation,
@@ -39,6 +41,16 @@ def test_transforms_are_chained_up_to_the_world() -> None:
     found = tree.T_cam_world("cam01")
     assert found is not None
     np.testing.assert_allclose(found, inverse(T_map_rig @ T_rig_cam), atol=1e-12)
+
+
+@pytest.mark.parametrize("wrong", [0.0, float("nan")])
+def test_a_quaternion_that_is_no_rotation_is_named(wrong: float) -> None:
+    tree = TransformTree()
+    message = stamped("map", "cam01_optical_frame", some(1))
+    message.transform.rotation = SimpleNamespace(w=wrong, x=wrong, y=wrong, z=wrong)
+    with pytest.raises(CalibrationError, match="map -> cam01_optical_frame: rotation"):
+        tree.update([message])
+    assert tree.T_cam_world("cam01") is None
 
 
 def test_a_cycle_does_not_hang() -> None:

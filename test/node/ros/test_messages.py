@@ -8,9 +8,10 @@ from visualization_msgs.msg import Marker
 from markerless_tracker.body import BodyModel, load_body, markers, root_transform
 from markerless_tracker.body.urdf import urdf
 from markerless_tracker.geometry import apply, inverse, rotation_from_quaternion
+from markerless_tracker.node.health import Health, Level
 from markerless_tracker.node.ros import messages
 from markerless_tracker.node.ros.stamps import stamp_of, time_message
-from markerless_tracker.records import Confidence, TrackState
+from markerless_tracker.records import Confidence
 
 STAMP_NS = 12_345_678_901
 
@@ -100,19 +101,19 @@ def test_a_lost_body_disappears_from_viewers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("state", "ready", "level"),
+    ("level", "number"),
     [
-        (TrackState.TRACKING, True, DiagnosticStatus.OK),
-        (TrackState.TRACKING, False, DiagnosticStatus.WARN),
-        (TrackState.LOST, True, DiagnosticStatus.WARN),
-        (TrackState.SEARCHING, True, DiagnosticStatus.WARN),
+        (Level.OK, DiagnosticStatus.OK),
+        (Level.WARN, DiagnosticStatus.WARN),
+        (Level.STALE, DiagnosticStatus.STALE),
     ],
 )
-def test_state_levels(state: TrackState, ready: bool, level: bytes) -> None:
-    values = {"activity": "tracking", "ready": str(ready)}
-    message = messages.state_message("tracker", values, state, STAMP_NS, ready=ready)
+def test_state_levels(level: Level, number: bytes) -> None:
+    values = {"activity": "tracking", "ready": "true"}
+    message = messages.state_message("/left/tracker", values, Health(level, "why"), STAMP_NS)
     (status,) = message.status
-    assert status.level == level and state.value in status.message
+    assert (status.level, status.message) == (number, "why")
+    assert status.name == "left/tracker: tracking"
     assert {pair.key: pair.value for pair in status.values} == values
     assert stamp_of(message) == STAMP_NS
 

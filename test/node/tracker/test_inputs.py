@@ -1,4 +1,5 @@
 import array
+import re
 from types import SimpleNamespace
 from typing import Any
 
@@ -6,8 +7,9 @@ import numpy as np
 import pytest
 
 from markerless_tracker.camera import CameraModel
+from markerless_tracker.node.health import QUIET_S
 from markerless_tracker.node.ros.camera_info import info_of
-from markerless_tracker.node.tracker.inputs import PATIENCE_S, CameraInput
+from markerless_tracker.node.tracker.inputs import CameraInput
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 
@@ -20,6 +22,7 @@ class Bench:
         self.sets: Synchronizer[Any] = Synchronizer(("cam01", "cam02"))
         self.status = TrackerStatus()
         self.reports: list[str] = []
+        self.channels: int | None = None
         self.input = CameraInput(
             "cam02",
             self.camera if calibrated else None,
@@ -27,14 +30,15 @@ class Bench:
             self.status,
             report=self.reports.append,
             clock=lambda: self.now_s,
+            channels=lambda _: self.channels,
         )
 
     def refused(self) -> int:
         return int(self.status.values(self.sets.counts, ("cam02",), ())["refused/cam02"])
 
-    def missing(self, *, others_speak: bool = True) -> list[str]:
-        silent = "cam02" in self.sets.silent(self.now_s, PATIENCE_S)
-        return self.input.missing(silent, others_speak, self.now_s)
+    def missing(self, *, others_send: bool = True, left_out: bool = False) -> list[str]:
+        silent = "cam02" in self.sets.silent(self.now_s, QUIET_S)
+        return self.input.missing(silent, left_out, others_send, self.now_s)
 
 
 def image(width: int = 8, height: int = 4, encoding: str = "mono8", stamp: int = 1) -> Any:
@@ -71,17 +75,35 @@ def test_good_images_are_stored_as_they_came(bench: Bench) -> None:
         (image(encoding="bgr8"), "cam02/image_raw: 32 bytes"),
     ],
 )
-def test_bad_images_are_counted_and_reported_once(bench: Bench, bad: Any, says: str) -> None:
-    import re
-
+def test_bad_images_are_counted_and_reported_with_every_occurrence(
+    bench: Bench, bad: Any, says: str
+) -> None:
     for _ in range(5):
         bench.input.on_image(bad)
     assert bench.refused() == 5 and bench.sets.held == 0
-    assert len(bench.reports) == 1 and re.search(says, bench.reports[0])
-    # Good ones go on being used, and the next bad one is news again.
+    assert all(re.search(says, report) for report in bench.reports) and len(bench.reports) == 5
+    assert re.search(says, bench.input.refusal)
     bench.input.on_image(image())
-    bench.input.on_image(bad)
-    assert bench.sets.held == 1 and len(bench.reports) == 2
+    assert bench.sets.held == 1 and bench.input.refusal == ""
+
+
+def test_an_image_of_other_channels_than_the_background_is_refused(bench: Bench) -> None:
+    bench.channels = 3
+    bench.input.on_image(image())
+    assert bench.refused() == 1 and bench.sets.held == 0
+    assert bench.reports == [
+        "cam02/image_raw: a grey image (mono8) came, the background of cam02 is colour"
+    ]
+    bench.now_s += 2 * QUIET_S
+    assert bench.input.refusal == ""
+    bench.channels = 1
+    bench.input.on_image(image())
+    assert bench.sets.held == 1
+
+
+def test_a_text_from_the_wire_is_cut(bench: Bench) -> None:
+    bench.input.on_image(image(encoding="x" * 2000))
+    assert "'" + 80 * "x" + "'" in bench.reports[0] and len(bench.reports[0]) < 300
 
 
 def test_a_camera_info_of_another_size_stops_its_camera_until_they_agree(bench: Bench) -> None:
@@ -90,11 +112,23 @@ def test_a_camera_info_of_another_size_stops_its_camera_until_they_agree(bench: 
         bench.input.on_info(wrong)
         bench.input.on_image(image())
     assert bench.sets.held == 0 and bench.refused() == 3
-    assert len(bench.reports) == 1 and "cam02/camera_info" in bench.reports[0]
+    assert len(set(bench.reports)) == 1 and "cam02/camera_info" in bench.reports[0]
     assert "4x2" in bench.reports[0] and "8x4" in bench.reports[0]
     bench.input.on_info(right)
+    assert bench.reports[-1] == "cam02/camera_info: agrees with the calibration file again"
     bench.input.on_image(image())
     assert bench.sets.held == 1
+
+
+def test_a_camera_info_with_another_lens_is_reported_once_and_used_no_further(bench: Bench) -> None:
+    other = info_of(bench.camera, 0)
+    other.k[0] *= 1.05
+    for number in range(3):
+        bench.input.on_info(other)
+        bench.input.on_image(image(stamp=number))
+    assert len(bench.reports) == 1 and bench.sets.held == 3
+    assert "cam02/camera_info: K is [52.5 " in bench.reports[0]
+    assert "the calibration file is used" in bench.reports[0]
 
 
 @pytest.mark.parametrize("calibrated", [True, False])
@@ -103,9 +137,9 @@ def test_a_missing_camera_info_is_named_once_it_is_due(calibrated: bool) -> None
     assert bench.missing() == ["cam02/image_raw", "cam02/camera_info"]
     bench.reports.clear()
     bench.input.on_image(image())
-    bench.now_s += 0.5 * PATIENCE_S
+    bench.now_s += 0.5 * QUIET_S
     assert bench.missing() == ["cam02/camera_info"] and not bench.reports
-    bench.now_s += PATIENCE_S
+    bench.now_s += QUIET_S
     bench.input.on_image(image(stamp=2))
     for _ in range(3):
         bench.missing()
@@ -116,15 +150,22 @@ def test_a_missing_camera_info_is_named_once_it_is_due(calibrated: bool) -> None
     assert bench.missing() == []
 
 
-def test_a_silent_camera_is_named_once_while_others_speak(bench: Bench) -> None:
+def test_a_silent_camera_and_its_return_are_named_once(bench: Bench) -> None:
     bench.input.on_info(info_of(bench.camera, 0))
     bench.input.on_image(image())
     assert bench.missing() == []
-    bench.now_s += 2 * PATIENCE_S
-    assert bench.missing(others_speak=False) == ["cam02/image_raw"] and not bench.reports
+    bench.now_s += 2 * QUIET_S
+    for changes in ({"others_send": False, "left_out": True}, {"left_out": False}):
+        assert bench.missing(**changes) == ["cam02/image_raw"] and not bench.reports
     for _ in range(3):
-        assert bench.missing() == ["cam02/image_raw"]
-    assert len(bench.reports) == 1 and "cam02/image_raw: no usable image" in bench.reports[0]
+        assert bench.missing(left_out=True) == ["cam02/image_raw"]
+    assert bench.reports == [
+        "cam02/image_raw: no usable image for 2 s while other cameras send; cam02 is left out "
+        "until one comes"
+    ]
+    bench.now_s += 10.0
+    bench.input.on_image(image(stamp=2))
+    assert bench.reports[1:] == ["cam02/image_raw: usable images again after 12.0 s"]
 
 
 def test_gaps_in_the_publishers_numbers_are_lost_images(bench: Bench) -> None:

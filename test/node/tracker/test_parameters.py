@@ -12,6 +12,7 @@ from markerless_tracker.node.tracker.parameters import (
     NodeSettings,
     descriptions,
     effective_values,
+    held_settings,
     parameter_names,
     read_settings,
 )
@@ -120,3 +121,13 @@ def test_the_example_file_is_understood(project_root: Path) -> None:
     settings = read_settings(given)
     assert settings.cameras == ("cam01", "cam02", "cam03", "cam04") and settings.stature == 1.72
     assert settings.config.refine.iterations == 4
+
+
+def test_the_most_used_parameters_come_first_and_ranges_are_known() -> None:
+    assert list(descriptions())[:6] == [
+        "calibration_file", "background_dir", "stature", "sync_tolerance", "start_file",
+        "result_file",
+    ]  # fmt: skip
+    ranges = {setting.name: (setting.min, setting.max) for setting in held_settings()}
+    assert ranges["stature"] == (0.5, 2.5) and ranges["sync_tolerance"] == (0.0, 1.0)
+    assert set(ranges) <= set(parameter_names())

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.node.tracker.synchronizer import STOPPED_VIEWS, Synchronizer
+from markerless_tracker.node.tracker.synchronizer import ABSENT_S, STOPPED_VIEWS, Synchronizer
 
 CAMERAS = ("a", "b", "c", "d")
 FRAME_NS = 16_666_667
@@ -67,10 +67,10 @@ def test_memory_is_bounded_while_a_camera_is_silent_and_it_is_named() -> None:
     sets: Synchronizer[str] = Synchronizer(CAMERAS, depth=8)
     for stamp in range(1000):
         for camera in ("a", "b", "d"):
-            sets.add(camera, stamp, "", now_s=stamp / 60)
+            sets.add(camera, stamp, "", now_s=stamp / 500)
     assert sets.held == 3 * 8
     assert sets.take() is None
-    assert sets.silent(1000 / 60) == ("c",)
+    assert sets.silent(1000 / 500) == ("c",)
     assert sets.counts.incomplete == 1000 - 8
     # It recovers with the first frame that all have.
     feed(sets, *every_camera(1000))
@@ -94,15 +94,26 @@ def test_a_camera_that_stops_is_left_out_and_taken_back() -> None:
     assert taken[40:] == ["ab"] + ["abc"] * 19
 
 
-def test_a_camera_never_heard_and_the_last_but_one_are_waited_for() -> None:
+def test_a_camera_never_heard_is_left_out_after_a_while() -> None:
     sets: Synchronizer[str] = Synchronizer(("a", "b", "c"))
-    two: Synchronizer[str] = Synchronizer(("a", "b"))
-    two.add("b", -1, "b", now_s=0.0)
-    for number in range(60):
-        for name in ("a", "b"):
+    taken = []
+    for number in range(200):
+        for name in ("a", "b") if number < 150 else ("a", "b", "c"):
             sets.add(name, number, name, now_s=number / 20.0)
-        two.add("a", number, "a", now_s=number / 20.0)
-        assert sets.take() is None and two.take() is None
+        found = sets.take()
+        taken.append(None if found is None else "".join(found.views))
+        assert sets.left_out(number / 20.0) == (("c",) if 100 <= number < 150 else ())
+    first = taken.index("ab")
+    assert first == ABSENT_S * 20 and taken[first:151] == ["ab"] * (151 - first)
+    assert taken[151:] == ["abc"] * 49
+
+
+def test_the_last_but_one_camera_is_waited_for() -> None:
+    sets: Synchronizer[str] = Synchronizer(("a", "b"))
+    sets.add("b", -1, "b", now_s=0.0)
+    for number in range(200):
+        sets.add("a", number, "a", now_s=number / 20.0)
+        assert sets.take() is None and sets.left_out(number / 20.0) == ()
 
 
 def test_all_cameras_are_silent_before_and_long_after_their_images() -> None:
@@ -113,45 +124,81 @@ def test_all_cameras_are_silent_before_and_long_after_their_images() -> None:
     assert sets.silent(1.5) == CAMERAS
 
 
-def test_a_bag_that_begins_anew_goes_on_at_once() -> None:
+def stamps_taken(*stamps: int) -> tuple[list[tuple[int, bool]], Synchronizer[str]]:
+    """What is handed out, with `restarted`, of sets that come in that order."""
     sets: Synchronizer[str] = Synchronizer(CAMERAS)
     taken = []
-    for stamp in [0, 1, 2, 0, 1, 2]:
+    for stamp in stamps:
         feed(sets, *every_camera(stamp))
-        matched = sets.take()
-        assert matched is not None
-        taken.append((matched.stamp_ns, matched.restarted))
-    assert taken == [(0, False), (1, False), (2, False), (0, True), (1, False), (2, False)]
-    assert sets.counts.restarts == 1 and sets.counts.incomplete == 0
+        if (matched := sets.take()) is not None:
+            taken.append((matched.stamp_ns, matched.restarted))
+    return taken, sets
+
+
+def test_time_set_back_is_accepted_with_the_third_set_in_a_row() -> None:
+    taken, sets = stamps_taken(*range(10, 16), *range(6))
+    forward = [(stamp, False) for stamp in range(10, 16)]
+    assert taken == [*forward, (2, True), (3, False), (4, False), (5, False)]
+    assert (sets.counts.restarts, sets.counts.late, sets.counts.incomplete) == (1, 2, 0)
+
+
+@pytest.mark.parametrize(
+    ("stamps", "late"),
+    [
+        ([10, 11, 0, 12, 13], 1),
+        ([11, 10, 13, 12, 15, 14, 17, 16], 4),
+        ([13, 12, 11, 10, 14], 3),
+        ([10, 5, 11, 6, 12, 7, 13, 8], 4),
+        ([10, 11, 11, 11, 11, 12], 0),
+    ],
+)
+def test_late_sets_are_dropped_and_no_restart(stamps: list[int], late: int) -> None:
+    taken, sets = stamps_taken(*stamps)
+    assert [stamp for stamp, _ in taken] == sorted(stamp for stamp, _ in taken)
+    assert not any(restarted for _, restarted in taken)
+    assert (sets.counts.restarts, sets.counts.late) == (0, late)
+
+
+def test_views_that_repeat_a_stamp_are_dropped_and_counted() -> None:
+    sets: Synchronizer[str] = Synchronizer(("a", "b"))
+    feed(sets, ("a", 5), ("a", 5), ("b", 5), ("b", 5), ("a", 5))
+    assert sets.take() is not None and sets.take() is None
+    assert (sets.counts.complete, sets.counts.duplicates, sets.held) == (1, 3, 0)
+
+
+def test_a_restart_is_reported_even_if_its_first_sets_were_skipped() -> None:
+    sets: Synchronizer[str] = Synchronizer(CAMERAS)
+    feed(sets, *every_camera(7))
+    sets.take()
+    feed(sets, *every_camera(0, 1, 2, 3))
+    matched = sets.take()
+    assert matched is not None and matched.stamp_ns == 3 and matched.restarted
 
 
 def test_a_restart_with_views_of_the_old_pass_on_their_way_loses_no_set() -> None:
     sets: Synchronizer[str] = Synchronizer(("a", "b"))
-    order = [("a", 8), ("a", 9), ("a", 0), ("b", 8), ("b", 9), ("b", 0), ("a", 1), ("b", 1)]
-    seen = []
-    for camera, stamp in order:
-        feed(sets, (camera, stamp))
-        if (matched := sets.take()) is not None:
-            seen.append(matched.stamp_ns)
-    assert seen == [8, 9, 0, 1]
+    order = [("a", 8), ("a", 9), *(("a", stamp) for stamp in range(4)), ("b", 8), ("b", 9)]
+    feed(sets, *order, *(("b", stamp) for stamp in range(4)), ("a", 4), ("b", 4))
+    assert (sets.counts.complete, sets.counts.late, sets.counts.incomplete) == (5, 2, 0)
 
 
-def test_a_restart_is_told_even_if_its_first_sets_were_skipped() -> None:
+def test_offsets_name_the_camera_whose_stamps_differ() -> None:
     sets: Synchronizer[str] = Synchronizer(CAMERAS)
-    feed(sets, *every_camera(7))
-    sets.take()
-    feed(sets, *every_camera(0, 1))
-    matched = sets.take()
-    assert matched is not None and matched.stamp_ns == 1 and matched.restarted
+    assert sets.offsets_ns() == {}
+    for number in range(6):
+        for camera, offset in (("a", 0), ("b", 0), ("c", 2_000_000), ("d", 0)):
+            feed(sets, (camera, number * FRAME_NS + offset))
+    assert sets.take() is None
+    assert sets.offsets_ns() == {"a": 0, "b": 0, "c": 2_000_000, "d": 0}
 
 
 def test_a_stamp_far_in_the_future_does_not_block() -> None:
     sets: Synchronizer[str] = Synchronizer(CAMERAS)
     feed(sets, *every_camera(1), ("a", 10**18), *every_camera(2, 3))
     assert sets.counts.complete == 3
-    feed(sets, *every_camera(10**18), *every_camera(4, 5))
+    feed(sets, *every_camera(10**18), *every_camera(4, 5, 6))
     matched = sets.take()
-    assert matched is not None and matched.stamp_ns == 5
+    assert matched is not None and matched.stamp_ns == 6
 
 
 def test_equal_stamps_need_to_be_equal_unless_a_tolerance_is_given() -> None:
@@ -188,7 +235,7 @@ def test_take_wakes_up_for_a_set_of_another_thread() -> None:
     sets: Synchronizer[str] = Synchronizer(("a",))
     timer = threading.Timer(0.05, feed, (sets, ("a", 1)))
     timer.start()
-    assert sets.take(timeout_s=20.0) is not None
+    assert sets.take(timeout_s=120.0) is not None
     timer.join()
 
 
@@ -225,7 +272,7 @@ def test_whatever_arrives_sets_are_sound_and_memory_bounded(
 def test_every_set_is_either_complete_or_incomplete(
     delays: dict[str, int], lost: set[tuple[str, int]]
 ) -> None:
-    """With in-order delivery, losses and delays: complete + incomplete + still held = offered."""
+    """With in-order delivery, losses and delays: complete + incomplete + held = offered."""
     sets: Synchronizer[int] = Synchronizer(CAMERAS)
     for tick in range(40 + 8):
         for camera in CAMERAS:

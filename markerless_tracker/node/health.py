@@ -1,0 +1,138 @@
+"""Level and message of the diagnostics of a running tracker."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from markerless_tracker.records import TrackState
+
+QUIET_S = 2.0
+"""Time without images, sets or results after which that is reported."""
+
+
+_NOTHING = "no image from any camera"
+
+
+class Level(Enum):
+    """Levels of diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    STALE = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Facts:
+    """Condition of a running tracker at one moment; ages in s, None for events that never occurred.
+
+    Attributes:
+        ready: whether it tracks images as they come.
+        activity: what it is doing, in a few words.
+        state: of the last result.
+        cameras: names of all cameras.
+        silent: cameras without a usable image for `QUIET_S`.
+        left_out: cameras without which sets are complete.
+        refusals: camera -> reason why its last image could not be used.
+        ready_age_s: since it became ready.
+        set_age_s: since a set of images was complete.
+        result_age_s: since the last result.
+        offsets_ns: camera -> offset of its stamps from the others'.
+        tolerance_s: `sync_tolerance`.
+        repeating: whether images arrive whose stamps repeat the previous ones.
+        last_error: of the last set that could not be tracked, empty if there was none since.
+        clock_missing: whether `use_sim_time` is set and no /clock is received.
+    """
+
+    ready: bool
+    activity: str
+    state: TrackState
+    cameras: Sequence[str]
+    silent: Sequence[str] = ()
+    left_out: Sequence[str] = ()
+    refusals: Mapping[str, str] = field(default_factory=dict)
+    ready_age_s: float | None = None
+    set_age_s: float | None = None
+    result_age_s: float | None = None
+    offsets_ns: Mapping[str, int] = field(default_factory=dict)
+    tolerance_s: float = 0.0
+    repeating: bool = False
+    last_error: str = ""
+    clock_missing: bool = False
+
+
+@dataclass(frozen=True)
+class Health:
+    """Level and message, one line; `trouble` is the reason for missing results, empty otherwise."""
+
+    level: Level
+    message: str
+    trouble: str = ""
+
+
+def assess(facts: Facts) -> Health:
+    """The level and message of a tracker's diagnostics.
+
+    OK: the person is tracked with every camera. STALE: no image arrives. WARN: anything else.
+    """
+    health = _assess(facts)
+    if not facts.clock_missing:
+        return health
+    clock = "use_sim_time is set and no /clock is received"
+    level = Level.WARN if health.level is Level.OK else health.level
+    return Health(level, f"{health.message}; {clock}", health.trouble)
+
+
+def _assess(facts: Facts) -> Health:
+    if not facts.ready:
+        return Health(Level.WARN, f"{facts.state.value}: {facts.activity}")
+    if _recent(facts.result_age_s):
+        return _working(facts)
+    if not _long(facts.ready_age_s):
+        return Health(Level.WARN, f"{facts.state.value}: {facts.activity}")
+    if _recent(facts.set_age_s) and not facts.last_error:
+        return Health(Level.WARN, f"{facts.state.value}: {facts.activity}")
+    trouble = _trouble(facts)
+    level = Level.STALE if trouble == _NOTHING else Level.WARN
+    return Health(level, f"{facts.state.value}: {trouble}", trouble)
+
+
+def _working(facts: Facts) -> Health:
+    problems = [facts.refusals.get(name, f"no image of {name}") for name in facts.left_out]
+    without = f"tracking without {', '.join(facts.left_out)}: {'; '.join(problems)}"
+    if facts.state is not TrackState.TRACKING:
+        message = f"{facts.state.value}: {facts.activity}"
+        return Health(Level.WARN, f"{message}; {without}" if problems else message)
+    if problems:
+        return Health(Level.WARN, f"{facts.state.value}: {without}")
+    return Health(Level.OK, facts.state.value)
+
+
+def _trouble(facts: Facts) -> str:
+    """Reason for missing results."""
+    if _recent(facts.set_age_s):
+        return f"no result for {QUIET_S:g} s: {facts.last_error}"
+    if facts.refusals:
+        return f"no complete set of images: {'; '.join(facts.refusals.values())}"
+    if facts.repeating:
+        return "no new set of images: the images repeat their stamps"
+    if set(facts.silent) == set(facts.cameras):
+        return _NOTHING
+    if facts.silent:
+        return f"no complete set of images: none from {', '.join(facts.silent)}"
+    return f"no complete set of images: {_spread(facts)}"
+
+
+def _spread(facts: Facts) -> str:
+    offsets = {name: offset for name, offset in facts.offsets_ns.items() if offset}
+    if not offsets:
+        return "their stamps do not match"
+    listed = ", ".join(f"{name} by {offset / 1e6:+.6g} ms" for name, offset in offsets.items())
+    return f"stamps differ, {listed}; sync_tolerance is {facts.tolerance_s:g} s"
+
+
+def _recent(age_s: float | None) -> bool:
+    return age_s is not None and age_s < QUIET_S
+
+
+def _long(age_s: float | None) -> bool:
+    return age_s is not None and age_s >= QUIET_S

@@ -1,0 +1,58 @@
+"""Results as topics."""
+
+from typing import Any
+
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.body.urdf import urdf
+from markerless_tracker.node.ros import messages
+from markerless_tracker.node.ros.qos import latched_qos, output_qos
+from markerless_tracker.records import TrackResult
+
+
+class ResultPublishers:
+    """Publishes poses, and the body whenever it changes.
+
+    Args:
+        node: creates the publishers.
+    """
+
+    def __init__(self, node: Any) -> None:
+        qos = output_qos()
+        self._descriptions = node.create_publisher(String, "robot_description", latched_qos())
+        self._joint_states = node.create_publisher(JointState, "joint_states", qos)
+        self._deviations = node.create_publisher(JointState, "joint_deviations", qos)
+        self._root_poses = node.create_publisher(PoseWithCovarianceStamped, "root_pose", qos)
+        self._marker_poses = node.create_publisher(PoseArray, "marker_poses", qos)
+        self._markers = node.create_publisher(MarkerArray, "markers", qos)
+        self._described: BodyModel | None = None
+        self._no_pose_shown = False
+
+    def describe(self, body: BodyModel) -> None:
+        """Publish the body's URDF if it is another than the last."""
+        if body is not self._described:
+            self._descriptions.publish(String(data=urdf(body)))
+            self._described = body
+
+    def publish(self, result: TrackResult, body: BodyModel) -> None:
+        """Publish a result; without a pose viewers lose the body, once."""
+        self.describe(body)
+        pose, points, stamp_ns = result.pose, result.markers_m, result.stamp_ns
+        if pose is None or points is None:
+            if not self._no_pose_shown:
+                self._markers.publish(messages.no_markers(stamp_ns))
+            self._no_pose_shown = True
+            return
+        self._joint_states.publish(messages.joint_state(body, pose, stamp_ns))
+        confidence = result.confidence
+        self._root_poses.publish(messages.root_pose(body, pose, stamp_ns, confidence))
+        if confidence is not None:
+            self._deviations.publish(messages.joint_deviations(body, confidence, stamp_ns))
+        self._marker_poses.publish(messages.marker_poses(points, stamp_ns))
+        if self._markers.get_subscription_count():
+            self._markers.publish(messages.body_markers(body, pose, points, stamp_ns))
+        self._no_pose_shown = False

@@ -1,0 +1,90 @@
+"""A file that grows by whole records while others may read it."""
+
+import os
+from pathlib import Path
+
+from markerless_tracker.errors import DatasetError
+
+
+class AppendedFile:
+    """A new file; every record reaches the operating system before `append` returns.
+
+    The end of the process, however sudden, therefore loses no record. Nothing is kept in memory.
+
+    Args:
+        path: the file; an earlier one is replaced.
+
+    Raises:
+        DatasetError: the file cannot be written; names it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            # Unbuffered: one record, one system call.
+            self._file = path.open("wb", buffering=0)
+        except OSError as error:
+            raise not_written(path, error) from error
+        self.size = 0
+
+    def append(self, record: bytes) -> None:
+        """Add a record at the end: all of it or, if there is no room, nothing.
+
+        Raises:
+            DatasetError: the record cannot be written; the file holds what it held before.
+        """
+        try:
+            self._write(record)
+        except OSError as error:
+            self.cut(self.size)
+            raise not_written(self.path, error) from error
+        self.size += len(record)
+
+    def rewrite(self, offset: int, record: bytes) -> None:
+        """Replace as many bytes from an offset on.
+
+        Raises:
+            DatasetError: they cannot be written.
+        """
+        try:
+            self._file.seek(offset)
+            self._write(record)
+            self._file.seek(self.size)
+        except OSError as error:
+            raise not_written(self.path, error) from error
+
+    def cut(self, size: int) -> None:
+        """Take away what was appended after the file had that many bytes."""
+        self._file.seek(size)
+        self._file.truncate()
+        self.size = size
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _write(self, record: bytes) -> None:
+        rest = memoryview(record)
+        while rest:
+            rest = rest[self._file.write(rest) :]
+
+
+def not_written(path: Path, error: OSError) -> DatasetError:
+    """The error of a file that cannot be written, in one line."""
+    return DatasetError(f"{path}: cannot be written: {error.strerror or error}")
+
+
+def check_writable(path: Path) -> None:
+    """Make sure that a file can be written, without changing what it holds.
+
+    Raises:
+        DatasetError: it cannot.
+    """
+    try:
+        exists = path.exists()
+        with path.open("ab"):
+            pass
+        if not exists:
+            os.unlink(path)
+    except OSError as error:
+        raise not_written(path, error) from error

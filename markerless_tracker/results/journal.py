@@ -1,0 +1,114 @@
+"""NAME.jsonl, the journal of a run: everything of NAME.json while it is not there yet.
+
+Each line is a JSON object. One with `stamp_ns` is a frame; any other holds entries of the summary,
+a later one replaces entries of an earlier one.
+"""
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.results.appended import AppendedFile, not_written
+
+FRAME_KEY = "stamp_ns"
+_FRAME = f'{{"{FRAME_KEY}": '
+
+
+class Journal:
+    """Writes a journal, then the summary from it; memory does not grow with the frames.
+
+    Args:
+        path: the journal.
+
+    Raises:
+        DatasetError: it cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = AppendedFile(path)
+
+    @property
+    def size(self) -> int:
+        """Bytes so far."""
+        return self._file.size
+
+    def add(self, entries: Mapping[str, Any]) -> None:
+        """Append a line, all of it or nothing.
+
+        Args:
+            entries: of a frame, `stamp_ns` first, or of the summary.
+
+        Raises:
+            DatasetError: it cannot be written.
+        """
+        self._file.append((json.dumps(entries) + "\n").encode())
+
+    def cut(self, size: int) -> None:
+        """Take away the lines that were added after the journal had that many bytes."""
+        self._file.cut(size)
+
+    def compose(self, path: Path) -> None:
+        """Write the summary and remove the journal.
+
+        Raises:
+            DatasetError: the summary cannot be written; the journal stays.
+        """
+        self._file.close()
+        summary = path.with_name(path.name + ".tmp")
+        try:
+            with summary.open("w", encoding="utf-8", newline="\n") as sink:
+                head = json.dumps(_head(self._file.path), indent=1)
+                sink.write(head.removesuffix("\n}") + ',\n "frames": [')
+                separator = "\n"
+                for line in _lines(self._file.path):
+                    if line.startswith(_FRAME):
+                        sink.write(f"{separator}  {line}")
+                        separator = ",\n"
+                sink.write("\n ]\n}\n")
+            os.replace(summary, path)
+            self._file.path.unlink()
+        except OSError as error:
+            summary.unlink(missing_ok=True)
+            raise not_written(path, error) from error
+
+
+def read_summary(name: Path) -> dict[str, Any]:
+    """What NAME.json holds, or NAME.jsonl where the run did not end: settings, `frames`, the rest.
+
+    Args:
+        name: path of the result without suffix.
+
+    Raises:
+        DatasetError: there is neither, or it is no result.
+    """
+    path = name.with_name(name.name + ".json")
+    journal = name.with_name(name.name + ".jsonl")
+    try:
+        if journal.exists() and not path.exists():
+            frames = [json.loads(line) for line in _lines(journal) if line.startswith(_FRAME)]
+            return {**_head(journal), "frames": frames}
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"{path}: no result of a tracker ({error})") from error
+    if not isinstance(content, dict) or not isinstance(content.get("frames"), list):
+        raise DatasetError(f"{path}: no result of a tracker (it has no `frames`)")
+    return content
+
+
+def _head(path: Path) -> dict[str, Any]:
+    head: dict[str, Any] = {}
+    for line in _lines(path):
+        if not line.startswith(_FRAME):
+            head.update(json.loads(line))
+    return head
+
+
+def _lines(path: Path) -> Iterator[str]:
+    """The complete lines: the end of the process may have cut the last one."""
+    with path.open(encoding="utf-8") as lines:
+        for line in lines:
+            if line.endswith("\n"):
+                yield line.rstrip("\n")
