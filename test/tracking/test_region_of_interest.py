@@ -51,7 +51,9 @@ def test_the_pose_is_that_of_whole_images(
             cut = np.s_[v : v + seen.height, u : u + seen.width]
             np.testing.assert_array_equal(seen.mask, a.observations[name].mask[cut])
             if undecided:
-                one, other = (o.in_full_frame(o.not_background) for o in (seen, a.observations[name]))
+                one, other = (
+                    o.in_full_frame(o.not_background) for o in (seen, a.observations[name])
+                )
                 np.testing.assert_array_equal(one[cut], other[cut])
             assert a.observations[name].mask.sum() == seen.mask.sum()
         sizes.append([seen.edges.size for seen in b.observations.values()])

@@ -66,7 +66,10 @@ def test_a_person_is_found_and_a_shadow_is_not() -> None:
         assert observation.size_px == (160, 120) and observation.offset_px == (0, 0)
         assert observation.edges.max() > 100
         if settings.shadow.undecided:
-            assert observation.undecided is not None and observation.undecided[95:105, 15:55].mean() > 0.95
+            assert (
+                observation.undecided is not None
+                and observation.undecided[95:105, 15:55].mean() > 0.95
+            )
             assert (observation.undecided & (mask > 0)).sum() < 0.02 * (mask > 0).sum()
         else:
             assert observation.undecided is None and not observation.edges[:, :20].any()
