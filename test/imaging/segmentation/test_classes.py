@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.imaging import ImagingSettings, Region, Segmenter, learn_background
+from markerless_tracker.imaging.segmentation import segmenter as segmenter_module
 
 SIZE_PX = (200, 150)
 PLAIN = ImagingSettings.from_mapping({"background.exposure_compensation": False})
@@ -42,6 +43,8 @@ def peopled(room: np.ndarray) -> np.ndarray:
     cv2.ellipse(image, (105, 55), (17, 33), 4, 0, 360, (20, 30, 60), -1)
     image[12:18, 150:190] = (20, 210, 230)
     image[140:150, 170:185] *= 0.7
+    image[20:90, 125:185] += 5.0
+    image[10:90, 15:60] -= np.linspace(0.0, 12.0, 45)[:, None]
     return np.asarray(image)
 
 
@@ -63,15 +66,18 @@ def test_the_scene_has_pixels_of_every_class(room) -> None:
     assert person.any() and undecided.any() and not (person & undecided).any()
     assert (person[30:80, 98:112] > 0).mean() > 0.9
     assert (undecided[120:130, 20:80] > 0).mean() > 0.5
-    assert not (person | undecided)[5:80, 5:60].any()
+    assert (undecided[40:80, 50:58] > 0).mean() > 0.2 and not undecided[5:80, 70:85].any()
 
 
-@settings(max_examples=60, deadline=None)
-@given(st.integers(0, 190), st.integers(0, 140), st.integers(1, 200), st.integers(1, 150))
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 190), st.integers(0, 140), st.integers(1, 60), st.integers(1, 60))
 def test_a_region_gives_what_the_frame_gives(room, left, top, width, height) -> None:
     segmenter, image, person, undecided = room
     region = Region(left, top, min(left + width, SIZE_PX[0]), min(top + height, SIZE_PX[1]))
-    mask, open_ = segmenter.classes(image, region)
+    # A wide margin at first would hide one that is too small.
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(segmenter_module, "_SLACK_PX", 1)
+        mask, open_ = segmenter.classes(image, region)
     np.testing.assert_array_equal(mask, person[region.slices])
     np.testing.assert_array_equal(open_, undecided[region.slices])
 
