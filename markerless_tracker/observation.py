@@ -44,7 +44,7 @@ class Observation:
     """What one camera's image says about the body, in that camera's own (distorted) pixels.
 
     A pixel is person, background or undecided: it differs from the background as a shadow on it
-    would. Undecided pixels count neither way.
+    would. Undecided pixels do not count.
 
     Attributes:
         camera: the camera's name.

@@ -193,8 +193,8 @@ class Confidence:
     Attributes:
         pose_sd: (p,) of each parameter.
         markers_sd_m: (15, 3) of each marker, along the world's axes.
-        root_covariance: (6, 6) of the root frame: x, y, z, and small turns about the world's x, y
-            and z axis.
+        root_covariance: (6, 6) of the root frame: x, y, z, and small rotations about the
+            world's x, y and z axis.
     """
 
     pose_sd: NDArray[np.float64]

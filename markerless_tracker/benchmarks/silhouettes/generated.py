@@ -1,4 +1,4 @@
-"""Silhouettes on generated scenes: rooms and clothes that nobody chose a threshold by.
+"""Silhouettes on generated scenes: rooms and clothes that no threshold was chosen by.
 
 Of every scene the sampled motion is measured, then the sampled posture.
 """

@@ -20,7 +20,7 @@ from markerless_tracker.tracking.evidence.selection import (
 
 
 class EvidenceMaker:
-    """Turns views into observations, and keeps of their silhouettes what the prediction explains.
+    """Makes observations of views, and keeps of their silhouettes what the prediction explains.
 
     Args:
         rig: the cameras.
@@ -50,7 +50,7 @@ class EvidenceMaker:
         self.take_backgrounds(backgrounds)
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
-        """Tell people from other empty scenes from now on.
+        """Use other backgrounds from now on.
 
         Raises:
             ImageError: a background does not fit its camera; all stays as it was.
@@ -126,7 +126,7 @@ class EvidenceMaker:
     ) -> tuple[dict[str, Observation], tuple[str, ...]]:
         """As `observe` and then `select`, in less time while the body is tracked.
 
-        With a margin around the body at the predicted pose, images are looked at there alone,
+        With a margin around the body at the predicted pose, only that region is processed,
         except where that would change what stays, and each camera's whole frame every
         `region.full_frame_every` calls.
 
@@ -157,7 +157,7 @@ class EvidenceMaker:
     def regions(
         self, body: BodyModel, predicted: FloatArray, margin_m: float | None
     ) -> dict[str, Region | None]:
-        """Where each camera looks at a body at a pose (p,), and a margin around it; None = all."""
+        """Region of each camera: a body at a pose (p,) and a margin around it; None = all."""
         if margin_m is None:
             return dict.fromkeys(self._rig.names)
         return {
@@ -174,7 +174,7 @@ class EvidenceMaker:
         }
 
     def _whole_frame_is_due(self, name: str) -> bool:
-        """Cameras take turns, so that no frame costs much more than others."""
+        """The cameras in rotation, so that no frame costs much more than others."""
         shift = self._rig.names.index(name) * self._every // len(self._rig)
         return (self._turn + shift) % self._every == 0
 

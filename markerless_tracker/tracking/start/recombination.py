@@ -9,14 +9,14 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.start.postures import joint_spread, postures
+from markerless_tracker.tracking.start.postures import joint_sd, postures
 
 _ONE_LIMB = 0.5
-"""Share of children with one limb drawn anew; the others mix limbs."""
+"""Fraction of children with one limb drawn anew; the others mix limbs."""
 _MIXED = 0.35
-"""Share of the limbs that a mixed child changes."""
+"""Fraction of the limbs that a mixed child changes."""
 _TURNED = 0.4
-"""Share of the mixed children that are also turned and tilted."""
+"""Fraction of the mixed children whose root is also rotated."""
 _TURN_RAD, _TILT_RAD = 0.5, 0.15
 _FREE_RAD = 2.8
 _FEW = 0.3
@@ -36,7 +36,7 @@ class Recombiner:
     def __init__(self, body: BodyModel, limits: FloatArray) -> None:
         self._body = body
         self._limits = limits
-        self._sd = joint_spread(body)
+        self._sd = joint_sd(body)
         self._known = postures(body)
         self._limbs = [body.subspaces[step[0]] for step in body.steps("six")[1:]]
         radius = np.where(self._sd < _FEW, _FEW, _FREE_RAD)
@@ -74,11 +74,11 @@ class Recombiner:
         return self.with_limb_near(poses, limb, 1.0, rng)
 
     def with_limb_near(
-        self, poses: FloatArray, limb: IntArray, share: float, rng: np.random.Generator
+        self, poses: FloatArray, limb: IntArray, fraction: float, rng: np.random.Generator
     ) -> FloatArray:
         """Poses (n, p), each with its limb varied by a fraction of the prior's deviations."""
         out = poses.copy()
-        out[:, limb] += share * self._sd[limb] * rng.standard_normal((len(poses), len(limb)))
+        out[:, limb] += fraction * self._sd[limb] * rng.standard_normal((len(poses), len(limb)))
         return np.clip(out, self._limits[0], self._limits[1], out=out)
 
     def _draw(self, child: FloatArray, limb: IntArray, rng: np.random.Generator) -> None:

@@ -60,13 +60,13 @@ def test_nobody_is_a_state_and_no_error(walk) -> None:
     scene, taken = walk
     tracker = tracker_of(scene, stature=1.72)
     stamp, seen, _ = taken[0]
-    nobody = {
+    empty = {
         name: Observation.from_mask(
             name, 0, np.zeros((view.height, view.width), np.uint8), view.edges
         )
         for name, view in seen.items()
     }
-    result = tracker.step(nobody, stamp - 1)
+    result = tracker.step(empty, stamp - 1)
     assert result.state is TrackState.SEARCHING
     assert result.pose is None and result.markers_m is None and not result.iou
     assert tracker.step(seen, stamp).state is TrackState.TRACKING
