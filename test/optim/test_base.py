@@ -88,7 +88,7 @@ def test_the_callers_costs_are_left_alone(problem):
     assert np.isnan(costs[0])
 
 
-def test_out_of_turn(problem):
+def test_out_of_order(problem):
     search = Counting(problem)
     with pytest.raises(SearchError, match="for no points asked for"):
         search.tell(np.zeros(3))

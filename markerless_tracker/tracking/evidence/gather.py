@@ -44,7 +44,7 @@ class EvidenceMaker:
         self._margin_px = config.region.component_margin_px
         self._clear_px = edge_radius_px(config) + config.region.component_margin_px
         self._every = config.region.full_frame_every
-        self._turn = 0
+        self._calls = 0
         self._pool = pool
         self.segmenters: dict[str, Segmenter] = {}
         self.take_backgrounds(backgrounds)
@@ -134,7 +134,7 @@ class EvidenceMaker:
             ImageError, CalibrationError: as `observe`.
         """
         self._check(views)
-        self._turn += 1
+        self._calls += 1
         regions = self.regions(body, predicted, margin_m)
 
         def evidence(item: tuple[str, Image | Observation]) -> tuple[Observation, int]:
@@ -176,7 +176,7 @@ class EvidenceMaker:
     def _whole_frame_is_due(self, name: str) -> bool:
         """The cameras in rotation, so that no frame costs much more than others."""
         shift = self._rig.names.index(name) * self._every // len(self._rig)
-        return (self._turn + shift) % self._every == 0
+        return (self._calls + shift) % self._every == 0
 
     def _check(self, views: Mapping[str, Image | Observation]) -> None:
         if not views:

@@ -17,7 +17,7 @@ _MIXED = 0.35
 """Fraction of the limbs that a mixed child changes."""
 _TURNED = 0.4
 """Fraction of the mixed children whose root is also rotated."""
-_TURN_RAD, _TILT_RAD = 0.5, 0.15
+_YAW_RAD, _TILT_RAD = 0.5, 0.15
 _FREE_RAD = 2.8
 _FEW = 0.3
 """A smaller prior standard deviation (rad) marks a joint that hardly moves: clavicles, thorax."""
@@ -42,7 +42,7 @@ class Recombiner:
         radius = np.where(self._sd < _FEW, _FEW, _FREE_RAD)
         self._low = np.maximum(limits[0], body.neutral - radius)
         self._high = np.minimum(limits[1], body.neutral + radius)
-        self._turn = body.index("pelvis_rz")
+        self._yaw = body.index("pelvis_rz")
         self._tilt = [body.index("pelvis_rx"), body.index("pelvis_ry")]
 
     def children(self, parents: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
@@ -98,5 +98,5 @@ class Recombiner:
                 scale = (0.5, 1.0)[rng.integers(2)]
                 child[limb] += scale * self._sd[limb] * rng.standard_normal(len(limb))
         if rng.random() < _TURNED:
-            child[self._turn] += _TURN_RAD * rng.standard_normal()
+            child[self._yaw] += _YAW_RAD * rng.standard_normal()
             child[self._tilt] += _TILT_RAD * rng.standard_normal(2)

@@ -127,7 +127,7 @@ class Starter:
         self._start_gate.reset()
         self._population: Population | None = None
         self._searcher: Searcher | None = None
-        self._way = 0.0
+        self._heading = 0.0
         self._seen: tuple[list[_Seen | None], list[_Seen | None]] = ([], [])
         self._leading = 0
         self._flipped = False
@@ -153,7 +153,7 @@ class Starter:
             return None
         self._population = population
         self._note(frame, population)
-        notes += self._turn(stamp_ns)
+        notes += self._check_heading(stamp_ns)
         settled = len(self._seen[0]) >= SETTLING_FRAMES
         pose = self._best(population).poses[0]
         if settled:
@@ -180,7 +180,7 @@ class Starter:
             if not self._start_gate.enough(self._searcher.body, best, looking, stamp_ns):
                 continue
             self._population = population
-            self._way = float(population.headings[0])
+            self._heading = float(population.headings[0])
             self._begun_ns = stamp_ns
             self._note(frame, population)
             self._from_m = self._trunk(population.poses[0])
@@ -266,14 +266,14 @@ class Starter:
 
     def _note(self, frame: FramePopulation, population: Population) -> None:
         for side, seen in enumerate(self._seen):
-            facing = population.facing(self._way + side * np.pi)
+            facing = population.facing(self._heading + side * np.pi)
             seen.append(
                 _Seen(frame.contours, facing.poses[0], float(facing.costs[0]))
                 if len(facing)
                 else None
             )
 
-    def _turn(self, stamp_ns: int) -> tuple[str, ...]:
+    def _check_heading(self, stamp_ns: int) -> tuple[str, ...]:
         """Change to the opposite heading, at most once, if it explains the frames better."""
         other = 1 - self._leading
         both = [
@@ -290,7 +290,7 @@ class Starter:
         walked_m = float(np.hypot(moved[0], moved[1]))
         if walked_m > _WALKED_M and seconds > 0.0 and walked_m / seconds > _WALK_M_S:
             off = heading_difference(
-                float(np.arctan2(moved[1], moved[0])), self._way + other * np.pi
+                float(np.arctan2(moved[1], moved[0])), self._heading + other * np.pi
             )
             rise += 2.0 * _WALK_BONUS * float(np.cos(off))
         over = len(self._seen[0]) >= SETTLING_FRAMES
@@ -301,7 +301,7 @@ class Starter:
 
     def _best(self, population: Population) -> Population:
         """The part of a population that has the leading heading, or all if none has."""
-        facing = population.facing(self._way + self._leading * np.pi)
+        facing = population.facing(self._heading + self._leading * np.pi)
         return facing if len(facing) else population
 
     def _settle(self, frame: FramePopulation, pose: FloatArray) -> FloatArray:

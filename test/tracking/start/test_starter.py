@@ -163,8 +163,8 @@ def test_who_is_turned_round_is_said_once() -> None:
     for cost, other in ((0.10, 0.09), (0.10, 0.08)):
         starter._seen[0].append(_Seen(None, pose, cost))
         starter._seen[1].append(_Seen(None, pose, other))
-    (note,) = starter._turn(33_000_000)
+    (note,) = starter._check_heading(33_000_000)
     assert "turned round" in note
     for seen, cost in zip(starter._seen, (0.01, 0.2), strict=True):
         seen.append(_Seen(None, pose, cost))
-    assert starter._turn(50_000_000) == ()
+    assert starter._check_heading(50_000_000) == ()
