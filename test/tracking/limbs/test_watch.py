@@ -137,7 +137,7 @@ def test_turns_come_by_time_and_depend_on_nothing_else(balancing) -> None:
         contours = contours_of(searcher, seen, hidden)
         return [watch.recover(searcher, contours, seen, stamp, hidden)[1] for stamp in stamps]
 
-    # The arm is first in rotation, and no limb comes again so soon.
+    # The arm is first in the order of turns, and nobody's turn comes again so soon.
     assert found([0, 1, ROTATION_NS - 1]) == [("l_arm",), (), ()]
     assert found([0, ROTATION_NS], threads=2) == found([0, ROTATION_NS])
     assert scene.body.limbs[0] == "l_arm"
