@@ -47,7 +47,7 @@ class JudgedSet:
         index: of the frame.
         images: camera to image.
         exact: camera to exact mask (h, w); empty without any.
-        body, pose: the body and its reference pose (p,), where there are no exact masks.
+        body, pose: the body and its reference pose (p,); no pose where nothing says it.
     """
 
     index: int
@@ -58,7 +58,7 @@ class JudgedSet:
 
     def masks(self, rig: CameraRig) -> Mapping[str, Mask]:
         """Camera to the mask (h, w) to compare with: exact, or the body's at the reference."""
-        if self.pose is None:
+        if self.exact or self.pose is None:
             return self.exact
         return {camera.name: silhouette(self.body, self.pose, camera) for camera in rig}
 
@@ -110,11 +110,13 @@ def recorded_scene(
     if isinstance(recording, FolderRecording):
         exact = {name: found for name in recording.rig.names if (found := recording.masks(name))}
     poses: dict[int, FloatArray] = {}
+    truth = truth_path(source)
     if exact:
         body = load_body(BODY)
         known = sorted(set().union(*exact.values()))
+        if truth.is_file():
+            body, poses = _posed(recording, truth)
     else:
-        truth = truth_path(source)
         if not truth.is_file():
             raise DatasetError(f"{source}: neither masks/ nor {truth.name}, expected one of them")
         body, poses = _posed(recording, truth)
@@ -152,16 +154,16 @@ def recorded_scene(
 
 
 def made_up_scene(
-    *, frames: int = FRAMES, size_px: tuple[int, int] = (656, 490)
+    *, frames: int = FRAMES, size_px: tuple[int, int] = (656, 490), grey: bool = False
 ) -> SilhouetteScene:
     """A made-up walk in front of four cameras, every sixth frame of it."""
-    scene = SyntheticScene(body=BODY, size_px=size_px)
+    scene = SyntheticScene(body=BODY, size_px=size_px, grey=grey)
     indices = tuple(6 * i for i in range(frames))
 
     def make() -> Iterator[JudgedSet]:
         for index in indices:
-            images, masks, _ = scene.frame(index)
-            yield JudgedSet(index, images, masks, scene.body)
+            images, masks, pose = scene.frame(index)
+            yield JudgedSet(index, images, masks, scene.body, pose)
 
     empty = scene.backgrounds(_EMPTY_IMAGES)
     return SilhouetteScene("made up", scene.rig, empty, indices, True, scene.body, make)

@@ -58,6 +58,7 @@ def test_evidence_equals_that_of_the_tracker(walk, evidence) -> None:
     for (stamp_ns, views), one in zip(stored, tracked, strict=True):
         result = ready.step(views, stamp_ns)
         assert stamp_ns == one.result.stamp_ns
+        assert any(seen.undecided is not None for seen in views.values())
         assert result.pose.tobytes() == one.result.pose.tobytes()
 
 
