@@ -1,12 +1,12 @@
 """How good silhouettes are: against exact masks, or against the body posed at the reference.
 
-Undecided pixels are measured apart: agreement is that of the decided ones, once after imaging alone
+Undecided pixels are measured apart: scores are those of the decided ones, once after imaging alone
 and once after the body at the reference pose has decided what lies near it, as the predicted body
 does when tracking.
 
 Side by side with OpenCV's background subtractors MOG2 and KNN on the same frames. Those learn the
-same empty-scene images, do not learn on while judged, remove shadows their own way and get the
-same repairs afterwards (`imaging.morphology.clean_mask`), which they need. One thread each; times
+same empty-scene images, learn nothing from the measured ones, remove shadows by their own rule and
+get the same repairs afterwards (`imaging.morphology.clean_mask`), which they need. One thread each; times
 are image to repaired silhouette, without the edge map.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.benchmarks.machine import machine
-from markerless_tracker.benchmarks.silhouettes.scene import JudgedSet, SilhouetteScene
+from markerless_tracker.benchmarks.silhouettes.scene import ImageSet, SilhouetteScene
 from markerless_tracker.body import BodyModel
 from markerless_tracker.imaging import Image, ImagingSettings, Segmenter, learn_background
 from markerless_tracker.imaging.segmentation import clean_mask
@@ -35,13 +35,13 @@ LEAK_PX = 5
 """False positives further than this from the exact mask count as leaked shadow."""
 
 Mask = NDArray[np.bool_]
-Judge = Callable[[Image], tuple[Mask, Mask | None]]
+Segmentation = Callable[[Image], tuple[Mask, Mask | None]]
 """Person and undecided pixels (h, w) of an image; None if there are two classes."""
 Picture = Callable[[str, int, Image], None]
 
 
 @dataclass(frozen=True)
-class Agreement:
+class MaskScores:
     """How a mask agrees with the exact one, each in 0..1 but `shadow_leak`, which may exceed 1.
 
     Attributes:
@@ -56,7 +56,7 @@ class Agreement:
     undecided_share: float = 0.0
 
 
-def agreement(mask: Mask, exact: Mask, undecided: Mask | None = None) -> Agreement:
+def mask_scores(mask: Mask, exact: Mask, undecided: Mask | None = None) -> MaskScores:
     """Compare two masks (h, w); a share of nothing is 1, a leak beside nothing is 0."""
     person, share = int(exact.sum()), 0.0
     if undecided is not None:
@@ -68,7 +68,7 @@ def agreement(mask: Mask, exact: Mask, undecided: Mask | None = None) -> Agreeme
     away = cv2.distanceTransform((~exact).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     # Without a single pixel of body there is no distance to it.
     leaked = int((mask & (np.asarray(away) > LEAK_PX)).sum()) if true else found
-    return Agreement(
+    return MaskScores(
         iou=both / either if either else 1.0,
         precision=both / found if found else 1.0,
         recall=both / true if true else 1.0,
@@ -79,10 +79,10 @@ def agreement(mask: Mask, exact: Mask, undecided: Mask | None = None) -> Agreeme
 
 @dataclass
 class _Tally:
-    """What one judge got, by camera."""
+    """What one method got, by camera."""
 
-    rows: dict[str, list[Agreement]] = field(default_factory=dict)
-    imaging: dict[str, list[Agreement]] = field(default_factory=dict)
+    rows: dict[str, list[MaskScores]] = field(default_factory=dict)
+    imaging: dict[str, list[MaskScores]] = field(default_factory=dict)
     selected: dict[str, list[float]] = field(default_factory=dict)
     ms: dict[str, list[float]] = field(default_factory=dict)
 
@@ -98,11 +98,11 @@ class _Tally:
         return float(np.median([value for values in self.ms.values() for value in values]))
 
 
-def _mean(rows: list[Agreement], key: str) -> float:
+def _mean(rows: list[MaskScores], key: str) -> float:
     return float(np.mean([getattr(row, key) for row in rows]))
 
 
-def _over_cameras(rows: Mapping[str, list[Agreement]], key: str) -> float:
+def _over_cameras(rows: Mapping[str, list[MaskScores]], key: str) -> float:
     return float(np.mean([_mean(of, key) for of in rows.values()]))
 
 
@@ -113,7 +113,7 @@ def measure(
     progress: Callable[[int, int], None] = lambda done, total: None,
     picture: Picture | None = None,
 ) -> dict[str, Any]:
-    """Judge silhouettes; keys as `benchmark silhouettes --json` prints them.
+    """Measure silhouettes; keys as `benchmark silhouettes --json` prints them.
 
     With exact masks `cameras` holds iou, precision, recall, shadow_leak and ms, and `iou_mean` and
     `undecided_share` sum up: after the body at the reference pose has decided undecided pixels
@@ -124,9 +124,9 @@ def measure(
     their median.
 
     Args:
-        scene: what is judged.
+        scene: what is measured.
         config: settings of the imaging and of the choice of components; defaults if None.
-        progress: told how many frames of how many are done.
+        progress: reports how many frames of how many are done.
         picture: given camera, frame and a picture of every silhouette: false positives red, false
             negatives blue, undecided yellow, the rest of the silhouette green.
 
@@ -134,29 +134,29 @@ def measure(
         TrackerError: the recording cannot be read, or its images do not fit its background.
     """
     config = config or TrackerConfig()
-    judges = {name: _judges(name, frames, config) for name, frames in scene.empty.items()}
-    tallies = {judge: _Tally() for judge in ("own", "mog2", "knn")}
+    methods = {name: _methods(name, frames, config) for name, frames in scene.empty.items()}
+    tallies = {method: _Tally() for method in ("own", "mog2", "knn")}
     with _one_thread():
         for count, views in enumerate(scene.frames()):
             for camera, exact in views.masks(scene.rig).items():
                 image = views.images[camera]
-                for judge, tally in tallies.items():
-                    (mask, undecided), ms = _timed(judges[camera][judge], image)
+                for method, tally in tallies.items():
+                    (mask, undecided), ms = _timed(methods[camera][method], image)
                     tally.ms.setdefault(camera, []).append(ms)
-                    if judge == "own":
-                        before = agreement(mask, exact, undecided)
+                    if method == "own":
+                        before = mask_scores(mask, exact, undecided)
                         tally.imaging.setdefault(camera, []).append(before)
                         if not views.exact:
                             selected = _selected(mask, undecided, scene, views, camera, config)
                             tally.selected.setdefault(camera, []).append(
-                                agreement(selected[0], exact, selected[1]).iou
+                                mask_scores(selected[0], exact, selected[1]).iou
                             )
                         elif undecided is not None and views.pose is not None:
                             mask, undecided = _decided(mask, undecided, scene, views, camera)
                         if picture is not None:
-                            drawn = draw_agreement(image, mask, exact, undecided)
+                            drawn = draw_mask_errors(image, mask, exact, undecided)
                             picture(camera, views.index, drawn)
-                    tally.rows.setdefault(camera, []).append(agreement(mask, exact, undecided))
+                    tally.rows.setdefault(camera, []).append(mask_scores(mask, exact, undecided))
             progress(count + 1, scene.frame_count)
     return _figures(scene, tallies)
 
@@ -212,7 +212,7 @@ def radii_mm(body: BodyModel) -> dict[str, list[float]]:
     }
 
 
-def draw_agreement(image: Image, mask: Mask, exact: Mask, undecided: Mask | None = None) -> Image:
+def draw_mask_errors(image: Image, mask: Mask, exact: Mask, undecided: Mask | None = None) -> Image:
     """The image (h, w, 3), darkened: silhouette green, too much red, missing blue.
 
     Undecided pixels are yellow, of the person or not.
@@ -227,44 +227,44 @@ def draw_agreement(image: Image, mask: Mask, exact: Mask, undecided: Mask | None
     return out
 
 
-def _judges(camera: str, empty: list[Image], settings: ImagingSettings) -> dict[str, Judge]:
+def _methods(camera: str, empty: list[Image], settings: ImagingSettings) -> dict[str, Segmentation]:
     segmenter = Segmenter(camera, learn_background(empty, settings, camera=camera), settings)
 
     def own(image: Image) -> tuple[Mask, Mask | None]:
         mask, undecided = segmenter.classes(image)
         return mask > 0, None if undecided is None else undecided > 0
 
-    judges: dict[str, Judge] = {"own": own}
+    methods: dict[str, Segmentation] = {"own": own}
     for name, make in (
         ("mog2", cv2.createBackgroundSubtractorMOG2),
         ("knn", cv2.createBackgroundSubtractorKNN),
     ):
-        judges[name] = _subtractor(make(history=max(len(empty), 2), detectShadows=True), empty,
+        methods[name] = _subtractor(make(history=max(len(empty), 2), detectShadows=True), empty,
                                    settings)  # fmt: skip
     # Compiles what is compiled at first use, and fills caches.
-    for judge in judges.values():
-        judge(empty[0])
-    return judges
+    for method in methods.values():
+        method(empty[0])
+    return methods
 
 
-def _subtractor(model: Any, empty: list[Image], settings: ImagingSettings) -> Judge:
+def _subtractor(model: Any, empty: list[Image], settings: ImagingSettings) -> Segmentation:
     # One still says little to a model with a memory of many frames.
     for image in empty * max(1, -(-10 // len(empty))):
         model.apply(image)
 
-    def judge(image: Image) -> tuple[Mask, Mask | None]:
+    def method(image: Image) -> tuple[Mask, Mask | None]:
         labels = model.apply(image, learningRate=0.0)
         mask = np.asarray(cv2.threshold(labels, 127, 255, cv2.THRESH_BINARY)[1], dtype=np.uint8)
         return clean_mask(mask, settings) > 0, None
 
-    return judge
+    return method
 
 
 def _selected(
     mask: Mask,
     undecided: Mask | None,
     scene: SilhouetteScene,
-    views: JudgedSet,
+    views: ImageSet,
     camera: str,
     config: TrackerConfig,
 ) -> tuple[Mask, Mask | None]:
@@ -277,7 +277,7 @@ def _selected(
 
 
 def _decided(
-    mask: Mask, undecided: Mask, scene: SilhouetteScene, views: JudgedSet, camera: str
+    mask: Mask, undecided: Mask, scene: SilhouetteScene, views: ImageSet, camera: str
 ) -> tuple[Mask, Mask | None]:
     """Person and undecided pixels after the body at the reference has decided."""
     assert views.pose is not None
@@ -292,12 +292,12 @@ def _observation(camera: str, mask: Mask, undecided: Mask | None) -> Observation
     return Observation.from_mask(camera, 0, mask, nothing, undecided=undecided)
 
 
-def _timed(judge: Judge, image: Image) -> tuple[tuple[Mask, Mask | None], float]:
+def _timed(method: Segmentation, image: Image) -> tuple[tuple[Mask, Mask | None], float]:
     """The classes, and the lesser of two times: the first run meets cold caches."""
     times = []
     for _ in range(2):
         start = time.perf_counter()
-        found = judge(image)
+        found = method(image)
         times.append((time.perf_counter() - start) * 1e3)
     return found, min(times)
 

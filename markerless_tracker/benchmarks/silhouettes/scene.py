@@ -1,4 +1,4 @@
-"""What silhouettes are judged on: frames with exact masks, or with a reference pose."""
+"""What silhouettes are measured on: frames with exact masks, or with a reference pose."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -35,12 +35,12 @@ Mask = NDArray[np.bool_]
 
 BODY = "person31"
 FRAMES = 10
-"""Frames judged by a reference pose, where exact masks do not say which."""
+"""Frames measured by a reference pose, where exact masks do not say which."""
 _EMPTY_IMAGES = 10
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedSet:
+class ImageSet:
     """Images of one time and what is known about the body then.
 
     Attributes:
@@ -65,16 +65,16 @@ class JudgedSet:
 
 @dataclass(frozen=True, eq=False)
 class SilhouetteScene:
-    """A recording, or a made-up scene, as silhouettes are judged on it.
+    """A recording, or a made-up scene, as silhouettes are measured on it.
 
     Attributes:
         name: of the recording.
         rig: its cameras.
         empty: empty-scene images by camera.
-        indices: the frames judged.
+        indices: the frames measured.
         exact: whether there are exact masks.
         body: whose silhouette stands in for exact masks.
-        frames: yields the judged sets in order.
+        frames: yields the measured sets in order.
     """
 
     name: str
@@ -83,11 +83,11 @@ class SilhouetteScene:
     indices: tuple[int, ...]
     exact: bool
     body: BodyModel
-    frames: Callable[[], Iterator[JudgedSet]]
+    frames: Callable[[], Iterator[ImageSet]]
 
     @property
     def frame_count(self) -> int:
-        """Number of frames judged."""
+        """Number of frames measured."""
         return len(self.indices)
 
 
@@ -130,7 +130,7 @@ def recorded_scene(
         known = [known[int(i)] for i in np.linspace(0, len(known) - 1, frames).round()]
     chosen = set(known)
 
-    def read() -> Iterator[JudgedSet]:
+    def read() -> Iterator[ImageSet]:
         for views in recording.frames():
             if views.index in chosen:
                 masks = {
@@ -138,7 +138,7 @@ def recorded_scene(
                     for name, found in exact.items()
                     if views.index in found
                 }
-                yield JudgedSet(views.index, views.images, masks, body, poses.get(views.index))
+                yield ImageSet(views.index, views.images, masks, body, poses.get(views.index))
             if views.index >= known[-1]:
                 return
 
@@ -160,10 +160,10 @@ def made_up_scene(
     scene = SyntheticScene(body=BODY, size_px=size_px, grey=grey)
     indices = tuple(6 * i for i in range(frames))
 
-    def make() -> Iterator[JudgedSet]:
+    def make() -> Iterator[ImageSet]:
         for index in indices:
             images, masks, pose = scene.frame(index)
-            yield JudgedSet(index, images, masks, scene.body, pose)
+            yield ImageSet(index, images, masks, scene.body, pose)
 
     empty = scene.backgrounds(_EMPTY_IMAGES)
     return SilhouetteScene("made up", scene.rig, empty, indices, True, scene.body, make)

@@ -1,4 +1,4 @@
-"""The body of the tracked person: what is known of it, and what is still to be fitted."""
+"""The body of the tracked person: what is known of it, and what remains to be fitted."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -127,7 +127,7 @@ class BodyEstimate:
             self.sections_fitted, self.sized = True, None
 
     def fit_tracked_frame(self, search: FrameSearch) -> FloatArray | None:
-        """Use a tracked frame for what is still to be fitted, if it agrees with the body.
+        """Use a tracked frame for what remains to be fitted, if it agrees with the body.
 
         Returns:
             If `body` has changed: how far (p,) its poses lie from those tracked so far.

@@ -3,8 +3,8 @@ import pytest
 
 from markerless_tracker.benchmarks.silhouettes.masks import (
     LEAK_PX,
-    agreement,
-    draw_agreement,
+    draw_mask_errors,
+    mask_scores,
     measure,
     radii_mm,
 )
@@ -20,51 +20,51 @@ def square(left: int, right: int) -> np.ndarray:
 
 
 def test_shares_by_hand() -> None:
-    told = agreement(square(15, 35), square(10, 30))
-    assert told.iou == pytest.approx(15 / 25)
-    assert told.precision == told.recall == pytest.approx(15 / 20)
-    assert told.shadow_leak == 0.0
+    scores = mask_scores(square(15, 35), square(10, 30))
+    assert scores.iou == pytest.approx(15 / 25)
+    assert scores.precision == scores.recall == pytest.approx(15 / 20)
+    assert scores.shadow_leak == 0.0
 
 
 def test_a_leak_begins_beyond_the_margin() -> None:
     exact = square(10, 30)
     near = exact.copy()
     near[20, 30 : 30 + LEAK_PX] = True
-    assert agreement(near, exact).shadow_leak == 0.0
+    assert mask_scores(near, exact).shadow_leak == 0.0
     near[20, 30 + LEAK_PX + 1] = True
-    assert agreement(near, exact).shadow_leak == pytest.approx(1 / exact.sum())
+    assert mask_scores(near, exact).shadow_leak == pytest.approx(1 / exact.sum())
 
 
 def test_nothing_there() -> None:
     nothing, something = np.zeros((40, 60), dtype=bool), square(10, 30)
-    assert agreement(nothing, nothing).iou == 1.0
-    told = agreement(nothing, something)
-    assert (told.iou, told.precision, told.recall) == (0.0, 1.0, 0.0)
-    told = agreement(something, nothing)
-    assert (told.iou, told.precision, told.recall) == (0.0, 0.0, 1.0)
+    assert mask_scores(nothing, nothing).iou == 1.0
+    scores = mask_scores(nothing, something)
+    assert (scores.iou, scores.precision, scores.recall) == (0.0, 1.0, 0.0)
+    scores = mask_scores(something, nothing)
+    assert (scores.iou, scores.precision, scores.recall) == (0.0, 0.0, 1.0)
 
 
 def test_undecided_pixels_count_neither_way() -> None:
     exact, undecided = square(10, 30), np.zeros((40, 60), dtype=bool)
     undecided[10:30, 25:40] = True
-    found = agreement(square(10, 35) & ~undecided, exact, undecided)
+    found = mask_scores(square(10, 35) & ~undecided, exact, undecided)
     assert (found.iou, found.precision, found.recall, found.shadow_leak) == (1.0, 1.0, 1.0, 0.0)
     assert found.undecided_share == pytest.approx(5 / 20)
-    found = agreement(square(12, 20), exact, undecided)
+    found = mask_scores(square(12, 20), exact, undecided)
     assert found.iou == found.recall == pytest.approx(8 / 15)
     everything = np.ones((40, 60), dtype=bool)
-    assert agreement(~everything, exact, everything).undecided_share == 1.0
-    assert agreement(~everything, ~everything, everything).undecided_share == 0.0
+    assert mask_scores(~everything, exact, everything).undecided_share == 1.0
+    assert mask_scores(~everything, ~everything, everything).undecided_share == 0.0
 
 
 def test_a_picture_shows_what_is_wrong() -> None:
-    picture = draw_agreement(np.full((40, 60), 100, np.uint8), square(15, 35), square(10, 30))
+    picture = draw_mask_errors(np.full((40, 60), 100, np.uint8), square(15, 35), square(10, 30))
     assert tuple(picture[20, 32]) == (0, 0, 255)
     assert tuple(picture[20, 12]) == (255, 80, 0)
     assert tuple(picture[20, 20]) == (50, 140, 50)
     assert tuple(picture[2, 2]) == (50, 50, 50)
     undecided = square(40, 50)
-    picture = draw_agreement(picture, square(15, 35), square(10, 30), undecided)
+    picture = draw_mask_errors(picture, square(15, 35), square(10, 30), undecided)
     assert (picture[undecided] == (0, 200, 200)).all() and tuple(picture[20, 32]) == (0, 0, 255)
 
 
@@ -100,12 +100,12 @@ def test_the_body_decides_most_of_what_imaging_left_undecided() -> None:
 def test_without_exact_masks_the_body_stands_in(balance_real) -> None:
     scene = recorded_scene(balance_real, scale=0.25, frames=1)
     assert not scene.exact and scene.frame_count == 1
-    told = measure(scene)
-    assert set(told["cameras"]) == set(scene.rig.names)
-    for row in told["cameras"].values():
+    scores = measure(scene)
+    assert set(scores["cameras"]) == set(scene.rig.names)
+    for row in scores["cameras"].values():
         assert 0.5 < row["overlap"] <= row["overlap_selected"] + 0.05
-    assert told["body"] == {"name": "person31", "radii_mm": radii_mm(scene.body)}
-    assert told["body"]["radii_mm"]
+    assert scores["body"] == {"name": "person31", "radii_mm": radii_mm(scene.body)}
+    assert scores["body"]["radii_mm"]
 
 
 def test_exact_masks_are_found_scaled(render_walk) -> None:

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from markerless_tracker.fitness.contour.silhouette_contour import UNDECIDED_PX, edge_of_mask
+from markerless_tracker.fitness.contour.silhouette_contour import UNDECIDED_PX, silhouette_contour
 from markerless_tracker.records import Observation
 
 SPACING_PX = 2.0
@@ -37,20 +37,20 @@ def in_window(edge, mask):
 
 def test_no_point_lies_beside_undecided_pixels(lower) -> None:
     person = blob()
-    edge = edge_of_mask(observe(person & ~lower, lower), SPACING_PX)
+    edge = silhouette_contour(observe(person & ~lower, lower), SPACING_PX)
     away = cv2.distanceTransform((~lower).astype(np.uint8), cv2.DIST_L2, 5)
     u, v = np.rint(edge.points).astype(int).T
     assert len(edge.points) > 40 and away[v, u].min() > UNDECIDED_PX - 1.0
     # The border of person and background has its points as before.
-    plain = edge_of_mask(observe(person), SPACING_PX)
+    plain = silhouette_contour(observe(person), SPACING_PX)
     rows = plain.points[:, 1]
     assert np.isclose(edge.spacing.sum(), plain.spacing[rows < 98].sum(), rtol=0.06)
 
 
 def test_distances_are_very_large_where_that_border_is_the_nearest(lower) -> None:
     person = blob()
-    edge = edge_of_mask(observe(person & ~lower, lower), SPACING_PX)
-    plain = edge_of_mask(observe(person), SPACING_PX)
+    edge = silhouette_contour(observe(person & ~lower, lower), SPACING_PX)
+    plain = silhouette_contour(observe(person), SPACING_PX)
     assert (edge.distance[in_window(edge, lower)] > FAR_PX).all()
     # In the middle, just above the border.
     assert edge.distance[94 - edge.top, 100 - edge.left] > FAR_PX
@@ -64,7 +64,7 @@ def test_undecided_pixels_far_away_change_nothing() -> None:
     person = blob()
     far = np.zeros(person.shape, bool)
     far[:3, :3] = True
-    edge, plain = (edge_of_mask(observe(person, u), SPACING_PX) for u in (far, None))
+    edge, plain = (silhouette_contour(observe(person, u), SPACING_PX) for u in (far, None))
     np.testing.assert_array_equal(edge.points, plain.points)
     np.testing.assert_array_equal(edge.normals, plain.normals)
     near = np.abs(plain.distance) < 20.0
@@ -74,7 +74,7 @@ def test_undecided_pixels_far_away_change_nothing() -> None:
 def test_without_undecided_pixels_it_is_the_plain_contour() -> None:
     person = blob()
     edge, plain = (
-        edge_of_mask(observe(person, u), SPACING_PX) for u in (np.zeros_like(person), None)
+        silhouette_contour(observe(person, u), SPACING_PX) for u in (np.zeros_like(person), None)
     )
     for name in ("distance", "points", "normals", "spacing"):
         np.testing.assert_array_equal(getattr(edge, name), getattr(plain, name))
@@ -90,7 +90,7 @@ def test_a_region_with_undecided_pixels(lower) -> None:
     )  # fmt: skip
     inside = np.zeros_like(person)
     inside[region] = True
-    whole = edge_of_mask(observe(person & ~lower, lower & inside), SPACING_PX)
-    part = edge_of_mask(cut, SPACING_PX)
+    whole = silhouette_contour(observe(person & ~lower, lower & inside), SPACING_PX)
+    part = silhouette_contour(cut, SPACING_PX)
     np.testing.assert_array_equal(part.points, whole.points)
     np.testing.assert_array_equal(part.distance, whole.distance)

@@ -60,7 +60,7 @@ def test_the_pose_is_that_of_whole_images(
     moved_m = np.linalg.norm(b.markers_m - frames[0].markers_m, axis=1).mean()
     assert moved_m > 0.03, "the start pose itself would pass"
     full = 256 * 192
-    # The first frame looks everywhere, later ones but for the cameras whose turn it is do not.
+    # The first frame uses whole images, later ones only those of the next cameras in rotation.
     assert sizes[0] == [full] * 4
     if undecided:
         # A shadow that leaves the region may hold more of the person: the frame is looked at.
@@ -82,7 +82,7 @@ def seen_in(mask, region: Region) -> Observation:
     )
 
 
-def test_exposure_is_told_per_camera(make_tracker, frames, swarm_settings) -> None:
+def test_exposure_is_reported_per_camera(make_tracker, frames, swarm_settings) -> None:
     tracker = make_tracker(swarm_settings, evaluations=100)
     for frame, gain in zip(frames[:2], (1.0, 1.2), strict=True):
         views = {
@@ -92,9 +92,9 @@ def test_exposure_is_told_per_camera(make_tracker, frames, swarm_settings) -> No
         exact = dict(views)
         last = next(reversed(exact))
         exact[last] = frame.observations[last]
-        told = tracker.step(exact, frame.stamp_ns).exposure
-        assert set(told) == set(views) - {last}
-        for values in told.values():
+        exposure = tracker.step(exact, frame.stamp_ns).exposure
+        assert set(exposure) == set(views) - {last}
+        for values in exposure.values():
             assert values == pytest.approx((gain,) * 3, rel=0.02)
 
 
