@@ -78,8 +78,7 @@ class ShadowSettings(SettingsGroup):
     )
     weak_sigmas: float = setting(
         2.0,
-        "patches whose mean differs from the background by so many sigmas are undecided; "
-        "0 = none",
+        "patches whose mean differs from the background by so many sigmas are undecided; 0 = none",
         least=0.0,
         most=1000.0,
     )
