@@ -4,7 +4,13 @@ The inverse normal equations of the contour refinement are the Gauss-Newton appr
 posterior covariance, with the variance of this frame's residuals. That is noise only. Added are the
 disagreement between the views, of which a pose is a compromise, and what images do not show: the
 joint's centre inside the limb and, for a person whose lengths were not measured, the lengths.
+
+A limb at a wrong optimum has a well-determined pose, so its covariance does not show the error. Its
+residuals do: they stay larger than those of a limb that fits. By how much decides what is added to
+the limb's markers. Undecided pixels give no residuals, hence no information.
 """
+
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -25,6 +31,12 @@ DISAGREEMENT = 2.7
 CORRELATED = 9.0
 """Factor of the residuals' correlation length: a generic section is wrong along a whole limb, some
 half a metre, not along the piece of outline that the refinement takes for independent."""
+FITTING_LIMB_M = 0.007
+"""Root mean square of the residuals of a limb that fits: sections are generic, clothes are not."""
+LIMB_ERROR = 15.0
+"""Error of a limb's end relative to how far its residuals exceed those of a limb that fits."""
+MOST_LIMB_M = 0.30
+"""Largest error that is inferred so: about the length of a segment."""
 _LEVER_M = 0.25
 """Length of the limbs that an error of a joint's centre rotates."""
 _TRUNCATION_M = 0.06
@@ -63,13 +75,15 @@ def confidence_of(
     floor = float(np.hypot(unseen, DISAGREEMENT * disagreement_m(contours, rows)))
     by_marker, by_root = _slopes(body, pose)
     of_markers = np.einsum("ij,jk,ik->i", by_marker, covariance, by_marker)
+    limbs = limb_errors_m(body, rows)
+    of_limbs, of_pose = _spread(body, by_marker, limbs)
     of_root = by_root @ covariance @ by_root.T
     of_root[np.diag_indices(6)] += np.repeat([floor**2, (floor / _LEVER_M) ** 2], 3)
     floors = np.full(body.size, floor / _LEVER_M)
     floors[body.translations] = floor
     return Confidence(
-        pose_sd=np.sqrt(np.diag(covariance) + floors**2),
-        markers_sd_m=np.sqrt(of_markers + floor**2).reshape(-1, 3),
+        pose_sd=np.sqrt(np.diag(covariance) + floors**2 + of_pose),
+        markers_sd_m=np.sqrt((of_markers + floor**2).reshape(-1, 3) + of_limbs[:, None]),
         root_covariance=0.5 * (of_root + of_root.T),
     )
 
@@ -96,6 +110,44 @@ def disagreement_m(contours: ContourFrame, rows: OutlineRows) -> float:
             shift = np.linalg.solve(normal, slopes.T @ (weight * rows.value[begin:end]))
             squares.append(float(shift @ shift) / 2.0)
     return float(np.sqrt(np.mean(squares))) if squares else 0.0
+
+
+def limb_errors_m(body: BodyModel, rows: OutlineRows) -> dict[str, float]:
+    """By limb, the error of its end that its residuals suggest, m; 0 for a limb that fits.
+
+    Args:
+        body: the body.
+        rows: residuals collected at the pose.
+    """
+    count = len(body.cone_node)
+    weight = np.bincount(rows.cone, rows.weight, count)
+    square = np.bincount(rows.cone, rows.weight * rows.value**2, count)
+    errors = {}
+    for name in body.limbs:
+        nodes = np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name]))
+        own = carried(body, nodes)[body.cone_node].any(axis=1)
+        total = float(weight[own].sum())
+        rms = float(np.sqrt(square[own].sum() / total)) if total > 0.0 else 0.0
+        errors[name] = min(LIMB_ERROR * max(rms - FITTING_LIMB_M, 0.0), MOST_LIMB_M)
+    return errors
+
+
+def _spread(
+    body: BodyModel, by_marker: FloatArray, errors: Mapping[str, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Variances that errors of limbs' ends (m) add: of the markers (15,), of the pose (p,).
+
+    A marker has its share by how far the limb's parameters move it.
+    """
+    of_markers, of_pose = np.zeros(len(by_marker) // 3), np.zeros(body.size)
+    for name, error in errors.items():
+        own = body.subspaces[name]
+        lever = np.linalg.norm(by_marker.reshape(len(of_markers), 3, -1)[:, :, own], axis=(1, 2))
+        longest = float(lever.max())
+        if longest > 0.0:
+            of_markers += (error * lever / longest) ** 2
+            of_pose[own] += (error / longest) ** 2
+    return of_markers, of_pose
 
 
 def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, markers, root_transform
+from markerless_tracker.camera import project_camera
 from markerless_tracker.fitness.contour import outline_rows
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
@@ -88,6 +90,50 @@ def test_views_that_disagree_are_less_sure(scene) -> None:
     unsure = confidence_of(scene.body, pose, beside, measured=True)
     assert sure is not None and unsure is not None
     assert unsure.markers_sd_m.mean() > 1.5 * sure.markers_sd_m.mean()
+
+
+def test_a_limb_beside_its_silhouettes_is_unsure_and_the_others_are_not(scene) -> None:
+    pose, contours = frame_of(scene, scene.rig.names)
+    sure = confidence_of(scene.body, pose, contours, measured=True)
+    bent = pose.copy()
+    bent[scene.body.index("l_elbow")] += 0.5
+    unsure = confidence_of(scene.body, bent, contours, measured=True)
+    assert sure is not None and unsure is not None
+    gap_m = np.linalg.norm(markers(scene.body, bent) - markers(scene.body, pose), axis=1)
+    wrist = MARKER_NAMES.index("LWrist")
+    sd_m = np.linalg.norm(unsure.markers_sd_m, axis=1)
+    assert gap_m[wrist] > 0.10
+    assert sd_m[wrist] > max(0.05, 0.5 * gap_m[wrist])
+    legs = [MARKER_NAMES.index(name) for name in ("LKnee", "LAnkle", "RKnee", "RAnkle")]
+    assert (sd_m[legs] < 0.03).all()
+    assert (np.linalg.norm(sure.markers_sd_m, axis=1)[wrist] < 0.03).all()
+    arm = scene.body.subspaces["l_arm"]
+    assert (unsure.pose_sd[arm] > sure.pose_sd[arm]).all()
+
+
+def test_a_limb_on_undecided_pixels_is_less_sure(scene) -> None:
+    pose, contours = frame_of(scene, scene.rig.names)
+    sure = confidence_of(scene.body, pose, contours, measured=True)
+    _, masks, _ = scene.frame(0)
+    joints = markers(scene.body, pose)
+    knee, ankle = MARKER_NAMES.index("LKnee"), MARKER_NAMES.index("LAnkle")
+    seen = {}
+    for name, mask in masks.items():
+        hidden = np.zeros(mask.shape, np.uint8)
+        ends = np.round(project_camera(joints[[knee, ankle]], scene.rig[name])).astype(int)
+        cv2.line(hidden, ends[0].tolist(), ends[1].tolist(), 1, 31)
+        seen[name] = Observation.from_mask(
+            name, 0, (mask > 0) & (hidden == 0), np.zeros(mask.shape, np.uint8), undecided=hidden
+        )
+    searcher = Searcher(
+        scene.rig, scene.body, TrackerConfig(threads=1), limits=scene.body.limits, threads=1
+    )
+    hidden_leg = searcher.frame(seen, 0, pose).contours
+    unsure = confidence_of(scene.body, pose, hidden_leg, measured=True)
+    assert sure is not None and unsure is not None
+    ratio = unsure.markers_sd_m.mean(axis=1) / sure.markers_sd_m.mean(axis=1)
+    assert ratio[ankle] > 2.0
+    assert ratio[MARKER_NAMES.index("LWrist")] < 1.5
 
 
 def test_the_roots_covariance_is_one(scene) -> None:

@@ -19,6 +19,7 @@ from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull, decided_by_hull, find_hulls, hulls_part
 from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
 from markerless_tracker.tracking.start.postures import put_at
+from markerless_tracker.tracking.start.rejections import Rejections
 from markerless_tracker.tracking.start.start_gate import StartGate
 
 SETTLING_FRAMES = 8
@@ -120,10 +121,11 @@ class Starter:
         self._fit_shape = fit_shape
         self._last_pose = last_pose
         self._start_gate = StartGate()
+        self._rejections = Rejections()
         self.reset()
 
     def reset(self) -> None:
-        """Forget the frames so far."""
+        """Forget the person so far; objects that were rejected stay known."""
         self._start_gate.reset()
         self._population: Population | None = None
         self._searcher: Searcher | None = None
@@ -162,7 +164,10 @@ class Starter:
 
     def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> Found | None:
         looking = [self._cameras[name] for name in observed]
+        self._rejections.begin_frame(stamp_ns)
         for hull in find_hulls(self._cameras, observed):
+            if self._rejections.waits(hull):
+                continue
             # A search takes long: not for a person that is hardly in view.
             stands = put_at(self._body, hull, self._body.neutral)
             if not self._start_gate.enough(self._body, stands, looking, stamp_ns):
@@ -173,6 +178,7 @@ class Starter:
             }
             found = self._search(hull, observations, stamp_ns)
             if found is None:
+                self._rejections.note(hull)
                 continue
             frame, population = found
             assert self._searcher is not None
