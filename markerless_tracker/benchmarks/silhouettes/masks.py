@@ -6,8 +6,8 @@ does when tracking.
 
 Side by side with OpenCV's background subtractors MOG2 and KNN on the same frames. Those learn the
 same empty-scene images, learn nothing from the measured ones, remove shadows by their own rule and
-get the same repairs afterwards (`imaging.morphology.clean_mask`), which they need. One thread each; times
-are image to repaired silhouette, without the edge map.
+get the same repairs afterwards (`imaging.morphology.clean_mask`), which they need. One thread each;
+times are image to repaired silhouette, without the edge map.
 """
 
 import time
