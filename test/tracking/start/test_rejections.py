@@ -1,4 +1,4 @@
-"""An object that is no person is searched ever more rarely, and hides nobody."""
+"""An object that is no person is searched ever more rarely, and hides no person."""
 
 from dataclasses import replace
 
