@@ -143,7 +143,9 @@ def excesses_m(body: BodyModel, rows: OutlineRows) -> tuple[dict[str, float], fl
         ].any(axis=1)
         for name in (*body.limbs, *(("head",) if "head" in body.subspaces else ()))
     }
-    trunk = ~np.any([*hangs.values(), np.zeros(count, dtype=np.bool_)], axis=0)
+    trunk = np.ones(count, dtype=np.bool_)
+    for others in hangs.values():
+        trunk &= ~others
     return {name: excess(hangs[name]) for name in body.limbs}, excess(trunk)
 
 
