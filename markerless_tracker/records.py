@@ -8,165 +8,33 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.errors import ImageError, SearchError
+from markerless_tracker.errors import SearchError
+from markerless_tracker.observation import (
+    MaskWords,
+    Observation,
+    locked,
+    pack_mask,
+    unpack_mask,
+)
 
-MaskWords = NDArray[np.uint64]
+__all__ = [
+    "CONTOUR",
+    "Comparison",
+    "Confidence",
+    "LimbState",
+    "MaskWords",
+    "Observation",
+    "SearchPlan",
+    "Stage",
+    "TrackResult",
+    "TrackState",
+    "locked",
+    "pack_mask",
+    "unpack_mask",
+]
 
 CONTOUR = "contour"
 """The algorithm of a stage that refines on contours instead of evaluating particles."""
-
-
-def locked(array: Any, dtype: Any) -> NDArray[Any]:
-    """A C-contiguous read-only array of that type; copied only if the type or layout differs."""
-    result = np.ascontiguousarray(array, dtype=dtype)
-    if result is array and result.flags.writeable:
-        result = result.view()
-    result.flags.writeable = False
-    return result
-
-
-def pack_mask(mask: NDArray[Any]) -> MaskWords:
-    """Pack a mask (h, w), non-zero = body, into words (h, ceil(w / 64)).
-
-    Column u is bit ``u % 64`` (least significant first) of word ``u // 64``; padding bits are 0.
-    """
-    height, width = mask.shape
-    packed = np.zeros((height, (width + 63) // 64 * 8), dtype=np.uint8)
-    bits = np.packbits(mask != 0, axis=1, bitorder="little")
-    packed[:, : bits.shape[1]] = bits
-    return packed.view("<u8").astype(np.uint64, copy=False)
-
-
-def unpack_mask(words: MaskWords, width: int) -> NDArray[np.bool_]:
-    """The mask (h, width) that `pack_mask` packed."""
-    raw = np.ascontiguousarray(words, dtype="<u8").view(np.uint8)
-    return np.unpackbits(raw, axis=1, count=width, bitorder="little").astype(np.bool_)
-
-
-@dataclass(frozen=True, eq=False)
-class Observation:
-    """What one camera's image says about the body, in that camera's own (distorted) pixels.
-
-    A pixel is person, background or undecided: it differs from the background as a shadow on it
-    would. Undecided pixels count neither way.
-
-    Attributes:
-        camera: the camera's name.
-        stamp_ns: capture time.
-        size_px: (width, height) of the full frame.
-        offset_px: (u, v) of the region's top left pixel in the full frame.
-        mask_words: (h, ceil(w / 64)) uint64, the silhouette (person) packed as `pack_mask` does.
-        edges: (h, w) uint8, edge strength M = value / 255, in the same region.
-        undecided_words: the undecided pixels, packed likewise; none if left out. No pixel is
-            person and undecided.
-    """
-
-    camera: str
-    stamp_ns: int
-    size_px: tuple[int, int]
-    offset_px: tuple[int, int]
-    mask_words: MaskWords
-    edges: NDArray[np.uint8]
-    undecided_words: MaskWords | None = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mask_words", locked(self.mask_words, np.uint64))
-        if self.undecided_words is not None:
-            words = locked(self.undecided_words, np.uint64)
-            # None stands for none, so that equal evidence is equal and costs nothing.
-            object.__setattr__(self, "undecided_words", words if words.any() else None)
-            if words.shape != self.mask_words.shape or (words & self.mask_words).any():
-                raise ImageError(
-                    f"{self.camera}: undecided words {words.shape} beside mask words "
-                    f"{self.mask_words.shape}, expected the same shape and no pixel in both"
-                )
-        object.__setattr__(self, "edges", locked(self.edges, np.uint8))
-        if self.edges.ndim != 2 or self.mask_words.shape != (self.height, (self.width + 63) // 64):
-            raise ImageError(
-                f"{self.camera}: observation holds edges {self.edges.shape} and mask words "
-                f"{self.mask_words.shape}, expected (h, w) and (h, ceil(w / 64))"
-            )
-        (full_w, full_h), (u, v) = self.size_px, self.offset_px
-        if u < 0 or v < 0 or u + self.width > full_w or v + self.height > full_h:
-            raise ImageError(
-                f"{self.camera}: region {self.width}x{self.height} at ({u}, {v}) does not lie "
-                f"inside the frame of {full_w}x{full_h} px"
-            )
-
-    @property
-    def width(self) -> int:
-        """Width of the region in px."""
-        return int(self.edges.shape[1])
-
-    @property
-    def height(self) -> int:
-        """Height of the region in px."""
-        return int(self.edges.shape[0])
-
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """The silhouette of the region, unpacked: (h, w)."""
-        return unpack_mask(self.mask_words, self.width)
-
-    @property
-    def undecided(self) -> NDArray[np.bool_] | None:
-        """The undecided pixels of the region, unpacked: (h, w); None if there are none."""
-        if self.undecided_words is None:
-            return None
-        return unpack_mask(self.undecided_words, self.width)
-
-    @property
-    def not_background(self) -> NDArray[np.bool_]:
-        """The pixels of the region that are person or undecided, unpacked: (h, w)."""
-        words = self.mask_words
-        if self.undecided_words is not None:
-            words = words | self.undecided_words
-        return unpack_mask(words, self.width)
-
-    def in_full_frame(self, part: NDArray[Any]) -> NDArray[Any]:
-        """An array (h, w) of the region as one of the full frame, 0 outside the region.
-
-        The very same if the region is the full frame.
-        """
-        width, height = self.size_px
-        if part.shape == (height, width):
-            return part
-        u, v = self.offset_px
-        frame = np.zeros((height, width), dtype=part.dtype)
-        frame[v : v + self.height, u : u + self.width] = part
-        return frame
-
-    def words_in_full_frame(self, words: MaskWords) -> MaskWords:
-        """As `in_full_frame`, of a packed mask of the region."""
-        if self.edges.shape == self.size_px[::-1]:
-            return words
-        return pack_mask(self.in_full_frame(unpack_mask(words, self.width)))
-
-    @classmethod
-    def from_mask(
-        cls,
-        camera: str,
-        stamp_ns: int,
-        mask: NDArray[Any],
-        edges: NDArray[np.uint8],
-        *,
-        undecided: NDArray[Any] | None = None,
-        size_px: tuple[int, int] | None = None,
-        offset_px: tuple[int, int] = (0, 0),
-    ) -> "Observation":
-        """Build from a mask (h, w), non-zero = person; the region is the full frame unless given.
-
-        Args:
-            undecided: (h, w), non-zero = undecided; none if left out.
-        """
-        size = size_px or (int(mask.shape[1]), int(mask.shape[0]))
-        words = None if undecided is None else pack_mask(undecided)
-        return cls(camera, stamp_ns, size, offset_px, pack_mask(mask), edges, words)
-
-    def with_masks(self, mask: NDArray[Any], undecided: NDArray[Any] | None) -> "Observation":
-        """The same view with other silhouette and undecided pixels, (h, w) of the region."""
-        words = None if undecided is None else pack_mask(undecided)
-        return replace(self, mask_words=pack_mask(mask), undecided_words=words)
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,8 +193,8 @@ class Confidence:
     Attributes:
         pose_sd: (p,) of each parameter.
         markers_sd_m: (15, 3) of each marker, along the world's axes.
-        root_covariance: (6, 6) of the root frame: x, y, z, and small turns about the world's x, y
-            and z axis.
+        root_covariance: (6, 6) of the root frame: x, y, z, and small rotations about the
+            world's x, y and z axis.
     """
 
     pose_sd: NDArray[np.float64]

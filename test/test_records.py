@@ -124,6 +124,41 @@ def test_observations_that_contradict_themselves(
         Observation("cam01", 0, size, offset, np.zeros((4, words), np.uint64), np.zeros((4, 7)))
 
 
+def observed(mask: np.ndarray, undecided: np.ndarray | None) -> Observation:
+    edges = np.zeros(mask.shape, np.uint8)
+    return Observation.from_mask("cam01", 5, mask, edges, undecided=undecided)
+
+
+@given(masks, st.integers(0, 2**32 - 1))
+def test_undecided_pixels_come_back(mask: np.ndarray, seed: int) -> None:
+    undecided = (np.random.default_rng(seed).random(mask.shape) < 0.4) & ~mask
+    seen = observed(mask, undecided)
+    np.testing.assert_array_equal(seen.mask, mask)
+    if undecided.any():
+        np.testing.assert_array_equal(seen.undecided, undecided)
+        assert seen.undecided_words is not None and not seen.undecided_words.flags.writeable
+    else:
+        assert seen.undecided is None and seen.undecided_words is None
+    np.testing.assert_array_equal(seen.not_background, mask | undecided)
+    decided = seen.with_masks(mask | undecided, None)
+    np.testing.assert_array_equal(decided.mask, mask | undecided)
+    assert decided.undecided is None
+    assert (decided.stamp_ns, decided.edges) == (seen.stamp_ns, seen.edges)
+
+
+def test_no_pixel_is_person_and_undecided() -> None:
+    mask = np.zeros((4, 70), bool)
+    mask[2, 68] = True
+    assert observed(mask, ~mask).undecided is not None
+    with pytest.raises(ImageError, match="cam01: undecided words .* no pixel in both"):
+        observed(mask, mask)
+
+
+def test_undecided_pixels_of_another_size() -> None:
+    with pytest.raises(ImageError, match=r"cam01: undecided words \(4, 2\) beside .* \(4, 1\)"):
+        observed(np.zeros((4, 7)), np.ones((4, 70)))
+
+
 # --- stages and results ----------------------------------------------------------------------
 
 COMPARISON = {

@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit status: 0 done, 1 failed with one line on standard error, 2 wrong arguments,
-        3 nobody found (`track`), 130 interrupted, 141 standard output was closed by its reader.
+        3 no person found (`track`), 130 interrupted, 141 standard output was closed by its reader.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if not words:

@@ -34,20 +34,20 @@ HELP = (
     "Track the person in a recording folder, a Pose2Sim project or a bag, without ROS. Writes "
     "NAME.trc (15 markers, metres), NAME.json (settings, and per frame state, fitness, parameters "
     "and warnings) and NAME.subject.yaml (the sizes of the body). The start pose and the stature "
-    "are optional: without them both are estimated. Exit status 3: nobody was found."
+    "are optional: without them both are estimated. Exit status 3: no person was found."
 )
 EXAMPLE = "markerless_tracker track recordings/walk -o out/walk --stature 1.75"
 
 __all__ = ["EXAMPLE", "HELP", "add_arguments", "read_config", "run"]
 
-NOBODY_FOUND = 3
+NO_PERSON_FOUND = 3
 """Exit status when the person was tracked in no frame."""
 
 _KEYS = ("optimizer", "body", "evaluations", "seed", "threads")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Track; returns 0, or 3 if nobody was found."""
+    """Track; returns 0, or 3 if no person was found."""
     console = Console(stderr=True)
     config = read_config(args.config, _flags(args))
     recording = open_recording(args.source, scale=args.scale)
@@ -100,13 +100,13 @@ def run(args: argparse.Namespace) -> int:
     if outcome.tracked:
         return 0
     console.print(
-        f"nobody was found in {outcome.frames} of {outcome.frames} frames; no subject file was "
+        f"no person was found in {outcome.frames} of {outcome.frames} frames; no subject file was "
         "written",
         markup=False,
         highlight=False,
         soft_wrap=True,
     )
-    return NOBODY_FOUND
+    return NO_PERSON_FOUND
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,9 @@ from markerless_tracker.errors import ImageError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
+UNDECIDED_BGR = (0, 220, 255)
+"""Colour of undecided pixels: yellow."""
+
 
 def draw_evidence(
     image: Image,
@@ -24,8 +27,8 @@ def draw_evidence(
     """A picture (h, 4 w, 3) BGR: the input, the mask, the edges, the body over the input.
 
     The background and the labels (h, w; 0 background, 127 shadow, 255 foreground) are the second
-    and third panel if given. Pixels outside the observation's region are dark grey. Without a body
-    or pose the last panel is the input.
+    and third panel if given. Undecided pixels of the mask are yellow. Pixels outside the
+    observation's region are dark grey. Without a body or pose the last panel is the input.
 
     Raises:
         ImageError: image or observation does not fit the camera.
@@ -42,6 +45,9 @@ def draw_evidence(
     mask = np.full((height, width), 64, dtype=np.uint8)
     edges = mask.copy()
     mask[region] = np.where(observation.mask, 255, 0)
+    silhouette = cv2.cvtColor(mask, cv2.COLOR_GRAY2BGR)
+    if observation.undecided is not None:
+        silhouette[region][observation.undecided] = UNDECIDED_BGR
     edges[region] = observation.edges
     over = plain
     if body is not None and pose is not None:
@@ -51,7 +57,7 @@ def draw_evidence(
     panels = [
         plain,
         *(as_colour(shown, camera) for shown in (background, labels) if shown is not None),
-        cv2.cvtColor(mask, cv2.COLOR_GRAY2BGR),
+        silhouette,
         cv2.cvtColor(edges, cv2.COLOR_GRAY2BGR),
         over,
     ]

@@ -1,4 +1,4 @@
-"""What every optimiser shares: budget, best so far, bad costs, the loop."""
+"""Base of every optimiser: budget, best so far, bad costs, the loop."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -18,7 +18,7 @@ class Optimizer(ABC):
     """Minimises by alternating `ask` and `tell`.
 
     A subclass writes `_ask` (the points to evaluate next, (n, d)) and `_tell` (what it makes of
-    their costs). This class counts evaluations, turns non-finite costs into infinity and counts
+    their costs). This class counts evaluations, replaces non-finite costs by infinity and counts
     them, lets no point that is marked infeasible win, and keeps the best.
 
     Attributes:
@@ -40,7 +40,7 @@ class Optimizer(ABC):
 
     @property
     def estimate(self) -> FloatArray:
-        """(d,) what the search makes of all it saw: its best point, for most."""
+        """(d,) the estimate of the search: its best point, for most algorithms."""
         return self.best_x
 
     @property
@@ -50,7 +50,7 @@ class Optimizer(ABC):
 
     @property
     def memory(self) -> ParticleSet | None:
-        """What the next frame's search may go on from; None for most."""
+        """What the next frame's search may start from; None for most algorithms."""
         return None
 
     @property
@@ -66,7 +66,7 @@ class Optimizer(ABC):
         """
         if self._asked is not None or self.finished:
             raise SearchError(
-                "ask() was called out of turn: tell() the costs first, stop when finished"
+                "ask() was called out of order: tell() the costs first, stop when finished"
             )
         self._asked, self._infeasible = self._ask()
         return self._asked
@@ -75,7 +75,7 @@ class Optimizer(ABC):
         """Take the costs (n,) of the points asked for.
 
         Raises:
-            SearchError: called out of turn or with another number of costs.
+            SearchError: called out of order or with another number of costs.
         """
         if self._asked is None or self._infeasible is None or costs.shape != (len(self._asked),):
             raise SearchError(
@@ -96,7 +96,7 @@ class Optimizer(ABC):
 
     @property
     def cutoff_costs(self) -> FloatArray | None:
-        """Costs (n,) below which the costs of the points asked for matter; None: all matter.
+        """Cutoff per point (n,): an evaluation may stop once its cost exceeds it; None = no cutoff.
 
         A particle swarm only learns from a particle that beats its own best.
         """

@@ -95,8 +95,8 @@ def refine(
     """
     x = np.clip(start, bounds[0], bounds[1])
     for i in range(iterations):
-        share = i / (iterations - 1) if iterations > 1 else 1.0
-        hessian, slope = equations(x, truncation[0] * (truncation[1] / truncation[0]) ** share)
+        part = i / (iterations - 1) if iterations > 1 else 1.0
+        hessian, slope = equations(x, truncation[0] * (truncation[1] / truncation[0]) ** part)
         hessian, slope = hessian.copy(), slope.copy()
         for prior in priors:
             hessian[np.diag_indices_from(hessian)] += prior.precision

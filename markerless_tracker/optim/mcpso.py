@@ -99,10 +99,10 @@ def master_step(
 class Mcpso(Optimizer):
     """Sub-swarms, evaluated together in one batch, then the master, in every iteration.
 
-    The first iteration evaluates everybody's first position in one batch.
+    The first iteration evaluates the first positions of all particles in one batch.
 
     Args:
-        problem: the search; its particles are shared out by `swarm_sizes`.
+        problem: the search; `swarm_sizes` distributes its particles.
         sub_swarms: number of sub-swarms.
         inertia_max, inertia_min: inertia of the first and the last move.
         acceleration: φ1 = φ2.

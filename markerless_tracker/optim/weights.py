@@ -23,12 +23,12 @@ def weights_from_costs(costs: FloatArray, sharpness: float) -> FloatArray:
 
 
 def survival(weights: FloatArray) -> float:
-    """Share of n particles that survive drawing by weight: (Σw)² / (n Σw²)."""
+    """Fraction of n particles that survive drawing by weight: (Σw)² / (n Σw²)."""
     return float(weights.sum() ** 2 / (weights.size * (weights**2).sum()))
 
 
 def annealed_sharpness(costs: FloatArray, rate: float) -> float:
-    """The sharpness β at which that share of the particles with finite costs (n,) survives.
+    """The sharpness β at which that fraction of the particles with finite costs (n,) survives.
 
     By bisection. Where even `SHARPEST` leaves more (all costs are nearly equal), β = 1.
     """

@@ -198,7 +198,7 @@ class ResultWriter:
 
     def _write_subject(self) -> None:
         if not self._tracked:
-            # Nobody was measured; a file of an earlier run would pass for this one's.
+            # No body was fitted; a file of an earlier run would pass for this one's.
             self.subject_path.unlink(missing_ok=True)
             return
         shapes = zip(self.body.cone_names, self.body.cone_shape, strict=True)
@@ -296,7 +296,7 @@ def _confidence(result: TrackResult) -> dict[str, Any]:
 
 
 def _limbs(result: TrackResult) -> dict[str, Any]:
-    """Per limb its state, the share of it inside the silhouettes, the scatter of its swarm."""
+    """Per limb its state, its fraction inside the silhouettes, its particle_sd_ratio."""
     if not result.limbs:
         return {}
     limbs = {

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.datasets.markers.track import HIPS, MarkerTrack
+from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
 
@@ -17,6 +17,9 @@ LIMBS = tuple(
     for joint in ("Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle")
     for side in ("L", "R")
 )
+SHARES_WITHIN_SD = (1, 2, 3)
+# Shorter than that on the floor's plane, hips and shoulders have no direction.
+_LEAST_ACROSS_M = 0.01
 # Half a frame at 60 Hz, for two tracks of one row each.
 LONE_ROW_TOLERANCE_NS = 8_333_333
 
@@ -30,12 +33,18 @@ class Score:
         max_mm: the largest frame mean.
         worst_joint_mm: the largest error of any one joint in any frame.
         frames: frames compared.
-        reference_frames: rows of the reference.
+        reference_frames: rows of the reference; of a score that skips frames, those from the first
+            frame not skipped on.
         frame_mm: (frames,) mean over the joints that both hold in that frame.
         joints: name -> mean over the frames; NaN if never compared.
         limbs_mm: mean over frames of the mean over the 12 limb joints; NaN without any.
-        bias: name -> mean offset result - reference, (forward, left, up) in the body's frame
-            (`body_frames`); joints never compared in a frame that has one are absent.
+        bias: name -> mean offset result - reference, (forward, left, up) in the heading frame
+            (`heading_frames`); joints never compared in a frame that has one are absent.
+        offsets_off_limbs_mm: `limbs_mm` of the errors from which each joint's `bias` is subtracted,
+            over the frames with a heading; NaN without any.
+        offsets_off_mm: `mean_mm` of the same errors.
+        inside_sd: shares of the errors per axis that are at most 1, 2 and 3 of the reported
+            standard deviations; None if the result reports none for what is compared.
         names: (m,) the joints compared.
         stamps_ns: (frames,) the reference's stamps.
         joint_mm: (frames, m), NaN where either is missing.
@@ -50,6 +59,9 @@ class Score:
     joints: Mapping[str, float]
     limbs_mm: float
     bias: Mapping[str, tuple[float, float, float]]
+    offsets_off_limbs_mm: float
+    offsets_off_mm: float
+    inside_sd: tuple[float, float, float] | None
     names: tuple[str, ...]
     stamps_ns: NDArray[np.int64] = field(repr=False)
     joint_mm: FloatArray = field(repr=False)
@@ -66,19 +78,44 @@ class Score:
             "joints": {name: _or_none(value) for name, value in self.joints.items()},
             "limbs_mm": _or_none(self.limbs_mm),
             "bias": {name: list(offset) for name, offset in self.bias.items()},
+            "offsets_off_mm": {
+                "limbs": _or_none(self.offsets_off_limbs_mm),
+                "all": _or_none(self.offsets_off_mm),
+            },
+            "inside_sd": None if self.inside_sd is None else list(self.inside_sd),
         }
 
 
-def score(result: MarkerTrack, reference: MarkerTrack) -> Score:
+def score(
+    result: MarkerTrack,
+    reference: MarkerTrack,
+    *,
+    markers_sd_mm: FloatArray | None = None,
+    skip: int = 0,
+) -> Score:
     """Compare two tracks, rows by time (within half a frame of the finer one), markers by name.
 
     A missing Pelvis is the midpoint of the hips. Rows and markers that one of the tracks lacks are
     omitted.
 
+    Args:
+        result: the track to assess.
+        reference: the track to compare it with.
+        markers_sd_mm: (n, m, 3) standard deviations of the result's rows and markers along x, y, z
+            of the world, mm; NaN = unknown.
+        skip: number of rows of the result to leave out at its beginning, blank ones included; the
+            reference's rows before the first one that is left are left out, too.
+
     Raises:
         DatasetError: no common marker, or no common frame; lists those of each.
     """
-    result, reference = result.with_pelvis(), reference.with_pelvis()
+    if not 0 <= skip < max(len(result), 1):
+        raise DatasetError(
+            f"cannot skip {skip} frames, expected a number from 0 to {max(len(result) - 1, 0)}: "
+            f"the result has {len(result)} frames"
+        )
+    sd_mm = _with_pelvis(result, markers_sd_mm)[skip:]
+    result, reference = result.with_pelvis().rows(slice(skip, None)), reference.with_pelvis()
     names = tuple(name for name in reference.names if name in result.names)
     if not names:
         raise DatasetError(
@@ -97,28 +134,34 @@ def score(result: MarkerTrack, reference: MarkerTrack) -> Score:
             f"no common frame: the result covers {_range(result)}, the reference "
             f"{_range(reference)}"
         )
+    first = int(reference_rows[0]) if skip else 0
+    sd_mm = sd_mm[rows][:, [result.names.index(name) for name in names]][compared]
     joint_mm, offset_m = joint_mm[compared], offset_m[compared]
     reference_rows = reference_rows[compared]
     frame_mm = _mean(joint_mm, axis=1)
     joints = dict(zip(names, _mean(joint_mm, axis=0).tolist(), strict=True))
-    limbs = _mean(joint_mm[:, [name in LIMBS for name in names]], axis=1)
-    frames = body_frames(reference)[reference_rows]
-    in_body_mm = np.einsum("nij,nmj->nmi", frames, offset_m) * MM_PER_M
-    biases = _mean(in_body_mm.reshape(len(in_body_mm), -1), axis=0).reshape(-1, 3)
+    limbs = np.array([name in LIMBS for name in names])
+    headings = heading_frames(reference)[reference_rows]
+    in_heading_mm = np.einsum("nij,nmj->nmi", headings, offset_m) * MM_PER_M
+    biases = _mean(in_heading_mm, axis=0)
+    off_mm = np.linalg.norm(in_heading_mm - biases, axis=2)
     return Score(
         mean_mm=float(frame_mm.mean()),
         max_mm=float(frame_mm.max()),
         worst_joint_mm=float(np.nanmax(joint_mm)),
         frames=len(frame_mm),
-        reference_frames=len(reference),
+        reference_frames=len(reference) - first,
         frame_mm=frame_mm,
         joints=joints,
-        limbs_mm=float(_mean(limbs, axis=0)),
+        limbs_mm=_mean_of_frames(joint_mm[:, limbs]),
         bias={
             name: (float(bias[0]), float(bias[1]), float(bias[2]))
             for name, bias in zip(names, biases, strict=True)
             if np.isfinite(bias).all()
         },
+        offsets_off_limbs_mm=_mean_of_frames(off_mm[:, limbs]),
+        offsets_off_mm=_mean_of_frames(off_mm),
+        inside_sd=_inside_sd(offset_m * MM_PER_M, sd_mm),
         names=names,
         stamps_ns=reference.stamps_ns[reference_rows],
         joint_mm=joint_mm,
@@ -156,22 +199,26 @@ def match_rows(
     return np.array([best[row] for row in reference_rows.tolist()], dtype=np.int64), reference_rows
 
 
-def body_frames(track: MarkerTrack) -> FloatArray:
-    """Rotations (n, 3, 3) from the world to the body's frame; rows are forward, left, up.
+def heading_frames(track: MarkerTrack) -> FloatArray:
+    """Rotations (n, 3, 3) from the world to the heading frame; rows are forward, left, up.
 
-    up: from the middle of the hips to Neck (the middle of the shoulders where there is no Neck).
-    left: from RHip to LHip, made orthogonal to up. forward: left x up.
-    NaN where a marker is missing.
+    up: the world's vertical (z). left: from the right to the left side, the sum over hips and
+    shoulders (one pair where the other is missing), projected on the floor's plane.
+    forward: left x up. NaN where both pairs are missing or their sum is vertical.
     """
     count = len(track)
-    right, left = (_column(track, name, count) for name in reversed(HIPS))
-    neck = _column(track, "Neck", count)
-    shoulders = 0.5 * (_column(track, "LShoulder", count) + _column(track, "RShoulder", count))
-    top = np.where(np.isfinite(neck), neck, shoulders)
-    up = _unit(top - 0.5 * (left + right))
-    across = left - right
-    left_axis = _unit(across - (across * up).sum(axis=1, keepdims=True) * up)
-    return np.stack([np.cross(left_axis, up), left_axis, up], axis=1)
+    pairs = np.stack(
+        [
+            _column(track, f"L{joint}", count) - _column(track, f"R{joint}", count)
+            for joint in ("Hip", "Shoulder")
+        ]
+    )
+    across = np.where(np.isfinite(pairs), pairs, 0.0).sum(axis=0)[:, :2]
+    length = np.linalg.norm(across, axis=1)
+    x, y = (across / np.where(length > _LEAST_ACROSS_M, length, np.nan)[:, None]).T
+    none, one = np.where(np.isfinite(x), np.array([[0.0], [1.0]]), np.nan)
+    forward, left, up = (y, -x, none), (x, y, none), (none, none, one)
+    return np.stack([np.stack(axis, axis=1) for axis in (forward, left, up)], axis=1)
 
 
 def _column(track: MarkerTrack, name: str, count: int) -> FloatArray:
@@ -180,9 +227,29 @@ def _column(track: MarkerTrack, name: str, count: int) -> FloatArray:
     return track.positions_m[:, track.names.index(name)]
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(length > 1e-9, length, np.nan)
+def _with_pelvis(result: MarkerTrack, sd_mm: FloatArray | None) -> FloatArray:
+    """The deviations for the markers of `result.with_pelvis()`: that of its midpoint is unknown."""
+    expected = (len(result), len(result.names), 3)
+    if sd_mm is None:
+        sd_mm = np.full(expected, np.nan)
+    if sd_mm.shape != expected:
+        raise DatasetError(f"markers_sd_mm has shape {sd_mm.shape}, expected {expected}")
+    added = len(result.with_pelvis().names) - len(result.names)
+    return np.concatenate([sd_mm, np.full((len(result), added, 3), np.nan)], axis=1)
+
+
+def _inside_sd(errors_mm: FloatArray, sd_mm: FloatArray) -> tuple[float, float, float] | None:
+    known = np.isfinite(errors_mm) & np.isfinite(sd_mm)
+    if not known.any():
+        return None
+    errors, sd = np.abs(errors_mm[known]), sd_mm[known]
+    one, two, three = (float((errors <= factor * sd).mean()) for factor in SHARES_WITHIN_SD)
+    return one, two, three
+
+
+def _mean_of_frames(errors_mm: FloatArray) -> float:
+    """Mean over frames of the mean over joints; NaN where there is none."""
+    return float(_mean(_mean(errors_mm, axis=1), axis=0))
 
 
 def _mean(values: FloatArray, *, axis: int) -> FloatArray:

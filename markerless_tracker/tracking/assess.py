@@ -47,7 +47,7 @@ class Found:
         stamp_ns: time of the frame.
         observations: the evidence that it used.
         warnings: what the user should know, one line each.
-        anew: whether an automatic start found the pose: it does not follow the last one.
+        anew: whether an automatic start found the pose: it does not continue the last one.
         settling: whether that start needs further frames.
         jumped: parameters that were found elsewhere.
     """
@@ -87,18 +87,18 @@ class Assessor:
         self.jump()
 
     def jump(self) -> None:
-        """The next pose does not follow the last one: do not smooth across the gap."""
+        """The next pose does not continue the last one: no smoothing across the gap."""
         if self._smooth is not None:
             self._smooth.reset()
 
     def give_up(self) -> None:
-        """Take the body for gone: it was lost for too long."""
+        """End the track: the body was lost for too long."""
         self.track = self.track.after(Event.GIVEN_UP)
         self.jump()
 
-    def nobody(self, seen: Seen) -> TrackResult:
+    def without_person(self, seen: Seen) -> TrackResult:
         """The result of a frame without a pose."""
-        self.track = self.track.after(Event.NOBODY, seen.stamp_ns)
+        self.track = self.track.after(Event.NO_PERSON, seen.stamp_ns)
         lost = self.track.state is TrackState.LOST
         return TrackResult(
             stamp_ns=seen.stamp_ns, state=self.track.state, pose=None, markers_m=None,

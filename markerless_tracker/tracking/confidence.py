@@ -95,7 +95,7 @@ def confidence_of(
 
 
 def disagreement_m(contours: ContourFrame, rows: OutlineRows) -> float:
-    """How far the views' silhouettes still lie beside the body, m.
+    """Distance of the views' silhouettes from the body after the fit, m.
 
     Root mean square, over views and both axes of the images, of the shift at the body that would
     lay its outline over each silhouette.
@@ -178,14 +178,14 @@ def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     moved = np.flatnonzero(body.node_kind >= 0)
     kind, parameter = body.node_kind[moved], body.node_parameter[moved]
     axes = body.node_sign[moved, None] * nodes[moved, :, kind % 3]
-    turned = np.cross(axes, points[:, None] - nodes[moved, :, 3])
-    moves = np.where((kind >= FIRST_TRANSLATION)[:, None], axes, turned)
+    arms = np.cross(axes, points[:, None] - nodes[moved, :, 3])
+    moves = np.where((kind >= FIRST_TRANSLATION)[:, None], axes, arms)
     hang = carried(body, moved)[[*body.marker_node, root]]
     moves *= hang[:, :, None]
     turning = axes * (hang[-1] * (kind < FIRST_TRANSLATION))[:, None]
-    slopes, turns = np.zeros((len(points), body.size, 3)), np.zeros((body.size, 3))
+    slopes, rotations = np.zeros((len(points), body.size, 3)), np.zeros((body.size, 3))
     for n, k in enumerate(parameter.tolist()):
         slopes[:, k] += moves[:, n]
-        turns[k] += turning[n]
+        rotations[k] += turning[n]
     by_marker = slopes[:-1].transpose(0, 2, 1).reshape(-1, body.size)
-    return by_marker, np.concatenate([slopes[-1].T, turns.T])
+    return by_marker, np.concatenate([slopes[-1].T, rotations.T])

@@ -50,9 +50,9 @@ PAPERS: Mapping[str, Mapping[str, Any]] = {
     "apf": {**_SAINI, "sigma.angle": 0.0},
     "pf": {**_SAINI, "sigma.angle": 0.0},
 }
-"""What the preset 'paper' sets besides for each optimiser: what is not SPPSO is set as in the
-comparison of Saini et al. (2015), whose swarms start with a variance of 0.01 rad² [R]. Of the
-filters' noise the paper says nothing: the body's own spreads, as in the filters' own papers."""
+"""Additional settings of the preset 'paper' for each optimiser. All but SPPSO are set as in the
+comparison of Saini et al. (2015), whose swarms start with a variance of 0.01 rad² [R]. The paper
+states no noise for the filters: it is the body's own sigma, as in the filters' own papers."""
 
 OPTIMIZERS = tuple(PAPERS)
 """The search algorithms, by name."""
@@ -73,7 +73,7 @@ class TrackerConfig(ImagingSettings):
 
     preset: str = setting(
         "tuned",
-        "tuned: what measures best; paper: every setting as published",
+        "tuned: the settings with the lowest errors; paper: every setting as published",
         choices=tuple(PRESETS),
     )
     optimizer: str = setting("sppso", "search algorithm", choices=OPTIMIZERS)
@@ -81,35 +81,35 @@ class TrackerConfig(ImagingSettings):
     evaluations: int = setting(
         1000,
         "budget per frame, in evaluations of the fitness: exactly that many without refinement; "
-        "with it the time that swarm and refinement may take together; unless given, the "
-        "optimiser's own: sppso 1000, others 3600",
+        "with refinement, the time that swarm and refinement may take together; default: the "
+        "published budget of the optimiser, sppso 1000, others 3600",
         least=1,
         most=10**7,
     )
     refinement: str = setting(
         "contour",
-        "contour: align with the silhouettes' edges before and after the swarm; none: swarm alone",
+        "contour: align with the contours before and after the swarm; none: swarm alone",
         choices=("contour", "none"),
     )
     min_improvement: float = setting(
         0.001,
-        "with refinement: how much f must rise for a swarm's result to be taken",
+        "with refinement: least rise of f for which a swarm's result is taken",
         least=0.0,
         most=2.0,
     )
     prediction: float = setting(
         0.6,
-        "share of the last change of pose that is expected again; 0 = zero motion",
+        "fraction of the last change of pose that is predicted again; 0 = zero motion",
         least=0.0,
         most=1.0,
     )
     smoothing: str = setting(
         "none",
-        "one_euro: results pass a causal filter that calms what stands; none",
+        "one_euro: results pass a causal filter that reduces jitter at rest; none",
         choices=("none", "one_euro"),
     )
     search_again: bool = setting(
-        True, "look for a body anew that has been lost for a tenth of a second"
+        True, "search the whole views for a body that has been lost for a tenth of a second"
     )
     fit_shape: bool = setting(
         True,
@@ -137,14 +137,14 @@ class TrackerConfig(ImagingSettings):
     )
     partition: str = setting(
         "soft",
-        "of sppso's and hmcpso's steps; soft: what earlier steps found joins with a small spread; "
-        "hard: it stays",
+        "of sppso's and hmcpso's steps; soft: parameters of earlier steps vary again with a small "
+        "sigma; hard: they are fixed",
         choices=("soft", "hard"),
     )
     cost: str = setting(
         "overlap",
-        "overlap: what f = f_s + f_e lacks; H-MCPSO's costs: one_sided: body pixels that are not "
-        "observed; bidirectional: these and observed pixels without body",
+        "overlap: 1 - f for f = f_s + f_e; H-MCPSO's costs: one_sided: body pixels outside the "
+        "silhouette; bidirectional: these and silhouette pixels outside the body",
         choices=COSTS,
     )
     edge_weight: float = setting(0.0, "weight of f_e beside f_s", least=0.0, most=100.0)

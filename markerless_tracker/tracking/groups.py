@@ -15,8 +15,8 @@ class EdgeSettings(EdgeMapSettings):
 
     rule: str = setting(
         "outline",
-        "model edges that are sampled: sides: all; visible: those no nearer part hides; outline: "
-        "those on the outline of the whole body",
+        "model edges that are sampled: sides: all; visible: those that no nearer part hides; "
+        "outline: those on the outline of the whole body",
         choices=tuple(EDGE_RULES),
     )
     term: str = setting(
@@ -24,7 +24,7 @@ class EdgeSettings(EdgeMapSettings):
     )
     spacing_px: float = setting(5.0, "distance of edge samples along a side", least=0.5, most=100.0)
     step_px: float = setting(
-        2.0, "outline: how far outside a sample must be free of the body", least=0.5, most=50.0
+        2.0, "outline: distance outside a sample at which no body may be", least=0.5, most=50.0
     )
 
 
@@ -39,7 +39,8 @@ class RefineSettings(SettingsGroup):
     )
     truncation_m: float = setting(
         0.10,
-        "outline farther than this from a silhouette's edge is an outlier, at first",
+        "outline points farther than this from a silhouette's contour are outliers, in the first "
+        "iteration",
         least=0.001,
         most=10.0,
     )
@@ -47,17 +48,17 @@ class RefineSettings(SettingsGroup):
         0.035, "the same, in the last iteration", least=0.001, most=10.0
     )
     sigma_m: float = setting(
-        0.01, "noise believed of a silhouette's edge, for refinement", least=1e-4, most=1.0
+        0.01, "standard deviation of a silhouette's contour, for refinement", least=1e-4, most=1.0
     )
     prior: float = setting(
         4.0,
-        "spread of the belief about the predicted pose, in published spreads",
+        "sigma of the prior about the predicted pose, as a factor of the published one",
         least=0.01,
         most=1e6,
     )
-    limb_spread: float = setting(
+    limb_sigma: float = setting(
         4.0,
-        "with refinement: spread of each limb's own small swarm, in published spreads",
+        "with refinement: sigma of each limb's own small swarm, as a factor of the published one",
         least=0.01,
         most=100.0,
     )
@@ -65,27 +66,30 @@ class RefineSettings(SettingsGroup):
 
 @dataclass(frozen=True, kw_only=True)
 class SigmaSettings(SettingsGroup):
-    """Spreads of the search."""
+    """Standard deviations of the first sample of a search (sigma)."""
 
     NAME = "sigma"
 
     scale: float = setting(
-        0.5, "factor of the published spreads of the search", least=0.01, most=100.0
+        0.5, "factor of the published sigma of the search", least=0.01, most=100.0
     )
     rate_max: float = setting(
         6.0,
-        "spreads grow with the time between frames up to this many 60ths of a second",
+        "sigma grows with the time between frames up to this many 60ths of a second",
         least=1.0,
         most=1000.0,
     )
     angle: float = setting(
         0.0,
-        "least spread of every angle, rad, at any rate; 0: each angle has its own, of the body",
+        "least sigma of every angle, rad, at any rate; 0: each angle has that of the body alone",
         least=0.0,
         most=3.0,
     )
     soft_factor: float = setting(
-        10.0, "soft partition: spreads of what joins are divided by this", least=1.0, most=1e6
+        10.0,
+        "soft partition: divisor of the sigma of parameters of earlier steps",
+        least=1.0,
+        most=1e6,
     )
 
 
@@ -103,7 +107,7 @@ class SppsoSettings(SettingsGroup):
     )
     update: str = setting(
         "iteration",
-        "when a swarm's best is updated; particle: as printed in SPPSO",
+        "when a swarm's best is updated; particle: after each, as printed in SPPSO",
         choices=UPDATES,
     )
 
@@ -114,10 +118,13 @@ class PsoSettings(SettingsGroup):
 
     NAME = "pso"
 
-    inertia_max: float = setting(2.0, "inertia of the first move", least=0.01, most=10.0)
-    inertia_min: float = setting(0.1, "inertia of the last move", least=0.001, most=10.0)
+    inertia_max: float = setting(2.0, "inertia in the first iteration", least=0.01, most=10.0)
+    inertia_min: float = setting(0.1, "inertia in the last iteration", least=0.001, most=10.0)
     acceleration: float = setting(
-        2.05, "pull of a particle's own best and of its swarm's best", least=0.0, most=10.0
+        2.05,
+        "acceleration towards a particle's own best and its swarm's best",
+        least=0.0,
+        most=10.0,
     )
 
     def __post_init__(self) -> None:
@@ -142,11 +149,14 @@ class HmcpsoSettings(SettingsGroup):
     )
     sub_swarms: int = setting(3, "hmcpso, mcpso: sub-swarms beside the master", least=1, most=1000)
     migration: float = setting(
-        2.0, "hmcpso, mcpso: pull of the sub-swarms' best on the master", least=0.0, most=10.0
+        2.0,
+        "hmcpso, mcpso: acceleration of the master towards the sub-swarms' best",
+        least=0.0,
+        most=10.0,
     )
     master_term: str = setting(
         "printed",
-        "hmcpso, mcpso: pull of the master's best; weighted: times the migration factor",
+        "hmcpso, mcpso: term of the master's best; weighted: times the migration factor",
         choices=MASTER_TERMS,
     )
 
@@ -158,10 +168,10 @@ class ApfSettings(SettingsGroup):
     NAME = "apf"
 
     layers: int = setting(
-        0, "layers; 0: six if they share the budget out evenly, else five", least=0, most=100
+        0, "layers; 0: six if the budget is a multiple of six, else five", least=0, most=100
     )
     survival: float = setting(
-        0.5, "share of the particles that survives a layer", least=0.01, most=1.0
+        0.5, "fraction of the particles that survives a layer", least=0.01, most=1.0
     )
     layer_shrink: float = setting(
         0.5, "factor of the noise's variance from layer to layer", least=0.01, most=1.0
@@ -185,27 +195,27 @@ class PfSettings(SettingsGroup):
 
 @dataclass(frozen=True, kw_only=True)
 class RegionSettings(SettingsGroup):
-    """Region of each image that is looked at while the person is tracked."""
+    """Region of each image that is processed while the person is tracked."""
 
     NAME = "region"
 
     full_frame_every: int = setting(
         30,
-        "while the person is tracked, images are looked at around the predicted body only, and "
-        "each camera's whole image every so many frames (it does not change the pose); 1 = always",
+        "while the person is tracked, images are processed around the predicted body only, and "
+        "each camera's whole image once in this many frames (the pose is the same); 1 = always",
         least=1,
         most=100000,
     )
     margin_m: float = setting(
         0.15,
-        "how far around the predicted body images are looked at, at the body; more where frames "
-        "are further apart",
+        "margin around the predicted body within which images are processed; it grows with the "
+        "time between frames",
         least=0.0,
         most=100.0,
     )
     component_margin_px: int = setting(
         0,
-        "silhouette components that come no nearer to the predicted body than this are left out",
+        "components of the silhouette farther than this from the predicted body are left out",
         least=0,
         most=10000,
     )

@@ -83,7 +83,7 @@ class MotionModel:
         self._tracked = tracked
 
     def lose(self) -> None:
-        """A frame shows nobody: the pose stays, at rest."""
+        """A frame shows no person: the pose stays, at rest."""
         self.velocity_per_ns = np.zeros(self.pose.size)
         self._tracked = False
 

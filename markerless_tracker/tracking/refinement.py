@@ -9,7 +9,7 @@ from markerless_tracker.tracking.config import TrackerConfig
 
 
 def data_precision(config: TrackerConfig) -> float:
-    """Factor (1 / m³) that turns sums of squared residuals over outline length into -2 log p."""
+    """Factor (1 / m³) from sums of squared residuals over outline length to -2 log p."""
     return 1.0 / (CORRELATION_M * config.refine.sigma_m**2)
 
 

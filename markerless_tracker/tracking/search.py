@@ -143,9 +143,9 @@ class FrameSearch:
 
         Swarms alone: the last one's best, as published. With contour refinement among them a
         stage's result is taken only if it explains the views better: the swarm rescues a refinement
-        that is stuck, the refinement sharpens the swarm. A stage may ask for a gain in f.
+        that is stuck, the refinement sharpens the swarm. A stage may require a least rise of f.
         """
-        # A contour stage looks at every parameter and every cone.
+        # A contour stage uses every parameter and every cone.
         contour = next((stage for stage in stages if stage.plan.algorithm == CONTOUR), None)
         costs_of = (
             None

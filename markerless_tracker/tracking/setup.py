@@ -1,4 +1,4 @@
-"""From files and settings to a tracker: what the node and the offline verbs share."""
+"""From files and settings to a tracker, for the node and the offline verbs alike."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -62,8 +62,8 @@ def build_tracker(
 
     The subject is the file's, or measured on the first row of a TRC (`subject_from`), or a generic
     person of a stature, or, when none is named, measured on the start's first row; if that row's
-    markers are noisy, the first frame settles the lengths measured on it. Without a start the
-    tracker finds somebody by itself, without a subject the stature, too.
+    markers are noisy, the lengths measured on it are corrected in the first frame. Without a start
+    the tracker finds the person automatically, without a subject the stature, too.
 
     Raises:
         ConfigError: more than one subject, or none and the start is no TRC.

@@ -36,7 +36,7 @@ class Phase(Enum):
 class Event(Enum):
     """What a frame says about the body."""
 
-    NOBODY = "NOBODY"
+    NO_PERSON = "NO_PERSON"
     """No silhouette in any usable view, or none that is a person's."""
     FOUND = "FOUND"
     """The automatic start found a person, and needs further frames."""
@@ -54,27 +54,27 @@ _S, _C, _T, _L = Phase.SEARCHING, Phase.SETTLING, Phase.TRACKING, Phase.LOST
 
 TRANSITIONS: Mapping[Phase, Mapping[Event, Phase]] = {
     _S: {
-        Event.NOBODY: _S,
+        Event.NO_PERSON: _S,
         Event.FOUND: _C,
         Event.DISAGREES: _L,
         Event.UNCERTAIN: _T,
         Event.AGREES: _T,
     },
     _C: {
-        Event.NOBODY: _S,
+        Event.NO_PERSON: _S,
         Event.FOUND: _C,
         Event.DISAGREES: _L,
         Event.UNCERTAIN: _T,
         Event.AGREES: _T,
     },
     _T: {
-        Event.NOBODY: _L,
+        Event.NO_PERSON: _L,
         Event.DISAGREES: _L,
         Event.UNCERTAIN: _T,
         Event.AGREES: _T,
     },
     _L: {
-        Event.NOBODY: _L,
+        Event.NO_PERSON: _L,
         Event.DISAGREES: _L,
         Event.UNCERTAIN: _L,
         Event.AGREES: _T,

@@ -122,7 +122,7 @@ class Tracker:
         self.reset()
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
-        """Segment against other empty scenes from now on; then `warm_up`, which resets.
+        """Use other backgrounds from now on; then `warm_up`, which resets.
 
         Args:
             backgrounds: by camera; cameras without one take ready-made observations only.
@@ -167,7 +167,7 @@ class Tracker:
         else:
             found = self._search_near(predicted, seen)
         if found is None:
-            result = self._assessor.nobody(seen)
+            result = self._assessor.without_person(seen)
             self._motion.lose()
         else:
             result = self._assessor.found(found, self.body, self._body.limits)
@@ -192,7 +192,7 @@ class Tracker:
         return Seen(stamp_ns, observed, believed, notes, left_out)
 
     def _search_room(self, starter: Starter, seen: Seen) -> Found | None:
-        """Search the whole views for a person; None for nobody."""
+        """Search the whole views for a person; None if there is none."""
         if not anybody(seen.believed):
             starter.reset()
             return None
@@ -211,7 +211,7 @@ class Tracker:
         )  # fmt: skip
 
     def _search_near(self, predicted: FloatArray, seen: Seen) -> Found | None:
-        """Search near a predicted pose (p,); None for nobody."""
+        """Search near a predicted pose (p,); None if there is no person."""
         believed, stamp_ns = seen.believed, seen.stamp_ns
         if not anybody(believed):
             return None

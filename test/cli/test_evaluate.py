@@ -57,3 +57,58 @@ def test_what_cannot_be_compared_fails_in_one_line(files, tmp_path: Path, capsys
         assert main(["evaluate", *words, "--json"]) == 1
         captured = capsys.readouterr()
         assert reported in captured.err and captured.err.count("\n") == 1 and not captured.out
+
+
+def test_several_results_in_one_call(files, tmp_path: Path, capsys) -> None:
+    found, truth = files
+    assert main(["evaluate", found, truth, truth, "--json"]) == 0
+    first, second = json.loads(capsys.readouterr().out)
+    assert (first["result"], second["result"]) == (found, truth)
+    assert (first["frames"], second["frames"], second["mean_mm"]) == (2, 3, 0.0)
+    assert main(["evaluate", found, truth, truth]) == 0
+    out = capsys.readouterr().out
+    assert "2 of 3" in out and "3 of 3" in out and "20.0" in out
+    assert main(["evaluate", found, str(tmp_path / "none.trc"), truth]) == 1
+    captured = capsys.readouterr()
+    assert "none.trc" in captured.err and not captured.out
+
+
+def test_skipped_frames(files, capsys) -> None:
+    assert main(["evaluate", *files, "--skip", "1", "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["frames"], summary["reference_frames"]) == (1, 2)
+    assert main(["evaluate", *files, "--skip", "3", "--json"]) == 1
+    captured = capsys.readouterr()
+    assert "result.trc: cannot skip 3 frames" in captured.err and not captured.out
+    for wrong in ("-1", "1.5", "some"):
+        with pytest.raises(SystemExit) as stopped:
+            main(["evaluate", *files, "--skip", wrong])
+        assert stopped.value.code == 2
+        assert "expected a whole number from 0 on" in capsys.readouterr().err
+
+
+def test_deviations_and_lost_frames_come_from_the_json_beside_the_result(
+    files, tmp_path: Path, capsys
+) -> None:
+    deviations = dict.fromkeys(NAMES, [15.0, 1.0, 1.0])
+    frames = [
+        {"stamp_ns": 0, "state": "TRACKING", "markers_sd_mm": deviations},
+        {"stamp_ns": 100_000_000, "state": "LOST", "markers_sd_mm": deviations},
+    ]
+    (tmp_path / "result.json").write_text(json.dumps({"frames": frames}))
+    assert main(["evaluate", *files, "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["frames"], summary["reference_frames"]) == (1, 3)
+    assert summary["inside_sd"] == pytest.approx([2 / 3, 1.0, 1.0])
+    assert summary["offsets_off_mm"] == pytest.approx({"limbs": 0.0, "all": 0.0}, abs=1e-6)
+    assert main(["evaluate", *files]) == 0
+    assert "inside 1, 2, 3 sd 0.667, 1.000, 1.000" in capsys.readouterr().out
+
+
+def test_another_tools_json_beside_a_marker_file_is_named(files, tmp_path: Path, capsys) -> None:
+    (tmp_path / "result.json").write_text("[1, 2]")
+    assert main(["evaluate", *files, "--json"]) == 0
+    captured = capsys.readouterr()
+    summary = json.loads(captured.out)
+    assert (summary["frames"], summary["inside_sd"]) == (2, None)
+    assert "result.json: no result of a tracker" in captured.err

@@ -1,4 +1,4 @@
-"""What `track` reports: warnings of frames, nobody found, and how often it reads a bag."""
+"""What `track` reports: warnings of frames, no person found, and how often it reads a bag."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -83,7 +83,7 @@ def empty_room(tmp_path: Path) -> Path:
 def test_nobody_found_is_no_success(run: Run, empty_room, tmp_path, json_flag) -> None:
     status, out, err = run(empty_room, *json_flag)
     assert status == 3
-    assert "nobody was found in 5 of 5 frames; no subject file was written" in err
+    assert "no person was found in 5 of 5 frames; no subject file was written" in err
     if json_flag:
         assert json.loads(out)["tracked"] == 0
     else:

@@ -5,6 +5,7 @@ import pytest
 
 from markerless_tracker.body import load_body
 from markerless_tracker.drawing import draw_evidence, draw_overlay
+from markerless_tracker.drawing.evidence import UNDECIDED_BGR
 from markerless_tracker.errors import ImageError
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
@@ -38,6 +39,18 @@ def test_four_panels() -> None:
     full = np.zeros((90, 120), dtype=np.bool_)
     full[50:70, 40:70] = mask
     np.testing.assert_array_equal(over, draw_overlay(IMAGE, CAMERA, BODY, POSE, mask=full))
+
+
+def test_undecided_pixels_have_their_own_colour() -> None:
+    mask, edges, plain = region()
+    undecided = ~mask & (np.random.default_rng(2).uniform(size=mask.shape) < 0.5)
+    picture = draw_evidence(IMAGE, plain.with_masks(mask, undecided), CAMERA, BODY, POSE)
+    shown = picture[50:70, 160:190]
+    assert undecided.any() and (shown[undecided] == UNDECIDED_BGR).all()
+    assert (shown[mask] == 255).all() and (shown[~mask & ~undecided] == 0).all()
+    # Nothing else changes.
+    picture[50:70, 160:190][undecided] = 0
+    np.testing.assert_array_equal(picture, draw_evidence(IMAGE, plain, CAMERA, BODY, POSE))
 
 
 def test_background_and_labels_come_after_the_input() -> None:

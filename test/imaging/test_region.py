@@ -51,6 +51,7 @@ def compare(
     part = segmenter.observe(image, 5, region)
     assert part.size_px == whole.size_px and part.offset_px == (region.left, region.top)
     np.testing.assert_array_equal(part.mask, whole.mask[region.slices])
+    np.testing.assert_array_equal(part.not_background, whole.not_background[region.slices])
     np.testing.assert_array_equal(part.edges, whole.edges[region.slices])
     np.testing.assert_array_equal(segmenter.mask(image, region) > 0, part.mask)
     return int(part.mask.sum())

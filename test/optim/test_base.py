@@ -8,22 +8,22 @@ from markerless_tracker.optim import Optimizer, Problem, everything_feasible
 
 
 class Counting(Optimizer):
-    """Asks for (i, 0), (i, 1) .. in turn i; cutoff_costs the points listed."""
+    """Asks for (i, 0), (i, 1) .. in round i; the points listed are infeasible."""
 
     def __init__(self, problem: Problem, infeasible: frozenset[int] = frozenset()) -> None:
         super().__init__(problem)
-        self.turn = 0
+        self.round = 0
         self.infeasible = infeasible
-        self.told: list[list[float]] = []
+        self.costs: list[list[float]] = []
 
     def _ask(self):
         n = self.problem.particles
-        points = np.column_stack([np.full(n, float(self.turn)), np.arange(n, dtype=float)])
+        points = np.column_stack([np.full(n, float(self.round)), np.arange(n, dtype=float)])
         return points, np.array([i in self.infeasible for i in range(n)])
 
     def _tell(self, points, costs):
-        self.turn += 1
-        self.told.append(costs.tolist())
+        self.round += 1
+        self.costs.append(costs.tolist())
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_costs_that_are_not_finite_never_win_and_are_counted(problem, bad):
     search.ask()
     search.tell(np.array([bad, 5.0, bad]))
     assert (search.best_cost, search.bad_costs) == (5.0, 2)
-    assert search.told == [[np.inf, 5.0, np.inf]]
+    assert search.costs == [[np.inf, 5.0, np.inf]]
     search.ask()
     search.tell(np.full(3, bad))
     assert (search.best_cost, search.bad_costs, search.evaluations) == (5.0, 5, 6)
@@ -88,12 +88,12 @@ def test_the_callers_costs_are_left_alone(problem):
     assert np.isnan(costs[0])
 
 
-def test_out_of_turn(problem):
+def test_out_of_order(problem):
     search = Counting(problem)
     with pytest.raises(SearchError, match="for no points asked for"):
         search.tell(np.zeros(3))
     search.ask()
-    with pytest.raises(SearchError, match=r"ask\(\) was called out of turn"):
+    with pytest.raises(SearchError, match=r"ask\(\) was called out of order"):
         search.ask()
     for wrong in (np.zeros(2), np.zeros((3, 1)), np.zeros(4)):
         with pytest.raises(SearchError, match="for 3 points asked for"):

@@ -70,7 +70,7 @@ def test_a_parameter_is_released_from_a_bound_that_it_leaves_for_good() -> None:
     np.testing.assert_array_equal(step, [1.0, 1.0])
     step = damped_step(h * [[1, -1], [-1, 1]], -h * [[1, -1], [-1, 1]] @ minimum, np.zeros(2),
                        bounds, 0.0)  # fmt: skip
-    # The other way round: 1.1 - 0.8 (3 - 1) = -0.5.
+    # With the signs exchanged: 1.1 - 0.8 (3 - 1) = -0.5.
     np.testing.assert_allclose(step, [1.0, -0.5], rtol=1e-9)
 
 
@@ -113,11 +113,11 @@ class Recorded:
 
     def __init__(self, h, minimum) -> None:
         self.h, self.minimum = h, minimum
-        self.points, self.reaches = [], []
+        self.points, self.truncations = [], []
 
     def __call__(self, x, truncation_m):
         self.points.append(x.copy())
-        self.reaches.append(truncation_m)
+        self.truncations.append(truncation_m)
         return self.h, self.h @ (x - self.minimum)
 
 
@@ -136,13 +136,13 @@ def test_refinement_converges_to_the_minimum() -> None:
 def test_the_reach_shrinks_geometrically() -> None:
     equations = Recorded(np.eye(4), np.zeros(4))
     run(equations, np.ones(4), iterations=4, truncation=(0.16, 0.02))
-    np.testing.assert_allclose(equations.reaches, [0.16, 0.08, 0.04, 0.02])
+    np.testing.assert_allclose(equations.truncations, [0.16, 0.08, 0.04, 0.02])
 
 
 def test_a_single_iteration_takes_the_last_reach() -> None:
     equations = Recorded(np.eye(4), np.zeros(4))
     run(equations, np.ones(4), iterations=1, truncation=(0.16, 0.02))
-    assert equations.reaches == [pytest.approx(0.02)]
+    assert equations.truncations == [pytest.approx(0.02)]
 
 
 def test_priors_pull_to_the_weighted_mean() -> None:

@@ -86,9 +86,9 @@ def test_the_first_move_of_the_swarm_by_hand(update):
     x = search.problem.centre + 0.5 * rng.standard_normal((3, 3))
     v = 0.5 * rng.uniform(-1.0, 1.0, (3, 3))
     batch = 3 if update == "iteration" else 1
-    for turn in range(3 // batch):
+    for batch_index in range(3 // batch):
         asked = search.ask()
-        np.testing.assert_array_equal(asked, x[turn * batch : (turn + 1) * batch])
+        np.testing.assert_array_equal(asked, x[batch_index * batch : (batch_index + 1) * batch])
         search.tell(sphere(asked))
     leader = x[np.argmin(sphere(x))]
     r1, r2 = rng.random((2, batch, 3))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import rotation_from_rodrigues
-from markerless_tracker.results.score import LIMBS, body_frames, match_rows, score
+from markerless_tracker.results.score import LIMBS, heading_frames, match_rows, score
 
 # A person facing +x, left is +y.
 POSE = {
@@ -63,9 +63,9 @@ def test_limbs_are_the_twelve() -> None:
 angles = st.floats(-3.0, 3.0)
 
 
-@given(st.tuples(angles, angles, angles), st.tuples(angles, angles, angles))
-def test_bias_does_not_depend_on_where_the_body_faces(rotation, shift) -> None:
-    matrix = rotation_from_rodrigues(rotation)
+@given(angles, st.tuples(angles, angles, angles))
+def test_bias_does_not_depend_on_where_the_body_faces(heading, shift) -> None:
+    matrix = rotation_from_rodrigues((0.0, 0.0, heading))
     pose = {name: matrix @ np.array(point) + np.array(shift) for name, point in POSE.items()}
     reference = track([0, FRAME_NS], pose=pose)
     result = track([0, FRAME_NS], pose=pose, offset_mm=matrix @ np.array([10.0, -20.0, 30.0]))
@@ -129,20 +129,28 @@ def test_a_joint_never_compared_is_null_in_json() -> None:
         "joints",
         "limbs_mm",
         "bias",
+        "offsets_off_mm",
+        "inside_sd",
     ]
+    assert figures_back["offsets_off_mm"] == {"limbs": 0.0, "all": 0.0}
+    assert figures_back["inside_sd"] is None
 
 
-def test_without_limbs_or_body_frame() -> None:
+def test_without_limbs_or_heading() -> None:
     figures = score(track([0], pose={"Head": (0, 0, 1)}), track([0], pose={"Head": (0, 0, 2)}))
     assert figures.mean_mm == pytest.approx(1000.0)
     assert math.isnan(figures.limbs_mm) and figures.bias == {}
+    assert figures.as_dict()["offsets_off_mm"] == {"limbs": None, "all": None}
 
 
-def test_the_shoulders_stand_in_for_the_neck() -> None:
-    pose = {name: POSE[name] for name in ("LHip", "RHip")}
-    pose |= {"LShoulder": (0.0, 0.2, 1.5), "RShoulder": (0.0, -0.2, 1.5)}
-    np.testing.assert_allclose(body_frames(track([0], pose=pose))[0], np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(body_frames(track([0]))[0], np.eye(3), atol=1e-12)
+def test_heading_comes_from_hips_and_shoulders() -> None:
+    hips = {"LHip": (0.0, 0.1, 1.0), "RHip": (0.0, -0.1, 1.1)}
+    shoulders = {"LShoulder": (0.1, 0.2, 1.5), "RShoulder": (0.1, -0.2, 1.4)}
+    for pose in (hips, shoulders, hips | shoulders):
+        np.testing.assert_allclose(heading_frames(track([0], pose=pose))[0], np.eye(3), atol=1e-12)
+    above = {"LHip": (0.0, 0.0, 1.2), "RHip": (0.0, 0.0, 1.0)}
+    for pose in (above, {"LHip": (0.0, 0.1, 1.0), "Neck": (0.0, 0.0, 1.5)}):
+        assert np.isnan(heading_frames(track([0], pose=pose))).all()
 
 
 def test_what_cannot_be_compared_is_reported() -> None:

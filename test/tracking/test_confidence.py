@@ -168,8 +168,8 @@ def test_slopes_against_finite_differences(scene) -> None:
     change = 1e-3 * rng.standard_normal(body.size)
     after, before = markers(body, pose + change), markers(body, pose - change)
     np.testing.assert_allclose(2.0 * by_marker @ change, (after - before).ravel(), atol=2e-5)
-    turn = root_transform(body, pose + change)[:3, :3] @ root_transform(body, pose)[:3, :3].T
-    small = np.array([turn[2, 1], turn[0, 2], turn[1, 0]])
+    rotation = root_transform(body, pose + change)[:3, :3] @ root_transform(body, pose)[:3, :3].T
+    small = np.array([rotation[2, 1], rotation[0, 2], rotation[1, 0]])
     np.testing.assert_allclose(by_root[3:] @ change, small, atol=2e-5)
 
 

@@ -58,9 +58,9 @@ def test_the_fit_is_the_mean_over_the_views():
 def test_views_count_by_what_they_show() -> None:
     well, badly = ViewTerms(0.9, 0.0, 0.9, 3000.0), ViewTerms(0.0, 0.0, 0.0, 1000.0)
     assert shared_overlap([well, badly]) == pytest.approx(0.675)
-    edge, nobody = ViewTerms(0.0, 0.0, 0.0, 3.0), ViewTerms(1.0, 0.0, 1.0, 0.0)
-    assert shared_overlap([well, well, edge, nobody]) == pytest.approx(0.9, abs=1e-3)
-    assert shared_overlap([nobody]) == 1.0
+    edge, empty = ViewTerms(0.0, 0.0, 0.0, 3.0), ViewTerms(1.0, 0.0, 1.0, 0.0)
+    assert shared_overlap([well, well, edge, empty]) == pytest.approx(0.9, abs=1e-3)
+    assert shared_overlap([empty]) == 1.0
 
 
 LIMB_MIDDLE = 0.5 * (LIMB_LOST_BELOW + LIMB_REGAINED_ABOVE)

@@ -204,25 +204,25 @@ def test_refinement_is_told_limits_beliefs_and_reach(person, monkeypatch) -> Non
     config = settings(
         **{"refine.truncation_m": 0.2, "refine.truncation_end_m": 0.05, "refine.prior": 3.0}
     )
-    told = []
+    given = []
 
     def refine(equations, start, **kwargs):
-        told.append(kwargs)
+        given.append(kwargs)
         # Wherever the search went since, the belief is about the prediction.
         return person.pose.copy()
 
     monkeypatch.setattr(refinement, "refine", refine)
     searched(person, config)
-    assert len(told) == 2
-    for kwargs in told:
+    assert len(given) == 2
+    for kwargs in given:
         assert kwargs["truncation"] == (0.2, 0.05) and kwargs["iterations"] == 3
         np.testing.assert_array_equal(kwargs["bounds"], person.body.limits)
-        predicted, usual = kwargs["priors"]
+        predicted, posture = kwargs["priors"]
         np.testing.assert_array_equal(predicted.mean, person.predicted)
         np.testing.assert_allclose(predicted.precision, (3.0 * person.body.sigma) ** -2.0)
-        np.testing.assert_array_equal(usual.mean, person.body.prior_mean)
-        assert not usual.precision[person.body.root].any()
-        assert (usual.precision[person.body.joints] > 0).all()
+        np.testing.assert_array_equal(posture.mean, person.body.prior_mean)
+        assert not posture.precision[person.body.root].any()
+        assert (posture.precision[person.body.joints] > 0).all()
 
 
 def test_what_was_spent_with_refinement(person) -> None:

@@ -110,9 +110,9 @@ def test_files_that_are_not_there(scene, config, files):
         build_tracker(scene.rig, config, start_file=files / "nowhere.trc")
     with pytest.raises(BodyModelError, match="nowhere.yaml"):
         build_tracker(scene.rig, config, start_file=files / "nowhere.yaml", stature=1.7)
-    with pytest.raises(BodyModelError, match="nobody.yaml"):
+    with pytest.raises(BodyModelError, match="missing.yaml"):
         build_tracker(
-            scene.rig, config, start_file=files / "start.yaml", subject_file=files / "nobody.yaml"
+            scene.rig, config, start_file=files / "start.yaml", subject_file=files / "missing.yaml"
         )
 
 

@@ -1,4 +1,4 @@
-"""The One Euro filter: calm when standing, in time when moving."""
+"""The One Euro filter: little jitter at rest, little lag in motion."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def points_mm(body, poses):
     return 1e3 * np.array([markers(body, pose) for pose in poses])
 
 
-def test_standing_still_is_calm(body) -> None:
+def test_jitter_at_rest_is_small(body) -> None:
     rng = np.random.default_rng(0)
     noise = np.where(np.isfinite(body.prior_sd), 0.0032, 0.0012)
     poses = body.neutral + noise * rng.standard_normal((180, body.size))
@@ -87,21 +87,21 @@ def test_what_was_taken_is_not_changed(body) -> None:
 def test_the_tracker_filters_what_it_shows_and_nothing_else(
     make_tracker, frames, refined_settings
 ) -> None:
-    plain, calm = (
+    plain, filtered = (
         make_tracker({**refined_settings, "smoothing": name}) for name in ("none", "one_euro")
     )
     raw, shown = (
         [tracker.step(frame.observations, frame.stamp_ns) for frame in frames]
-        for tracker in (plain, calm)
+        for tracker in (plain, filtered)
     )
-    smooth = OneEuro(calm.body)
+    smooth = OneEuro(filtered.body)
     for one, other in zip(raw, shown, strict=True):
         expected = smooth(one.pose, one.stamp_ns)
         np.testing.assert_allclose(other.pose, expected, atol=1e-12)
-        np.testing.assert_allclose(other.markers_m, markers(calm.body, other.pose), atol=1e-12)
+        np.testing.assert_allclose(other.markers_m, markers(filtered.body, other.pose), atol=1e-12)
         assert other.fitness == one.fitness
     assert np.abs(shown[-1].pose - raw[-1].pose).max() > 1e-6
-    calm.reset()
-    again = calm.step(frames[2].observations, frames[2].stamp_ns)
+    filtered.reset()
+    again = filtered.step(frames[2].observations, frames[2].stamp_ns)
     fresh = make_tracker(refined_settings).step(frames[2].observations, frames[2].stamp_ns)
     np.testing.assert_array_equal(again.pose, fresh.pose)

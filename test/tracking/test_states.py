@@ -13,21 +13,21 @@ from markerless_tracker.tracking.states import PATIENCE_NS, TRANSITIONS, Event, 
 MIDDLE = 0.5 * (LOST_BELOW + REGAINED_ABOVE)
 FRAME_EVENTS = tuple(event for event in Event if event is not Event.GIVEN_UP)
 EXPECTED = """
-SEARCHING NOBODY    SEARCHING
+SEARCHING NO_PERSON SEARCHING
 SEARCHING FOUND     SETTLING
 SEARCHING DISAGREES LOST
 SEARCHING UNCERTAIN TRACKING
 SEARCHING AGREES    TRACKING
-SETTLING  NOBODY    SEARCHING
+SETTLING  NO_PERSON SEARCHING
 SETTLING  FOUND     SETTLING
 SETTLING  DISAGREES LOST
 SETTLING  UNCERTAIN TRACKING
 SETTLING  AGREES    TRACKING
-TRACKING  NOBODY    LOST
+TRACKING  NO_PERSON LOST
 TRACKING  DISAGREES LOST
 TRACKING  UNCERTAIN TRACKING
 TRACKING  AGREES    TRACKING
-LOST      NOBODY    LOST
+LOST      NO_PERSON LOST
 LOST      DISAGREES LOST
 LOST      UNCERTAIN LOST
 LOST      AGREES    TRACKING
@@ -66,13 +66,13 @@ def test_an_overlap_between_the_thresholds_does_not_change_the_phase(phase):
 def test_patience_begins_with_the_first_of_consecutive_lost_frames():
     track = Track(Phase.TRACKING).after(Event.AGREES, 0, 0.8)
     assert track.mean_overlap == pytest.approx(0.8)
-    track = track.after(Event.NOBODY, 10)
+    track = track.after(Event.NO_PERSON, 10)
     assert not track.given_up
     assert not track.after(Event.DISAGREES, 10 + PATIENCE_NS - 1).given_up
     assert track.after(Event.DISAGREES, 10 + PATIENCE_NS).given_up
-    track = track.after(Event.AGREES, 20, 0.8).after(Event.NOBODY, 30)
-    assert not track.after(Event.NOBODY, 10 + PATIENCE_NS).given_up
-    given_up = track.after(Event.NOBODY, 30 + PATIENCE_NS)
+    track = track.after(Event.AGREES, 20, 0.8).after(Event.NO_PERSON, 30)
+    assert not track.after(Event.NO_PERSON, 10 + PATIENCE_NS).given_up
+    given_up = track.after(Event.NO_PERSON, 30 + PATIENCE_NS)
     assert given_up.given_up
     assert given_up.after(Event.GIVEN_UP) == Track()
 
@@ -81,7 +81,7 @@ def test_only_tracked_frames_enter_the_mean_overlap():
     track = Track(Phase.TRACKING).after(Event.AGREES, 0, 0.8).after(Event.AGREES, 1, 0.6)
     assert track.mean_overlap == pytest.approx(0.79)
     assert track.after(Event.DISAGREES, 2, 0.1).mean_overlap == track.mean_overlap
-    assert track.after(Event.NOBODY, 2).mean_overlap == track.mean_overlap
+    assert track.after(Event.NO_PERSON, 2).mean_overlap == track.mean_overlap
 
 
 @given(st.lists(st.tuples(st.sampled_from(FRAME_EVENTS), st.integers(), st.floats(0.0, 1.0))))

@@ -1,4 +1,4 @@
-"""Silhouettes on generated scenes: rooms and clothes that nobody chose a threshold by.
+"""Silhouettes on generated scenes: rooms and clothes that no threshold was chosen by.
 
 Of every scene the sampled motion is measured, then the sampled posture.
 """
@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from markerless_tracker.benchmarks.silhouettes.masks import Picture, measure
-from markerless_tracker.benchmarks.silhouettes.scene import JudgedSet, SilhouetteScene
+from markerless_tracker.benchmarks.silhouettes.scene import BODY, ImageSet, SilhouetteScene
+from markerless_tracker.body import MARKER_NAMES, load_description, pose_from_markers
+from markerless_tracker.body.build import build_body
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.synthesis.scenes import (
     DEVELOPMENT_SEEDS,
@@ -39,15 +41,18 @@ def generated_scene(seed: int, *, posture: bool = False, frames: int = FRAMES) -
     spec = sample_scene(seed)
     scene = GeneratedScene(spec, motion=spec.posture if posture else spec.motion)
     indices = tuple(_APART * i for i in range(frames))
+    # A tracker's body, whose sections are not the person's.
+    body = build_body(load_description(BODY), scene.subject())
 
-    def make() -> Iterator[JudgedSet]:
+    def make() -> Iterator[ImageSet]:
         for index in indices:
             images, masks, _ = scene.frame(index)
-            yield JudgedSet(index, images, masks, scene.body)
+            truth = dict(zip(MARKER_NAMES, scene.markers(index), strict=True))
+            yield ImageSet(index, images, masks, body, pose_from_markers(body, truth))
 
     empty = scene.backgrounds(_EMPTY_IMAGES)
     name = f"scene {seed} {scene.motion.kind}"
-    return SilhouetteScene(name, scene.rig, empty, indices, True, scene.body, make)
+    return SilhouetteScene(name, scene.rig, empty, indices, True, body, make)
 
 
 def measure_generated(

@@ -1,9 +1,13 @@
 """How good silhouettes are: against exact masks, or against the body posed at the reference.
 
+Undecided pixels are measured apart: scores are those of the decided ones, once after imaging alone
+and once after the body at the reference pose has decided what lies near it, as the predicted body
+does when tracking.
+
 Side by side with OpenCV's background subtractors MOG2 and KNN on the same frames. Those learn the
-same empty-scene images, do not learn on while judged, remove shadows their own way and get the
-same repairs afterwards (`imaging.morphology.clean_mask`), which they need. One thread each; times
-are image to repaired silhouette, without the edge map.
+same empty-scene images, learn nothing from the measured ones, remove shadows by their own rule and
+get the same repairs afterwards (`imaging.morphology.clean_mask`), which they need. One thread each;
+times are image to repaired silhouette, without the edge map.
 """
 
 import time
@@ -17,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.benchmarks.machine import machine
-from markerless_tracker.benchmarks.silhouettes.scene import JudgedSet, SilhouetteScene
+from markerless_tracker.benchmarks.silhouettes.scene import ImageSet, SilhouetteScene
 from markerless_tracker.body import BodyModel
 from markerless_tracker.imaging import Image, ImagingSettings, Segmenter, learn_background
 from markerless_tracker.imaging.segmentation import clean_mask
@@ -25,59 +29,81 @@ from markerless_tracker.records import Observation
 from markerless_tracker.results.result import versions
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.selection import explained_part
+from markerless_tracker.tracking.evidence.undecided import decide
 
 LEAK_PX = 5
 """False positives further than this from the exact mask count as leaked shadow."""
 
 Mask = NDArray[np.bool_]
-Judge = Callable[[Image], Mask]
+Segmentation = Callable[[Image], tuple[Mask, Mask | None]]
+"""Person and undecided pixels (h, w) of an image; None if there are two classes."""
 Picture = Callable[[str, int, Image], None]
 
 
 @dataclass(frozen=True)
-class Agreement:
-    """How a mask agrees with the exact one, each in 0..1 but `shadow_leak`, which may exceed 1."""
+class MaskScores:
+    """How a mask agrees with the exact one, each in 0..1 but `shadow_leak`, which may exceed 1.
+
+    Attributes:
+        iou, precision, recall, shadow_leak: of the decided pixels.
+        undecided_share: undecided pixels of the person, relative to the person's.
+    """
 
     iou: float
     precision: float
     recall: float
     shadow_leak: float
+    undecided_share: float = 0.0
 
 
-def agreement(mask: Mask, exact: Mask) -> Agreement:
+def mask_scores(mask: Mask, exact: Mask, undecided: Mask | None = None) -> MaskScores:
     """Compare two masks (h, w); a share of nothing is 1, a leak beside nothing is 0."""
+    person, share = int(exact.sum()), 0.0
+    if undecided is not None:
+        share = int((exact & undecided).sum()) / person if person else 0.0
+        mask, exact = mask & ~undecided, exact & ~undecided
     both = int((mask & exact).sum())
     either = int((mask | exact).sum())
     found, true = int(mask.sum()), int(exact.sum())
     away = cv2.distanceTransform((~exact).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     # Without a single pixel of body there is no distance to it.
     leaked = int((mask & (np.asarray(away) > LEAK_PX)).sum()) if true else found
-    return Agreement(
+    return MaskScores(
         iou=both / either if either else 1.0,
         precision=both / found if found else 1.0,
         recall=both / true if true else 1.0,
         shadow_leak=leaked / true if true else 0.0,
+        undecided_share=share,
     )
 
 
 @dataclass
 class _Tally:
-    """What one judge got, by camera."""
+    """What one method got, by camera."""
 
-    rows: dict[str, list[Agreement]] = field(default_factory=dict)
+    rows: dict[str, list[MaskScores]] = field(default_factory=dict)
+    imaging: dict[str, list[MaskScores]] = field(default_factory=dict)
     selected: dict[str, list[float]] = field(default_factory=dict)
     ms: dict[str, list[float]] = field(default_factory=dict)
 
     def mean(self, camera: str, key: str) -> float:
-        return float(np.mean([getattr(row, key) for row in self.rows[camera]]))
+        return _mean(self.rows[camera], key)
 
     @property
     def iou_mean(self) -> float:
-        return float(np.mean([self.mean(camera, "iou") for camera in self.rows]))
+        return _over_cameras(self.rows, "iou")
 
     @property
     def median_ms(self) -> float:
         return float(np.median([value for values in self.ms.values() for value in values]))
+
+
+def _mean(rows: list[MaskScores], key: str) -> float:
+    return float(np.mean([getattr(row, key) for row in rows]))
+
+
+def _over_cameras(rows: Mapping[str, list[MaskScores]], key: str) -> float:
+    return float(np.mean([_mean(of, key) for of in rows.values()]))
 
 
 def measure(
@@ -87,42 +113,50 @@ def measure(
     progress: Callable[[int, int], None] = lambda done, total: None,
     picture: Picture | None = None,
 ) -> dict[str, Any]:
-    """Judge silhouettes; keys as `benchmark silhouettes --json` prints them.
+    """Measure silhouettes; keys as `benchmark silhouettes --json` prints them.
 
-    With exact masks `cameras` holds iou, precision, recall, shadow_leak and ms. Without them it
+    With exact masks `cameras` holds iou, precision, recall, shadow_leak and ms, and `iou_mean` and
+    `undecided_share` sum up: after the body at the reference pose has decided undecided pixels
+    near it, and in `imaging` before. Without a reference pose both are the same. Without them it
     holds `overlap`, the IoU of the silhouette with the body posed at the reference,
     `overlap_selected`, the same for the components that this body explains, and ms; and `body` says
-    whose sections were drawn. Means over the frames, ms their median.
+    whose sections were drawn; `undecided_share` is that of imaging alone. Means over the frames, ms
+    their median.
 
     Args:
-        scene: what is judged.
+        scene: what is measured.
         config: settings of the imaging and of the choice of components; defaults if None.
-        progress: told how many frames of how many are done.
+        progress: reports how many frames of how many are done.
         picture: given camera, frame and a picture of every silhouette: false positives red, false
-            negatives blue, the rest of the silhouette green.
+            negatives blue, undecided yellow, the rest of the silhouette green.
 
     Raises:
         TrackerError: the recording cannot be read, or its images do not fit its background.
     """
     config = config or TrackerConfig()
-    judges = {name: _judges(name, frames, config) for name, frames in scene.empty.items()}
-    tallies = {judge: _Tally() for judge in ("own", "mog2", "knn")}
+    methods = {name: _methods(name, frames, config) for name, frames in scene.empty.items()}
+    tallies = {method: _Tally() for method in ("own", "mog2", "knn")}
     with _one_thread():
         for count, views in enumerate(scene.frames()):
             for camera, exact in views.masks(scene.rig).items():
                 image = views.images[camera]
-                for judge, tally in tallies.items():
-                    mask, ms = _timed(judges[camera][judge], image)
-                    tally.rows.setdefault(camera, []).append(agreement(mask, exact))
+                for method, tally in tallies.items():
+                    (mask, undecided), ms = _timed(methods[camera][method], image)
                     tally.ms.setdefault(camera, []).append(ms)
-                    if judge == "own":
+                    if method == "own":
+                        before = mask_scores(mask, exact, undecided)
+                        tally.imaging.setdefault(camera, []).append(before)
                         if not views.exact:
-                            selected = _selected(mask, scene, views, camera, config)
+                            selected = _selected(mask, undecided, scene, views, camera, config)
                             tally.selected.setdefault(camera, []).append(
-                                agreement(selected, exact).iou
+                                mask_scores(selected[0], exact, selected[1]).iou
                             )
+                        elif undecided is not None and views.pose is not None:
+                            mask, undecided = _decided(mask, undecided, scene, views, camera)
                         if picture is not None:
-                            picture(camera, views.index, draw_agreement(image, mask, exact))
+                            drawn = draw_mask_errors(image, mask, exact, undecided)
+                            picture(camera, views.index, drawn)
+                    tally.rows.setdefault(camera, []).append(mask_scores(mask, exact, undecided))
             progress(count + 1, scene.frame_count)
     return _figures(scene, tallies)
 
@@ -150,13 +184,19 @@ def _figures(scene: SilhouetteScene, tallies: Mapping[str, _Tally]) -> dict[str,
         "exact": scene.exact,
         "cameras": cameras,
         mean: own.iou_mean,
+        "undecided_share": _over_cameras(own.rows, "undecided_share"),
         "ms": own.median_ms,
         "opencv": {
             name: {mean: tallies[name].iou_mean, "ms": tallies[name].median_ms}
             for name in ("mog2", "knn")
         },
     }
-    if not scene.exact:
+    if scene.exact:
+        figures["imaging"] = {
+            "iou_mean": _over_cameras(own.imaging, "iou"),
+            "undecided_share": _over_cameras(own.imaging, "undecided_share"),
+        }
+    else:
         figures["overlap_selected_mean"] = float(
             np.mean([values["overlap_selected"] for values in cameras.values()])
         )
@@ -172,66 +212,94 @@ def radii_mm(body: BodyModel) -> dict[str, list[float]]:
     }
 
 
-def draw_agreement(image: Image, mask: Mask, exact: Mask) -> Image:
-    """The image (h, w, 3), darkened, with the silhouette green, too much red, missing blue."""
+def draw_mask_errors(image: Image, mask: Mask, exact: Mask, undecided: Mask | None = None) -> Image:
+    """The image (h, w, 3), darkened: silhouette green, too much red, missing blue.
+
+    Undecided pixels are yellow, of the person or not.
+    """
     colour = image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     out = np.asarray(colour // 2, dtype=np.uint8)
     out[mask & exact, 1] += np.uint8(90)
     out[mask & ~exact] = (0, 0, 255)
     out[exact & ~mask] = (255, 80, 0)
+    if undecided is not None:
+        out[undecided] = (0, 200, 200)
     return out
 
 
-def _judges(camera: str, empty: list[Image], settings: ImagingSettings) -> dict[str, Judge]:
+def _methods(camera: str, empty: list[Image], settings: ImagingSettings) -> dict[str, Segmentation]:
     segmenter = Segmenter(camera, learn_background(empty, settings, camera=camera), settings)
 
-    def own(image: Image) -> Mask:
-        return segmenter.mask(image) > 0
+    def own(image: Image) -> tuple[Mask, Mask | None]:
+        mask, undecided = segmenter.classes(image)
+        return mask > 0, None if undecided is None else undecided > 0
 
-    judges: dict[str, Judge] = {"own": own}
+    methods: dict[str, Segmentation] = {"own": own}
     for name, make in (
         ("mog2", cv2.createBackgroundSubtractorMOG2),
         ("knn", cv2.createBackgroundSubtractorKNN),
     ):
-        judges[name] = _subtractor(make(history=max(len(empty), 2), detectShadows=True), empty,
+        methods[name] = _subtractor(make(history=max(len(empty), 2), detectShadows=True), empty,
                                    settings)  # fmt: skip
     # Compiles what is compiled at first use, and fills caches.
-    for judge in judges.values():
-        judge(empty[0])
-    return judges
+    for method in methods.values():
+        method(empty[0])
+    return methods
 
 
-def _subtractor(model: Any, empty: list[Image], settings: ImagingSettings) -> Judge:
+def _subtractor(model: Any, empty: list[Image], settings: ImagingSettings) -> Segmentation:
     # One still says little to a model with a memory of many frames.
     for image in empty * max(1, -(-10 // len(empty))):
         model.apply(image)
 
-    def judge(image: Image) -> Mask:
+    def method(image: Image) -> tuple[Mask, Mask | None]:
         labels = model.apply(image, learningRate=0.0)
         mask = np.asarray(cv2.threshold(labels, 127, 255, cv2.THRESH_BINARY)[1], dtype=np.uint8)
-        return clean_mask(mask, settings) > 0
+        return clean_mask(mask, settings) > 0, None
 
-    return judge
+    return method
 
 
 def _selected(
-    mask: Mask, scene: SilhouetteScene, views: JudgedSet, camera: str, config: TrackerConfig
-) -> Mask:
+    mask: Mask,
+    undecided: Mask | None,
+    scene: SilhouetteScene,
+    views: ImageSet,
+    camera: str,
+    config: TrackerConfig,
+) -> tuple[Mask, Mask | None]:
+    """Person and undecided pixels of the components that the body at the reference explains."""
     assert views.pose is not None
-    nothing = np.zeros(mask.shape, dtype=np.uint8)
-    observation = Observation.from_mask(camera, 0, mask, nothing)
+    seen = _observation(camera, mask, undecided)
     margin_px = config.region.component_margin_px
-    return explained_part(observation, scene.rig[camera], scene.body, views.pose, margin_px)[0].mask
+    part = explained_part(seen, scene.rig[camera], scene.body, views.pose, margin_px)[0]
+    return part.mask, part.undecided
 
 
-def _timed(judge: Judge, image: Image) -> tuple[Mask, float]:
-    """The mask, and the lesser of two times: the first run meets cold caches."""
+def _decided(
+    mask: Mask, undecided: Mask, scene: SilhouetteScene, views: ImageSet, camera: str
+) -> tuple[Mask, Mask | None]:
+    """Person and undecided pixels after the body at the reference has decided."""
+    assert views.pose is not None
+    seen = {camera: _observation(camera, mask, undecided)}
+    cameras = {camera: scene.rig[camera]}
+    decided = decide(seen, cameras, views.body, views.pose)[camera]
+    return decided.mask, decided.undecided
+
+
+def _observation(camera: str, mask: Mask, undecided: Mask | None) -> Observation:
+    nothing = np.zeros(mask.shape, dtype=np.uint8)
+    return Observation.from_mask(camera, 0, mask, nothing, undecided=undecided)
+
+
+def _timed(method: Segmentation, image: Image) -> tuple[tuple[Mask, Mask | None], float]:
+    """The classes, and the lesser of two times: the first run meets cold caches."""
     times = []
     for _ in range(2):
         start = time.perf_counter()
-        mask = judge(image)
+        found = method(image)
         times.append((time.perf_counter() - start) * 1e3)
-    return mask, min(times)
+    return found, min(times)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What silhouettes are judged on: frames with exact masks, or with a reference pose."""
+"""What silhouettes are measured on: frames with exact masks, or with a reference pose."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -35,19 +35,19 @@ Mask = NDArray[np.bool_]
 
 BODY = "person31"
 FRAMES = 10
-"""Frames judged by a reference pose, where exact masks do not say which."""
+"""Frames measured by a reference pose, where exact masks do not say which."""
 _EMPTY_IMAGES = 10
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedSet:
+class ImageSet:
     """Images of one time and what is known about the body then.
 
     Attributes:
         index: of the frame.
         images: camera to image.
         exact: camera to exact mask (h, w); empty without any.
-        body, pose: the body and its reference pose (p,), where there are no exact masks.
+        body, pose: the body and its reference pose (p,); no pose where nothing says it.
     """
 
     index: int
@@ -58,23 +58,23 @@ class JudgedSet:
 
     def masks(self, rig: CameraRig) -> Mapping[str, Mask]:
         """Camera to the mask (h, w) to compare with: exact, or the body's at the reference."""
-        if self.pose is None:
+        if self.exact or self.pose is None:
             return self.exact
         return {camera.name: silhouette(self.body, self.pose, camera) for camera in rig}
 
 
 @dataclass(frozen=True, eq=False)
 class SilhouetteScene:
-    """A recording, or a made-up scene, as silhouettes are judged on it.
+    """A recording, or a made-up scene, as silhouettes are measured on it.
 
     Attributes:
         name: of the recording.
         rig: its cameras.
         empty: empty-scene images by camera.
-        indices: the frames judged.
+        indices: the frames measured.
         exact: whether there are exact masks.
         body: whose silhouette stands in for exact masks.
-        frames: yields the judged sets in order.
+        frames: yields the measured sets in order.
     """
 
     name: str
@@ -83,11 +83,11 @@ class SilhouetteScene:
     indices: tuple[int, ...]
     exact: bool
     body: BodyModel
-    frames: Callable[[], Iterator[JudgedSet]]
+    frames: Callable[[], Iterator[ImageSet]]
 
     @property
     def frame_count(self) -> int:
-        """Number of frames judged."""
+        """Number of frames measured."""
         return len(self.indices)
 
 
@@ -110,11 +110,13 @@ def recorded_scene(
     if isinstance(recording, FolderRecording):
         exact = {name: found for name in recording.rig.names if (found := recording.masks(name))}
     poses: dict[int, FloatArray] = {}
+    truth = truth_path(source)
     if exact:
         body = load_body(BODY)
         known = sorted(set().union(*exact.values()))
+        if truth.is_file():
+            body, poses = _posed(recording, truth)
     else:
-        truth = truth_path(source)
         if not truth.is_file():
             raise DatasetError(f"{source}: neither masks/ nor {truth.name}, expected one of them")
         body, poses = _posed(recording, truth)
@@ -128,7 +130,7 @@ def recorded_scene(
         known = [known[int(i)] for i in np.linspace(0, len(known) - 1, frames).round()]
     chosen = set(known)
 
-    def read() -> Iterator[JudgedSet]:
+    def read() -> Iterator[ImageSet]:
         for views in recording.frames():
             if views.index in chosen:
                 masks = {
@@ -136,7 +138,7 @@ def recorded_scene(
                     for name, found in exact.items()
                     if views.index in found
                 }
-                yield JudgedSet(views.index, views.images, masks, body, poses.get(views.index))
+                yield ImageSet(views.index, views.images, masks, body, poses.get(views.index))
             if views.index >= known[-1]:
                 return
 
@@ -152,16 +154,16 @@ def recorded_scene(
 
 
 def made_up_scene(
-    *, frames: int = FRAMES, size_px: tuple[int, int] = (656, 490)
+    *, frames: int = FRAMES, size_px: tuple[int, int] = (656, 490), grey: bool = False
 ) -> SilhouetteScene:
     """A made-up walk in front of four cameras, every sixth frame of it."""
-    scene = SyntheticScene(body=BODY, size_px=size_px)
+    scene = SyntheticScene(body=BODY, size_px=size_px, grey=grey)
     indices = tuple(6 * i for i in range(frames))
 
-    def make() -> Iterator[JudgedSet]:
+    def make() -> Iterator[ImageSet]:
         for index in indices:
-            images, masks, _ = scene.frame(index)
-            yield JudgedSet(index, images, masks, scene.body)
+            images, masks, pose = scene.frame(index)
+            yield ImageSet(index, images, masks, scene.body, pose)
 
     empty = scene.backgrounds(_EMPTY_IMAGES)
     return SilhouetteScene("made up", scene.rig, empty, indices, True, scene.body, make)

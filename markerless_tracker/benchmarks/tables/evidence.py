@@ -20,6 +20,8 @@ from markerless_tracker.imaging import ImagingSettings, Segmenter
 from markerless_tracker.records import Observation, locked
 from markerless_tracker.results.run import recording_backgrounds
 
+_KINDS = ("mask", "undecided", "edges")
+
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
@@ -48,13 +50,13 @@ class Evidence:
                 f"every {every}th frame requested, expected a multiple of {self.every}"
             )
         count = len(self.stamps_ns)
-        masks, edges = {}, {}
+        masks, undecided, edges = {}, {}, {}
         for camera in self.rig:
             width, height = camera.size_px
-            mask, edge = _files(self.folder, camera.name)
-            masks[camera.name] = np.memmap(
-                mask, np.uint64, "r", shape=(count, height, (width + 63) // 64)
-            )
+            mask, unsure, edge = _files(self.folder, camera.name)
+            words = (count, height, (width + 63) // 64)
+            masks[camera.name] = np.memmap(mask, np.uint64, "r", shape=words)
+            undecided[camera.name] = np.memmap(unsure, np.uint64, "r", shape=words)
             edges[camera.name] = np.memmap(edge, np.uint8, "r", shape=(count, height, width))
         for row in range(0, count, every // self.every):
             stamp_ns = self.stamps_ns[row]
@@ -68,6 +70,7 @@ class Evidence:
                         (0, 0),
                         locked(np.asarray(masks[camera.name][row]), np.uint64),
                         locked(np.asarray(edges[camera.name][row]), np.uint8),
+                        locked(np.asarray(undecided[camera.name][row]), np.uint64),
                     )
                     for camera in self.rig
                 },
@@ -125,7 +128,7 @@ def make_evidence(
     frames: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Evidence:
-    """Segment a recording into a folder (1.1 bytes per pixel, camera and frame).
+    """Segment a recording into a folder (1.25 bytes per pixel, camera and frame).
 
     Args:
         recording: the images.
@@ -152,8 +155,11 @@ def make_evidence(
         def observe(item: tuple[str, FrameSet]) -> None:
             name, views = item
             observation = segmenters[name].observe(views.images[name], views.stamp_ns)
-            mask, edges = files[name]
+            mask, undecided, edges = files[name]
             mask.write(observation.mask_words.tobytes())
+            words = observation.undecided_words
+            words = np.zeros_like(observation.mask_words) if words is None else words
+            undecided.write(words.tobytes())
             edges.write(observation.edges.tobytes())
 
         for views in recording.frames(start=start, every=every):
@@ -166,5 +172,7 @@ def make_evidence(
     return Evidence(folder, recording.rig, every, tuple(stamps))
 
 
-def _files(folder: Path, camera: str) -> tuple[Path, Path]:
-    return folder / f"{camera}.mask", folder / f"{camera}.edges"
+def _files(folder: Path, camera: str) -> tuple[Path, Path, Path]:
+    """Files of the person, of the undecided pixels, and of the edges."""
+    mask, undecided, edges = (folder / f"{camera}.{kind}" for kind in _KINDS)
+    return mask, undecided, edges

@@ -50,8 +50,8 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     )
     parser.add_argument(
         "--pictures", type=Path, metavar="DIR",
-        help="write RECORDING-CAMERA-FRAME.png: false positives red, false negatives blue, the "
-        "rest green",
+        help="write RECORDING-CAMERA-FRAME.png: false positives red, false negatives blue, "
+        "undecided yellow, the rest green",
     )  # fmt: skip
     parser.add_argument(
         "--json", action="store_true", help="print JSON (a list for several recordings)"
@@ -135,16 +135,16 @@ def _run_generated(args: argparse.Namespace, config: TrackerConfig) -> int:
 
 def generated_table(figures: Mapping[str, Any]) -> Table:
     """The figures of `benchmarks.silhouettes.generated.measure_generated` for people."""
-    undecided = "undecided_share" in figures
     table = Table(title=f"{figures['recording']}, {len(figures['scenes'])} scenes")
-    headings = ["IoU", "of the motion", "of the posture", "shadow leak", "MOG2", "KNN"]
-    for heading in ("seed", "motion", "posture", *headings, *(["undecided"] if undecided else [])):
+    headings = ["IoU", "of the motion", "of the posture", "shadow leak", "undecided"]
+    headings += ["IoU, imaging", "undecided, imaging", "MOG2", "KNN"]
+    for heading in ("seed", "motion", "posture", *headings):
         table.add_column(heading, justify="left" if heading in ("motion", "posture") else "right")
     for row in figures["scenes"]:
         leak = [camera["shadow_leak"] for camera in row["cameras"].values()]
         values = [row["iou_mean"], row["motion_iou"], row["posture_iou"], sum(leak) / len(leak)]
+        values += [row["undecided_share"], *row["imaging"].values()]
         values += [row["opencv"][name]["iou_mean"] for name in ("mog2", "knn")]
-        values += [row["undecided_share"]] if undecided else []
         cells = (f"{value:.3f}" for value in values)
         table.add_row(str(row["seed"]), row["motion"], row["posture"], *cells)
     table.add_section()
@@ -169,15 +169,20 @@ def silhouette_table(figures: Mapping[str, Any]) -> Table:
         mean = "overlap_mean"
     table = Table(title=title)
     table.add_column("")
-    for heading in (*columns.values(), "ms"):
+    for heading in (*columns.values(), "undecided", "ms"):
         table.add_column(heading, justify="right")
     for name, row in figures["cameras"].items():
         cells = (f"{row[key]:.3f}" for key in columns)
-        table.add_row(name, *cells, f"{row['ms']:.1f}")
+        table.add_row(name, *cells, "", f"{row['ms']:.1f}")
     blank = [""] * (len(columns) - 1)
     table.add_section()
-    table.add_row("mean", f"{figures[mean]:.3f}", *blank, f"{figures['ms']:.1f}")
+    share = f"{figures['undecided_share']:.3f}"
+    table.add_row("mean", f"{figures[mean]:.3f}", *blank, share, f"{figures['ms']:.1f}")
+    if "imaging" in figures:
+        before = figures["imaging"]
+        share = f"{before['undecided_share']:.3f}"
+        table.add_row("imaging alone", f"{before['iou_mean']:.3f}", *blank, share, "")
     for key, label in (("mog2", "OpenCV MOG2"), ("knn", "OpenCV KNN")):
         row = figures["opencv"][key]
-        table.add_row(label, f"{row[mean]:.3f}", *blank, f"{row['ms']:.1f}")
+        table.add_row(label, f"{row[mean]:.3f}", *blank, "", f"{row['ms']:.1f}")
     return table

@@ -17,8 +17,8 @@ from markerless_tracker.fitness.contour.outline_samples import Samples, make_sam
 from markerless_tracker.fitness.contour.residuals import Residuals, make_residuals
 from markerless_tracker.fitness.contour.silhouette_contour import (
     SilhouetteContour,
-    edge_of_mask,
     join_edges,
+    silhouette_contour,
 )
 from markerless_tracker.fitness.raster import Outlines, make_outlines
 from markerless_tracker.fitness.threads import parallel, usable_threads, worth_waking
@@ -81,7 +81,7 @@ class ContourFrame:
         self._step_px = step_px
 
         def edge(name: str) -> SilhouetteContour:
-            return edge_of_mask(observations[name], SPACING_M * pixels_per_m[name])
+            return silhouette_contour(observations[name], SPACING_M * pixels_per_m[name])
 
         self.contours = join_edges(list(mapper(edge, views.names)))  # type: ignore[call-overload]
         count = len(views.names)

@@ -65,7 +65,7 @@ class ContourViews(NamedTuple):
     point_start: NDArray[np.int64]
 
 
-def edge_of_mask(observation: Observation, spacing_px: float) -> SilhouetteContour:
+def silhouette_contour(observation: Observation, spacing_px: float) -> SilhouetteContour:
     """Signed distances around a silhouette, and points along its edge.
 
     The window is the silhouette's bounding box and a margin of a sixth of its height. The edge

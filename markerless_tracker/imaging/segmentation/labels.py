@@ -25,6 +25,12 @@ LOOK_PX = 3
 _SOLID = np.ones((3, 3), dtype=np.uint8)
 
 
+def patch_radius_px(settings: ImagingSettings) -> int:
+    """Radius within which a label depends on other labels through the means of patches, px."""
+    compares = settings.shadow.undecided and settings.shadow.weak_sigmas > 0.0
+    return WEAK_RADIUS_PX if compares else 0
+
+
 class PixelLabeller:
     """Labels pixels of one camera's images: 0 background, 127 shadow, 255 foreground.
 
@@ -61,10 +67,12 @@ class PixelLabeller:
             settings.texture.radius_px > 0 and settings.shadow.removal and not background.modes
         )
         # A single still does not tell its noise, and holds errors that patches do not average out.
+        # A slow change of light, which the background follows, looks like a faint patch.
         self._uses_patches = (
-            settings.shadow.undecided
-            and settings.shadow.weak_sigmas > 0.0
+            patch_radius_px(settings) > 0
             and background.variance.min() < background.variance.max()
+            and self._adaptation is None
+            and not background.modes
         )
         width, height = gaussians.size_px
         self._memory = np.empty(height * width, dtype=np.uint8)

@@ -166,7 +166,7 @@ class Segmenter:
         """As `_silhouette`, with a margin of `slack` px; None if that is too small."""
         zones = Zones.around(need, slack, self._size_px, self.settings, grey=self._grey)
         window = zones.window
-        labels = self._labeller.label(image, window, zones.zone_before_repair)
+        labels = self._labeller.label(image, window, zones.corrected)
         size = window.height * window.width
         mask, shadow = self._memory[:, :size].reshape(2, window.height, window.width)
         if not repair_mask(

@@ -5,7 +5,7 @@ shadow where w <= I_V / B_V <= e, I_S - B_S <= tau_S and |I_H - B_H| <= tau_H. H
 difference is taken around the circle, and hue is compared only where the darkened background would
 have colour. On grey cameras the ratio of brightness decides alone, in a narrower range. The paper
 prints no values: the defaults are measured. A shadow is also a patch of some size, unlike a few
-pixels of clothes that pass the test (`morphology.foreground_mask`; not in the paper).
+pixels of clothes that pass the test (`morphology.shadow_patches`; not in the paper).
 """
 
 import numpy as np

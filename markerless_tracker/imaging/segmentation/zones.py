@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.blobs import BOTTOM, LEFT, RIGHT, TOP
 from markerless_tracker.imaging.segmentation.border import border_radius_px
-from markerless_tracker.imaging.segmentation.labels import LOOK_PX
+from markerless_tracker.imaging.segmentation.labels import LOOK_PX, patch_radius_px
 from markerless_tracker.imaging.segmentation.level_set import refinement_radius_px
 from markerless_tracker.imaging.segmentation.morphology import (
     SPLIT_RADIUS_PX,
@@ -23,6 +23,8 @@ class Zones:
         patches: where patches must have the right size, before border and contour are moved.
         zone: `patches` and some slack, in which patches are measured.
         patches_before_repair, zone_before_repair: the same before opening and closing.
+        corrected: where texture corrects labels: `zone_before_repair`, and as far from it as the
+            opening of shadows and the means of patches depend on labels.
         window: the labelled region.
         open_sides: sides of `zone` beyond which the image continues.
         frame_px: pixels of the whole image.
@@ -32,6 +34,7 @@ class Zones:
     zone: Region
     patches_before_repair: Region
     zone_before_repair: Region
+    corrected: Region
     window: Region
     open_sides: int
     frame_px: int
@@ -59,12 +62,15 @@ class Zones:
         frame_px = size_px[0] * size_px[1]
         repair = repair_radius_px(settings, frame_px)
         before = zone.grown(repair, size_px)
+        radius_px = opening_radius_px(settings, grey=grey) + patch_radius_px(settings)
+        corrected = before.grown(radius_px, size_px)
         return cls(
             patches=patches,
             zone=zone,
             patches_before_repair=patches.grown(repair, size_px),
             zone_before_repair=before,
-            window=before.grown(LOOK_PX + opening_radius_px(settings, grey=grey), size_px),
+            corrected=corrected,
+            window=corrected.grown(LOOK_PX, size_px),
             open_sides=_open_sides(zone, size_px),
             frame_px=frame_px,
         )

@@ -128,8 +128,8 @@ class GeneratedScene:
 
     def backgrounds(self, count: int) -> dict[str, list[Image]]:
         """That many images of the empty room by camera."""
-        nobody = np.zeros(len(self._furniture.triangles), dtype=np.bool_)
-        seen = self._seen(self._furniture, self._wood, nobody)
+        no_person = np.zeros(len(self._furniture.triangles), dtype=np.bool_)
+        seen = self._seen(self._furniture, self._wood, no_person)
         return {
             name: [
                 self._views[name].taken(

@@ -20,7 +20,7 @@ from markerless_tracker.tracking.evidence.selection import (
 
 
 class EvidenceMaker:
-    """Turns views into observations, and keeps of their silhouettes what the prediction explains.
+    """Makes observations of views, and keeps of their silhouettes what the prediction explains.
 
     Args:
         rig: the cameras.
@@ -44,13 +44,13 @@ class EvidenceMaker:
         self._margin_px = config.region.component_margin_px
         self._clear_px = edge_radius_px(config) + config.region.component_margin_px
         self._every = config.region.full_frame_every
-        self._turn = 0
+        self._calls = 0
         self._pool = pool
         self.segmenters: dict[str, Segmenter] = {}
         self.take_backgrounds(backgrounds)
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
-        """Tell people from other empty scenes from now on.
+        """Use other backgrounds from now on.
 
         Raises:
             ImageError: a background does not fit its camera; all stays as it was.
@@ -126,7 +126,7 @@ class EvidenceMaker:
     ) -> tuple[dict[str, Observation], tuple[str, ...]]:
         """As `observe` and then `select`, in less time while the body is tracked.
 
-        With a margin around the body at the predicted pose, images are looked at there alone,
+        With a margin around the body at the predicted pose, only that region is processed,
         except where that would change what stays, and each camera's whole frame every
         `region.full_frame_every` calls.
 
@@ -134,7 +134,7 @@ class EvidenceMaker:
             ImageError, CalibrationError: as `observe`.
         """
         self._check(views)
-        self._turn += 1
+        self._calls += 1
         regions = self.regions(body, predicted, margin_m)
 
         def evidence(item: tuple[str, Image | Observation]) -> tuple[Observation, int]:
@@ -157,7 +157,7 @@ class EvidenceMaker:
     def regions(
         self, body: BodyModel, predicted: FloatArray, margin_m: float | None
     ) -> dict[str, Region | None]:
-        """Where each camera looks at a body at a pose (p,), and a margin around it; None = all."""
+        """Region of each camera: a body at a pose (p,) and a margin around it; None = all."""
         if margin_m is None:
             return dict.fromkeys(self._rig.names)
         return {
@@ -174,9 +174,9 @@ class EvidenceMaker:
         }
 
     def _whole_frame_is_due(self, name: str) -> bool:
-        """Cameras take turns, so that no frame costs much more than others."""
+        """The cameras in rotation, so that no frame costs much more than others."""
         shift = self._rig.names.index(name) * self._every // len(self._rig)
-        return (self._turn + shift) % self._every == 0
+        return (self._calls + shift) % self._every == 0
 
     def _check(self, views: Mapping[str, Image | Observation]) -> None:
         if not views:

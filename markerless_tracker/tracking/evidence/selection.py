@@ -41,7 +41,7 @@ def explained_in_region(
     margin_px: int,
     clear_px: int,
 ) -> tuple[Observation, int] | None:
-    """`explained_part` of an observation of a region; None where only the whole frame can tell.
+    """`explained_part` of an observation of a region; None where the whole frame is needed.
 
     That is so if no component is near to the body, or if one that is comes nearer than `clear_px`
     to a side of the region beyond which the frame goes on: it may go on there too. Otherwise the
@@ -77,7 +77,7 @@ def body_region(
         least_px: smallest margin.
 
     Returns:
-        None if the camera does not see the body well enough to tell.
+        None if the camera does not see enough of the body.
     """
     focal = float(camera.matrix[0, 0])
     pixels, depths_m, radii_m = _cone_lines(camera, body, pose)

@@ -61,7 +61,7 @@ class ViewWatch:
             points = markers(body, expected)
             for name in empty:
                 if self._in_frame(points, name) >= IN_FRAME:
-                    reasons[name] = "nobody where the others see somebody"
+                    reasons[name] = "no person where the other views show one"
                     del believed[name]
         return believed, self._changes(reasons)
 

@@ -25,8 +25,8 @@ def other_limb(
 ) -> tuple[FloatArray, float]:
     """The best pose (p,) that is found with a limb elsewhere, and its cost 1 - f_s.
 
-    Draws thin out where a limb has six joints, so the best are looked around twice, as in an
-    annealed filter; one contour refinement, of the whole body, then settles the best of all.
+    Draws are sparse for a limb of six joints, so the best are varied twice, as in an annealed
+    filter. One contour refinement, of the whole body, then refines the best of all.
 
     Args:
         frame: the evidence.
@@ -43,10 +43,10 @@ def other_limb(
         ]
     )
     costs = frame.costs(poses)
-    for share in LAYERS:
+    for fraction in LAYERS:
         best = np.argsort(costs, kind="stable")[:_PARENTS]
         near = recombiner.with_limb_near(
-            np.repeat(poses[best], _CHILDREN, axis=0), limb, share, rng
+            np.repeat(poses[best], _CHILDREN, axis=0), limb, fraction, rng
         )
         poses = np.concatenate([poses[best], near])
         costs = np.concatenate([costs[best], frame.costs(near)])

@@ -59,13 +59,14 @@ def _left_over(
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     near = cv2.dilate(np.ascontiguousarray(window).view(np.uint8), disc).view(np.bool_)
     rest = observation.mask & ~near
-    if not rest.any():
+    least_px = LEAST_M2 * scale**2
+    if np.count_nonzero(rest) < least_px:
         return []
     count, _, stats, centres = cv2.connectedComponentsWithStats(rest.view(np.uint8))
     return [
         (float(stats[n, cv2.CC_STAT_AREA]), centres[n] + observation.offset_px)
         for n in range(1, count)
-        if stats[n, cv2.CC_STAT_AREA] >= LEAST_M2 * scale**2
+        if stats[n, cv2.CC_STAT_AREA] >= least_px
     ]
 
 

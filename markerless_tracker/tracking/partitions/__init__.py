@@ -1,4 +1,4 @@
-"""How each optimiser shares a frame out into stages, one file each."""
+"""The stages of a frame for each optimiser, one file each."""
 
 from collections.abc import Callable, Mapping
 

@@ -8,7 +8,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.tracking.config import TrackerConfig
 
 SWARM_SHARE = Fraction(2, 10)
-"""Share of the budget that the swarm keeps beside contour refinement."""
+"""Fraction of the budget that the swarm keeps beside contour refinement."""
 
 
 def scaled_particles(
@@ -18,7 +18,7 @@ def scaled_particles(
     *,
     share: Fraction = Fraction(1),
 ) -> tuple[int, ...]:
-    """Particles per stage for the swarm's share of a budget: they scale, the iterations stay.
+    """Particles per stage for the swarm's fraction of a budget: they scale, the iterations stay.
 
     Raises:
         ConfigError: the budget cannot be met exactly; names the nearest that can.

@@ -22,7 +22,7 @@ def filter_stages(
     """One stage; beside a refinement with `SWARM_SHARE` of the particles.
 
     Raises:
-        ConfigError: the layers cannot share the budget out evenly.
+        ConfigError: the budget is no multiple of the layers.
     """
     layers = 1 if config.optimizer == "pf" else layers_for(config)
     share = Fraction(1) if config.refinement == "none" else SWARM_SHARE

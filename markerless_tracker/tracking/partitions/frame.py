@@ -1,4 +1,4 @@
-"""Which searches a frame is made of: an optimiser's stages, and refinement around them."""
+"""The searches of a frame: an optimiser's stages, and refinement around them."""
 
 import numpy as np
 
@@ -18,12 +18,12 @@ def frame_stages(
 ) -> tuple[Stage, ...]:
     """The stages of one frame, in order; each starts from the estimate so far.
 
-    Beside a refinement, swarms must raise f clearly: a body part that is found again does, while
-    without asking for that the parts that no view shows would wander.
+    Beside a refinement, swarms must raise f clearly (`min_improvement`). A body part that is found
+    again does so. Without that threshold parts that no view shows would drift.
 
     Args:
         body: the body.
-        config: names the optimiser and how the budget is shared out.
+        config: names the optimiser and the budget.
         centre: (p,) predicted pose.
         sigma: (p,) published standard deviations, widened for the time since the last frame.
 
@@ -56,7 +56,7 @@ def limb_stages(
             "sppso",
             body.subspaces[name],
             centre,
-            config.refine.limb_spread * sigma,
+            config.refine.limb_sigma * sigma,
             budget,
         )
         for name in body.limbs

@@ -32,7 +32,7 @@ RESCUE_STAGES: Mapping[str, tuple[tuple[int, int], ...]] = {
     "three": ((40, 5), (40, 5), (60, 10)),
     "global": ((100, 10),),
 }
-"""The same evaluations beside contour refinement: it homes in, so the swarm may look widely."""
+"""The same evaluations beside contour refinement, which converges: the swarm may be wide."""
 
 
 def sppso_stages(

@@ -1,4 +1,4 @@
-"""What all swarms' stages share: the whole body explains the whole view."""
+"""Stages of all swarms: they compare the whole body with the whole views."""
 
 from dataclasses import asdict, replace
 from typing import Any

@@ -18,7 +18,7 @@ EVERY = 2
 POLISH = 5
 """Iterations after the last frame was taken; there is one with each frame before."""
 TRUNCATION_M = (0.10, 0.05)
-"""Outline further than this from the silhouette's edge is an outlier, at first and at last."""
+"""Outline points farther than this from the contour are outliers: first and last iteration."""
 
 
 @dataclass(frozen=True, eq=False)

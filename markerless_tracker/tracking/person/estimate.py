@@ -1,6 +1,7 @@
-"""The body of the tracked person: what is known of it, and what is still to be fitted."""
+"""The body of the tracked person: what is known of it, and what remains to be fitted."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from markerless_tracker.tracking.loss import LEAST_FIT, silhouette_fit
 from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import BodyFitting, Unmeasured
 from markerless_tracker.tracking.person.first_frame import StartMarkers, shape_of_first_frame
+from markerless_tracker.tracking.person.varied import VariedFrames
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 
 START_FRAMES = 30
@@ -26,8 +28,9 @@ SearcherFor = Callable[[BodyModel], Searcher]
 class BodyEstimate:
     """A body that becomes the person's: first its sections, then its lengths are fitted.
 
-    Sections are fitted in one frame with the pose held, lengths over several tracked frames. Only
-    frames whose silhouettes agree with the body are used: f_s of at least `LEAST_FIT`.
+    Sections are fitted in one frame with the pose held, lengths over several tracked frames. With a
+    start given, sections are revised whenever a tracked pose shows something new. Only frames
+    whose silhouettes agree with the body are used: f_s of at least `LEAST_FIT`.
 
     Args:
         body: with generic sections, and lengths that were measured or follow from a stature.
@@ -67,6 +70,7 @@ class BodyEstimate:
         self.sections_fitted = not self._fits_sections
         self.sized = None if self._person is None else self._person.sized
         self._disagreeing = 0
+        self._varied: VariedFrames | None = None
         self._reported = False
         self._lengths: BodyFitting | None = None
         if self._person is not None and self._fits_sections and self._config.fit_lengths:
@@ -123,13 +127,15 @@ class BodyEstimate:
             self.sections_fitted, self.sized = True, None
 
     def fit_tracked_frame(self, search: FrameSearch) -> FloatArray | None:
-        """Use a tracked frame for what is still to be fitted, if it agrees with the body.
+        """Use a tracked frame for what remains to be fitted, if it agrees with the body.
 
         Returns:
             If `body` has changed: how far (p,) its poses lie from those tracked so far.
         """
-        if (self.sections_fitted and self._lengths is None) or not _agrees(search):
+        if not _agrees(search):
             return None
+        if self.sections_fitted and self._lengths is None:
+            return self._revise_sections(search)
         if not self.sections_fitted:
             self.body = fit_shape(self.body, [(search.contours, search.pose)])
             self.sections_fitted = True
@@ -141,6 +147,13 @@ class BodyEstimate:
         self._lengths = None
         self.body = fitted.body
         return fitted.moved
+
+    def _revise_sections(self, search: FrameSearch) -> FloatArray | None:
+        """Fit the sections to this frame as well, if its pose shows something new."""
+        if self._varied is None or not self._varied.takes(search.pose, self.body):
+            return None
+        self.body = fit_shape(self._varied.prior, self._varied.add(search.contours, search.pose))
+        return np.zeros(self.body.size)
 
     def warm_up(
         self,
@@ -168,7 +181,10 @@ class BodyEstimate:
         self.body, pose = shape_of_first_frame(
             self.generic, pose, self._start_markers, contours, self._config, self.limits
         )
+        # The generic sections on the lengths that were settled with the first frame.
+        prior = replace(self.body, cone_shape=self.generic.cone_shape)
         self.sections_fitted = True
+        self._varied = VariedFrames(prior, contours(self.body, pose), pose)
         return pose
 
 

@@ -1,7 +1,7 @@
 """The first frame: the person's shape from the silhouettes, the start pose known or nearly so.
 
 Fitting pose and shape together drifts while the fitness rises, so the pose is held while the shape
-is fitted. A start whose markers are noisy would be pressed into the shape: pose and segment lengths
+is fitted. Noise of the start markers would enter the shape: pose and segment lengths
 are first moved to where a nearly generic body fits silhouettes and markers, each as far as it is
 trusted.
 """

@@ -1,1 +1,1 @@
-"""Starting by itself: where somebody stands, which way, and in which pose."""
+"""Automatic start: position, heading, stature and pose of a person in the views."""

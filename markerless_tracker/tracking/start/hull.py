@@ -80,7 +80,7 @@ class Hull:
 def find_hulls(
     cameras: Mapping[str, CameraModel], observations: Mapping[str, Observation]
 ) -> Iterator[Hull]:
-    """The lumps of the visual hull that may be a person, the largest first; none for nobody.
+    """The lumps of the visual hull that may be a person, the largest first; none without a person.
 
     Args:
         cameras: cameras by name.
@@ -160,7 +160,7 @@ def _fine(
     low: FloatArray,
     views: "Sequence[_View]",
 ) -> Hull | None:
-    """A coarse lump looked at closely; None if it is nobody."""
+    """A coarse lump on the fine grid; None if it is no person."""
     cells = int((labels[box] == number).sum())
     if cells < 2 or COARSE_M**3 * cells > MOST_COARSE_M3:
         return None
@@ -252,7 +252,7 @@ def _occupied(
 def _middle(cameras: Sequence[CameraModel]) -> FloatArray:
     """The point (3,) nearest to all optical axes, m: the middle of what is looked at.
 
-    A weak pull to a place some metres ahead of the cameras decides where the axes are parallel.
+    A weak pull to a place some metres in front of the cameras decides where the axes are parallel.
     """
     total, right = np.zeros((3, 3)), np.zeros(3)
     for camera in cameras:

@@ -101,20 +101,20 @@ class FramePopulation:
         return self.selected(self.refined(initialised, *_INITIALISE))
 
     def recombined(
-        self, population: Population, generation: int, *, share: float = 1.0
+        self, population: Population, generation: int, *, fraction: float = 1.0
     ) -> Population:
         """One more generation.
 
         Args:
             population: the parents; they stay if they are good enough.
             generation: keys the draws.
-            share: fraction of the full number of children.
+            fraction: of the full number of children.
         """
         rng = keyed_generator(
             self._searcher.config.seed, self._stamp_ns, f"generation {generation}"
         )
-        children = self._recombiner.children(population.poses, round(share * _CHILDREN), rng)
-        best = np.argsort(self.costs(children), kind="stable")[: max(1, round(share * _REFINED))]
+        children = self._recombiner.children(population.poses, round(fraction * _CHILDREN), rng)
+        best = np.argsort(self.costs(children), kind="stable")[: max(1, round(fraction * _REFINED))]
         return self.selected(
             np.concatenate([population.poses, self.refined(children[best], *_RECOMBINE)])
         )

@@ -1,4 +1,4 @@
-"""Generic postures to begin with, put where a hull's trunk is, facing all ways."""
+"""Generic postures to begin with, placed at a hull's trunk, in every heading."""
 
 from collections.abc import Mapping
 
@@ -12,8 +12,8 @@ from markerless_tracker.tracking.start.hull import Hull
 HEADINGS = 16
 VARIATIONS = 48
 """Random variations of the postures, per heading."""
-VARIATION_SHARE = 0.6
-"""Their spread, as a share of how far people's joints scatter."""
+VARIATION_FRACTION = 0.6
+"""Their standard deviation, as a fraction of the prior's."""
 _TILT_RAD = (0.35, 0.40)
 _LIKE_TRUNK = ("pelvis", "belly", "chest", "torso")
 
@@ -56,8 +56,8 @@ def postures(body: BodyModel) -> FloatArray:
     return np.array([posture(body, angles) for angles in POSTURES])
 
 
-def joint_spread(body: BodyModel) -> FloatArray:
-    """(p,) how far people's joints scatter about neutral, rad; 0 for the root."""
+def joint_sd(body: BodyModel) -> FloatArray:
+    """(p,) standard deviation of people's joints about neutral, rad; 0 for the root."""
     return np.where(np.isfinite(body.prior_sd), body.prior_sd, 0.0)
 
 
@@ -73,15 +73,13 @@ def first_guesses(
         rng: draws the variations.
     """
     known = postures(body)
-    spread = VARIATION_SHARE * joint_spread(body)
-    spread[[body.index("pelvis_rx"), body.index("pelvis_ry")]] = _TILT_RAD
+    sd = VARIATION_FRACTION * joint_sd(body)
+    sd[[body.index("pelvis_rx"), body.index("pelvis_ry")]] = _TILT_RAD
     middle = hull.trunk_m.mean(axis=0)
     out = np.empty((HEADINGS, len(known) + VARIATIONS, body.size))
     for k in range(HEADINGS):
         varied = known[rng.integers(len(known), size=VARIATIONS)]
-        out[k] = np.concatenate(
-            [known, varied + spread * rng.standard_normal((VARIATIONS, body.size))]
-        )
+        out[k] = np.concatenate([known, varied + sd * rng.standard_normal((VARIATIONS, body.size))])
         out[k, :, body.index("pelvis_rz")] += 2.0 * np.pi * k / HEADINGS
     np.clip(out, limits[0], limits[1], out=out)
     at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]

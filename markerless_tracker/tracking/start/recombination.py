@@ -9,15 +9,15 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.start.postures import joint_spread, postures
+from markerless_tracker.tracking.start.postures import joint_sd, postures
 
 _ONE_LIMB = 0.5
-"""Share of children with one limb drawn anew; the others mix limbs."""
+"""Fraction of children with one limb drawn anew; the others mix limbs."""
 _MIXED = 0.35
-"""Share of the limbs that a mixed child changes."""
+"""Fraction of the limbs that a mixed child changes."""
 _TURNED = 0.4
-"""Share of the mixed children that are also turned and tilted."""
-_TURN_RAD, _TILT_RAD = 0.5, 0.15
+"""Fraction of the mixed children whose root is also rotated."""
+_YAW_RAD, _TILT_RAD = 0.5, 0.15
 _FREE_RAD = 2.8
 _FEW = 0.3
 """A smaller prior standard deviation (rad) marks a joint that hardly moves: clavicles, thorax."""
@@ -36,13 +36,13 @@ class Recombiner:
     def __init__(self, body: BodyModel, limits: FloatArray) -> None:
         self._body = body
         self._limits = limits
-        self._sd = joint_spread(body)
+        self._sd = joint_sd(body)
         self._known = postures(body)
         self._limbs = [body.subspaces[step[0]] for step in body.steps("six")[1:]]
         radius = np.where(self._sd < _FEW, _FEW, _FREE_RAD)
         self._low = np.maximum(limits[0], body.neutral - radius)
         self._high = np.minimum(limits[1], body.neutral + radius)
-        self._turn = body.index("pelvis_rz")
+        self._yaw = body.index("pelvis_rz")
         self._tilt = [body.index("pelvis_rx"), body.index("pelvis_ry")]
 
     def children(self, parents: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
@@ -74,11 +74,11 @@ class Recombiner:
         return self.with_limb_near(poses, limb, 1.0, rng)
 
     def with_limb_near(
-        self, poses: FloatArray, limb: IntArray, share: float, rng: np.random.Generator
+        self, poses: FloatArray, limb: IntArray, fraction: float, rng: np.random.Generator
     ) -> FloatArray:
         """Poses (n, p), each with its limb varied by a fraction of the prior's deviations."""
         out = poses.copy()
-        out[:, limb] += share * self._sd[limb] * rng.standard_normal((len(poses), len(limb)))
+        out[:, limb] += fraction * self._sd[limb] * rng.standard_normal((len(poses), len(limb)))
         return np.clip(out, self._limits[0], self._limits[1], out=out)
 
     def _draw(self, child: FloatArray, limb: IntArray, rng: np.random.Generator) -> None:
@@ -98,5 +98,5 @@ class Recombiner:
                 scale = (0.5, 1.0)[rng.integers(2)]
                 child[limb] += scale * self._sd[limb] * rng.standard_normal(len(limb))
         if rng.random() < _TURNED:
-            child[self._turn] += _TURN_RAD * rng.standard_normal()
+            child[self._yaw] += _YAW_RAD * rng.standard_normal()
             child[self._tilt] += _TILT_RAD * rng.standard_normal(2)

@@ -1,8 +1,9 @@
 """Whether enough of a body is in view to start from.
 
 One outline and a hand in another view leave depth, heading and most of the limbs open, and two
-whole outlines may fit a person who faces the other way. A start from too little is wrong, and the
-body's sections are fitted to it. So a person who enters at the image border is waited for.
+whole outlines may fit a person with the opposite heading. A start from too little is wrong, and the
+body's sections are fitted to it. So a person entering at the image border is not tracked until
+enough is in view.
 """
 
 from collections.abc import Iterable
@@ -30,7 +31,7 @@ class StartGate:
         self.reset()
 
     def reset(self) -> None:
-        """Nobody is in view."""
+        """No person is in view."""
         self._since_ns: int | None = None
         self._last_ns = 0
 
@@ -46,7 +47,7 @@ class StartGate:
             stamp_ns: the time; in order, except where a recording begins anew.
         """
         seeing = list(cameras)
-        if share_in_view(body, pose, seeing, LEAST_CAMERAS) < LEAST_IN_VIEW:
+        if fraction_in_view(body, pose, seeing, LEAST_CAMERAS) < LEAST_IN_VIEW:
             return False
         if self._since_ns is None or not 0 <= stamp_ns - self._last_ns <= GAP_NS:
             self._since_ns = stamp_ns
@@ -54,10 +55,10 @@ class StartGate:
         if stamp_ns - self._since_ns >= PATIENCE_NS:
             return True
         wanted = min(ENOUGH_CAMERAS, len(seeing))
-        return share_in_view(body, pose, seeing, wanted) >= LEAST_IN_VIEW
+        return fraction_in_view(body, pose, seeing, wanted) >= LEAST_IN_VIEW
 
 
-def share_in_view(
+def fraction_in_view(
     body: BodyModel, pose: FloatArray, cameras: Iterable[CameraModel], count: int
 ) -> float:
     """Fraction of the markers of a pose (p,) that lie in the frames of so many cameras or more."""

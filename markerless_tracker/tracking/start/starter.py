@@ -29,19 +29,19 @@ SECOND_GENERATIONS = 5
 STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
 """Statures that are tried for an unknown person, in heights of the hull; raised arms make it higher
 than the person."""
-USUAL_STATURES_M = (1.56, 1.63, 1.70, 1.77, 1.84)
-"""Statures that are tried besides: a person who bends, squats or sits is taller than the hull."""
+COMMON_STATURES_M = (1.56, 1.63, 1.70, 1.77, 1.84)
+"""Statures that are tried besides: a bent, squatting or sitting person is taller than the hull."""
 STANDING_M = 1.45
-"""A lower hull is that of a person who does not stand upright."""
+"""A lower hull is that of a person not standing upright."""
 _STATURE_RANGE_M = (1.2, 2.1)
 _STATURE_SD_M = 0.10
 _STATURE_WEIGHT = 0.002
 """A stature one standard deviation from the mean must raise f_s by this much more."""
 _FLIP_MARGIN = 0.005
-"""Mean gain in f_s that the opposite heading needs before the settling ends."""
+"""Mean rise of f_s that the opposite heading needs before the settling ends."""
 _WALKED_M, _WALK_M_S, _WALK_BONUS = 0.05, 0.25, 0.01
 """People walk forwards: added to f_s beyond that distance and speed."""
-_GENERATION_SHARE = 0.5
+_GENERATION_FRACTION = 0.5
 _SHAPE_FRAMES = 5
 _SHAPE_SLACK = 0.01
 _RESIZED_AFTER = 3
@@ -129,7 +129,7 @@ class Starter:
         self._start_gate.reset()
         self._population: Population | None = None
         self._searcher: Searcher | None = None
-        self._way = 0.0
+        self._heading = 0.0
         self._seen: tuple[list[_Seen | None], list[_Seen | None]] = ([], [])
         self._leading = 0
         self._flipped = False
@@ -137,7 +137,7 @@ class Starter:
         self._from_m = np.zeros(3)
 
     def step(self, observed: Mapping[str, Observation], stamp_ns: int) -> Found | None:
-        """Search one frame; None for nobody."""
+        """Search one frame; None without a person."""
         if self._population is None or self._searcher is None:
             return self._begin(observed, stamp_ns)
         population = self._population
@@ -149,13 +149,13 @@ class Starter:
         population = frame.propagated(population)
         if len(self._seen[0]) == 1:
             population = self._second_look(frame, population, observations)
-        population = frame.recombined(population, 0, share=_GENERATION_SHARE)
+        population = frame.recombined(population, 0, fraction=_GENERATION_FRACTION)
         if 1.0 - population.costs[0] < LEAST_FIT:
             self.reset()
             return None
         self._population = population
         self._note(frame, population)
-        notes += self._turn(stamp_ns)
+        notes += self._check_heading(stamp_ns)
         settled = len(self._seen[0]) >= SETTLING_FRAMES
         pose = self._best(population).poses[0]
         if settled:
@@ -168,7 +168,7 @@ class Starter:
         for hull in find_hulls(self._cameras, observed):
             if self._rejections.waits(hull):
                 continue
-            # A search takes long: not for a person who is hardly in view yet.
+            # A search takes long: not for a person that is hardly in view.
             stands = put_at(self._body, hull, self._body.neutral)
             if not self._start_gate.enough(self._body, stands, looking, stamp_ns):
                 continue
@@ -186,7 +186,7 @@ class Starter:
             if not self._start_gate.enough(self._searcher.body, best, looking, stamp_ns):
                 continue
             self._population = population
-            self._way = float(population.headings[0])
+            self._heading = float(population.headings[0])
             self._begun_ns = stamp_ns
             self._note(frame, population)
             self._from_m = self._trunk(population.poses[0])
@@ -257,7 +257,7 @@ class Starter:
         best = (
             float(population.costs[0]) + _stature_cost(height_m), frame, population, self._searcher
         )  # fmt: skip
-        statures = {share * height_m for share in STATURES} | set(USUAL_STATURES_M)
+        statures = {ratio * height_m for ratio in STATURES} | set(COMMON_STATURES_M)
         for stature_m in sorted({float(np.clip(s, *_STATURE_RANGE_M)) for s in statures}):
             searcher = self._searcher_for(self._sized(stature_m))
             moved = scaled_to(self._searcher.body, searcher.body, population.poses)
@@ -272,14 +272,14 @@ class Starter:
 
     def _note(self, frame: FramePopulation, population: Population) -> None:
         for side, seen in enumerate(self._seen):
-            facing = population.facing(self._way + side * np.pi)
+            facing = population.facing(self._heading + side * np.pi)
             seen.append(
                 _Seen(frame.contours, facing.poses[0], float(facing.costs[0]))
                 if len(facing)
                 else None
             )
 
-    def _turn(self, stamp_ns: int) -> tuple[str, ...]:
+    def _check_heading(self, stamp_ns: int) -> tuple[str, ...]:
         """Change to the opposite heading, at most once, if it explains the frames better."""
         other = 1 - self._leading
         both = [
@@ -290,24 +290,24 @@ class Starter:
         lead, rival = self._seen[self._leading][-1], self._seen[other][-1]
         if self._flipped or rival is None:
             return ()
-        gain = float(np.mean([a - b for a, b in both])) if both and lead is not None else 1.0
+        rise = float(np.mean([a - b for a, b in both])) if both and lead is not None else 1.0
         moved = self._trunk(rival.pose) - self._from_m
         seconds = (stamp_ns - self._begun_ns) * 1e-9
-        way = float(np.hypot(moved[0], moved[1]))
-        if way > _WALKED_M and seconds > 0.0 and way / seconds > _WALK_M_S:
+        walked_m = float(np.hypot(moved[0], moved[1]))
+        if walked_m > _WALKED_M and seconds > 0.0 and walked_m / seconds > _WALK_M_S:
             off = heading_difference(
-                float(np.arctan2(moved[1], moved[0])), self._way + other * np.pi
+                float(np.arctan2(moved[1], moved[0])), self._heading + other * np.pi
             )
-            gain += 2.0 * _WALK_BONUS * float(np.cos(off))
+            rise += 2.0 * _WALK_BONUS * float(np.cos(off))
         over = len(self._seen[0]) >= SETTLING_FRAMES
-        if gain <= (0.0 if over else _FLIP_MARGIN):
+        if rise <= (0.0 if over else _FLIP_MARGIN):
             return ()
         self._leading, self._flipped = other, True
-        return ("start: the person faces the other way than first thought, turned round",)
+        return ("start: the person has the opposite heading, turned round",)
 
     def _best(self, population: Population) -> Population:
         """The part of a population that has the leading heading, or all if none has."""
-        facing = population.facing(self._way + self._leading * np.pi)
+        facing = population.facing(self._heading + self._leading * np.pi)
         return facing if len(facing) else population
 
     def _settle(self, frame: FramePopulation, pose: FloatArray) -> FloatArray:

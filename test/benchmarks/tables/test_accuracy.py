@@ -58,6 +58,7 @@ def test_evidence_equals_that_of_the_tracker(walk, evidence) -> None:
     for (stamp_ns, views), one in zip(stored, tracked, strict=True):
         result = ready.step(views, stamp_ns)
         assert stamp_ns == one.result.stamp_ns
+        assert any(seen.undecided is not None for seen in views.values())
         assert result.pose.tobytes() == one.result.pose.tobytes()
 
 
@@ -217,8 +218,8 @@ def test_a_recording_that_cannot_be_scored_is_an_error(walk, make_recording) -> 
     plan = Plan(configs=(SWARM,), seeds=1)
     with pytest.raises(DatasetError, match=r"small: no ground_truth\.trc"):
         make_table([make_recording()], plan)
-    with pytest.raises(BodyModelError, match="nobody"):
-        make_table([walk], replace(plan, configs=(replace(SWARM, body="nobody"),)))
+    with pytest.raises(BodyModelError, match="missing"):
+        make_table([walk], replace(plan, configs=(replace(SWARM, body="missing"),)))
     # The same from another process, where the run itself finds out.
     impossible = replace(plan, configs=(replace(SWARM, evaluations=7),), seeds=2, frames=1)
     for jobs in (1, 2):

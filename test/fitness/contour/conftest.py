@@ -11,7 +11,10 @@ from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contour.frame import SPACING_M, ContourFrame
-from markerless_tracker.fitness.contour.silhouette_contour import SilhouetteContour, edge_of_mask
+from markerless_tracker.fitness.contour.silhouette_contour import (
+    SilhouetteContour,
+    silhouette_contour,
+)
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
@@ -36,7 +39,7 @@ class Scene:
         return SPACING_M * self.rig.cameras[0].matrix[0, 0] / DISTANCE_M
 
     def edges(self, camera: CameraModel) -> SilhouetteContour:
-        return edge_of_mask(self.observations[camera.name], self.spacing_px)
+        return silhouette_contour(self.observations[camera.name], self.spacing_px)
 
 
 def scene(name, seed, make_pose, *, lens=(0.0,) * 5, cameras=4, size=(656, 490), threads=1):

@@ -14,8 +14,8 @@ from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.contour.silhouette_contour import (
     SilhouetteContour,
-    edge_of_mask,
     join_edges,
+    silhouette_contour,
 )
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
@@ -55,7 +55,7 @@ def window(edge: SilhouetteContour):
 )  # fmt: skip
 def test_disc(u, v, radius, spacing_px) -> None:
     """A disc of pixels is off by up to half a pixel; the distance itself by up to 2 %."""
-    edge = edge_of_mask(observed(disc((u, v), radius)), spacing_px)
+    edge = silhouette_contour(observed(disc((u, v), radius)), spacing_px)
     at = window(edge)
     error = edge.distance - (np.hypot(at[0] - u, at[1] - v) - radius)
     far = np.abs(edge.distance)
@@ -79,7 +79,7 @@ def test_disc(u, v, radius, spacing_px) -> None:
 def test_rectangle(left, top, wide, high) -> None:
     mask = np.zeros(SIZE[::-1], bool)
     mask[top : top + high, left : left + wide] = True
-    edge = edge_of_mask(observed(mask), 4.0)
+    edge = silhouette_contour(observed(mask), 4.0)
     u, v = window(edge)
     # The edge runs midway between the last pixel inside and the first outside.
     du = np.maximum(left - 0.5 - u, u - (left + wide - 0.5))
@@ -103,17 +103,17 @@ def test_rectangle(left, top, wide, high) -> None:
 def test_window_is_the_bounding_box_with_a_margin() -> None:
     mask = np.zeros((400, 300), bool)
     mask[40:340, 100:160] = True
-    edge = edge_of_mask(observed(mask), 4.0)
+    edge = silhouette_contour(observed(mask), 4.0)
     # A sixth of the height, cut at the frame.
     assert (edge.left, edge.top) == (100 - 49, 0)
     assert edge.distance.shape == (340 + 49, 60 + 2 * 49)
-    small = edge_of_mask(observed(disc((120, 100), 10.0)), 4.0)
+    small = silhouette_contour(observed(disc((120, 100), 10.0)), 4.0)
     assert (small.left, small.top) == (110 - 24, 90 - 24)
 
 
 def test_holes_have_edges_too() -> None:
     ring = disc((120, 100), 60.0) & ~disc((120, 100), 30.0)
-    edge = edge_of_mask(observed(ring), 3.0)
+    edge = silhouette_contour(observed(ring), 3.0)
     out = edge.points - (120, 100)
     radius = np.linalg.norm(out, axis=1)
     inner = radius < 45
@@ -125,7 +125,7 @@ def test_holes_have_edges_too() -> None:
 
 @pytest.mark.parametrize("at", [(0.0, 100.0), (239.0, 100.0), (120.0, 0.0), (120.0, 199.0)])
 def test_no_points_where_the_silhouette_leaves_the_frame(at) -> None:
-    edge = edge_of_mask(observed(disc(at, 50.0)), 2.0)
+    edge = silhouette_contour(observed(disc(at, 50.0)), 2.0)
     assert np.abs(np.linalg.norm(edge.points - at, axis=1) - 50.0).max() < 0.8
     assert (edge.points > 0).all() and (edge.points < np.array(SIZE) - 1).all()
     # Half of it is left.
@@ -137,20 +137,20 @@ def test_specks_have_no_points() -> None:
     speckled = mask.copy()
     speckled[30:33, 30:33] = True
     speckled[99:101, 119:121] = False
-    plain, edge = (edge_of_mask(observed(m), 3.0) for m in (mask, speckled))
+    plain, edge = (silhouette_contour(observed(m), 3.0) for m in (mask, speckled))
     np.testing.assert_array_equal(edge.points, plain.points)
     assert edge.distance.shape != plain.distance.shape
 
 
 @pytest.mark.parametrize("mask", [np.zeros((50, 60), bool), disc((3, 3), 1.0)])
 def test_an_empty_silhouette(mask) -> None:
-    edge = edge_of_mask(observed(mask), 3.0)
+    edge = silhouette_contour(observed(mask), 3.0)
     assert edge.points.shape == edge.normals.shape == (0, 2) and edge.spacing.shape == (0,)
     assert edge.distance.shape == (0, 0) or np.isfinite(edge.distance).all()
 
 
 def test_a_full_frame_is_all_inside() -> None:
-    edge = edge_of_mask(observed(np.ones((50, 60), bool)), 3.0)
+    edge = silhouette_contour(observed(np.ones((50, 60), bool)), 3.0)
     assert edge.points.shape == (0, 2)
     assert (edge.distance < 0).all()
 
@@ -161,8 +161,8 @@ def test_a_region_says_the_same_as_the_full_frame(margin) -> None:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     v, u = int(rows[0]) - margin, int(columns[0]) - margin
     cut = mask[v : rows[-1] + margin + 1, u : columns[-1] + margin + 1]
-    part = edge_of_mask(observed(cut, size_px=SIZE, offset_px=(u, v)), 4.0)
-    whole = edge_of_mask(observed(mask), 4.0)
+    part = silhouette_contour(observed(cut, size_px=SIZE, offset_px=(u, v)), 4.0)
+    whole = silhouette_contour(observed(mask), 4.0)
     assert (part.left, part.top) == (whole.left, whole.top)
     for name in ("distance", "points", "normals", "spacing"):
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name))
@@ -170,7 +170,7 @@ def test_a_region_says_the_same_as_the_full_frame(margin) -> None:
 
 def test_joined_edges_hold_each_views_edge() -> None:
     masks = [disc((120, 100), 40.0), np.zeros(SIZE[::-1], bool), disc((70, 60), 25.0)]
-    edges = [edge_of_mask(observed(mask), 3.0) for mask in masks]
+    edges = [silhouette_contour(observed(mask), 3.0) for mask in masks]
     joined = join_edges(edges)
     for i, edge in enumerate(edges):
         left, top, width, height = joined.window[i]

@@ -1,13 +1,17 @@
 import cv2
 import numpy as np
+from hypothesis import given
+from hypothesis.extra import numpy as hnp
 
 from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.imaging.segmentation.morphology import (
+    SPLIT_RADIUS_PX,
     clean_mask,
     closing_px,
     drop_blobs,
     fill_holes,
-    foreground_mask,
+    shadow_patches,
+    split_undecided,
 )
 
 
@@ -71,21 +75,84 @@ def test_repairs_do_not_grow_or_shrink_a_round_body() -> None:
     assert abs(int((mask > 0).sum()) - area) < 0.005 * area
 
 
-def test_small_shadow_patches_become_foreground() -> None:
+def patches(labels: np.ndarray, least_px: float, *, opened: bool) -> np.ndarray:
+    """(h, w) bool."""
+    shadow = np.empty_like(labels)
+    assert not shadow_patches(labels, shadow, least_px, opened=opened)
+    return shadow > 0
+
+
+def test_small_patches_are_no_shadows() -> None:
     labels = body()
     labels[30:34, 70:74] = 127
     labels[100:110, 60:140] = 127
-    mask = np.empty_like(labels)
-    foreground_mask(labels, mask, 50, grey=False)
-    assert (mask == body()).all()
-    foreground_mask(labels, mask, 0, grey=False)
-    assert mask[31, 71] == 0
+    large = np.zeros(labels.shape, bool)
+    large[100:110, 60:140] = True
+    np.testing.assert_array_equal(patches(labels, 50, opened=False), large)
+    np.testing.assert_array_equal(patches(labels, 0, opened=False), labels == 127)
 
 
-def test_grey_shadows_are_opened_first() -> None:
+def test_threads_of_a_patch_are_opened_away() -> None:
     labels = body()
     labels[100:110, 60:140] = 127
     labels[60:100, 80] = 127  # one pixel wide, attached to the large patch
-    mask = np.empty_like(labels)
-    foreground_mask(labels, mask, 50, grey=True)
-    assert mask[70, 80] == 255 and mask[105, 100] == 0
+    opened = patches(labels, 50, opened=True)
+    assert not opened[70, 80] and opened[105, 100]
+    assert patches(labels, 50, opened=False)[70, 80]
+
+
+def split(either: np.ndarray, shadow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    person, undecided = either.astype(np.uint8) * 255, shadow.astype(np.uint8) * 255
+    split_undecided(person, undecided)
+    return person > 0, undecided > 0
+
+
+def test_person_and_undecided_share_what_is_not_background() -> None:
+    either = body() > 0
+    shadow = np.zeros(either.shape, bool)
+    shadow[70:110, 40:90] = True
+    person, undecided = split(either, shadow)
+    np.testing.assert_array_equal(person, either & ~shadow)
+    np.testing.assert_array_equal(undecided, either & shadow)
+
+
+def test_specks_and_threads_among_the_undecided_are_undecided() -> None:
+    either = body() > 0
+    shadow = np.zeros(either.shape, bool)
+    shadow[60:100, 60:100] = True
+    shadow[80, 70:72] = False  # a speck
+    shadow[60:100, 90:92] = False  # a thread of two pixels that hangs from the person
+    person, undecided = split(either, shadow)
+    assert undecided[80, 70:72].all() and undecided[70:100, 90:92].all()
+    np.testing.assert_array_equal(person | undecided, either)
+    np.testing.assert_array_equal(person[:59], either[:59])
+
+
+def test_threads_of_the_person_away_from_undecided_pixels_stay() -> None:
+    either = body() > 0
+    either[10:20, 80] = True
+    shadow = np.zeros(either.shape, bool)
+    shadow[90:100, 60:100] = True
+    assert split(either, shadow)[0][10:20, 80].all()
+
+
+@given(hnp.arrays(np.bool_, (12, 17)), hnp.arrays(np.bool_, (12, 17)))
+def test_a_split_makes_two_parts_of_one(either: np.ndarray, shadow: np.ndarray) -> None:
+    person, undecided = split(either, shadow)
+    assert not (person & undecided).any()
+    np.testing.assert_array_equal(person | undecided, either)
+    assert (undecided >= (either & shadow)).all()
+    if not (either & shadow).any():
+        np.testing.assert_array_equal(person, either)
+
+
+@given(hnp.arrays(np.bool_, (13, 13)), hnp.arrays(np.bool_, (13, 13)))
+def test_a_split_depends_on_pixels_within_its_radius(
+    either: np.ndarray, shadow: np.ndarray
+) -> None:
+    changed = ~either
+    side = slice(6 - SPLIT_RADIUS_PX, 7 + SPLIT_RADIUS_PX)
+    near = side, side
+    changed[near] = either[near]
+    here = [part[6, 6] for part in split(either, shadow)]
+    assert here == [part[6, 6] for part in split(changed, shadow)]

@@ -43,6 +43,9 @@ def overlap(a: np.ndarray, b: np.ndarray) -> float:
     return float((a & b).sum() / (a | b).sum())
 
 
+TWO_CLASSES = ImagingSettings.from_mapping({"shadow.undecided": False})
+
+
 def shaded(image: np.ndarray, factor: float) -> np.ndarray:
     """A cast shadow on the floor left of the person."""
     where = np.zeros(image.shape[:2], np.uint8)
@@ -55,11 +58,21 @@ def shaded(image: np.ndarray, factor: float) -> np.ndarray:
 def test_a_person_is_found_and_a_shadow_is_not() -> None:
     empty = room()
     image, mask = person(shaded(empty, 0.65), (200, 60, 20))
-    observation = Segmenter("cam01", model(empty)).observe(with_noise(image, 99), 123)
-    assert overlap(observation.mask, mask) > 0.95
-    assert observation.camera == "cam01" and observation.stamp_ns == 123
-    assert observation.size_px == (160, 120) and observation.offset_px == (0, 0)
-    assert observation.edges.max() > 100 and not observation.edges[:, :20].any()
+    for settings in (ImagingSettings(), TWO_CLASSES):
+        segmenter = Segmenter("cam01", model(empty), settings)
+        observation = segmenter.observe(with_noise(image, 99), 123)
+        assert overlap(observation.mask, mask) > 0.95
+        assert observation.camera == "cam01" and observation.stamp_ns == 123
+        assert observation.size_px == (160, 120) and observation.offset_px == (0, 0)
+        assert observation.edges.max() > 100
+        if settings.shadow.undecided:
+            assert (
+                observation.undecided is not None
+                and observation.undecided[95:105, 15:55].mean() > 0.95
+            )
+            assert (observation.undecided & (mask > 0)).sum() < 0.02 * (mask > 0).sum()
+        else:
+            assert observation.undecided is None and not observation.edges[:, :20].any()
     left = Segmenter("cam01", model(empty), ImagingSettings.from_mapping({"shadow.removal": False}))
     assert left.observe(with_noise(image, 99), 0).mask[100, 30]
 
@@ -76,8 +89,15 @@ def test_grey_cameras_in_one_or_three_channels(channels: int) -> None:
     if channels == 3:
         frames = [np.repeat(frame[:, :, None], 3, axis=2) for frame in frames]
         image = np.repeat(image[:, :, None], 3, axis=2)
-    observation = Segmenter("cam01", learn_background(frames)).observe(image, 0)
+    background = learn_background(frames)
+    observation = Segmenter("cam01", background, TWO_CLASSES).observe(image, 0)
     assert overlap(observation.mask, mask) > 0.95
+    # Where the wall is bright, so dark a pixel may be shadow or body.
+    observation = Segmenter("cam01", background).observe(image, 0)
+    undecided, exact = observation.undecided, mask > 0
+    assert undecided is not None and undecided[95:105, 15:55].mean() > 0.95
+    assert overlap(observation.mask & ~undecided, exact & ~undecided) > 0.95
+    assert (exact & ~observation.not_background).sum() < 0.01 * exact.sum()
 
 
 def test_labels_separate_body_shadow_and_room() -> None:
@@ -171,7 +191,7 @@ def test_exact_masks_of_a_rendered_walk(render_walk: Path, grey: bool, least: fl
         if grey:
             empty = [cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY) for frame in empty]
             images = [cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY) for frame in images]
-        segmenter = Segmenter(camera, learn_background(empty))
+        segmenter = Segmenter(camera, learn_background(empty), TWO_CLASSES)
         for index, image in zip((0, 50, 100), images[::1], strict=True):
             name = render_walk / "masks" / camera / f"{index:06d}.png"
             exact = cv2.imread(str(name), cv2.IMREAD_GRAYSCALE) > 127

@@ -48,8 +48,8 @@ def test_an_empty_view_is_wrong_only_where_the_body_should_be(scene) -> None:
     nothing = np.zeros((192, 256), np.uint8)
     seen = views(scene, cam01=nothing)
     believed, notes = ViewWatch(scene.rig).sort(seen, scene.body, scene.pose(0))
-    assert "cam01" not in believed and "nobody where the others see somebody" in notes[0]
-    # Nobody knows where the body is, or it is out of that view.
+    assert "cam01" not in believed and "no person where the other views show one" in notes[0]
+    # The pose is unknown, or the body is outside that view.
     assert "cam01" in ViewWatch(scene.rig).sort(seen, scene.body, None)[0]
     away = scene.pose(0).copy()
     away[scene.body.index("pelvis_tz")] += 50.0

@@ -128,8 +128,10 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
     assert watch.recover(searcher, contours, seen, 0, pose) == (pose, ())
 
 
-def test_turns_come_by_time_and_depend_on_nothing_else(balancing) -> None:
+def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch) -> None:
     scene, seen, _, hidden = balancing
+    explained = "markerless_tracker.tracking.limbs.watch.limbs_unexplained"
+    monkeypatch.setattr(explained, lambda *_: ())
 
     def found(stamps, threads=1):
         searcher = searcher_of(scene, threads)
@@ -137,10 +139,20 @@ def test_turns_come_by_time_and_depend_on_nothing_else(balancing) -> None:
         contours = contours_of(searcher, seen, hidden)
         return [watch.recover(searcher, contours, seen, stamp, hidden)[1] for stamp in stamps]
 
-    # The arm is first in the order of turns, and nobody's turn comes again so soon.
+    # The arm is the first in rotation, and no limb comes again so soon.
     assert found([0, 1, ROTATION_NS - 1]) == [("l_arm",), (), ()]
     assert found([0, ROTATION_NS], threads=2) == found([0, ROTATION_NS])
     assert scene.body.limbs[0] == "l_arm"
+
+
+def test_a_limb_near_unexplained_silhouette_is_searched_in_every_frame(balancing) -> None:
+    scene, seen, _, hidden = balancing
+    searcher = searcher_of(scene)
+    watch = LimbWatch(scene.rig)
+    contours = contours_of(searcher, seen, hidden)
+    for stamp_ns in (0, 1, ROTATION_NS - 1):
+        names = watch.recover(searcher, contours, seen, stamp_ns, hidden)[1]
+        assert "l_arm" in names
 
 
 def test_the_same_search_gives_the_same_bytes_with_any_number_of_threads(standing) -> None:

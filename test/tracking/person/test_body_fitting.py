@@ -1,4 +1,4 @@
-"""The body of somebody unknown, fitted while it is tracked."""
+"""The body of an unknown person, fitted while it is tracked."""
 
 import numpy as np
 import pytest

@@ -62,16 +62,16 @@ def settled(start, contours):
     return shape_of_first_frame(body, pose, begun, contours, config, body.limits)
 
 
-def test_noise_is_judged_by_the_two_sides() -> None:
+def test_noise_is_estimated_from_the_two_sides() -> None:
     assert start_noise_m({"l_thigh": 0.42, "r_thigh": 0.40}) == pytest.approx(0.010)
     assert start_noise_m({"l_thigh": 0.4, "r_thigh": 0.4, "torso": 0.5}) == 0.0
     assert start_noise_m({"torso": 0.5, "l_thigh": 0.4}) == 0.0
 
 
-def test_the_judgement_is_about_right(scene) -> None:
+def test_the_estimate_is_about_right(scene) -> None:
     true = markers(scene.body, scene.pose(7))
     rng = np.random.default_rng(1)
-    judged = [
+    found = [
         start_noise_m(
             measured_lengths(
                 DESCRIPTION,
@@ -80,7 +80,7 @@ def test_the_judgement_is_about_right(scene) -> None:
         )
         for _ in range(200)
     ]
-    assert 0.008 < np.sqrt(np.mean(np.square(judged))) < 0.012
+    assert 0.008 < np.sqrt(np.mean(np.square(found))) < 0.012
 
 
 def test_an_exact_start_is_held(scene, contours) -> None:

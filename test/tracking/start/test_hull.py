@@ -1,4 +1,4 @@
-"""The visual hull: where somebody is."""
+"""The visual hull: the position of a person."""
 
 from dataclasses import replace
 

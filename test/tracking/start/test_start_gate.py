@@ -1,4 +1,4 @@
-"""A person who is hardly in view is waited for."""
+"""A person hardly in view is not tracked yet."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from markerless_tracker.tracking.start.start_gate import (
     GAP_NS,
     PATIENCE_NS,
     StartGate,
-    share_in_view,
+    fraction_in_view,
 )
 
 
@@ -30,18 +30,18 @@ def standing(body, x_m: float):
 
 
 def test_in_the_middle_everything_is_seen(body) -> None:
-    assert share_in_view(body, standing(body, 0.0), ring_rig(4), 4) == 1.0
+    assert fraction_in_view(body, standing(body, 0.0), ring_rig(4), 4) == 1.0
 
 
 def test_two_cameras_must_see_it(body) -> None:
     rig = ring_rig(4)
-    assert share_in_view(body, standing(body, 0.0), rig.cameras[:1], 2) == 0.0
-    assert share_in_view(body, standing(body, 0.0), rig.cameras[:2], 2) == 1.0
+    assert fraction_in_view(body, standing(body, 0.0), rig.cameras[:1], 2) == 0.0
+    assert fraction_in_view(body, standing(body, 0.0), rig.cameras[:2], 2) == 1.0
 
 
 def test_the_share_falls_towards_the_edge(body) -> None:
     places = np.linspace(0.0, 4.0, 81)
-    shares = [share_in_view(body, standing(body, x), ring_rig(3), 2) for x in places]
+    shares = [fraction_in_view(body, standing(body, x), ring_rig(3), 2) for x in places]
     assert shares[0] == 1.0 and shares[-1] == 0.0
     assert any(0.2 < share < 0.8 for share in shares)
 
@@ -49,7 +49,9 @@ def test_the_share_falls_towards_the_edge(body) -> None:
 def test_a_third_camera_is_waited_for_a_while(body) -> None:
     rig, pose = ring_rig(4), standing(body, 0.0)
     aside = standing(body, 2.6)
-    assert share_in_view(body, aside, rig, 2) == 1.0 > 0.5 > share_in_view(body, aside, rig, 3)
+    assert (
+        fraction_in_view(body, aside, rig, 2) == 1.0 > 0.5 > fraction_in_view(body, aside, rig, 3)
+    )
     assert StartGate().enough(body, pose, rig, 0)
     # Others do not look: two are all there are.
     assert StartGate().enough(body, pose, rig.cameras[:2], 0)
@@ -86,7 +88,7 @@ def test_a_recording_that_begins_anew_is_another_visit(body) -> None:
 
 
 def test_nobody_is_started_from_an_outline_and_a_hand() -> None:
-    """One camera sees all of him, the other's frame ends where he begins."""
+    """One camera sees the whole person, the other's frame ends where the person begins."""
     scene = SyntheticScene(body="person31", motion="stand", size_px=(200, 152), seed=2)
     masks = scene.frame(0)[1]
     whole, beside = (scene.rig[name] for name in ("cam01", "cam02"))

@@ -60,13 +60,13 @@ def test_nobody_is_a_state_and_no_error(walk) -> None:
     scene, taken = walk
     tracker = tracker_of(scene, stature=1.72)
     stamp, seen, _ = taken[0]
-    nobody = {
+    empty = {
         name: Observation.from_mask(
             name, 0, np.zeros((view.height, view.width), np.uint8), view.edges
         )
         for name, view in seen.items()
     }
-    result = tracker.step(nobody, stamp - 1)
+    result = tracker.step(empty, stamp - 1)
     assert result.state is TrackState.SEARCHING
     assert result.pose is None and result.markers_m is None and not result.iou
     assert tracker.step(seen, stamp).state is TrackState.TRACKING
@@ -163,8 +163,8 @@ def test_who_is_turned_round_is_said_once() -> None:
     for cost, other in ((0.10, 0.09), (0.10, 0.08)):
         starter._seen[0].append(_Seen(None, pose, cost))
         starter._seen[1].append(_Seen(None, pose, other))
-    (note,) = starter._turn(33_000_000)
+    (note,) = starter._check_heading(33_000_000)
     assert "turned round" in note
     for seen, cost in zip(starter._seen, (0.01, 0.2), strict=True):
         seen.append(_Seen(None, pose, cost))
-    assert starter._turn(50_000_000) == ()
+    assert starter._check_heading(50_000_000) == ()

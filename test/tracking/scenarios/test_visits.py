@@ -1,4 +1,4 @@
-"""Somebody walks in, is tracked, leaves and comes back elsewhere: from images to poses."""
+"""A person walks in, is tracked, leaves and comes back elsewhere: from images to poses."""
 
 from itertools import groupby
 
@@ -15,7 +15,7 @@ from markerless_tracker.tracking import TrackerConfig, build_tracker
 FPS = 30.0
 WALK_M_S = 1.5
 BEFORE, FIRST, BETWEEN, SECOND = range(2), range(2, 28), range(28, 34), range(34, 44)
-"""Frames: nobody, somebody walks in until all see him, nobody, he is there on the other side."""
+"""Frames: empty, a person walks in until all see them, empty, the person on the other side."""
 FIRST_TO_MIDDLE, SECOND_TO_MIDDLE = 52, 20
 """Frames from the first of a visit to the middle of the room."""
 
@@ -27,18 +27,18 @@ class Visits(SyntheticScene):
         """Pose (p,) of a frame of one of the visits."""
         first = index in FIRST
         visit, left = (FIRST, FIRST_TO_MIDDLE) if first else (SECOND, SECOND_TO_MIDDLE)
-        way = 0.4 if first else 2.7
+        heading = 0.4 if first else 2.7
         away_m = (left - (index - visit.start)) / self.fps * WALK_M_S
         pose = super().pose(index).copy()
         tx, ty, rz = (self.body.index(f"pelvis_{name}") for name in ("tx", "ty", "rz"))
-        pose[tx], pose[ty] = -away_m * np.cos(way), -away_m * np.sin(way)
-        pose[rz] = way
+        pose[tx], pose[ty] = -away_m * np.cos(heading), -away_m * np.sin(heading)
+        pose[rz] = heading
         return pose
 
 
 @pytest.fixture(scope="module")
 def visits():
-    """Results and, where somebody is there, his true markers: one per frame."""
+    """Results and, where a person is there, the true markers: one per frame."""
     scene = Visits(
         body="person31", motion="walk", size_px=(164, 122), fps=FPS, samples=2, noise=4.0, seed=2
     )
@@ -91,7 +91,7 @@ def test_he_is_tracked_where_he_is(visits) -> None:
         return 1e3 * float(np.linalg.norm(results[index].markers_m - truth[index], axis=1).mean())
 
     tracked = [index for index in FIRST if results[index].pose is not None]
-    # At first one camera sees him and another half of him: that is no start.
+    # At first one camera sees the person and another half of the body: that is no start.
     assert FIRST[4] < tracked[0] < FIRST[-8]
     assert max(error_mm(index) for index in (*tracked, *SECOND)) < 70.0
     apart_m = np.linalg.norm(truth[FIRST[-1]][0] - truth[SECOND[0]][0])

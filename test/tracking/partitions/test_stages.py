@@ -114,7 +114,7 @@ def test_refinement_stands_before_and_after_a_smaller_swarm(body, refined_settin
 
 
 def test_each_limb_has_a_small_wide_swarm_of_its_own(body, refined_settings):
-    config = swarm(refined_settings, **{"refine.limb_spread": 3.0})
+    config = swarm(refined_settings, **{"refine.limb_sigma": 3.0})
     limbs = {s.name: s for s in frame_stages(body, config, body.neutral, body.sigma)[3:7]}
     assert list(limbs) == ["l_arm", "r_arm", "l_leg", "r_leg"]
     for name, stage in limbs.items():

@@ -1,0 +1,97 @@
+"""What a result's JSON file says about the rows of its marker file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.datasets.markers.track import MarkerTrack
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import TrackState
+from markerless_tracker.results.journal import read_summary
+
+
+@dataclass(frozen=True, eq=False)
+class StoredFrames:
+    """Rows of a result's marker file, with what its JSON file says about them.
+
+    Attributes:
+        track: the markers; rows of frames in the state LOST are blank.
+        markers_sd_mm: (n, m, 3) standard deviations of the markers along x, y, z of the world, mm;
+            NaN = unknown.
+        lost: (n,) whether the frame's state is LOST.
+    """
+
+    track: MarkerTrack
+    markers_sd_mm: FloatArray
+    lost: NDArray[np.bool_]
+
+
+def stored_frames(path: Path, track: MarkerTrack) -> StoredFrames | None:
+    """Frames of the JSON file (or the journal of a run without end) beside a marker file.
+
+    NAME.trc belongs to NAME.json, and NAME.2.trc, where time was set back, to it as well unless
+    there is a NAME.2.json. Frames are matched by stamp.
+
+    Args:
+        path: the marker file.
+        track: its content.
+
+    Returns:
+        None if there is neither file.
+
+    Raises:
+        DatasetError: the file is no result of a tracker, or a frame of it is malformed.
+    """
+    found = _summary_of(path)
+    if found is None:
+        return None
+    name, segment = found
+    row_of = {stamp: row for row, stamp in enumerate(track.stamps_ns.tolist())}
+    column_of = {marker: column for column, marker in enumerate(track.names)}
+    sd_mm = np.full(track.positions_m.shape, np.nan)
+    lost = np.zeros(len(track), dtype=np.bool_)
+    for number, frame in enumerate(read_summary(name)["frames"]):
+        where = f"{name}.json: frame {number}"
+        if not isinstance(frame, dict) or not isinstance(frame.get("stamp_ns"), int):
+            raise DatasetError(f"{where}: no `stamp_ns`, expected whole nanoseconds")
+        row = row_of.get(frame["stamp_ns"])
+        if row is None or frame.get("segment", 1) != segment:
+            continue
+        lost[row] = frame.get("state") == TrackState.LOST.value
+        deviations = frame.get("markers_sd_mm") or {}
+        if not isinstance(deviations, dict):
+            raise DatasetError(f"{where}: `markers_sd_mm` is no table of markers")
+        for marker in deviations.keys() & column_of.keys():
+            sd_mm[row, column_of[marker]] = _deviation(deviations[marker], where, marker)
+    positions = np.where(lost[:, None, None], np.nan, track.positions_m)
+    return StoredFrames(MarkerTrack(track.names, track.stamps_ns, positions), sd_mm, lost)
+
+
+def _summary_of(path: Path) -> tuple[Path, int] | None:
+    """The result's path without suffix, and which of its marker files this is."""
+    name = path.with_suffix("") if path.suffix.lower() == ".trc" else path
+    candidates = [(name, 1)]
+    number = name.suffix[1:]
+    if number.isascii() and number.isdecimal():
+        candidates.append((name.with_suffix(""), int(number)))
+    for base, segment in candidates:
+        if any(base.with_name(base.name + suffix).exists() for suffix in (".json", ".jsonl")):
+            return base, segment
+    return None
+
+
+def _deviation(value: Any, where: str, marker: str) -> FloatArray:
+    """(3,) standard deviations; None is unknown."""
+    try:
+        sd = np.array(value, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
+        sd = np.empty(0)
+    if sd.shape != (3,) or (sd < 0).any():
+        raise DatasetError(
+            f"{where}: `markers_sd_mm` of {marker} is {value!r}, expected three numbers from 0 on"
+        )
+    return sd

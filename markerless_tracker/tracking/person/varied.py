@@ -1,0 +1,43 @@
+"""Frames in which a person's poses differ, for fits of the sections."""
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.fitness.contour import ContourFrame
+from markerless_tracker.geometry import FloatArray
+
+MOST = 8
+"""Frames that are kept."""
+VARIETY_RAD = 0.2
+"""Root mean square difference of the joints' angles from which on a pose is another one."""
+FIRST_WEIGHT = 5
+"""Weight of the first frame, relative to each later one."""
+
+
+class VariedFrames:
+    """The first frame, whose pose is known best, and later ones in other poses.
+
+    Args:
+        prior: the body with generic sections.
+        contours: evidence of the first frame.
+        pose: (p,) its pose.
+    """
+
+    def __init__(self, prior: BodyModel, contours: ContourFrame, pose: FloatArray) -> None:
+        self.prior = prior
+        self._frames = [(contours, pose)]
+
+    def takes(self, pose: FloatArray, body: BodyModel) -> bool:
+        """Whether a pose (p,) differs from all kept ones, and there is room."""
+        if len(self._frames) >= MOST:
+            return False
+        angles = np.setdiff1d(body.joints, body.root)
+        gaps = [np.sqrt(np.mean((pose - kept)[angles] ** 2)) for _, kept in self._frames]
+        return bool(min(gaps) > VARIETY_RAD)
+
+    def add(
+        self, contours: ContourFrame, pose: FloatArray
+    ) -> list[tuple[ContourFrame, FloatArray]]:
+        """Keep a frame; returns all for `fit_shape`."""
+        self._frames.append((contours, pose))
+        return [self._frames[0]] * (FIRST_WEIGHT - 1) + self._frames

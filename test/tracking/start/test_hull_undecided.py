@@ -1,0 +1,107 @@
+"""The visual hull where pixels are undecided: legs like the floor, and shadows on it."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.camera import project_camera
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking.start.hull import FLOOR_M, decided_by_hull, find_hulls, hulls_part
+
+
+@pytest.fixture(scope="module")
+def person():
+    scene = SyntheticScene(body="person31", motion="walk", size_px=(256, 192), seed=4)
+    _, masks, _ = scene.frame(0)
+    return scene, {name: mask > 0 for name, mask in masks.items()}
+
+
+def cameras(scene):
+    return {camera.name: camera for camera in scene.rig}
+
+
+def observe(name, mask, undecided) -> Observation:
+    edges = np.zeros(mask.shape, np.uint8)
+    return Observation.from_mask(name, 0, mask & ~undecided, edges, undecided=undecided)
+
+
+def lower_half(mask):
+    rows = np.flatnonzero(mask.any(axis=1))
+    half = np.zeros_like(mask)
+    half[(rows[0] + rows[-1]) // 2 :] = True
+    return half
+
+
+def floor_disc(scene, name, mask):
+    """(h, w): the pixels of a disc of 0.3 m radius on the floor beside the person."""
+    pelvis = scene.markers(0)[0]
+    grid = np.stack(np.meshgrid(*[np.linspace(-0.3, 0.3, 240)] * 2), axis=-1).reshape(-1, 2)
+    grid = grid[np.linalg.norm(grid, axis=1) < 0.3]
+    points = np.column_stack([grid + pelvis[:2] + (0.22, 0.0), np.zeros(len(grid))])
+    u, v = np.round(project_camera(points, scene.rig[name])).astype(int).T
+    height, width = mask.shape
+    framed = (u >= 0) & (v >= 0) & (u < width) & (v < height)
+    disc = np.zeros_like(mask)
+    disc[v[framed], u[framed]] = True
+    return disc
+
+
+def test_undecided_legs_in_two_views_do_not_carve(person) -> None:
+    scene, masks = person
+    nothing = {name: np.zeros_like(mask) for name, mask in masks.items()}
+    whole = next(find_hulls(cameras(scene), {n: observe(n, masks[n], nothing[n]) for n in masks}))
+    two = list(masks)[:2]
+    hidden = {n: lower_half(m) & m if n in two else nothing[n] for n, m in masks.items()}
+    seen = {n: observe(n, masks[n], hidden[n]) for n in masks}
+    hull = next(find_hulls(cameras(scene), seen))
+    assert abs(hull.low_m - whole.low_m) < 0.07 and abs(hull.high_m - whole.high_m) < 0.04
+    # As background they would carve the legs away.
+    carved = {n: observe(n, masks[n] & ~hidden[n], nothing[n]) for n in masks}
+    assert next(find_hulls(cameras(scene), carved)).low_m > whole.low_m + 0.3
+
+
+def test_a_shadow_on_the_floor_adds_nothing_above_it(person) -> None:
+    """Its layer at the floor, as thick as the masks are grown, does not move the trunk."""
+    scene, masks = person
+    nothing = {name: np.zeros_like(mask) for name, mask in masks.items()}
+    discs = {n: floor_disc(scene, n, m) & ~m for n, m in masks.items()}
+    assert all(disc.sum() > 20 for disc in discs.values())
+    plain, shadowed = (
+        next(find_hulls(cameras(scene), {n: observe(n, masks[n] | u[n], u[n]) for n in masks}))
+        for u in (nothing, discs)
+    )
+    above = [int((hull.points_m[:, 2] > FLOOR_M + 0.1).sum()) for hull in (plain, shadowed)]
+    assert above[1] == pytest.approx(above[0], rel=0.02)
+    trunks = [hull.trunk_m.mean(axis=0) for hull in (plain, shadowed)]
+    assert np.linalg.norm(trunks[0] - trunks[1]) < 0.03
+    assert abs(plain.high_m - shadowed.high_m) < 0.04
+    # As person it reaches down to the floor and below.
+    as_person = {n: observe(n, masks[n] | discs[n], nothing[n]) for n in masks}
+    hull = next(find_hulls(cameras(scene), as_person))
+    assert len(hull.points_m) > 1.05 * len(shadowed.points_m)
+
+
+def test_a_shadow_without_a_person_is_no_hull(person) -> None:
+    scene, masks = person
+    seen = {}
+    for name, mask in masks.items():
+        speck = np.zeros_like(mask)
+        speck[0, 0] = True
+        seen[name] = observe(name, speck, floor_disc(scene, name, mask))
+    assert not list(find_hulls(cameras(scene), seen))
+
+
+def test_undecided_pixels_under_the_hull_are_person(person) -> None:
+    scene, masks = person
+    name = next(iter(masks))
+    nothing = np.zeros_like(masks[name])
+    hull = next(find_hulls(cameras(scene), {n: observe(n, m, nothing) for n, m in masks.items()}))
+    legs = lower_half(masks[name]) & masks[name]
+    shadow = floor_disc(scene, name, masks[name]) & ~masks[name]
+    seen = decided_by_hull(observe(name, masks[name], legs | shadow), scene.rig[name], hull)
+    assert seen.mask[legs].mean() > 0.95
+    assert seen.mask[shadow].mean() < 0.25
+    np.testing.assert_array_equal(seen.not_background, masks[name] | shadow)
+    plain = observe(name, masks[name], nothing)
+    assert decided_by_hull(plain, scene.rig[name], hull) is plain
+    assert hulls_part(plain, scene.rig[name], hull) is plain
