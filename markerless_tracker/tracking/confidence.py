@@ -137,12 +137,11 @@ def excesses_m(body: BodyModel, rows: OutlineRows) -> tuple[dict[str, float], fl
         rms = float(np.sqrt(square[cones].sum() / total)) if total > 0.0 else 0.0
         return max(rms - FITTING_M, 0.0)
 
-    hangs = {
-        name: carried(body, np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name])))[
-            body.cone_node
-        ].any(axis=1)
-        for name in (*body.limbs, *(("head",) if "head" in body.subspaces else ()))
-    }
+    def hanging(name: str) -> NDArray[np.bool_]:
+        nodes = np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name]))
+        return np.asarray(carried(body, nodes)[body.cone_node].any(axis=1))
+
+    hangs = {name: hanging(name) for name in (*body.limbs, "head") if name in body.subspaces}
     trunk = np.ones(count, dtype=np.bool_)
     for others in hangs.values():
         trunk &= ~others
