@@ -7,12 +7,14 @@ joint's centre inside the limb and, for a person whose lengths were not measured
 
 A limb at a wrong optimum has a well-determined pose, so its covariance does not show the error. Its
 residuals do: they stay larger than those of a limb that fits. By how much decides what is added to
-the limb's markers. Undecided pixels give no residuals, hence no information.
+the limb's markers; the trunk's excess is added to all. Undecided pixels give no residuals, hence no
+information.
 """
 
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, markers, transforms
 from markerless_tracker.body.kinematics import carried
@@ -31,12 +33,14 @@ DISAGREEMENT = 2.7
 CORRELATED = 9.0
 """Factor of the residuals' correlation length: a generic section is wrong along a whole limb, some
 half a metre, not along the piece of outline that the refinement takes for independent."""
-FITTING_LIMB_M = 0.007
-"""Root mean square of the residuals of a limb that fits: sections are generic, clothes are not."""
+FITTING_M = 0.007
+"""Root mean square of the residuals of a limb or trunk that fits: its sections are generic."""
 LIMB_ERROR = 15.0
 """Error of a limb's end relative to how far its residuals exceed those of a limb that fits."""
 MOST_LIMB_M = 0.30
 """Largest error that is inferred so: about the length of a segment."""
+TRUNK_ERROR = 2.0
+"""Error of all markers relative to the same excess of the trunk, which has no end to swing."""
 _LEVER_M = 0.25
 """Length of the limbs that an error of a joint's centre rotates."""
 _TRUNCATION_M = 0.06
@@ -72,11 +76,13 @@ def confidence_of(
     if not (np.isfinite(covariance).all() and np.diag(covariance).min() >= 0.0):
         return None
     unseen = MEASURED_M if measured else UNMEASURED_M
-    floor = float(np.hypot(unseen, DISAGREEMENT * disagreement_m(contours, rows)))
+    by_limb, of_trunk = excesses_m(body, rows)
+    between = DISAGREEMENT * disagreement_m(contours, rows)
+    floor = float(np.linalg.norm([unseen, between, TRUNK_ERROR * of_trunk]))
     by_marker, by_root = _slopes(body, pose)
     of_markers = np.einsum("ij,jk,ik->i", by_marker, covariance, by_marker)
-    limbs = limb_errors_m(body, rows)
-    of_limbs, of_pose = _spread(body, by_marker, limbs)
+    limbs_m = {name: min(LIMB_ERROR * value, MOST_LIMB_M) for name, value in by_limb.items()}
+    of_limbs, of_pose = _spread(body, by_marker, limbs_m)
     of_root = by_root @ covariance @ by_root.T
     of_root[np.diag_indices(6)] += np.repeat([floor**2, (floor / _LEVER_M) ** 2], 3)
     floors = np.full(body.size, floor / _LEVER_M)
@@ -112,8 +118,11 @@ def disagreement_m(contours: ContourFrame, rows: OutlineRows) -> float:
     return float(np.sqrt(np.mean(squares))) if squares else 0.0
 
 
-def limb_errors_m(body: BodyModel, rows: OutlineRows) -> dict[str, float]:
-    """By limb, the error of its end that its residuals suggest, m; 0 for a limb that fits.
+def excesses_m(body: BodyModel, rows: OutlineRows) -> tuple[dict[str, float], float]:
+    """How far residuals exceed those of a body that fits, m: by limb, and of the trunk.
+
+    Root mean squares over the outline points of a limb; of the trunk, over those of no limb and not
+    of the head.
 
     Args:
         body: the body.
@@ -122,14 +131,21 @@ def limb_errors_m(body: BodyModel, rows: OutlineRows) -> dict[str, float]:
     count = len(body.cone_node)
     weight = np.bincount(rows.cone, rows.weight, count)
     square = np.bincount(rows.cone, rows.weight * rows.value**2, count)
-    errors = {}
-    for name in body.limbs:
+
+    def excess(cones: NDArray[np.bool_]) -> float:
+        total = float(weight[cones].sum())
+        rms = float(np.sqrt(square[cones].sum() / total)) if total > 0.0 else 0.0
+        return max(rms - FITTING_M, 0.0)
+
+    def hanging(name: str) -> NDArray[np.bool_]:
         nodes = np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name]))
-        own = carried(body, nodes)[body.cone_node].any(axis=1)
-        total = float(weight[own].sum())
-        rms = float(np.sqrt(square[own].sum() / total)) if total > 0.0 else 0.0
-        errors[name] = min(LIMB_ERROR * max(rms - FITTING_LIMB_M, 0.0), MOST_LIMB_M)
-    return errors
+        return np.asarray(carried(body, nodes)[body.cone_node].any(axis=1))
+
+    hangs = {name: hanging(name) for name in (*body.limbs, "head") if name in body.subspaces}
+    trunk = np.ones(count, dtype=np.bool_)
+    for others in hangs.values():
+        trunk &= ~others
+    return {name: excess(hangs[name]) for name in body.limbs}, excess(trunk)
 
 
 def _spread(
