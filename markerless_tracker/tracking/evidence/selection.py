@@ -95,11 +95,8 @@ def body_region(
 
 
 def _components(observation: Observation) -> tuple[int, NDArray[np.int32]]:
-    """Components of the person's pixels: count, and label of each pixel (h, w).
-
-    Undecided ones do not connect: a shadow leads from the feet to anywhere.
-    """
-    mask = observation.mask.view(np.uint8)
+    """Components of what is person or undecided: count, and label of each pixel (h, w)."""
+    mask = observation.not_background.view(np.uint8)
     count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
     return count, np.asarray(labels)
 
@@ -127,8 +124,11 @@ def _only(
     if kept[1:].all():
         return observation, 0
     selected = kept[labels]
-    part = observation.with_masks(selected, observation.undecided)
-    return part, int((observation.mask & ~selected).sum())
+    mask, undecided = observation.mask, observation.undecided
+    part = observation.with_masks(
+        mask & selected, None if undecided is None else undecided & selected
+    )
+    return part, int((mask & ~selected).sum())
 
 
 def _thick_body(
