@@ -70,17 +70,16 @@ class RecordingWriter:
             if camera.name not in images:
                 raise DatasetError(f"{camera.name}: no image of it in frame {self._count}")
             image = check_image(images[camera.name], camera.name, size_px=camera.size_px)
-            self._videos[camera.name].write(
-                cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
-            )
+            self._videos[camera.name].write(_as_in_videos(image))
         for name, mask in (masks or {}).items():
             check_image(mask, f"mask of {name}", size_px=self.rig[name].size_px)
             write_image(self.folder / "masks" / name / f"{self._count:0{DIGITS}d}.png", mask)
         self._count += 1
 
     def write_background(self, name: str, images: Sequence[Image]) -> None:
-        """Write a camera's empty-scene images; see `write_background`."""
-        write_background(self.folder / BACKGROUND, self.rig[name], images)
+        """Write a camera's empty-scene images, in colour as its video; see `write_background`."""
+        colour = [_as_in_videos(image) for image in images]
+        write_background(self.folder / BACKGROUND, self.rig[name], colour)
 
     def write_truth(self, track: MarkerTrack) -> None:
         """Write `ground_truth.trc`."""
@@ -143,3 +142,10 @@ def write_image(path: Path, image: Image) -> None:
         path.write_bytes(data.tobytes())
     except OSError as error:
         raise DatasetError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def _as_in_videos(image: Image) -> Image:
+    """A grey image (h, w) as colour (h, w, 3): videos are colour."""
+    if image.ndim == 3:
+        return image
+    return cv2.cvtColor(image, cv2.COLOR_GRAY2BGR).astype("uint8", copy=False)

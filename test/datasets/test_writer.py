@@ -93,3 +93,15 @@ def test_existing_targets_are_refused_and_not_changed(tmp_path: Path) -> None:
     with new_folder(tmp_path / "empty") as folder:
         (folder / "new").write_text("here")
     assert (tmp_path / "empty" / "new").read_text() == "here"
+
+
+def test_a_grey_cameras_background_has_the_channels_of_its_video(tmp_path: Path, rig) -> None:
+    grey = {name: np.full((48, 64), 90, np.uint8) for name in rig.names}
+    with new_recording(tmp_path / "grey", rig, 30.0, lossless=True) as out:
+        out.write(grey)
+        for name, image in grey.items():
+            out.write_background(name, [image, image])
+    recording = open_recording(tmp_path / "grey")
+    (images,) = recording.frames()
+    for name, model in recording.background_frames().items():
+        assert model[0].shape == images.images[name].shape == (48, 64, 3)
