@@ -11,6 +11,8 @@ from markerless_tracker.compiled import compiled
 
 FOREGROUND = 255
 SHADOW = 127
+WEAK = 64
+"""A pixel of a patch that differs from the background though no single pixel does."""
 LEVELS = 256
 """Integer steps per grey level of the means in `coarse`."""
 

@@ -1,5 +1,7 @@
 """Label of each pixel of an image: background, background in shadow, or foreground."""
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,8 @@ from markerless_tracker.imaging.segmentation.shadow import shadow_rule
 from markerless_tracker.imaging.segmentation.texture import correct_labels, correction_radius_px
 from markerless_tracker.imaging.settings import ImagingSettings
 
+# From this size of the images on, lengths in pixels are as stated.
+_FULL_FRAME_PX = 640 * 480
 WEAK_RADIUS_PX = 3
 """Radius of the patches whose mean is compared with the background."""
 _LEAST_SHARE = 0.5
@@ -75,6 +79,9 @@ class PixelLabeller:
             and not background.modes
         )
         width, height = gaussians.size_px
+        # Smaller images show limbs smaller: patches must not be wider than those.
+        scale = min(1.0, math.sqrt(width * height / _FULL_FRAME_PX))
+        self._patch_radius_px = max(1, round(WEAK_RADIUS_PX * scale))
         self._memory = np.empty(height * width, dtype=np.uint8)
 
     def reset(self) -> None:
@@ -114,7 +121,7 @@ class PixelLabeller:
         return labels
 
     def _mark_weak(self, image: Image, labels: Mask, window: Region) -> None:
-        """Label background as shadow where a patch differs from it, though no single pixel does.
+        """Label background as weak where a patch differs from it, though no single pixel does.
 
         The mean of a patch has less noise than a pixel: clothes nearly of the background's colour
         are found this way, and faint shadows.
@@ -123,7 +130,7 @@ class PixelLabeller:
         part = background.pixels(image, window).astype(np.float32)
         mean = background.mean[0][:, window.top : window.bottom, window.left : window.right]
         plain = labels == 0
-        side = 2 * WEAK_RADIUS_PX + 1
+        side = 2 * self._patch_radius_px + 1
         options = self._settings.shadow
         limit = max(options.weak_least, options.weak_sigmas * background.sigma)
         # Pixels that differ by themselves would smear over those beside them.
@@ -133,7 +140,7 @@ class PixelLabeller:
             plane = part[:, :, c] - np.minimum(self.gain[c] * mean[c], np.float32(255.0))
             smooth = cv2.boxFilter(plane * plain, cv2.CV_32F, (side, side))
             weak |= np.abs(smooth) > limit * np.maximum(share, _LEAST_SHARE)
-        labels[weak & plain] = kernels.SHADOW
+        labels[weak & plain] = kernels.WEAK
 
     def _correct_by_texture(
         self, image: Image, labels: Mask, window: Region, corrected: Region

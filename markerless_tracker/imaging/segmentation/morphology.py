@@ -8,7 +8,7 @@ import numpy as np
 from markerless_tracker.imaging.masks import Mask, disc
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_small
-from markerless_tracker.imaging.segmentation.kernels import SHADOW
+from markerless_tracker.imaging.segmentation.kernels import SHADOW, WEAK
 from markerless_tracker.imaging.settings import ImagingSettings
 
 # In images of at least this size, lengths in pixels are used unscaled.
@@ -43,7 +43,7 @@ def shadow_patches(
     Returns:
         Whether the size of a needed patch is unknown.
     """
-    cv2.inRange(labels, (SHADOW,), (SHADOW,), dst=shadow)
+    cv2.inRange(labels, (WEAK,), (SHADOW,), dst=shadow)
     if opened:
         cv2.morphologyEx(shadow, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8), dst=shadow)
     if least_px <= 1.0:

@@ -8,6 +8,7 @@ from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_small, occupied
 from markerless_tracker.imaging.segmentation.border import trim_border
+from markerless_tracker.imaging.segmentation.kernels import WEAK
 from markerless_tracker.imaging.segmentation.labels import PixelLabeller
 from markerless_tracker.imaging.segmentation.level_set import refine_contour
 from markerless_tracker.imaging.segmentation.morphology import open_and_close, shadow_patches
@@ -52,8 +53,11 @@ def repair_mask(
         need=zones.patches_before_repair.within(window), unknown=zones.open_sides,
     ):  # fmt: skip
         return False
-    cv2.threshold(labels, 0, 255, cv2.THRESH_BINARY, dst=mask)
-    if not settings.shadow.undecided:
+    # Weak pixels count in large patches only: small ones are noise.
+    cv2.threshold(labels, WEAK, 255, cv2.THRESH_BINARY, dst=mask)
+    if settings.shadow.undecided:
+        cv2.bitwise_or(mask, shadow, dst=mask)
+    else:
         cv2.subtract(mask, shadow, dst=mask)
     # Outside of `zone_before_repair` the mask is wrong; opening and closing do not depend on that.
     open_and_close(mask, settings, frame_px)
