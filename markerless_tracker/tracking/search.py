@@ -212,9 +212,10 @@ class FrameSearch:
         """Size of a metre at the body in each view, px."""
         searcher = self._searcher
         at = self.pose[[searcher.body.index(f"pelvis_t{axis}") for axis in "xyz"]]
-        sizes = {}
-        for name in self._views.names:
-            camera = searcher.cameras[name]
-            depth = float(camera.T_cam_world[2, :3] @ at + camera.T_cam_world[2, 3])
-            sizes[name] = float(camera.matrix[0, 0]) / max(depth, _NEAREST_M)
-        return sizes
+        return {name: pixels_per_m(searcher.cameras[name], at) for name in self._views.names}
+
+
+def pixels_per_m(camera: CameraModel, point_m: FloatArray) -> float:
+    """Size of a metre at a point (3,) of the world in a camera's image, px."""
+    depth = float(camera.T_cam_world[2, :3] @ point_m + camera.T_cam_world[2, 3])
+    return float(camera.matrix[0, 0]) / max(depth, _NEAREST_M)

@@ -15,12 +15,11 @@ from markerless_tracker.imaging.segmentation import kernels
 from markerless_tracker.imaging.segmentation.blobs import occupied
 from markerless_tracker.imaging.segmentation.exposure import ExposureMeter
 from markerless_tracker.imaging.segmentation.gaussians import BackgroundGaussians
+from markerless_tracker.imaging.segmentation.morphology import FULL_FRAME_PX
 from markerless_tracker.imaging.segmentation.shadow import shadow_rule
 from markerless_tracker.imaging.segmentation.texture import correct_labels, correction_radius_px
 from markerless_tracker.imaging.settings import ImagingSettings
 
-# From this size of the images on, lengths in pixels are as stated.
-_FULL_FRAME_PX = 640 * 480
 WEAK_RADIUS_PX = 3
 """Radius of the patches whose mean is compared with the background."""
 _LEAST_SHARE = 0.5
@@ -80,7 +79,7 @@ class PixelLabeller:
         )
         width, height = gaussians.size_px
         # Smaller images show limbs smaller: patches must not be wider than those.
-        scale = min(1.0, math.sqrt(width * height / _FULL_FRAME_PX))
+        scale = min(1.0, math.sqrt(width * height / FULL_FRAME_PX))
         self._patch_radius_px = max(1, round(WEAK_RADIUS_PX * scale))
         self._memory = np.empty(height * width, dtype=np.uint8)
 

@@ -12,7 +12,7 @@ from markerless_tracker.imaging.segmentation.kernels import SHADOW, WEAK
 from markerless_tracker.imaging.settings import ImagingSettings
 
 # In images of at least this size, lengths in pixels are used unscaled.
-_FULL_FRAME_PX = 640 * 480
+FULL_FRAME_PX = 640 * 480
 
 
 def opening_radius_px(settings: ImagingSettings, *, grey: bool) -> int:
@@ -75,7 +75,7 @@ def split_undecided(mask: Mask, shadow: Mask) -> None:
 
 def closing_px(settings: ImagingSettings, frame_px: int) -> int:
     """Side of the closing in a frame of that many pixels, odd; `mask.close_px` says how."""
-    side = settings.mask.close_px * min(1.0, math.sqrt(frame_px / _FULL_FRAME_PX))
+    side = settings.mask.close_px * min(1.0, math.sqrt(frame_px / FULL_FRAME_PX))
     return 2 * round((side - 1.0) / 2.0) + 1 if side > 1.0 else 1
 
 

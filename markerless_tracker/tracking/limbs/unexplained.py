@@ -12,6 +12,7 @@ from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
+from markerless_tracker.tracking.search import pixels_per_m
 
 MARGIN_M = 0.03
 """Silhouette so near to the body is explained: sections and clothes are never exact."""
@@ -41,7 +42,7 @@ def limbs_unexplained(
     areas: dict[str, float] = {}
     for name, observation in observations.items():
         camera = rig[name]
-        scale = _pixels_per_m(camera, middle)
+        scale = pixels_per_m(camera, middle)
         left_over = _left_over(observation, masks[name], scale)
         for area_px, centre in left_over:
             limb = _nearest(axes, camera, centre)
@@ -87,8 +88,3 @@ def _nearest(axes: Mapping[str, FloatArray], camera: CameraModel, centre: FloatA
         return float(np.nanmin(np.linalg.norm(project_camera(axes[name], camera) - centre, axis=1)))
 
     return min(axes, key=gap)
-
-
-def _pixels_per_m(camera: CameraModel, point_m: FloatArray) -> float:
-    depth = float(camera.T_cam_world[2, :3] @ point_m + camera.T_cam_world[2, 3])
-    return float(camera.matrix[0, 0]) / max(depth, 0.5)
