@@ -43,16 +43,20 @@ def explained_in_region(
 ) -> tuple[Observation, int] | None:
     """`explained_part` of an observation of a region; None where the whole frame is needed.
 
-    That is so if no component is near to the body, or if one that is comes nearer than `clear_px`
-    to a side of the region beyond which the frame goes on: it may go on there too. Otherwise the
-    components kept are those that would be kept of the whole frame.
+    That is so if no component with person pixels is near to the body, or if person pixels of one
+    that is come nearer than `clear_px` to a side of the region beyond which the frame goes on: the
+    person may go on there too. Undecided pixels at a side do not ask for more: shadows and faint
+    patches go on across the floor, and count neither way. Components are those of the region: one
+    that joins the body's through undecided pixels outside of it is left out.
     """
     count, labels = _components(observation)
     kept = _near(labels, count, observation, camera, body, pose, margin_px)
     if not kept.any():
         return None
     part, left_out = _only(observation, labels, kept)
-    left, top, width, height = cv2.boundingRect(kept[labels].view(np.uint8))
+    left, top, width, height = cv2.boundingRect(part.mask.view(np.uint8))
+    if width == 0:
+        return None
     box = Region(left, top, left + width, top + height).moved(*observation.offset_px)
     u, v = observation.offset_px
     region = Region(u, v, u + observation.width, v + observation.height)
