@@ -16,6 +16,7 @@ from markerless_tracker.imaging.segmentation.blobs import occupied
 from markerless_tracker.imaging.segmentation.exposure import ExposureMeter
 from markerless_tracker.imaging.segmentation.gaussians import BackgroundGaussians
 from markerless_tracker.imaging.segmentation.morphology import FULL_FRAME_PX
+from markerless_tracker.imaging.segmentation.patches import mark_weak
 from markerless_tracker.imaging.segmentation.shadow import shadow_rule
 from markerless_tracker.imaging.segmentation.texture import correct_labels, correction_radius_px
 from markerless_tracker.imaging.settings import ImagingSettings
@@ -120,26 +121,16 @@ class PixelLabeller:
         return labels
 
     def _mark_weak(self, image: Image, labels: Mask, window: Region) -> None:
-        """Label background as weak where a patch differs from it, though no single pixel does.
-
-        The mean of a patch has less noise than a pixel: clothes nearly of the background's colour
-        are found this way, and faint shadows.
-        """
-        background = self.background
-        part = background.pixels(image, window).astype(np.float32)
-        mean = background.mean[0][:, window.top : window.bottom, window.left : window.right]
-        plain = labels == 0
-        side = 2 * self._patch_radius_px + 1
-        options = self._settings.shadow
+        """Label background as weak where a patch differs from it, though no single pixel does."""
+        background, options = self.background, self._settings.shadow
         limit = max(options.weak_least, options.weak_sigmas * background.sigma)
+        part = background.pixels(image, window)
         # Pixels that differ by themselves would smear over those beside them.
-        share = cv2.boxFilter(plain.astype(np.float32), cv2.CV_32F, (side, side))
-        weak = np.zeros(part.shape[:2], dtype=np.bool_)
-        for c in range(part.shape[2]):
-            plane = part[:, :, c] - np.minimum(self.gain[c] * mean[c], np.float32(255.0))
-            smooth = cv2.boxFilter(plane * plain, cv2.CV_32F, (side, side))
-            weak |= np.abs(smooth) > limit * np.maximum(share, _LEAST_SHARE)
-        labels[weak & plain] = kernels.WEAK
+        mark_weak(
+            np.ascontiguousarray(part.transpose(2, 0, 1)), background.mean[0], self.gain, labels,
+            (window.left, window.top), radius=self._patch_radius_px, limit=limit,
+            least_share=_LEAST_SHARE,
+        )  # fmt: skip
 
     def _correct_by_texture(
         self, image: Image, labels: Mask, window: Region, corrected: Region

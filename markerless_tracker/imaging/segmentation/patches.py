@@ -1,0 +1,145 @@
+"""Means of patches: they differ from the background where no single pixel does.
+
+The mean of a patch has less noise than a pixel: clothes nearly of the background's colour are found
+this way, and faint shadows.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.compiled import inlined, kernel
+from markerless_tracker.imaging.segmentation.kernels import WEAK
+
+
+@inlined
+def _mirrored(v, count):  # type: ignore[no-untyped-def]
+    """Index v of a row beyond the border, mirrored at the border row (OpenCV's REFLECT_101)."""
+    if count == 1:
+        return 0
+    while v < 0 or v >= count:
+        v = -v if v < 0 else 2 * count - 2 - v
+    return v
+
+
+@kernel
+def _take_plain(label, plain, old, total):  # type: ignore[no-untyped-def]
+    """Row of background pixels, 1 or 0; the column sums ``total`` lose the row ``old`` for it."""
+    for j in range(label.size):
+        # Weak pixels were background before.
+        one = np.float32(1.0) if (label[j] == 0) | (label[j] == WEAK) else np.float32(0.0)
+        total[j] += np.float64(one - old[j])
+        old[j] = one
+        plain[j] = one
+
+
+@kernel
+def _take_differences(value, mean, gain, plain, old, total):  # type: ignore[no-untyped-def]
+    """As `_take_plain`, of a row's differences from the background."""
+    white = np.float32(255.0)
+    for j in range(plain.size):
+        new = (np.float32(value[j]) - min(gain * mean[j], white)) * plain[j]
+        # Sums of differences of float32 are exact in float64, in any order.
+        total[j] += np.float64(new) - np.float64(old[j])
+        old[j] = new
+
+
+@kernel
+def _sum_patches(total, side, out):  # type: ignore[no-untyped-def]
+    """out[j] = total[j] + ... + total[j + side - 1]."""
+    if side == 7:
+        for j in range(out.size):
+            left = total[j] + total[j + 1] + total[j + 2]
+            right = total[j + 4] + total[j + 5] + total[j + 6]
+            out[j] = left + total[j + 3] + right
+        return
+    for j in range(out.size):
+        whole = total[j]
+        for k in range(1, side):
+            whole += total[j + k]
+        out[j] = whole
+
+
+@kernel
+def _mirror_ends(row, radius):  # type: ignore[no-untyped-def]
+    """Fill the first and last ``radius`` values of a row with those mirrored at its ends."""
+    n = row.size - 2 * radius
+    for k in range(1, radius + 1):
+        row[radius - k] = row[radius + _mirrored(-k, n)]
+        row[radius + n - 1 + k] = row[radius + _mirrored(n - 1 + k, n)]
+
+
+@kernel
+def _limits(count, share, limit, least_share, out):  # type: ignore[no-untyped-def]
+    for j in range(out.size):
+        out[j] = limit * max(np.float32(count[j] * share), least_share)
+
+
+@kernel
+def _mark_beyond(patch, share, limit, label):  # type: ignore[no-untyped-def]
+    for j in range(label.size):
+        far = abs(np.float32(patch[j] * share)) > limit[j]
+        label[j] = np.uint8(WEAK) if far & (label[j] == 0) else label[j]
+
+
+@kernel
+def _weak_rows(planes, mean, gain, radius, limit, least_share, left, top, rings, total, labels):  # type: ignore[no-untyped-def]
+    """See `mark_weak`; planes (c, a, b), rings (side + 1, c + 1, b), total (c + 2, b + 2 r)."""
+    channels = planes.shape[0]
+    rows, columns = labels.shape
+    side = 2 * radius + 1
+    share = 1.0 / np.float64(side * side)
+    plain, limits = rings[side, 0], rings[side, 1]
+    patch = total[channels + 1, :columns]
+    last = radius + columns
+    for s in range(-radius, rows + radius):
+        v = _mirrored(s, rows)
+        old = rings[(s + radius) % side]
+        _take_plain(labels[v], plain, old[channels], total[channels, radius:last])
+        for c in range(channels):
+            base = mean[c, top + v, left : left + columns]
+            _take_differences(planes[c, v], base, gain[c], plain, old[c], total[c, radius:last])
+        i = s - radius
+        if i < 0:
+            continue
+        _mirror_ends(total[channels], radius)
+        _sum_patches(total[channels], side, patch)
+        _limits(patch, share, limit, least_share, limits)
+        for c in range(channels):
+            _mirror_ends(total[c], radius)
+            _sum_patches(total[c], side, patch)
+            _mark_beyond(patch, share, limits, labels[i])
+
+
+def mark_weak(
+    planes: NDArray[np.uint8],
+    mean: NDArray[np.float32],
+    gain: NDArray[np.float32],
+    labels: NDArray[np.uint8],
+    corner: tuple[int, int],
+    *,
+    radius: int,
+    limit: float,
+    least_share: float,
+) -> None:
+    """Label background as weak where the mean of the patch around it differs from the background.
+
+    The means are those of the background pixels of square patches, mirrored at the part's border.
+
+    Args:
+        planes: (c, a, b), channels of a part of an image.
+        mean: (c, h, w) grey levels, the background of the whole image.
+        gain: (c,) brightness of the image relative to the background's.
+        labels: (a, b), changed: 0 becomes `WEAK`.
+        corner: the part's first column and row in the image.
+        radius: of the patches, px.
+        limit: least difference of a mean, grey levels.
+        least_share: share of a patch as which a smaller share of background pixels counts.
+    """
+    channels, _, columns = planes.shape
+    side = 2 * radius + 1
+    rings = np.zeros((side + 1, max(channels + 1, 2), columns), dtype=np.float32)
+    total = np.zeros((channels + 2, columns + 2 * radius), dtype=np.float64)
+    _weak_rows(
+        planes, mean, gain, radius, np.float32(limit), np.float32(least_share), corner[0],
+        corner[1], rings, total, labels,
+    )  # fmt: skip
