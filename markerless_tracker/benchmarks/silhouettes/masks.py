@@ -28,7 +28,11 @@ from markerless_tracker.imaging.segmentation import clean_mask
 from markerless_tracker.records import Observation
 from markerless_tracker.results.result import versions
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.evidence.selection import explained_part
+from markerless_tracker.tracking.evidence.selection import (
+    body_lines,
+    explained_part,
+    place_cones,
+)
 from markerless_tracker.tracking.evidence.undecided import decide
 
 LEAK_PX = 5
@@ -272,7 +276,8 @@ def _selected(
     assert views.pose is not None
     seen = _observation(camera, mask, undecided)
     margin_px = config.region.component_margin_px
-    part = explained_part(seen, scene.rig[camera], scene.body, views.pose, margin_px)[0]
+    lines = body_lines(scene.rig[camera], place_cones(scene.body, views.pose))
+    part = explained_part(seen, lines, margin_px)[0]
     return part.mask, part.undecided
 
 

@@ -29,6 +29,7 @@ class Segmenter:
         camera: the camera's name.
         background: its empty scene.
         settings: defaults if None.
+        edges: whether edge maps are read; if not, those of observations are 0.
 
     Raises:
         ImageError: no background for this camera.
@@ -39,12 +40,15 @@ class Segmenter:
         camera: str,
         background: BackgroundModel | None,
         settings: ImagingSettings | None = None,
+        *,
+        edges: bool = True,
     ) -> None:
         if background is None:
             raise ImageError(f"{camera}: no background came, expected one to compare images with")
         self.camera = camera
         self.background = background
         self.settings = settings or ImagingSettings()
+        self._with_edges = edges
         self._labeller = PixelLabeller(camera, background, self.settings)
         self._grey = self._labeller.background.is_grey
         self._size_px = width, height = background.size_px
@@ -118,10 +122,14 @@ class Segmenter:
                 f"{self.camera}: got a region of {tuple(region)}, expected one inside the image of "
                 f"{self._size_px[0]}x{self._size_px[1]} px"
             )
-        mask, undecided, zone = self._silhouette(image, region, edge_radius_px(self.settings))
+        radius_px = edge_radius_px(self.settings) if self._with_edges else 0
+        mask, undecided, zone = self._silhouette(image, region, radius_px)
         inside = region.within(zone).slices
         either = mask if undecided is None else mask | undecided
-        edges = edge_map(image[zone.slices], either, self.settings)[inside]
+        if self._with_edges:
+            edges = edge_map(image[zone.slices], either, self.settings)[inside]
+        else:
+            edges = np.zeros((region.height, region.width), dtype=np.uint8)
         self._labeller.follow(image, either if region == self._whole else None, stamp_ns)
         return Observation.from_mask(
             self.camera,

@@ -13,9 +13,12 @@ from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.selection import (
+    BodyLines,
+    body_lines,
     body_region,
     explained_in_region,
     explained_part,
+    place_cones,
 )
 
 
@@ -66,7 +69,9 @@ class EvidenceMaker:
                     f"{background.size_px[1]} px, its calibration says "
                     f"{camera.size_px[0]}x{camera.size_px[1]}"
                 )
-            segmenters[camera.name] = Segmenter(camera.name, background, self._config)
+            segmenters[camera.name] = Segmenter(
+                camera.name, background, self._config, edges=self._config.edge_weight > 0.0
+            )
         self.segmenters = segmenters
 
     def observe(
@@ -108,10 +113,11 @@ class EvidenceMaker:
         self, observed: Mapping[str, Observation], body: BodyModel, predicted: FloatArray
     ) -> tuple[dict[str, Observation], tuple[str, ...]]:
         """Keep the components that a predicted pose (p,) explains; say what was left out."""
+        cones = place_cones(body, predicted)
 
         def part(item: tuple[str, Observation]) -> tuple[Observation, int]:
             name, observation = item
-            return explained_part(observation, self._rig[name], body, predicted, self._margin_px)
+            return explained_part(observation, body_lines(self._rig[name], cones), self._margin_px)
 
         return _kept(dict(zip(observed, self._pool.map(part, observed.items()), strict=True)))
 
@@ -135,22 +141,23 @@ class EvidenceMaker:
         """
         self._check(views)
         self._calls += 1
-        regions = self.regions(body, predicted, margin_m)
+        cones = place_cones(body, predicted)
 
         def evidence(item: tuple[str, Image | Observation]) -> tuple[Observation, int]:
             name, view = item
-            camera, region = self._rig[name], regions[name]
+            lines = body_lines(self._rig[name], cones)
             if not isinstance(view, Observation):
                 segmenter = self._segmenter(name)
-                if region is not None and not self._whole_frame_is_due(name):
+                region = None
+                if not self._whole_frame_is_due(name):
+                    region = self._region(lines, margin_m)
+                if region is not None:
                     seen = segmenter.observe(view, stamp_ns, region)
-                    found = explained_in_region(
-                        seen, camera, body, predicted, self._margin_px, self._clear_px
-                    )
+                    found = explained_in_region(seen, lines, self._margin_px, self._clear_px)
                     if found is not None:
                         return found
                 view = segmenter.observe(view, stamp_ns)
-            return explained_part(view, camera, body, predicted, self._margin_px)
+            return explained_part(view, lines, self._margin_px)
 
         return _kept(dict(zip(views, self._pool.map(evidence, views.items()), strict=True)))
 
@@ -158,12 +165,13 @@ class EvidenceMaker:
         self, body: BodyModel, predicted: FloatArray, margin_m: float | None
     ) -> dict[str, Region | None]:
         """Region of each camera: a body at a pose (p,) and a margin around it; None = all."""
-        if margin_m is None:
-            return dict.fromkeys(self._rig.names)
+        cones = place_cones(body, predicted)
         return {
-            camera.name: body_region(camera, body, predicted, margin_m, self._clear_px)
-            for camera in self._rig
+            camera.name: self._region(body_lines(camera, cones), margin_m) for camera in self._rig
         }
+
+    def _region(self, lines: BodyLines, margin_m: float | None) -> Region | None:
+        return None if margin_m is None else body_region(lines, margin_m, self._clear_px)
 
     def exposure(self, views: Mapping[str, Image | Observation]) -> dict[str, tuple[float, ...]]:
         """How bright the images just gathered are beside their backgrounds, by channel."""

@@ -1,5 +1,7 @@
 """Which parts of a silhouette are the tracked body's: the components that the prediction meets."""
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +15,65 @@ from markerless_tracker.records import Observation
 _POINTS_PER_CONE = 6
 
 
+class PlacedCones(NamedTuple):
+    """The cones of a body at a pose.
+
+    Attributes:
+        points_m: (c, n, 3) along each cone's axis, world frame.
+        radii_m: (c,) the largest of each cone.
+    """
+
+    points_m: FloatArray
+    radii_m: FloatArray
+
+
+class BodyLines(NamedTuple):
+    """A body in one camera's image, as a thick line along each cone.
+
+    Attributes:
+        pixels: (c, n, 2) px, NaN behind the camera.
+        depths_m: (c,) least depth of each line.
+        radii_px: (c,) largest radius of each cone, at that depth.
+        px_m: the camera's focal length, px: size of a metre at a metre's distance.
+        size_px: (width, height) of the frame.
+    """
+
+    pixels: FloatArray
+    depths_m: FloatArray
+    radii_px: FloatArray
+    px_m: float
+    size_px: tuple[int, int]
+
+
+def place_cones(body: BodyModel, pose: FloatArray) -> PlacedCones:
+    """The cones of a body at a pose (p,)."""
+    t = np.linspace(0.0, 1.0, _POINTS_PER_CONE)
+    placed = cone_transforms(body, pose)
+    ends, shape = body.cone_shape[:, :, 2:], body.cone_shape
+    local = np.empty((len(placed), t.size, 3))
+    local[:, :, :2] = (1.0 - t)[:, None] * ends[:, None, 0] + t[:, None] * ends[:, None, 1]
+    local[:, :, 2] = t * body.cone_length[:, None]
+    points_m = local @ placed[:, :3, :3].transpose(0, 2, 1) + placed[:, None, :3, 3]
+    return PlacedCones(points_m, shape[:, :, :2].max(axis=(1, 2)))
+
+
+def body_lines(camera: CameraModel, cones: PlacedCones) -> BodyLines:
+    """Placed cones as a camera sees them."""
+    points, focal = cones.points_m, float(camera.matrix[0, 0])
+    depths_m = (points @ camera.T_cam_world[2, :3] + camera.T_cam_world[2, 3]).min(axis=1)
+    pixels = project_camera(points.reshape(-1, 3), camera).reshape(*points.shape[:2], 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radii_px = focal * cones.radii_m / depths_m
+    return BodyLines(pixels, depths_m, radii_px, focal, camera.size_px)
+
+
 def explained_part(
-    observation: Observation, camera: CameraModel, body: BodyModel, pose: FloatArray, margin_px: int
+    observation: Observation, lines: BodyLines, margin_px: int
 ) -> tuple[Observation, int]:
     """Keep the silhouette's components that come near to the predicted body.
 
-    A component stays if any of its pixels is nearer than `margin_px` to the body at the pose, drawn
-    as thick lines along its cones. If none is (the prediction is elsewhere), all stay.
+    A component stays if any of its pixels is nearer than `margin_px` to the body at the predicted
+    pose, drawn as `lines`. If none is (the prediction is elsewhere), all stay.
 
     Returns:
         The observation, the very same if nothing was left out, and the number of pixels left out.
@@ -27,19 +81,14 @@ def explained_part(
     count, labels = _components(observation)
     if count <= 2:
         return observation, 0
-    kept = _near(labels, count, observation, camera, body, pose, margin_px)
+    kept = _near(labels, count, observation, lines, margin_px)
     if not kept.any():
         return observation, 0
     return _only(observation, labels, kept)
 
 
 def explained_in_region(
-    observation: Observation,
-    camera: CameraModel,
-    body: BodyModel,
-    pose: FloatArray,
-    margin_px: int,
-    clear_px: int,
+    observation: Observation, lines: BodyLines, margin_px: int, clear_px: int
 ) -> tuple[Observation, int] | None:
     """`explained_part` of an observation of a region; None where the whole frame is needed.
 
@@ -50,7 +99,7 @@ def explained_in_region(
     that joins the body's through undecided pixels outside of it is left out.
     """
     count, labels = _components(observation)
-    kept = _near(labels, count, observation, camera, body, pose, margin_px)
+    kept = _near(labels, count, observation, lines, margin_px)
     if not kept.any():
         return None
     part, left_out = _only(observation, labels, kept)
@@ -71,28 +120,26 @@ def explained_in_region(
     return None if cut else (part, left_out)
 
 
-def body_region(
-    camera: CameraModel, body: BodyModel, pose: FloatArray, margin_m: float, least_px: int
-) -> Region | None:
-    """The part of a camera's frame that holds a body at a pose (p,), and a margin around it.
+def body_region(lines: BodyLines, margin_m: float, least_px: int) -> Region | None:
+    """The part of a camera's frame that holds a body, and a margin around it.
 
     Args:
+        lines: the body in that camera.
         margin_m: margin at the body, all around.
         least_px: smallest margin.
 
     Returns:
         None if the camera does not see enough of the body.
     """
-    focal = float(camera.matrix[0, 0])
-    pixels, depths_m, radii_m = _cone_lines(camera, body, pose)
+    pixels, depths_m = lines.pixels, lines.depths_m
     if not np.isfinite(pixels).all() or depths_m.min() <= 0.0:
         return None
-    radii_px = (focal * radii_m / depths_m)[:, None]
+    radii_px = lines.radii_px[:, None]
     low = (pixels.min(axis=1) - radii_px).min(axis=0)
     high = (pixels.max(axis=1) + radii_px).max(axis=0)
-    margin = max(focal * margin_m / float(depths_m.min()), float(least_px))
+    margin = max(lines.px_m * margin_m / float(depths_m.min()), float(least_px))
     left, top = np.floor(np.maximum(low - margin, 0.0))
-    right, bottom = np.ceil(np.minimum(high + margin, np.asarray(camera.size_px, dtype=float)))
+    right, bottom = np.ceil(np.minimum(high + margin, np.asarray(lines.size_px, dtype=float)))
     if right <= left or bottom <= top:
         return None
     return Region(int(left), int(top), int(right), int(bottom))
@@ -109,15 +156,17 @@ def _near(
     labels: NDArray[np.int32],
     count: int,
     observation: Observation,
-    camera: CameraModel,
-    body: BodyModel,
-    pose: FloatArray,
+    lines: BodyLines,
     margin_px: int,
 ) -> NDArray[np.bool_]:
     """(count,) which components come near to the body; the first is the background's."""
-    near = _thick_body(observation, camera, body, pose, margin_px)
     kept = np.zeros(count, dtype=np.bool_)
-    kept[np.unique(labels[near])] = True
+    # Mostly the points of the lines themselves meet all components, and nothing need be drawn.
+    points = _drawn(observation, lines)[1].reshape(-1, 2)
+    inside = ((points >= 0) & (points < (observation.width, observation.height))).all(axis=1)
+    kept[labels[points[inside, 1], points[inside, 0]]] = True
+    if not kept[1:].all():
+        kept[np.unique(labels[_thick_body(observation, lines, margin_px)])] = True
     kept[0] = False
     return kept
 
@@ -135,34 +184,21 @@ def _only(
     return part, int((mask & ~selected).sum())
 
 
-def _thick_body(
-    observation: Observation, camera: CameraModel, body: BodyModel, pose: FloatArray, margin_px: int
-) -> NDArray[np.bool_]:
+def _thick_body(observation: Observation, lines: BodyLines, margin_px: int) -> NDArray[np.bool_]:
     """Mask (h, w) of the region's pixels within a margin of the body."""
     out = np.zeros((observation.height, observation.width), dtype=np.uint8)
-    focal = float(camera.matrix[0, 0])
-    lines, depths_m, radii_m = _cone_lines(camera, body, pose)
-    for line, depth_m, radius_m in zip(lines, depths_m, radii_m, strict=True):
-        pixels = line - observation.offset_px
-        if not np.isfinite(pixels).all() or np.abs(pixels).max() > 1e4:
-            continue
-        thickness = max(1, min(2 * (round(focal * radius_m / depth_m) + margin_px), 255))
-        points = np.round(pixels).astype(np.int32).reshape(-1, 1, 2)
-        cv2.polylines(out, [points], False, 1, thickness)
+    which, points = _drawn(observation, lines)
+    for line, radius_px in zip(points, lines.radii_px[which], strict=True):
+        thickness = max(1, min(2 * (round(float(radius_px)) + margin_px), 255))
+        cv2.polylines(out, [line.reshape(-1, 1, 2)], False, 1, thickness)
     return out.view(np.bool_)
 
 
-def _cone_lines(
-    camera: CameraModel, body: BodyModel, pose: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Per cone: points (c, n, 2) px along its axis, their least depth and its largest radius, m."""
-    t = np.linspace(0.0, 1.0, _POINTS_PER_CONE)
-    placed = cone_transforms(body, pose)
-    ends, shape = body.cone_shape[:, :, 2:], body.cone_shape
-    local = np.empty((len(placed), t.size, 3))
-    local[:, :, :2] = (1.0 - t)[:, None] * ends[:, None, 0] + t[:, None] * ends[:, None, 1]
-    local[:, :, 2] = t * body.cone_length[:, None]
-    points = local @ placed[:, :3, :3].transpose(0, 2, 1) + placed[:, None, :3, 3]
-    depths_m = points @ camera.T_cam_world[2, :3] + camera.T_cam_world[2, 3]
-    pixels = project_camera(points.reshape(-1, 3), camera).reshape(*points.shape[:2], 2)
-    return pixels, depths_m.min(axis=1), shape[:, :, :2].max(axis=(1, 2))
+def _drawn(
+    observation: Observation, lines: BodyLines
+) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
+    """Which lines (c,) can be drawn, and their points (k, n, 2) in whole pixels of the region."""
+    pixels = lines.pixels - observation.offset_px
+    # Not for NaN either.
+    which = (np.abs(pixels) <= 1e4).all(axis=(1, 2))
+    return which, np.round(pixels[which]).astype(np.int32)

@@ -6,7 +6,15 @@ import pytest
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
-from markerless_tracker.tracking.evidence.selection import explained_part
+from markerless_tracker.tracking.evidence.selection import (
+    body_lines,
+    explained_part,
+    place_cones,
+)
+
+
+def lines(camera, body, pose):
+    return body_lines(camera, place_cones(body, pose))
 
 
 @pytest.fixture
@@ -29,13 +37,13 @@ def with_blob(person, u: int, size: int = 12):
 
 def test_a_silhouette_in_one_piece_is_not_touched(camera, body, pose, person):
     seen = observe(person)
-    assert explained_part(seen, camera, body, pose, 0) == (seen, 0)
+    assert explained_part(seen, lines(camera, body, pose), 0) == (seen, 0)
     nothing = observe(np.zeros_like(person))
-    assert explained_part(nothing, camera, body, pose, 0) == (nothing, 0)
+    assert explained_part(nothing, lines(camera, body, pose), 0) == (nothing, 0)
 
 
 def test_a_blob_far_from_the_body_is_left_out(camera, body, pose, person):
-    kept, left_out = explained_part(observe(with_blob(person, 5)), camera, body, pose, 0)
+    kept, left_out = explained_part(observe(with_blob(person, 5)), lines(camera, body, pose), 0)
     np.testing.assert_array_equal(kept.mask, person)
     assert left_out == 144
     assert (kept.camera, kept.stamp_ns, kept.size_px) == ("cam01", 5, (240, 180))
@@ -45,8 +53,8 @@ def test_a_blob_far_from_the_body_is_left_out(camera, body, pose, person):
 def test_a_blob_within_the_margin_stays(camera, body, pose, person):
     first = int(np.flatnonzero(person[80:92].any(axis=0))[0])
     mask = with_blob(person, first - 20, 12)
-    near = explained_part(observe(mask), camera, body, pose, 15)
-    far = explained_part(observe(mask), camera, body, pose, 0)
+    near = explained_part(observe(mask), lines(camera, body, pose), 15)
+    far = explained_part(observe(mask), lines(camera, body, pose), 0)
     assert (near[1], far[1]) == (0, 144)
 
 
@@ -54,7 +62,7 @@ def test_a_body_in_several_pieces_keeps_them_all(camera, body, pose, person):
     mask = with_blob(person, 5)
     cut = int(np.mean(np.flatnonzero(person.any(axis=1))))
     mask[cut : cut + 2] = False
-    kept, left_out = explained_part(observe(mask), camera, body, pose, 0)
+    kept, left_out = explained_part(observe(mask), lines(camera, body, pose), 0)
     expected = person.copy()
     expected[cut : cut + 2] = False
     np.testing.assert_array_equal(kept.mask, expected)
@@ -66,21 +74,21 @@ def test_a_prediction_that_meets_nothing_leaves_all(camera, body, pose, person):
     mask = with_blob(person, 5)
     assert not (np.asarray(silhouette(body, pose, camera)).astype(bool) & mask).any()
     seen = observe(mask)
-    assert explained_part(seen, camera, body, pose, 0) == (seen, 0)
+    assert explained_part(seen, lines(camera, body, pose), 0) == (seen, 0)
 
 
 @pytest.mark.parametrize("away_m", [50.0, -50.0, 1e9])
 def test_a_prediction_out_of_sight_leaves_all(camera, body, pose, person, away_m):
     pose[body.index("pelvis_tx")] = away_m
     seen = observe(with_blob(person, 5))
-    assert explained_part(seen, camera, body, pose, 0) == (seen, 0)
+    assert explained_part(seen, lines(camera, body, pose), 0) == (seen, 0)
 
 
 def test_regions_are_cut_as_full_frames(camera, body, pose, person):
     mask = with_blob(person, 5)
     window = np.s_[20:170, 3:220]
     region = observe(mask[window], size_px=(240, 180), offset_px=(3, 20))
-    kept, left_out = explained_part(region, camera, body, pose, 0)
+    kept, left_out = explained_part(region, lines(camera, body, pose), 0)
     np.testing.assert_array_equal(kept.mask, person[window])
     assert left_out == 144
     assert kept.offset_px == (3, 20)
@@ -92,6 +100,6 @@ def test_more_specks_than_fit_sixteen_bits(body, pose):
     mask = np.zeros((480, 640), dtype=bool)
     mask[::2, ::2] = True
     mask[:4] = False
-    kept, left_out = explained_part(observe(mask), camera, body, pose, 0)
+    kept, left_out = explained_part(observe(mask), lines(camera, body, pose), 0)
     assert kept.mask.sum() + left_out == mask.sum()
     assert left_out > 65535

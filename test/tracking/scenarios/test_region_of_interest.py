@@ -10,9 +10,11 @@ from markerless_tracker.drawing import silhouette
 from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.tracking.evidence.selection import (
+    body_lines,
     body_region,
     explained_in_region,
     explained_part,
+    place_cones,
 )
 
 
@@ -67,6 +69,10 @@ def test_the_pose_is_that_of_whole_images(
     assert any(size < full // 2 for row in sizes[1:] for size in row)
 
 
+def lines(camera, body, pose):
+    return body_lines(camera, place_cones(body, pose))
+
+
 def seen_in(mask, region: Region) -> Observation:
     part = np.ascontiguousarray(mask[region.slices])
     return Observation.from_mask(
@@ -98,15 +104,15 @@ def test_exposure_is_reported_per_camera(make_tracker, frames, swarm_settings) -
 def test_the_region_holds_the_body_and_its_margin(camera, body, pose):
     mask = np.asarray(silhouette(body, pose, camera)).astype(np.uint8)
     box = cv2.boundingRect(mask)
-    bare = body_region(camera, body, pose, 0.0, 0)
-    wide = body_region(camera, body, pose, 0.2, 0)
+    bare = body_region(lines(camera, body, pose), 0.0, 0)
+    wide = body_region(lines(camera, body, pose), 0.2, 0)
     assert bare.left <= box[0] and bare.right >= box[0] + box[2]
     assert bare.top <= box[1] and bare.bottom >= box[1] + box[3]
     depth_m = np.linalg.norm(camera.T_cam_world[:3, 3])
     margin = 0.2 * camera.matrix[0, 0] / depth_m
     assert bare.left - wide.left == pytest.approx(margin, rel=0.3)
-    assert body_region(camera, body, pose, 0.0, 30).left <= bare.left - 29
-    assert body_region(camera, body, pose, 1e6, 0) == Region(0, 0, 240, 180)
+    assert body_region(lines(camera, body, pose), 0.0, 30).left <= bare.left - 29
+    assert body_region(lines(camera, body, pose), 1e6, 0) == Region(0, 0, 240, 180)
 
 
 @pytest.mark.parametrize("away_m", [50.0, -50.0, 1e9])
@@ -114,7 +120,7 @@ def test_a_body_out_of_sight_has_no_region(camera, body, pose, away_m):
     for axis in ("pelvis_tx", "pelvis_ty"):
         moved = pose.copy()
         moved[body.index(axis)] = away_m
-        region = body_region(camera, body, moved, 0.1, 0)
+        region = body_region(lines(camera, body, moved), 0.1, 0)
         assert region is None or region.width * region.height < 240 * 180 / 4
 
 
@@ -124,8 +130,8 @@ def test_what_is_kept_in_a_region_is_what_is_kept_of_the_frame(camera, body, pos
     region = Region(left, top, left + width, top + height).grown(20, (240, 180))
     mask[region.top + 30 : region.top + 36, region.left : region.left + 5] = True
     mask[2:6, 2:6] = True
-    whole = explained_part(seen_in(mask, Region(0, 0, 240, 180)), camera, body, pose, 0)[0]
-    found = explained_in_region(seen_in(mask, region), camera, body, pose, 0, 3)
+    whole = explained_part(seen_in(mask, Region(0, 0, 240, 180)), lines(camera, body, pose), 0)[0]
+    found = explained_in_region(seen_in(mask, region), lines(camera, body, pose), 0, 3)
     assert found is not None and found[1] == 30
     np.testing.assert_array_equal(found[0].mask, whole.mask[region.slices])
 
@@ -134,13 +140,13 @@ def test_a_body_cut_by_the_region_asks_for_the_frame(camera, body, pose):
     mask = np.asarray(silhouette(body, pose, camera)).astype(bool)
     left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
     box = Region(left, top, left + width, top + height)
-    assert explained_in_region(seen_in(mask, box), camera, body, pose, 0, 3) is None
+    assert explained_in_region(seen_in(mask, box), lines(camera, body, pose), 0, 3) is None
     near = box.grown(2, (240, 180))
-    assert explained_in_region(seen_in(mask, near), camera, body, pose, 0, 3) is None
-    assert explained_in_region(seen_in(mask, near), camera, body, pose, 0, 2) is not None
+    assert explained_in_region(seen_in(mask, near), lines(camera, body, pose), 0, 3) is None
+    assert explained_in_region(seen_in(mask, near), lines(camera, body, pose), 0, 2) is not None
     # Cut by the frame itself: there is nothing more to see.
     whole = Region(0, 0, 240, 180)
-    assert explained_in_region(seen_in(mask, whole), camera, body, pose, 0, 500) is not None
+    assert explained_in_region(seen_in(mask, whole), lines(camera, body, pose), 0, 500) is not None
 
 
 def test_undecided_pixels_at_a_side_do_not_ask_for_the_frame(camera, body, pose):
@@ -161,19 +167,21 @@ def test_undecided_pixels_at_a_side_do_not_ask_for_the_frame(camera, body, pose)
             offset_px=(part.left, part.top),
         )  # fmt: skip
 
-    found = explained_in_region(seen(region, person | thing), camera, body, pose, 0, 5)
+    found = explained_in_region(seen(region, person | thing), lines(camera, body, pose), 0, 5)
     assert found is not None and found[1] == 0
     np.testing.assert_array_equal(found[0].mask, person[region.slices])
     # The person leaves the region in the same place.
-    assert explained_in_region(seen(region, person | floor), camera, body, pose, 0, 5) is None
+    assert (
+        explained_in_region(seen(region, person | floor), lines(camera, body, pose), 0, 5) is None
+    )
     # All that is near the body is undecided: the frame may tell more.
     nobody = np.zeros_like(person)
-    assert explained_in_region(seen(region, nobody), camera, body, pose, 0, 5) is None
+    assert explained_in_region(seen(region, nobody), lines(camera, body, pose), 0, 5) is None
 
 
 def test_a_region_without_the_body_asks_for_the_frame(camera, body, pose):
     region = Region(0, 0, 240, 180)
     nothing = np.zeros((180, 240), dtype=bool)
-    assert explained_in_region(seen_in(nothing, region), camera, body, pose, 0, 3) is None
+    assert explained_in_region(seen_in(nothing, region), lines(camera, body, pose), 0, 3) is None
     nothing[2:8, 2:8] = True
-    assert explained_in_region(seen_in(nothing, region), camera, body, pose, 0, 3) is None
+    assert explained_in_region(seen_in(nothing, region), lines(camera, body, pose), 0, 3) is None
