@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 
 Mask = NDArray[np.uint8]
 """(h, w), 0 or 255."""
+SOLID = np.ones((3, 3), dtype=np.uint8)
+"""The square element that reaches one pixel in every direction."""
 
 
 def disc(side_px: int) -> Mask:

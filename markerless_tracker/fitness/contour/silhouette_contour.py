@@ -14,6 +14,11 @@ from markerless_tracker.records import Observation
 
 UNDECIDED_PX = 2.0
 """No residual is taken so near to undecided pixels."""
+# Pixels within that distance.
+_AROUND = np.arange(-int(UNDECIDED_PX), int(UNDECIDED_PX) + 1)
+_NEAR_UNDECIDED = (np.hypot(_AROUND[:, None], _AROUND) <= UNDECIDED_PX).astype(np.uint8)
+# Chamfer distances of 5x5 depend on pixels so near.
+_REACH_PX = 2
 _SAME_PX = 0.5
 _FAR_PX = np.float32(1e4)
 _SMALLEST_EDGE_PX = 12
@@ -74,28 +79,23 @@ def silhouette_contour(observation: Observation, spacing_px: float) -> Silhouett
     are no points within `UNDECIDED_PX` of undecided pixels, and distances are very large where
     that border is the nearest.
     """
-    mask = observation.in_full_frame(observation.mask.view(np.uint8))
-    undecided = observation.undecided
-    height, width = mask.shape
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if rows.size == 0:
+    mask, undecided = observation.mask.view(np.uint8), observation.undecided
+    width, height = observation.size_px
+    first, row, columns, rows = cv2.boundingRect(mask)
+    if rows == 0:
         nothing = np.empty((0, 2))
         return SilhouetteContour(np.empty((0, 0), np.float32), 0, 0, nothing, nothing, np.empty(0))
-    margin = max(_LEAST_MARGIN_PX, (rows[-1] - rows[0]) // 6)
-    top, bottom = max(0, rows[0] - margin), min(height, rows[-1] + margin + 1)
-    left, right = max(0, columns[0] - margin), min(width, columns[-1] + margin + 1)
-    window = np.ascontiguousarray(mask[top:bottom, left:right])
-    inside = cv2.distanceTransform(window, cv2.DIST_L2, 5)
-    distance = np.asarray(cv2.distanceTransform(1 - window, cv2.DIST_L2, 5), np.float32)
-    # The edge runs midway between pixels inside and outside.
-    distance -= inside
-    distance += window
-    distance -= 0.5
+    first, row = first + observation.offset_px[0], row + observation.offset_px[1]
+    margin = max(_LEAST_MARGIN_PX, (rows - 1) // 6)
+    top, bottom = max(0, row - margin), min(height, row + rows + margin)
+    left, right = max(0, first - margin), min(width, first + columns + margin)
+    box = left, top, right, bottom
+    window = _window(observation, mask, box)
+    distance = _signed_distance(window)
     known, free = distance, None
     if undecided is not None:
-        frame = observation.in_full_frame(undecided.view(np.uint8))
         known, free = _without_undecided(
-            distance, window, np.ascontiguousarray(frame[top:bottom, left:right])
+            distance, window, _window(observation, undecided.view(np.uint8), box)
         )
     contours, _ = cv2.findContours(window, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     chains: list[NDArray[Any]] = [np.empty((0, 2), dtype=np.int32)]
@@ -118,12 +118,48 @@ def silhouette_contour(observation: Observation, spacing_px: float) -> Silhouett
     normal = normal[inner] / length[inner, None]
     return SilhouetteContour(
         known,
-        int(left),
-        int(top),
+        left,
+        top,
         at[inner] + 0.5 * normal,
         normal,
         np.concatenate(spacing)[inner],
     )
+
+
+def _window(
+    observation: Observation, part: NDArray[np.uint8], box: tuple[int, int, int, int]
+) -> NDArray[np.uint8]:
+    """A window (left, top, right, bottom) of the frame, of an array (h, w) of the region.
+
+    0 outside of the region.
+    """
+    left, top, right, bottom = box
+    u, v = observation.offset_px
+    window = np.zeros((bottom - top, right - left), dtype=np.uint8)
+    inner = np.s_[
+        max(v - top, 0) : max(v + observation.height - top, 0),
+        max(u - left, 0) : max(u + observation.width - left, 0),
+    ]
+    outer = np.s_[max(top - v, 0) : max(bottom - v, 0), max(left - u, 0) : max(right - u, 0)]
+    window[inner] = part[outer]
+    return window
+
+
+def _signed_distance(mask: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Distances (h, w) to the edge of a mask (h, w) of 0 and 1, px, positive outside."""
+    distance = np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, 5), np.float32)
+    # Inside, only the pixels of the mask and those next to it matter.
+    left, top, width, height = cv2.boundingRect(mask)
+    part = np.s_[
+        max(top - _REACH_PX, 0) : top + height + _REACH_PX,
+        max(left - _REACH_PX, 0) : left + width + _REACH_PX,
+    ]
+    near = distance[part]
+    near -= cv2.distanceTransform(np.ascontiguousarray(mask[part]), cv2.DIST_L2, 5)
+    # The edge runs midway between pixels inside and outside.
+    near += mask[part]
+    distance -= 0.5
+    return distance
 
 
 def _without_undecided(
@@ -138,14 +174,11 @@ def _without_undecided(
         distance: (h, w) to the edge of the person alone.
         person, undecided: (h, w), 0 or 1.
     """
-    either = person | undecided
-    wider = np.asarray(cv2.distanceTransform(1 - either, cv2.DIST_L2, 5), np.float32)
-    wider -= cv2.distanceTransform(either, cv2.DIST_L2, 5)
-    wider += either
-    wider -= 0.5
+    wider = _signed_distance(person | undecided)
     same = np.abs(wider - distance) < _SAME_PX
-    free = np.asarray(cv2.distanceTransform(1 - undecided, cv2.DIST_L2, 3) > UNDECIDED_PX)
-    return np.where(same & free, distance, _FAR_PX), free
+    free = cv2.dilate(undecided, _NEAR_UNDECIDED) == 0
+    same &= free
+    return np.where(same, distance, _FAR_PX), free
 
 
 @kernel

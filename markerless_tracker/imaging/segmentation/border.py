@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
+from markerless_tracker.imaging.masks import SOLID
 from markerless_tracker.imaging.region import Region
 
 # Radius of the window from which the colour of the body beside a pixel is taken, px.
@@ -90,8 +91,8 @@ def trim_border(
     """
     gone = np.empty_like(mask)
     for _ in range(layers):
-        inner = cv2.erode(mask, np.ones((3, 3), dtype=np.uint8))
-        deep = cv2.erode(inner, np.ones((3, 3), dtype=np.uint8))
+        inner = cv2.erode(mask, SOLID)
+        deep = cv2.erode(inner, SOLID)
         mark_half_covered(
             image, mean, gain, part.left, part.top, mask, inner, deep, np.float32(least**2), gone
         )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from markerless_tracker.imaging.background.adapt import Adaptation
 from markerless_tracker.imaging.background.model import BackgroundModel
 from markerless_tracker.imaging.images import Image, grey_of
-from markerless_tracker.imaging.masks import Mask
+from markerless_tracker.imaging.masks import SOLID, Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation import kernels
 from markerless_tracker.imaging.segmentation.blobs import occupied
@@ -26,7 +26,6 @@ WEAK_RADIUS_PX = 3
 _LEAST_SHARE = 0.5
 LOOK_PX = 3
 """Radius within which the choice of pixels whose texture is examined depends on their labels."""
-_SOLID = np.ones((3, 3), dtype=np.uint8)
 
 
 def patch_radius_px(settings: ImagingSettings) -> int:
@@ -140,8 +139,8 @@ class PixelLabeller:
         if not is_grey:
             # Specks are removed later: their texture is not tested.
             solid = cv2.threshold(labels, kernels.SHADOW, 255, cv2.THRESH_BINARY)[1]
-            cv2.morphologyEx(solid, cv2.MORPH_OPEN, _SOLID, dst=solid)
-            looked_at = np.asarray(cv2.dilate(solid, _SOLID), dtype=np.uint8)
+            cv2.morphologyEx(solid, cv2.MORPH_OPEN, SOLID, dst=solid)
+            looked_at = np.asarray(cv2.dilate(solid, SOLID), dtype=np.uint8)
             part = occupied(looked_at, corrected.within(window)).moved(window.left, window.top)
         if part.width <= 0:
             return

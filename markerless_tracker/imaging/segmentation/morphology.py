@@ -3,9 +3,8 @@
 import math
 
 import cv2
-import numpy as np
 
-from markerless_tracker.imaging.masks import Mask, disc
+from markerless_tracker.imaging.masks import SOLID, Mask, disc
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_small
 from markerless_tracker.imaging.segmentation.kernels import SHADOW, WEAK
@@ -45,7 +44,7 @@ def shadow_patches(
     """
     cv2.inRange(labels, (WEAK,), (SHADOW,), dst=shadow)
     if opened:
-        cv2.morphologyEx(shadow, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8), dst=shadow)
+        cv2.morphologyEx(shadow, cv2.MORPH_OPEN, SOLID, dst=shadow)
     if least_px <= 1.0:
         return False
     return clear_small(shadow, least_px, connectivity=4, zone=zone, need=need, unknown=unknown)
@@ -65,9 +64,9 @@ def split_undecided(mask: Mask, shadow: Mask) -> None:
     """
     cv2.bitwise_and(shadow, mask, dst=shadow)
     cv2.subtract(mask, shadow, dst=mask)
-    solid = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8))
+    solid = cv2.morphologyEx(mask, cv2.MORPH_OPEN, SOLID)
     thin = cv2.subtract(mask, solid)
-    beside = cv2.dilate(shadow, np.ones((3, 3), dtype=np.uint8))
+    beside = cv2.dilate(shadow, SOLID)
     cv2.bitwise_and(thin, beside, dst=thin)
     cv2.subtract(mask, thin, dst=mask)
     cv2.bitwise_or(shadow, thin, dst=shadow)
