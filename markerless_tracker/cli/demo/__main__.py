@@ -15,9 +15,9 @@ from rich.table import Table
 
 from markerless_tracker.bags import write_bag
 from markerless_tracker.body import load_body, read_subject
-from markerless_tracker.cli.demo.live import Replay, replay
 from markerless_tracker.cli.demo.pictures import draw_pictures, mean_overlap, read_outcome
 from markerless_tracker.cli.demo.scene import Scene, made_up_scene, real_scene
+from markerless_tracker.cli.replay.replay import Replay, replay
 from markerless_tracker.datasets import open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.errors import DatasetError, TrackerError

@@ -113,6 +113,7 @@ class Synchronizer(Generic[View]):
         self._waiting: MatchedSet[View] | None = None
         self._newest_ns: int | None = None
         self._late_ns: list[int] = []
+        self._last_late_ns: int | None = None
         self._complete_s: float | None = None
         self._counts: Counter[str] = Counter()
         self._changed = Condition()
@@ -129,6 +130,12 @@ class Synchronizer(Generic[View]):
         with self._changed:
             waiting = len(self._waiting.views) if self._waiting is not None else 0
             return waiting + sum(len(queue) for queue in self._pending.values())
+
+    @property
+    def late_ns(self) -> int | None:
+        """Stamp of the last set that was dropped because it was late; None so far."""
+        with self._changed:
+            return self._last_late_ns
 
     @property
     def complete_s(self) -> float | None:
@@ -266,6 +273,7 @@ class Synchronizer(Generic[View]):
         stamp_ns = min(entry.stamp_ns for entry in members.values())
         if not self._accepts(stamp_ns):
             self._counts["late"] += 1
+            self._last_late_ns = stamp_ns
             return
         restarted = self._newest_ns is not None and stamp_ns <= self._newest_ns
         if restarted:

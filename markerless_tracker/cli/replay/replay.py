@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from markerless_tracker.cli.demo.processes import NodeError, NodeProcess
+from markerless_tracker.cli.replay.processes import NodeError, NodeProcess
 from markerless_tracker.node.ros.profile import apply_profile
 from markerless_tracker.node.watch import StateWatch
 

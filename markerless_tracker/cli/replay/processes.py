@@ -1,4 +1,4 @@
-"""The demo's nodes as processes that end with the demo."""
+"""Nodes as processes that end with this one."""
 
 import os
 import signal
@@ -13,7 +13,7 @@ from markerless_tracker.errors import TrackerError
 
 
 class NodeError(TrackerError):
-    """A node of the demo ended early, or was not ready in time."""
+    """A node ended early, or was not ready in time."""
 
 
 class NodeProcess:
