@@ -234,6 +234,9 @@ class TrackWorker:
                     return
             else:
                 self._status.doing("processing images")
+            # EFFORT: once `Tracker.step` takes one, hand it `EffortRule.take(Lateness(...))` here
+            # (effort.py): `matched.replaced`, `matched.period_s`, the time since `arrived_s`, and
+            # how long `take` waited in `_run`.
             result = handle.tracker.step(images, matched.stamp_ns)
             finished_s = self._clock()
         except Exception as error:
