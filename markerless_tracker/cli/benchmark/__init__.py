@@ -5,6 +5,7 @@ import argparse
 from markerless_tracker.cli.benchmark import (
     cameras,
     jitter,
+    live,
     recovery,
     silhouettes,
     speed,
@@ -14,7 +15,7 @@ from markerless_tracker.cli.benchmark import (
 
 HELP = (
     "Measure accuracy (tables), fewer cameras (cameras), automatic starts (start), recovery, "
-    "jitter and lag (jitter), silhouettes or speed. "
+    "jitter and lag (jitter), silhouettes, speed, or all of it live over ROS 2 (live). "
     "Recordings need a ground_truth.trc; in tables its first row gives the start pose and the "
     "segment lengths, all its rows are the reference."
 )
@@ -28,6 +29,7 @@ _KINDS = {
     "recovery": recovery,
     "cameras": cameras,
     "jitter": jitter,
+    "live": live,
 }
 
 

@@ -15,22 +15,13 @@ from rich.table import Table
 
 from markerless_tracker.bags import write_bag
 from markerless_tracker.body import load_body, read_subject
-from markerless_tracker.cli.demo.live import Replay, replay
 from markerless_tracker.cli.demo.pictures import draw_pictures, mean_overlap, read_outcome
 from markerless_tracker.cli.demo.scene import Scene, made_up_scene, real_scene
+from markerless_tracker.cli.replay.replay import Replay, replay
 from markerless_tracker.datasets import open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.errors import DatasetError, TrackerError
 from markerless_tracker.node.ros.process import require_ros
-
-SLOW_RATE = 0.04
-"""Playback rate of the first attempt to skip no set: 2.4 sets/s of a 60 fps recording. The search
-for the person in the first frames takes many times as long as tracking."""
-
-MISSED_AT_START = 8
-"""Sets that may be skipped during the search for the person without a slower attempt."""
-
-_TRIES = 2
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -58,15 +49,15 @@ def _demo(folder: Path, console: Console, *, made_up: bool) -> None:
     scene = _scene(folder, console, made_up=made_up)
     bag = folder / "bag"
     sets, fps = _convert(scene, bag, console)
-    slow, live = _replays(scene, bag, folder, console, sets=sets, fps=fps)
-    outcome = read_outcome(slow.result)
+    every, live = _replays(scene, bag, folder, console, sets=sets, fps=fps)
+    outcome = read_outcome(every.result)
     overlaps = [mean_overlap(outcome.frames), _overlap(live.result)]
     with _bar(console, "drawing", None):
         body = load_body(
-            outcome.body, read_subject(slow.result.with_name(slow.result.name + ".subject.yaml"))
+            outcome.body, read_subject(every.result.with_name(every.result.name + ".subject.yaml"))
         )
         sheets = draw_pictures(bag, outcome.frames, body, folder / "result" / "overlays")
-    _report(console, scene, (slow, live), overlaps, sheets)
+    _report(console, scene, (every, live), overlaps, sheets)
     console.print(f"The demo took {time.monotonic() - started_s:.0f} s.")
 
 
@@ -101,14 +92,14 @@ def _convert(scene: Scene, bag: Path, console: Console) -> tuple[int, float]:
 def _replays(
     scene: Scene, bag: Path, folder: Path, console: Console, *, sets: int, fps: float
 ) -> tuple[Replay, Replay]:
-    """One replay at a rate at which no set is skipped, and one in real time."""
+    """One replay in lockstep, which skips no set, and one in real time."""
     tracker: dict[str, object] = {
         "calibration_file": bag / "calibration.toml",
         "background_dir": bag / "background",
         **({"body": scene.body} if scene.body else {}),
     }
 
-    def run(rate: float, name: str, title: str) -> Replay:
+    def run(rate: float | None, name: str, title: str) -> Replay:
         with _bar(console, title, sets) as advance:
             return replay(
                 bag,
@@ -121,18 +112,11 @@ def _replays(
                 report=advance,
             )
 
-    rate = SLOW_RATE
-    for _ in range(_TRIES):
-        slow = run(rate, "every_frame", f"tracking at {rate:g} x real time")
-        missed = slow.skipped + slow.lost
-        if missed <= MISSED_AT_START:
-            break
-        console.print(f"  {missed} of {sets} sets were skipped at this rate")
-        rate /= 2
+    every = run(None, "every_frame", "tracking every set, in lockstep")
     live = run(1.0, "real_time", "tracking in real time")
-    for warning in live.warnings:
+    for warning in (*every.warnings, *live.warnings):
         console.print(f"  player: {warning}", markup=False, style="dim", soft_wrap=True)
-    return slow, live
+    return every, live
 
 
 def _overlap(result: Path) -> dict[str, float]:
@@ -160,6 +144,10 @@ def _bar(console: Console, title: str, total: int | None) -> Iterator[Callable[[
         progress.update(task, description=title, total=total or 1, completed=total or 1)
 
 
+def _pace(run: Replay) -> str:
+    return "every set" if run.rate is None else f"{run.rate:g} x"
+
+
 def _report(
     console: Console,
     scene: Scene,
@@ -173,7 +161,7 @@ def _report(
         table.add_column(heading, justify="right")
     for run, overlap in zip(replays, overlaps, strict=True):
         table.add_row(
-            f"{run.rate:g} x",
+            _pace(run),
             str(run.sets),
             str(run.tracked),
             f"{run.skipped}" + (f" + {run.lost} lost" if run.lost else ""),
@@ -184,7 +172,7 @@ def _report(
         )
     console.print(table)
     console.print(
-        f"Overlap (IoU) of silhouette and body at {replays[0].rate:g} x: "
+        "Overlap (IoU) of silhouette and body, every set: "
         + ", ".join(f"{name} {value:.3f}" for name, value in overlaps[0].items()),
         soft_wrap=True,
     )

@@ -80,15 +80,22 @@ class BagRecording(Recording):
             self.warn(f"{self.name}: the file has no index, it was read through to find its topics")
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
-        first_ns, place = self._place_of(start)
-        grouping = SetGrouping(self._topics, self._where, first_ns)
         with ThreadPoolExecutor(len(self.rig), thread_name_prefix="decode") as pool:
-            sets = enumerate(grouping.sets(self._files.messages(place)), start=start)
-            for index, found in sets:
+            for index, found in enumerate(self.stored_sets(start), start=start):
                 if (index - start) % every == 0:
-                    images = pool.map(self._image, found.messages.values())
+                    images = pool.map(self.image, found.messages.values())
                     named = dict(zip(self.rig.names, images, strict=True))
                     yield FrameSet(index, found.stamp_ns, named)
+
+    def stored_sets(self, start: int = 0) -> Iterator[StampedSet]:
+        """The complete sets from that one on, their images as stored.
+
+        Raises:
+            DatasetError: the bag ends before, or its messages have no header.
+        """
+        first_ns, place = self._place_of(start)
+        grouping = SetGrouping(self._topics, self._where, first_ns)
+        yield from grouping.sets(self._files.messages(place))
         if grouping.incomplete:
             self.warn(
                 f"{self.name}: sets lacking a camera were skipped "
@@ -143,7 +150,12 @@ class BagRecording(Recording):
             forward = SetGrouping(self._topics, self._where).sets(self._files)
             yield from islice(forward, count, None)
 
-    def _image(self, message: RawMessage) -> Image:
+    def image(self, message: RawMessage) -> Image:
+        """The image of a stored message, at the recording's scale.
+
+        Raises:
+            DatasetError, ImageError: it cannot be decoded, or is not as its camera is calibrated.
+        """
         name = self._topics[message.topic]
         where = f"{self.name}: {message.topic}"
         content = self._decoded(message)

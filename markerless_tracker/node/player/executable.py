@@ -66,10 +66,16 @@ def _play(context: Any, stop: StopSignals) -> int:
     node.play(spin)
     if not stop.asked:
         node.finish(spin)
-    node.get_logger().info(f"played {node.sets_played} sets")
+    node.get_logger().info(_summary(node.sets_played, node.playing_s, node.cpu_s))
     executor.shutdown(timeout_sec=0)
     node.destroy_node()
     return 0
+
+
+def _summary(sets: int, playing_s: float, cpu_s: float) -> str:
+    if not sets or not playing_s:
+        return f"played {sets} sets"
+    return f"played {sets} sets in {playing_s:.3f} s, {1e3 * cpu_s / sets:.2f} ms of CPU time a set"
 
 
 if __name__ == "__main__":

@@ -8,8 +8,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
 from sensor_msgs.msg import CameraInfo, Image
 
-from markerless_tracker.datasets import FrameSet, Recording, detect_format, open_recording
+from markerless_tracker.datasets import detect_format
+from markerless_tracker.datasets.bag.recording import BagRecording
 from markerless_tracker.errors import DatasetError
+from markerless_tracker.node.player.encode import PlayedSet, played_sets
+from markerless_tracker.node.player.lockstep import Lockstep
 from markerless_tracker.node.player.pace import Pace
 from markerless_tracker.node.player.parameters import (
     PlayerSettings,
@@ -18,16 +21,19 @@ from markerless_tracker.node.player.parameters import (
     read_player_settings,
 )
 from markerless_tracker.node.player.prefetch import prefetch
-from markerless_tracker.node.ros.camera_info import info_of
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
-from markerless_tracker.node.ros.images import fill_image
-from markerless_tracker.node.ros.messages import header, optical_frame
 from markerless_tracker.node.ros.qos import image_qos, latched_qos
 
 _PREFETCH_SETS = 8
 _REMIND_S = 10.0
 _DISCOVERY_S = 1.0
+_SERVE_S = 0.1
+"""Time between two looks at callbacks that are due, such as requests for parameters."""
+_PATIENCE_S = 5.0
+"""Time for the discovery of a tracker in lockstep."""
 _ACKNOWLEDGE_S = 3.0
+_LATE_S = 0.05
+"""Delay of the last set that is reported."""
 # An acknowledged image may not have reached the subscriber's callback yet.
 _LINGER_S = 0.5
 
@@ -49,12 +55,17 @@ class PlayerNode(GivenNode):
         self._recording = _open_bag(self.settings)
         self._start = round(self.settings.start_offset * self._recording.fps)
         self._ready = False
+        self._lockstep = Lockstep(self.settings.lockstep_timeout, clock=time.monotonic)
+        self._served_s = time.monotonic()
         names = self._recording.rig.names
         qos = image_qos()
         self._images = {n: self.create_publisher(Image, f"{n}/image_raw", qos) for n in names}
         self._infos = {n: self.create_publisher(CameraInfo, f"{n}/camera_info", qos) for n in names}
-        self.create_subscription(DiagnosticArray, "state", self._on_state, latched_qos())
+        self._states: Any = self.create_subscription(
+            DiagnosticArray, "state", self._on_state, latched_qos()
+        )
         self.sets_played = 0
+        self.playing_s = self.cpu_s = 0.0
 
     def waiting_for(self) -> list[str]:
         """What `wait_for_subscribers` waits for, in words; empty when nothing is missing."""
@@ -80,14 +91,22 @@ class PlayerNode(GivenNode):
         going = self._wait(spin) if self.settings.wait_for_subscribers else self._discover(spin)
         if not going:
             return
+        if not self.settings.lockstep:
+            # Every result comes with a state, and each would be decoded.
+            self.destroy_subscription(self._states)
         count = self._recording.frame_count
+        pace = f"at {self.settings.rate:g} x {self._recording.fps:g} fps"
         self.get_logger().info(
             f"playing {self._recording.name}: {'?' if count is None else count} sets of "
-            f"{len(self._recording.rig)} cameras at {self.settings.rate:g} x "
-            f"{self._recording.fps:g} fps"
+            f"{len(self._recording.rig)} cameras {'in lockstep' if self._in_step else pace}"
         )
+        if self.settings.lockstep and not self._in_step:
+            self.get_logger().warning(f"no tracker's `state` says ready; playing {pace}")
+        began_s, began_cpu_s = time.monotonic(), time.process_time()
         while going:
             going = self._pass(spin) and self.settings.loop
+        self.playing_s = time.monotonic() - began_s
+        self.cpu_s = time.process_time() - began_cpu_s
         for warning in self._recording.warnings:
             self.get_logger().warning(warning)
 
@@ -98,11 +117,17 @@ class PlayerNode(GivenNode):
                 publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGE_S))
         spin(_LINGER_S)
 
+    @property
+    def _in_step(self) -> bool:
+        return self.settings.lockstep and not self._lockstep.alone
+
     def _discover(self, spin: Callable[[float], bool]) -> bool:
-        """Wait up to `_DISCOVERY_S` for subscribers: images sent before discovery are lost."""
-        until_s = time.monotonic() + _DISCOVERY_S
+        """Wait a while for subscribers, in lockstep for a tracker: earlier images are lost."""
+        lockstep = self.settings.lockstep
+        until_s = time.monotonic() + (_PATIENCE_S if lockstep else _DISCOVERY_S)
         while time.monotonic() < until_s:
-            if all(publisher.get_subscription_count() for publisher in self._images.values()):
+            heard = all(publisher.get_subscription_count() for publisher in self._images.values())
+            if heard and (self._in_step or not lockstep):
                 return True
             if not spin(0.05):
                 return False
@@ -122,47 +147,68 @@ class PlayerNode(GivenNode):
     def _pass(self, spin: Callable[[float], bool]) -> bool:
         """Play once; returns whether to go on."""
         pace = Pace(self.settings.rate, clock=time.monotonic)
-        began_s, first_ns, last_ns = time.monotonic(), None, 0
         with prefetch(self._sets, _PREFETCH_SETS) as sets:
-            for frame_set in sets:
-                first_ns = frame_set.stamp_ns if first_ns is None else first_ns
-                last_ns = frame_set.stamp_ns
-                messages = self._messages(frame_set)
-                if not _sleep(pace.wait_s(frame_set.stamp_ns), spin):
+            for played in sets:
+                if not self._sleep(0.0 if self._in_step else pace.wait_s(played.stamp_ns), spin):
                     return False
-                self._publish(messages)
-        if first_ns is not None and pace.late_s > 0.0:
-            due_s = (last_ns - first_ns) / 1e9 / self.settings.rate
+                self._publish(played)
+                if not self._until_dealt_with(played.stamp_ns, spin):
+                    return False
+        if (lost_s := pace.shifted_s + pace.late_s) > _LATE_S:
             self.get_logger().warning(
-                f"could not keep pace: {time.monotonic() - began_s:.2f} s instead of {due_s:.2f} s "
-                f"at rate {self.settings.rate:g}"
+                f"could not keep pace: the last set was sent {lost_s:.2f} s late at rate "
+                f"{self.settings.rate:g}"
             )
         return True
 
-    def _sets(self) -> Iterator[FrameSet]:
-        return self._recording.frames(start=self._start)
+    def _sets(self) -> Iterator[PlayedSet]:
+        return played_sets(self._recording, self._start)
 
-    def _messages(self, frame_set: FrameSet) -> dict[str, tuple[Image, CameraInfo]]:
-        messages = {}
-        for camera in self._recording.rig:
-            image = Image(header=header(frame_set.stamp_ns, optical_frame(camera.name)))
-            fill_image(image, frame_set.images[camera.name], f"{camera.name}/image_raw")
-            messages[camera.name] = (image, info_of(camera, frame_set.stamp_ns))
-        return messages
-
-    def _publish(self, messages: dict[str, tuple[Image, CameraInfo]]) -> None:
-        for name, (image, info) in messages.items():
+    def _publish(self, played: PlayedSet) -> None:
+        for name, (info, image) in played.messages.items():
             self._infos[name].publish(info)
             self._images[name].publish(image)
         self.sets_played += 1
 
+    def _until_dealt_with(self, stamp_ns: int, spin: Callable[[float], bool]) -> bool:
+        """In lockstep, wait until the trackers have dealt with a set; returns whether to go on."""
+        if not self._in_step:
+            return True
+        self._lockstep.sent(stamp_ns)
+        while self._lockstep.waiting_for():
+            if not spin(_SERVE_S):
+                return False
+            if late := self._lockstep.overdue():
+                self.get_logger().warning(
+                    f"stamp {stamp_ns}: not dealt with by {', '.join(late)} in "
+                    f"{self.settings.lockstep_timeout:g} s (lockstep_timeout); not waited for "
+                    "until another set is"
+                )
+        return True
+
+    def _sleep(self, seconds: float, spin: Callable[[float], bool]) -> bool:
+        """Sleep exactly, serving callbacks now and then; returns False when it is time to end."""
+        until_s = time.monotonic() + seconds
+        while True:
+            now_s = time.monotonic()
+            if now_s - self._served_s > _SERVE_S:
+                self._served_s = now_s
+                if not spin(0.0):
+                    return False
+            left_s = until_s - time.monotonic()
+            if left_s <= 0.0:
+                return True
+            time.sleep(min(left_s, _SERVE_S))
+
     def _on_state(self, message: DiagnosticArray) -> None:
-        values = {pair.key: pair.value for status in message.status for pair in status.values}
-        if "ready" in values:
-            self._ready = values["ready"] == "true"
+        for status in message.status:
+            values = {pair.key: pair.value for pair in status.values}
+            self._lockstep.hear(status.name, values)
+            if "ready" in values:
+                self._ready = values["ready"] == "true"
 
 
-def _open_bag(settings: PlayerSettings) -> Recording:
+def _open_bag(settings: PlayerSettings) -> BagRecording:
     if not settings.bag.exists():
         raise DatasetError(f"bag: {settings.bag}: no such file or folder")
     if detect_format(settings.bag) != "bag":
@@ -170,19 +216,4 @@ def _open_bag(settings: PlayerSettings) -> Recording:
             f"bag: {settings.bag}: no bag, expected a folder with metadata.yaml or a .mcap file "
             "(`markerless_tracker convert` makes one of a recording)"
         )
-    return open_recording(settings.bag, format="bag")
-
-
-def _sleep(seconds: float, spin: Callable[[float], bool]) -> bool:
-    """Sleep exactly, serving callbacks now and then; returns False when it is time to end."""
-    until_s = time.monotonic() + seconds
-    if not spin(0.0):
-        return False
-    while (left_s := until_s - time.monotonic()) > 0.0:
-        # Spinning ends whenever a callback ran; a long wait is cut so that signals are noticed.
-        if left_s > 0.1:
-            if not spin(0.05):
-                return False
-        else:
-            time.sleep(left_s)
-    return True
+    return BagRecording(settings.bag)

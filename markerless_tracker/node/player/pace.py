@@ -6,8 +6,9 @@ from collections.abc import Callable
 class Pace:
     """Publication times from the stamps of a recording and a rate.
 
-    A delay above `slack_s` shifts all later times, so that no burst of late images follows. The
-    delays add up in `late_s`.
+    The times are those of the first set and of the stamps, so that delays do not add up. After a
+    delay the sets that are overdue follow at most twice as fast as recorded, so that no burst of
+    images comes. A delay above `slack_s` shifts all later times; such delays add up in `shifted_s`.
 
     Args:
         rate: 2 plays twice as fast as recorded.
@@ -15,25 +16,32 @@ class Pace:
         slack_s: delay that is caught up with.
     """
 
-    def __init__(self, rate: float, *, clock: Callable[[], float], slack_s: float = 0.05) -> None:
+    def __init__(self, rate: float, *, clock: Callable[[], float], slack_s: float = 1.0) -> None:
         self._rate = rate
         self._clock = clock
         self._slack_s = slack_s
         self._origin: tuple[float, int] | None = None
+        self._last: tuple[float, int] | None = None
+        self.shifted_s = 0.0
         self.late_s = 0.0
 
     def wait_s(self, stamp_ns: int) -> float:
-        """Seconds until the set of that stamp is due, 0 if it is due now or late."""
+        """Seconds until the set of that stamp is to be sent, 0 if it is due now or overdue.
+
+        `late_s` is then how much later than its time it is sent.
+        """
         now_s = self._clock()
         if self._origin is None:
             self._origin = (now_s, stamp_ns)
         start_s, first_ns = self._origin
         due_s = start_s + (stamp_ns - first_ns) / 1e9 / self._rate
         if now_s - due_s > self._slack_s:
-            self.late_s += now_s - due_s
-            self._origin = (now_s, stamp_ns)
-        return max(0.0, due_s - now_s)
-
-    def begin(self) -> None:
-        """Publish the next set at once, whatever its stamp."""
-        self._origin = None
+            self.shifted_s += now_s - due_s
+            self._origin, due_s = (now_s, stamp_ns), now_s
+        at_s = max(now_s, due_s)
+        if self._last is not None:
+            sent_s, sent_ns = self._last
+            at_s = max(at_s, sent_s + 0.5 * (stamp_ns - sent_ns) / 1e9 / self._rate)
+        self._last = (at_s, stamp_ns)
+        self.late_s = at_s - due_s
+        return at_s - now_s

@@ -19,6 +19,8 @@ class PlayerSettings:
         loop: start again at the end.
         start_offset: s to skip at the beginning of the bag.
         wait_for_subscribers: wait until every image topic has a subscriber and `state` says ready.
+        lockstep: send the next set when `state` tells that the last was dealt with; ignores `rate`.
+        lockstep_timeout: s after which the next set is sent nevertheless.
     """
 
     bag: Path
@@ -26,6 +28,8 @@ class PlayerSettings:
     loop: bool = False
     start_offset: float = 0.0
     wait_for_subscribers: bool = False
+    lockstep: bool = False
+    lockstep_timeout: float = 60.0
 
 
 _NAMES = tuple(entry.name for entry in fields(PlayerSettings))
@@ -42,10 +46,14 @@ def read_player_settings(given: Mapping[str, Any]) -> PlayerSettings:
     if "bag" not in values:
         raise ConfigError("bag: not given, expected the folder of a bag (-p bag:=FOLDER)")
     chosen: dict[str, Any] = {"bag": Path(declared.text("bag", values["bag"])).expanduser()}
-    for name, least, most in (("rate", 1e-3, 1e3), ("start_offset", 0.0, 1e9)):
+    for name, least, most in (
+        ("rate", 1e-3, 1e3),
+        ("start_offset", 0.0, 1e9),
+        ("lockstep_timeout", 0.1, 1e6),
+    ):
         if name in values:
             chosen[name] = declared.number(name, values[name], least, most)
-    for name in ("loop", "wait_for_subscribers"):
+    for name in ("loop", "wait_for_subscribers", "lockstep"):
         if name in values:
             chosen[name] = declared.flag(name, values[name])
     return PlayerSettings(**chosen)

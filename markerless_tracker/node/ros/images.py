@@ -16,13 +16,27 @@ _SHOWN = 80
 
 
 class ImageLike(Protocol):
-    """The fields of sensor_msgs/Image that are read here."""
+    """The fields of sensor_msgs/Image that are read here; also of `cdr.ImageMessage`."""
 
-    height: int
-    width: int
-    encoding: str
-    step: int
-    data: Any
+    @property
+    def height(self) -> int:
+        """Rows, px."""
+
+    @property
+    def width(self) -> int:
+        """Columns, px."""
+
+    @property
+    def encoding(self) -> str:
+        """Name of the encoding."""
+
+    @property
+    def step(self) -> int:
+        """Bytes per row."""
+
+    @property
+    def data(self) -> Any:
+        """The bytes, any buffer with a length."""
 
 
 def check_layout(message: ImageLike, topic: str) -> None:

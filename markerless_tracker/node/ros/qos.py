@@ -47,6 +47,7 @@ class FollowingSubscription:
         topic: its name.
         callback: as for ``rclpy.node.Node.create_subscription``.
         depth: messages the middleware keeps.
+        raw: whether the callback gets the serialised bytes.
     """
 
     def __init__(
@@ -57,9 +58,10 @@ class FollowingSubscription:
         callback: Callable[..., None],
         *,
         depth: int = IMAGE_DEPTH,
+        raw: bool = False,
     ) -> None:
         self._node, self._kind, self._topic, self._callback = node, kind, topic, callback
-        self._depth = depth
+        self._depth, self._raw = depth, raw
         self._reliable = True
         self._subscription = self._subscribe()
 
@@ -76,4 +78,6 @@ class FollowingSubscription:
 
     def _subscribe(self) -> Any:
         qos = image_qos(reliable=self._reliable, depth=self._depth)
-        return self._node.create_subscription(self._kind, self._topic, self._callback, qos)
+        return self._node.create_subscription(
+            self._kind, self._topic, self._callback, qos, raw=self._raw
+        )

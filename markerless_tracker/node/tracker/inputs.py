@@ -1,14 +1,17 @@
-"""Topics of one camera: messages are checked and stored, images are not decoded."""
+"""Topics of one camera: messages are checked and stored, pixels are not touched."""
 
 from collections.abc import Callable
 from typing import Any
+
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import CameraInfo
 
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.node.health import QUIET_S
 from markerless_tracker.node.ros.camera_info import check_info
+from markerless_tracker.node.ros.cdr import ImageMessage, read_image, without_stamp
 from markerless_tracker.node.ros.images import channels_of, check_layout
-from markerless_tracker.node.ros.stamps import stamp_of
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 
@@ -25,7 +28,7 @@ class CameraInput:
     Args:
         name: the camera's name.
         camera: its calibration for full-size images, None while unknown.
-        sets: gets the images (as messages) that can be used.
+        sets: gets the images (as `ImageMessage`) that can be used.
         status: gets the counts and errors.
         report: called with one line when a problem begins and when it ends.
         clock: monotonic time in s.
@@ -59,6 +62,7 @@ class CameraInput:
         self._refusal = ""
         self._refused_s = 0.0
         self._sequence: int | None = None
+        self._info_bytes = b""
         self._info_reported = False
         self._silent_since_s: float | None = None
 
@@ -67,11 +71,11 @@ class CameraInput:
         """Reason why the last image could not be used; empty if it could, or if it is old."""
         return self._refusal if self._clock() - self._refused_s < QUIET_S else ""
 
-    def on_image(self, message: Any, sequence: int | None = None) -> None:
+    def on_image(self, serialised: bytes, sequence: int | None = None) -> None:
         """Store a sensor_msgs/Image; an unusable one is counted and reported.
 
         Args:
-            message: the image.
+            serialised: the message's bytes; the stored image shares them.
             sequence: its sequence number at the publisher; gaps are images lost by the middleware.
         """
         now_s = self._clock()
@@ -79,6 +83,7 @@ class CameraInput:
         if self._first_image_s is None:
             self._first_image_s = now_s
         try:
+            message = read_image(serialised, self.image_topic)
             self._check(message)
         except ImageError as error:
             self._status.refused(self.name)
@@ -92,9 +97,16 @@ class CameraInput:
                 f"{now_s - self._silent_since_s:.1f} s"
             )
             self._silent_since_s = None
-        self._sets.add(self.name, stamp_of(message), message, now_s=now_s)
+        self._sets.add(self.name, message.stamp_ns, message, now_s=now_s)
 
-    def on_info(self, message: Any) -> None:
+    def on_info_bytes(self, serialised: bytes) -> None:
+        """Take a serialised sensor_msgs/CameraInfo, if it differs from the last in its content."""
+        content = without_stamp(serialised)
+        if content != self._info_bytes:
+            self.on_info(deserialize_message(serialised, CameraInfo))
+            self._info_bytes = content
+
+    def on_info(self, message: CameraInfo) -> None:
         """Compare a sensor_msgs/CameraInfo with the calibration; differences are reported."""
         self.info = message
         if self.camera is None:
@@ -138,7 +150,7 @@ class CameraInput:
                 self._say(f"{self.info_topic}: no camera info comes with the images; {source}")
         return topics
 
-    def _check(self, message: Any) -> None:
+    def _check(self, message: ImageMessage) -> None:
         check_layout(message, self.image_topic)
         if self._info_refusal:
             raise ImageError(self._info_refusal)

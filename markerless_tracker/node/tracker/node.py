@@ -18,6 +18,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.imaging import scale_image
 from markerless_tracker.node.health import QUIET_S, Facts, assess
 from markerless_tracker.node.ros import messages
+from markerless_tracker.node.ros.cdr import ImageMessage
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
 from markerless_tracker.node.ros.images import decode_image
 from markerless_tracker.node.ros.notices import Notices
@@ -51,6 +52,8 @@ _NOTED = (
     "latency_median_ms",
     "latency_p95_ms",
     "fps",
+    "first_pose_s",
+    "cpu_s",
 )
 
 
@@ -82,13 +85,14 @@ class TrackerNode(GivenNode):
         self._announcer = Announcer(self._inform, self._notices)
         self._source = RigSource(self._settings)
         self._status = TrackerStatus()
-        self._sets: Synchronizer[Image] = Synchronizer(
+        self._sets: Synchronizer[ImageMessage] = Synchronizer(
             self._source.names, tolerance_ns=round(self._settings.sync_tolerance * 1e9)
         )
         self._tracker: Tracker | None = None
         self._handle: TrackerHandle | None = None
         self._missing: Sequence[str] = ()
         self._repeated = (0, 0.0)
+        self._late_ns: int | None = None
         self._state_lock = Lock()
         self._started_s = self._seconds()
         self._result_file = ResultFile(
@@ -104,6 +108,7 @@ class TrackerNode(GivenNode):
             publish=self._publish,
             report=self._warn,
             inform=self._inform,
+            dealt=self._dealt,
             clock=self._seconds,
         )
         self._inputs = [self._input(name) for name in self._source.names]
@@ -151,8 +156,12 @@ class TrackerNode(GivenNode):
         self._subscriptions_followed = []
         for source in self._inputs:
             self._subscriptions_followed += [
-                FollowingSubscription(self, Image, source.image_topic, _numbered(source.on_image)),
-                FollowingSubscription(self, CameraInfo, source.info_topic, source.on_info, depth=1),
+                FollowingSubscription(
+                    self, Image, source.image_topic, _numbered(source.on_image), raw=True
+                ),
+                FollowingSubscription(
+                    self, CameraInfo, source.info_topic, source.on_info_bytes, depth=1, raw=True
+                ),
             ]
         self._source.listen(self, self._warn)
         self.create_service(Trigger, "~/reset", self._on_reset)
@@ -234,13 +243,20 @@ class TrackerNode(GivenNode):
             return
         self._results.publish(tracked.result, self._tracker.body)
         self._pictures.publish(tracked, self._tracker)
-        self._publish_state()
+
+    def _dealt(self) -> None:
+        if self.context.ok():
+            self._publish_state()
 
     def _publish_state(self, missing: Sequence[str] | None = None) -> DiagnosticArray:
         now_s = self._seconds()
         with self._state_lock:
             if missing is not None:
                 self._missing = list(missing)
+            late_ns = self._sets.late_ns
+            if late_ns is not None and late_ns != self._late_ns:
+                self._late_ns = late_ns
+                self._status.dealt_with(late_ns)
             health = assess(self._facts(now_s))
             values = self._status.values(
                 self._sets.counts, self._sets.cameras, self._missing, now_s=now_s
@@ -315,14 +331,14 @@ def _yield_to_executor() -> Generator[None, None, None]:
     yield
 
 
-def _numbered(take: Callable[[Any, int | None], None]) -> Callable[[Any, Any], None]:
+def _numbered(take: Callable[[bytes, int | None], None]) -> Callable[[bytes, Any], None]:
     """A callback with the publisher's sequence number of each message."""
 
-    def callback(message: Any, info: Any) -> None:
+    def callback(message: bytes, info: Any) -> None:
         take(message, info["publication_sequence_number"])
 
     return callback
 
 
-def _decode(sizes_px: dict[str, tuple[int, int]], name: str, message: Image) -> Any:
+def _decode(sizes_px: dict[str, tuple[int, int]], name: str, message: ImageMessage) -> Any:
     return scale_image(decode_image(message, f"{name}/image_raw"), sizes_px[name])

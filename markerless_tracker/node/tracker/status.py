@@ -1,5 +1,6 @@
 """Counts, times and errors of a running tracker, for its diagnostics."""
 
+import time
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 from threading import Lock
@@ -32,6 +33,10 @@ class TrackerStatus:
         self._result: TrackResult | None = None
         self._last_error = ""
         self._set_error = ""
+        self._dealt_ns: int | None = None
+        self._first_arrived_s: float | None = None
+        self._first_pose_s: float | None = None
+        self._ready_cpu_s = 0.0
 
     @property
     def ready(self) -> bool:
@@ -66,6 +71,7 @@ class TrackerStatus:
         """Images are tracked as they arrive from now on."""
         with self._lock:
             self._activity, self._ready, self._ready_s = activity, True, now_s
+            self._ready_cpu_s = time.process_time()
 
     def tracked(self, result: TrackResult, *, arrived_s: float, finished_s: float) -> None:
         """Record a result and its times of one monotonic clock."""
@@ -75,6 +81,15 @@ class TrackerStatus:
             self._set_error = ""
             self._latencies_s.append(finished_s - arrived_s)
             self._finished_s.append(finished_s)
+            if self._first_arrived_s is None:
+                self._first_arrived_s = arrived_s
+            if self._first_pose_s is None and result.pose is not None:
+                self._first_pose_s = finished_s - self._first_arrived_s
+
+    def dealt_with(self, stamp_ns: int) -> None:
+        """Record that a complete set was tracked or dropped."""
+        with self._lock:
+            self._dealt_ns = stamp_ns
 
     def dropped(self, reason: str, sets: int = 1) -> None:
         """Count complete sets that were not tracked, by reason such as ``before_ready``."""
@@ -132,6 +147,10 @@ class TrackerStatus:
     ) -> dict[str, str]:
         """Everything as text, by key, in a fixed order.
 
+        `first_pose_s`: from the arrival of the first set that was tracked to the first pose;
+        `cpu_s`: CPU time of this process since it became ready; `dealt_with_ns`: stamp of the last
+        complete set that was tracked or dropped.
+
         Args:
             counts: of the sets of images.
             cameras: names, in order.
@@ -162,7 +181,12 @@ class TrackerStatus:
                     np.percentile(latencies, 95) if latencies.size else None, 1
                 ),
                 "fps": _number(self._rate(now_s), 2),
+                "first_pose_s": _number(self._first_pose_s, 3),
+                "cpu_s": _number(
+                    time.process_time() - self._ready_cpu_s if self._ready else None, 3
+                ),
                 "stamp_ns": "" if result is None else str(result.stamp_ns),
+                "dealt_with_ns": "" if self._dealt_ns is None else str(self._dealt_ns),
                 "fitness": _number(None if result is None else result.fitness, 4),
                 "evaluations": "0" if result is None else str(result.evaluations),
             }

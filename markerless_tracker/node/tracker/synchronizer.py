@@ -37,12 +37,16 @@ class MatchedSet(Generic[View]):
         views: by camera, in the order of the cameras.
         arrived_s: when the last of them came, in the caller's clock.
         restarted: stamps were set back since the last set handed out (a bag was played again).
+        replaced: complete sets that this one replaced since the last set handed out.
+        period_s: time since the set before it was complete, 0 for the first.
     """
 
     stamp_ns: int
     views: Mapping[str, View]
     arrived_s: float
     restarted: bool
+    replaced: int = 0
+    period_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,7 @@ class Synchronizer(Generic[View]):
         self._waiting: MatchedSet[View] | None = None
         self._newest_ns: int | None = None
         self._late_ns: list[int] = []
+        self._last_late_ns: int | None = None
         self._complete_s: float | None = None
         self._counts: Counter[str] = Counter()
         self._changed = Condition()
@@ -129,6 +134,12 @@ class Synchronizer(Generic[View]):
         with self._changed:
             waiting = len(self._waiting.views) if self._waiting is not None else 0
             return waiting + sum(len(queue) for queue in self._pending.values())
+
+    @property
+    def late_ns(self) -> int | None:
+        """Stamp of the last set that was dropped because it was late; None so far."""
+        with self._changed:
+            return self._last_late_ns
 
     @property
     def complete_s(self) -> float | None:
@@ -262,21 +273,25 @@ class Synchronizer(Generic[View]):
             for _ in range(positions[name]):
                 self._drop_oldest(name)
             members[name] = self._pending[name].popleft()
+        period_s = 0.0 if self._complete_s is None else now_s - self._complete_s
         self._complete_s = now_s
         stamp_ns = min(entry.stamp_ns for entry in members.values())
         if not self._accepts(stamp_ns):
             self._counts["late"] += 1
+            self._last_late_ns = stamp_ns
             return
         restarted = self._newest_ns is not None and stamp_ns <= self._newest_ns
         if restarted:
             self._counts["restarts"] += 1
+        replaced = 0
         if self._waiting is not None:
             self._counts["skipped"] += 1
+            replaced = self._waiting.replaced + 1
             restarted = restarted or self._waiting.restarted
         self._counts["complete"] += 1
         self._newest_ns = stamp_ns
         views = {name: entry.view for name, entry in members.items()}
-        self._waiting = MatchedSet(stamp_ns, views, now_s, restarted)
+        self._waiting = MatchedSet(stamp_ns, views, now_s, restarted, replaced, period_s)
 
     def _accepts(self, stamp_ns: int) -> bool:
         """Whether a set is the next in time, by itself or after time was set back."""

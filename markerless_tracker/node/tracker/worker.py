@@ -100,6 +100,7 @@ class TrackWorker:
         publish: called in the worker's thread with each result.
         report: called with each error, one line.
         inform: called with a line for the log when a phase begins.
+        dealt: called in the worker's thread after each set, tracked or dropped.
         clock: monotonic time in s, the clock of the sets' arrival.
     """
 
@@ -112,6 +113,7 @@ class TrackWorker:
         publish: Callable[[TrackedSet], None],
         report: Callable[[str], None],
         inform: Callable[[str], None] = lambda _: None,
+        dealt: Callable[[], None] = lambda: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._sets = sets
@@ -120,6 +122,7 @@ class TrackWorker:
         self._publish = publish
         self._report = report
         self._inform = inform
+        self._dealt = dealt
         self._clock = clock
         self._stop = Event()
         self._reset = Event()
@@ -186,6 +189,7 @@ class TrackWorker:
             matched = self._sets.take(_POLL_S)
             if matched is not None:
                 self._handle(handle, gate, matched)
+                self._end(matched)
             request = self._request.current
             if request is not None:
                 request.refuse_if_overdue(self._status.activity)
@@ -230,6 +234,9 @@ class TrackWorker:
                     return
             else:
                 self._status.doing("processing images")
+            # EFFORT: once `Tracker.step` takes one, hand it `EffortRule.take(Lateness(...))` here
+            # (effort.py): `matched.replaced`, `matched.period_s`, the time since `arrived_s`, and
+            # how long `take` waited in `_run`.
             result = handle.tracker.step(images, matched.stamp_ns)
             finished_s = self._clock()
         except Exception as error:
@@ -247,6 +254,13 @@ class TrackWorker:
         if learning is not None:
             learning.saw(result.state)
             self._learn(handle, learning, matched.stamp_ns)
+
+    def _end(self, matched: MatchedSet[Any]) -> None:
+        self._status.dealt_with(matched.stamp_ns)
+        try:
+            self._dealt()
+        except Exception as error:
+            self._trouble(matched.stamp_ns, error)
 
     def _decoded(self, handle: TrackerHandle, matched: MatchedSet[Any]) -> Images:
         """The set's images; one that cannot be decoded is left out, unless it is the last."""

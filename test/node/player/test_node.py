@@ -104,6 +104,93 @@ def test_a_bag_arrives_whole_with_its_own_stamps(
     assert f"played {SETS} sets" in player.output
 
 
+class Trackers:
+    """Publishes the `state` of made-up trackers, and deals with sets at once or never."""
+
+    def __init__(self, peer: Any, audience: Audience, **deals: bool) -> None:
+        self._says = peer.node.create_publisher(DiagnosticArray, "state", latched_qos())
+        self._peer, self._audience, self._deals = peer, audience, deals
+        self.most_ahead = 0
+        self._dealt: int | None = None
+        self.say()
+        peer.node.create_timer(0.05, self._tick)
+
+    def say(self) -> None:
+        """Publish every tracker's state."""
+        status = []
+        for name, deals in self._deals.items():
+            dealt = "" if self._dealt is None or not deals else str(self._dealt)
+            pairs = {"ready": "true", "dealt_with_ns": dealt}
+            values = [KeyValue(key=key, value=value) for key, value in pairs.items()]
+            status.append(DiagnosticStatus(name=name, values=values))
+        self._says.publish(DiagnosticArray(status=status))
+
+    def _tick(self) -> None:
+        heard = self._audience.heard
+        if heard:
+            stamps = [stamp_of(image) for image in self._audience.images["cam01"]]
+            ahead = heard - 1 if self._dealt is None else sum(s > self._dealt for s in stamps)
+            self.most_ahead = max(self.most_ahead, ahead)
+            self._dealt = stamps[heard - 1]
+        self.say()
+
+
+def test_in_lockstep_every_set_waits_for_the_tracker(
+    bag: Path, pictures: Pictures, peer: Any, start: Callable[..., Any]
+) -> None:
+    audience = Audience(peer, pictures.rig.names)
+    trackers = Trackers(peer, audience, first=True, second=True)
+    # Without lockstep all sets would be sent within a millisecond.
+    player = start("player", bag=bag, rate=1000.0, lockstep=True)
+    peer.until(lambda: not player.running, "the player to end")
+    assert player.wait() == 0, player.output
+    assert "in lockstep" in player.output and "WARN" not in player.output
+    assert audience.heard == SETS and trackers.most_ahead == 1
+
+
+def test_in_lockstep_a_tracker_without_an_answer_is_named_and_does_not_stop_the_bag(
+    bag: Path, pictures: Pictures, peer: Any, start: Callable[..., Any]
+) -> None:
+    audience = Audience(peer, pictures.rig.names)
+    Trackers(peer, audience, good=True, dumb=False)
+    player = start("player", bag=bag, lockstep=True, lockstep_timeout=1.0)
+    peer.until(lambda: not player.running, "the player to end")
+    assert player.wait() == 0, player.output
+    assert player.output.count("not dealt with by dumb in 1 s (lockstep_timeout)") == 1
+    assert audience.heard == SETS
+
+
+def test_in_lockstep_without_a_tracker_the_bag_is_played_at_its_pace(
+    bag: Path, pictures: Pictures, peer: Any, start: Callable[..., Any]
+) -> None:
+    audience = Audience(peer, pictures.rig.names)
+    player = start("player", bag=bag, lockstep=True)
+    peer.until(lambda: not player.running, "the player to end")
+    assert player.wait() == 0, player.output
+    assert "no tracker's `state` says ready; playing at 1 x 20 fps" in player.output
+    assert audience.heard == SETS
+
+
+@pytest.mark.parametrize("compress", ["zstd", "jpeg"])
+def test_compressed_bags(
+    compress: str, pictures: Pictures, tmp_path: Path, peer: Any, start: Callable[..., Any]
+) -> None:
+    names = pictures.rig.names
+    backgrounds = {name: [pictures.picture(name, 99)] for name in names}
+    write_bag(pictures, tmp_path / "bag", compress=compress, backgrounds=backgrounds)
+    audience = Audience(peer, names)
+    player = start("player", bag=tmp_path / "bag", rate=4.0)
+    peer.until(lambda: audience.heard >= SETS, "all images")
+    assert player.wait() == 0, player.output
+    for name in names:
+        for index, image in enumerate(audience.images[name]):
+            assert stamp_of(image) == FIRST_NS + round(index * 1e9 / FPS)
+            assert image.header.frame_id == f"{name}_optical_frame"
+            decoded, truth = decode_image(image, name), pictures.picture(name, index)
+            assert decoded.shape == truth.shape
+            assert compress == "jpeg" or (decoded == truth).all()
+
+
 def test_a_loop_begins_anew_until_a_signal_and_an_offset_leaves_sets_out(
     bag: Path, pictures: Pictures, peer: Any, start: Callable[..., Any]
 ) -> None:

@@ -1,14 +1,20 @@
 import array
 import re
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.node.health import QUIET_S
 from markerless_tracker.node.ros.camera_info import info_of
+from markerless_tracker.node.ros.stamps import time_message
 from markerless_tracker.node.tracker.inputs import CameraInput
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
@@ -41,15 +47,16 @@ class Bench:
         return self.input.missing(silent, left_out, others_send, self.now_s)
 
 
-def image(width: int = 8, height: int = 4, encoding: str = "mono8", stamp: int = 1) -> Any:
-    return SimpleNamespace(
-        header=SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=stamp)),
+def image(width: int = 8, height: int = 4, encoding: str = "mono8", stamp: int = 1) -> bytes:
+    message = Image(
+        header=Header(stamp=time_message(stamp)),
         width=width,
         height=height,
         step=width,
         encoding=encoding,
         data=array.array("B", bytes(width * height)),
     )
+    return bytes(serialize_message(message))
 
 
 @pytest.fixture
@@ -62,7 +69,10 @@ def test_good_images_are_stored_as_they_came(bench: Bench) -> None:
     bench.input.on_image(came)
     bench.sets.add("cam01", 1, None, now_s=0.0)
     matched = bench.sets.take()
-    assert matched is not None and matched.views["cam02"] is came
+    assert matched is not None
+    stored = matched.views["cam02"]
+    assert (stored.width, stored.height, stored.stamp_ns) == (8, 4, 1)
+    assert np.shares_memory(stored.data, np.frombuffer(came, np.uint8))
     assert bench.refused() == 0 and not bench.reports
 
 
@@ -73,6 +83,7 @@ def test_good_images_are_stored_as_they_came(bench: Bench) -> None:
         (image(width=16), "cam02/image_raw.*16x4 px.*cam02.*8x4 px"),
         (image(height=8), "8x8 px"),
         (image(encoding="bgr8"), "cam02/image_raw: 32 bytes"),
+        (image()[:60], "cam02/image_raw: a message of 60 bytes is cut"),
     ],
 )
 def test_bad_images_are_counted_and_reported_with_every_occurrence(
@@ -173,3 +184,15 @@ def test_gaps_in_the_publishers_numbers_are_lost_images(bench: Bench) -> None:
         bench.input.on_image(image(stamp=number), number)
     values = bench.status.values(bench.sets.counts, ("cam02",), ())
     assert values["lost/cam02"] == "3"
+
+
+def test_an_unchanged_camera_info_is_decoded_once(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = []
+    monkeypatch.setattr(bench.input, "on_info", seen.append)
+    for stamp in (0, 5 * 10**9, 6):
+        bench.input.on_info_bytes(serialize_message(info_of(bench.camera, stamp)))
+    assert len(seen) == 1 and seen[0].k[0] == 50.0
+    bench.input.on_info_bytes(serialize_message(info_of(bench.camera.scaled(0.5), 7)))
+    assert len(seen) == 2 and seen[1].width == 4

@@ -286,3 +286,23 @@ def test_every_set_is_either_complete_or_incomplete(
     broken = {frame for _, frame in lost}
     assert sets.counts.complete == 41 - len(broken)
     assert sets.counts.incomplete == len(broken) - gone
+
+
+def test_a_set_knows_how_many_it_replaced_and_the_time_since_the_one_before() -> None:
+    sets: Synchronizer[int] = Synchronizer(("a", "b"))
+
+    def send(stamp_ns: int, now_s: float) -> None:
+        for camera in sets.cameras:
+            sets.add(camera, stamp_ns, stamp_ns, now_s=now_s)
+
+    for number in range(1, 5):
+        send(number, 0.1 * number)
+    taken = sets.take()
+    assert taken is not None and (taken.stamp_ns, taken.replaced) == (4, 3)
+    assert taken.period_s == pytest.approx(0.1)
+    send(5, 0.7)
+    taken = sets.take()
+    assert taken is not None and taken.replaced == 0 and taken.period_s == pytest.approx(0.3)
+    assert sets.late_ns is None
+    send(3, 0.8)
+    assert sets.take() is None and sets.late_ns == 3

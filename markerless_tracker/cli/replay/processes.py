@@ -1,4 +1,4 @@
-"""The demo's nodes as processes that end with the demo."""
+"""Nodes as processes that end with this one."""
 
 import os
 import signal
@@ -13,7 +13,7 @@ from markerless_tracker.errors import TrackerError
 
 
 class NodeError(TrackerError):
-    """A node of the demo ended early, or was not ready in time."""
+    """A node ended early, or was not ready in time."""
 
 
 class NodeProcess:
@@ -75,9 +75,13 @@ class NodeProcess:
         if status:
             raise NodeError(f"{self.name} ended with status {status}: {self._last_line()}")
 
+    def output(self) -> str:
+        """What it has printed so far."""
+        return self._log.read_text(encoding="utf-8", errors="replace")
+
     def warnings(self) -> list[str]:
         """The texts of the warnings in its log so far."""
-        lines = self._log.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = self.output().splitlines()
         return [line.partition("]: ")[2] for line in lines if line.startswith("[WARN]")]
 
     def stop(self, timeout_s: float = 20.0) -> int:
@@ -91,7 +95,7 @@ class NodeProcess:
         return status
 
     def _last_line(self) -> str:
-        lines = self._log.read_text(encoding="utf-8", errors="replace").split("\n")
+        lines = self.output().split("\n")
         return next((line.strip() for line in reversed(lines) if line.strip()), "no output")
 
 

@@ -1,19 +1,26 @@
 """Replaying a bag to a running tracker, each in its own process."""
 
+import math
 import os
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from markerless_tracker.cli.demo.processes import NodeError, NodeProcess
+from markerless_tracker.cli.replay.processes import NodeError, NodeProcess
 from markerless_tracker.node.ros.profile import apply_profile
 from markerless_tracker.node.watch import StateWatch
 
-READY_S = 240.0
-"""Time for the tracker to start; the first start compiles every kernel."""
+READY_S = 900.0
+"""Time for the tracker to start; the first start compiles, on a busy machine for minutes."""
+
+STUCK_S = 120.0
+"""Time without progress, in real time beyond the bag's own, after which a replay is given up."""
 
 _QUIET_S = 5.0
+_LOOK_S = 0.2
+_PLAYED = re.compile(r"played \d+ sets in ([\d.]+) s, ([\d.]+) ms of CPU time a set")
 
 Report = Callable[[str, int], None]
 """Called with the current activity and the number of sets that the tracker has finished."""
@@ -24,18 +31,23 @@ class Replay:
     """Counts and times of one replay.
 
     Attributes:
-        rate: playback rate, 1 = real time.
+        rate: playback rate, 1 = real time; None = lockstep.
         sets: sets of images in the bag.
         tracked: sets that were tracked.
         skipped: complete sets replaced by newer ones before they were tracked.
         lost: sets that were never complete.
         fps: frames tracked per second at this rate.
         latency_median_ms, latency_p95_ms: from the arrival of a set's last image to its result.
+        first_pose_s: from the arrival of the first set that was tracked to the first pose; NaN
+            without a pose.
+        playing_s: time in which the player sent the sets.
+        player_cpu_ms: CPU time of the player per set.
+        tracker_cpu_s: CPU time of the tracker from its being ready to the end.
         result: the result files' path without suffix.
         warnings: the warnings of the player.
     """
 
-    rate: float
+    rate: float | None
     sets: int
     tracked: int
     skipped: int
@@ -43,6 +55,10 @@ class Replay:
     fps: float
     latency_median_ms: float
     latency_p95_ms: float
+    first_pose_s: float
+    playing_s: float
+    player_cpu_ms: float
+    tracker_cpu_s: float
     result: Path
     warnings: Sequence[str]
 
@@ -51,7 +67,7 @@ def replay(
     bag: Path,
     *,
     sets: int,
-    rate: float,
+    rate: float | None,
     fps: float,
     tracker: Mapping[str, object],
     result: Path,
@@ -63,7 +79,7 @@ def replay(
     Args:
         bag: the bag's folder.
         sets: sets of images in it.
-        rate: playback rate, 1 = real time.
+        rate: playback rate, 1 = real time; None = lockstep, every set as fast as it is tracked.
         fps: the recording's rate, 1/s.
         tracker: the tracker's parameters.
         result: path of the result files without suffix.
@@ -85,15 +101,18 @@ def replay(
     )
     with node, StateWatch(domain_id) as watch:
         _until_ready(node, watch, report)
+        pace = {"lockstep": True} if rate is None else {"rate": float(rate)}
         player = NodeProcess(
             "markerless_tracker.node.player.executable",
-            {"bag": bag, "rate": float(rate), "wait_for_subscribers": True},
+            {"bag": bag, "wait_for_subscribers": True, **pace},
             log=log_dir / f"player_{result.name}.log",
             domain_id=domain_id,
         )
         with player:
-            values = _until_through(node, player, watch, sets, sets / fps / rate, report)
+            lasts_s = None if rate is None else sets / fps / rate
+            values = _until_through(node, player, watch, sets, lasts_s, report)
             warnings = player.warnings()
+            playing_s, player_cpu_ms = _played(player.output())
         node.check()
     counted = {key: int(values.get(key, "0")) for key in ("tracked", "skipped")}
     return Replay(
@@ -103,6 +122,10 @@ def replay(
         fps=float(values.get("fps", "nan")),
         latency_median_ms=float(values.get("latency_median_ms", "nan")),
         latency_p95_ms=float(values.get("latency_p95_ms", "nan")),
+        first_pose_s=float(values.get("first_pose_s", "nan")),
+        playing_s=playing_s,
+        player_cpu_ms=player_cpu_ms,
+        tracker_cpu_s=float(values.get("cpu_s", "nan")),
         result=result,
         warnings=warnings,
         **counted,
@@ -132,16 +155,29 @@ def _until_through(
     player: NodeProcess,
     watch: StateWatch,
     sets: int,
-    lasts_s: float,
+    lasts_s: float | None,
     report: Report,
 ) -> Mapping[str, str]:
-    """Wait until the player has ended and the tracker has finished all sets it received."""
-    deadline_s = time.monotonic() + lasts_s + 60.0
+    """Wait until the player has ended and the tracker has finished all sets it received.
+
+    Args:
+        node, player: the processes.
+        watch: hears the tracker's `state`.
+        sets: sets of images in the bag.
+        lasts_s: time the bag takes; None = as long as sets are tracked.
+        report: called with the progress.
+
+    Raises:
+        NodeError: a process failed, or it takes too long.
+    """
+    began_s = time.monotonic()
     changed_s, seen = time.monotonic(), -1
     # The rate falls once the last set is tracked.
     latest: Mapping[str, str] = {}
     while True:
         values = watch.listen(0.1)
+        # Results come far more often; on two cores each message heard costs the tracker time.
+        time.sleep(_LOOK_S)
         done = _dealt_with(values)
         now_s = time.monotonic()
         if done != seen:
@@ -151,13 +187,20 @@ def _until_through(
         player.check()
         if not player.running and (done >= sets or now_s - changed_s > _QUIET_S):
             return latest
-        if now_s > deadline_s:
+        limit_s = changed_s + STUCK_S if lasts_s is None else began_s + lasts_s + STUCK_S
+        if now_s > limit_s:
             raise NodeError(
                 f"{'player' if player.running else 'tracker'}: not through {sets} sets after "
-                f"{lasts_s + 60.0:.0f} s, {done} were dealt with"
+                f"{now_s - began_s:.0f} s, {done} were dealt with"
             )
 
 
+def _played(output: str) -> tuple[float, float]:
+    """Duration (s) and CPU time per set (ms) that the player states; NaN if it was cut short."""
+    found = _PLAYED.search(output)
+    return (float(found[1]), float(found[2])) if found else (math.nan, math.nan)
+
+
 def _dealt_with(values: Mapping[str, str]) -> int:
-    keys = ("tracked", "skipped", "dropped_before_start", "dropped_on_error")
+    keys = ("tracked", "skipped", "late", "dropped_before_start", "dropped_on_error")
     return sum(int(values.get(key, "0")) for key in keys)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from markerless_tracker.cli.demo.processes import NodeError, NodeProcess, ros_arguments
+from markerless_tracker.cli.replay.processes import NodeError, NodeProcess, ros_arguments
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,78 @@
+"""Sets of a bag as serialised messages: as they are stored where that can be published."""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+from rclpy.serialization import serialize_message
+
+from markerless_tracker.datasets.bag.recording import RAW_TYPE, BagRecording
+from markerless_tracker.datasets.bag.stream import RawMessage
+from markerless_tracker.errors import DatasetError, ImageError
+from markerless_tracker.node.ros.camera_info import info_of
+from markerless_tracker.node.ros.cdr import image_bytes, read_image, with_stamp
+from markerless_tracker.node.ros.images import check_layout
+from markerless_tracker.node.ros.messages import optical_frame
+
+
+@dataclass(frozen=True)
+class PlayedSet:
+    """One set, ready to be published.
+
+    Attributes:
+        stamp_ns: time of the images.
+        messages: camera -> serialised sensor_msgs/CameraInfo and sensor_msgs/Image.
+    """
+
+    stamp_ns: int
+    messages: dict[str, tuple[bytes, bytes]]
+
+
+def played_sets(recording: BagRecording, start: int) -> Iterator[PlayedSet]:
+    """The sets of a bag from one on, serialised.
+
+    An image message is taken as it is stored if it is a raw image in its camera's frame; others are
+    decoded and written anew.
+
+    Raises:
+        DatasetError, ImageError: the bag ends before, or cannot be read.
+    """
+    if recording.frame_count is not None and start >= recording.frame_count:
+        raise DatasetError(
+            f"{recording.name}: start at frame {start}, but it has {recording.frame_count} frames"
+        )
+    infos = {camera.name: serialize_message(info_of(camera, 0)) for camera in recording.rig}
+    with ThreadPoolExecutor(len(recording.rig), thread_name_prefix="decode") as pool:
+        for found in recording.stored_sets(start):
+            names, stored = list(found.messages), list(found.messages.values())
+            images = [_as_stored(recording, n, raw) for n, raw in zip(names, stored, strict=True)]
+            if None in images:
+                decoded = pool.map(recording.image, stored)
+                images = [
+                    image_bytes(image, found.stamp_ns, optical_frame(name))
+                    for name, image in zip(names, decoded, strict=True)
+                ]
+            yield PlayedSet(
+                found.stamp_ns,
+                {
+                    name: (with_stamp(infos[name], found.stamp_ns), image)
+                    for name, image in zip(names, images, strict=True)
+                    if image is not None
+                },
+            )
+
+
+def _as_stored(recording: BagRecording, name: str, raw: RawMessage) -> bytes | None:
+    """The stored bytes of an image message; None if they must be written anew."""
+    if raw.type != RAW_TYPE:
+        return None
+    try:
+        image = read_image(raw.data, raw.topic)
+        check_layout(image, raw.topic)
+    except ImageError:
+        # Decoding states what is wrong with it.
+        return None
+    size_px = (image.width, image.height)
+    if image.frame_id != optical_frame(name) or size_px != recording.rig[name].size_px:
+        return None
+    return raw.data

@@ -1,0 +1,72 @@
+"""Lockstep: the next set is sent when the trackers have dealt with the last."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+
+@dataclass
+class _Tracker:
+    dealt_ns: int
+    heard_s: float
+    waited_for: bool = True
+
+
+class Lockstep:
+    """Which trackers have not dealt with the set that was sent.
+
+    A tracker counts once its `state` says ready. One that lets a set time out is not waited for
+    again until it has dealt with another set; one whose `state` is not heard for the timeout is
+    forgotten.
+
+    Args:
+        timeout_s: longest wait for one set.
+        clock: monotonic time in s.
+    """
+
+    def __init__(self, timeout_s: float, *, clock: Callable[[], float]) -> None:
+        self._timeout_s = timeout_s
+        self._clock = clock
+        self._trackers: dict[str, _Tracker] = {}
+        self._sent: tuple[int, float] | None = None
+
+    @property
+    def alone(self) -> bool:
+        """Whether there is no tracker to wait for."""
+        return not any(tracker.waited_for for tracker in self._trackers.values())
+
+    def hear(self, name: str, values: Mapping[str, str]) -> None:
+        """Take the values of a tracker's `state`."""
+        if values.get("ready") != "true" or "dealt_with_ns" not in values:
+            self._trackers.pop(name, None)
+            return
+        dealt_ns = int(values["dealt_with_ns"] or -1)
+        known = self._trackers.setdefault(name, _Tracker(dealt_ns, self._clock()))
+        known.heard_s = self._clock()
+        if dealt_ns != known.dealt_ns:
+            known.dealt_ns, known.waited_for = dealt_ns, True
+
+    def sent(self, stamp_ns: int) -> None:
+        """Begin to wait for the set of that stamp."""
+        self._sent = (stamp_ns, self._clock())
+
+    def waiting_for(self) -> list[str]:
+        """Names of the trackers that have not dealt with the set; empty when the next is due."""
+        if self._sent is None:
+            return []
+        now_s = self._clock()
+        for name in [n for n, t in self._trackers.items() if now_s - t.heard_s > self._timeout_s]:
+            del self._trackers[name]
+        return [
+            name
+            for name, tracker in self._trackers.items()
+            if tracker.waited_for and tracker.dealt_ns != self._sent[0]
+        ]
+
+    def overdue(self) -> list[str]:
+        """Names of the trackers that let the set time out, once; they are not waited for now."""
+        if self._sent is None or self._clock() - self._sent[1] < self._timeout_s:
+            return []
+        late = self.waiting_for()
+        for name in late:
+            self._trackers[name].waited_for = False
+        return late

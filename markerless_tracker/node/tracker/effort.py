@@ -1,0 +1,72 @@
+"""How much is spent on each set when sets come faster than they are tracked."""
+
+from collections import deque
+from dataclasses import dataclass
+
+LEAST = 0.25
+"""Least effort."""
+LATE_SETS = 2
+"""Late sets among the last `WINDOW` before the effort falls: one long search is no overload."""
+WINDOW = 12
+EARLY_SETS = 12
+"""Sets in a row with time to spare before the effort rises."""
+SPARE = 0.2
+"""Share of the time between two sets that counts as time to spare."""
+_FALL = 0.8
+_RISE = 1.15
+
+
+@dataclass(frozen=True)
+class Lateness:
+    """How late the worker is when it takes a set.
+
+    Attributes:
+        left_out: complete sets that newer ones replaced since the worker took its last set.
+        waited_s: time that the worker waited for the set; 0 if it lay ready.
+        age_s: time since the set was complete.
+        period_s: time from the arrival of the last set that was complete to that of this one.
+    """
+
+    left_out: int
+    waited_s: float
+    age_s: float
+    period_s: float
+
+    @property
+    def late(self) -> bool:
+        """Whether sets were left out, or this one waited for longer than until the next came."""
+        return self.left_out > 0 or self.age_s > self.period_s > 0.0
+
+    @property
+    def early(self) -> bool:
+        """Whether there was time to spare."""
+        return not self.late and self.waited_s > SPARE * self.period_s
+
+
+class EffortRule:
+    """The effort for the next set, in (0, 1].
+
+    It falls while the worker is late and rises again while it has time to spare; in between it
+    stays, so that it does not swing.
+    """
+
+    def __init__(self) -> None:
+        self._effort = 1.0
+        self._recent: deque[bool] = deque(maxlen=WINDOW)
+        self._early = 0
+
+    @property
+    def effort(self) -> float:
+        """The effort for the set that was taken last."""
+        return self._effort
+
+    def take(self, lateness: Lateness) -> float:
+        """The effort for a set that is taken now."""
+        self._recent.append(lateness.late)
+        self._early = self._early + 1 if lateness.early else 0
+        if sum(self._recent) >= LATE_SETS:
+            self._effort = max(LEAST, _FALL * self._effort)
+            self._recent.clear()
+        elif self._early >= EARLY_SETS:
+            self._effort, self._early = min(1.0, _RISE * self._effort), 0
+        return self._effort
