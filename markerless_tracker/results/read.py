@@ -166,7 +166,8 @@ class _Positions:
             self._next = next(self._rows, None)
         if self._next is None or self._next[0] != stamp_ns:
             return self._missing
-        return self._next[1]
+        row: FloatArray = self._next[1]
+        return row
 
 
 def _number(value: Any) -> float:

@@ -164,9 +164,7 @@ class ResultWriter:
         journal.add(_frame(result, self._segment))
         try:
             markers_m = result.markers_m
-            if markers_m is None or not (
-                self._keep_lost or result.state is TrackState.TRACKING
-            ):
+            if markers_m is None or not (self._keep_lost or result.state is TrackState.TRACKING):
                 markers_m = _MISSING
             trc.add(result.stamp_ns, markers_m, self._rate())
         except DatasetError:

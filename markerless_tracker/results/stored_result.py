@@ -176,7 +176,10 @@ class StoredResult:
         if not pieces:
             raise DatasetError("the result has no frame")
         return pieces[0].with_arrays(
-            **{name: np.concatenate([getattr(part, name) for part in pieces]) for name in _PER_FRAME}
+            **{
+                name: np.concatenate([getattr(part, name) for part in pieces])
+                for name in _PER_FRAME
+            }
         )
 
 
@@ -229,8 +232,10 @@ def result_names(name: Path) -> list[Path]:
     if not name.with_name(name.name + ".trc").exists():
         raise DatasetError(f"{name}.trc: no such file, expected the name of a result")
     found = [name]
-    while (more := name.with_name(f"{name.name}.{len(found) + 1}")).with_name(
-        f"{more.name}.trc"
-    ).exists():
+    while (
+        (more := name.with_name(f"{name.name}.{len(found) + 1}"))
+        .with_name(f"{more.name}.trc")
+        .exists()
+    ):
         found.append(more)
     return found

@@ -68,7 +68,7 @@ class TrcRows:
         self._file.close()
 
     def chunks(self, rows: int = CHUNK_ROWS) -> Iterator[tuple[NDArray[np.int64], FloatArray]]:
-        """Stamps (k,) in ns and positions (k, m, 3) in m, world frame, of the next k <= `rows` rows.
+        """Stamps (k,) in ns and positions (k, m, 3) in m, world frame, of k <= `rows` rows.
 
         Raises:
             DatasetError: a row is malformed, or its time is not later than that of the row before.
@@ -103,7 +103,7 @@ class TrcRows:
     def _lines(self) -> Iterator[str]:
         try:
             # `yield from` would close the file with the generator.
-            for line in self._file:
+            for line in self._file:  # noqa: UP028
                 yield line
         except OSError as error:
             raise DatasetError(f"{self._path}: cannot be read: {error.strerror}") from error

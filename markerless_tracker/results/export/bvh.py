@@ -30,7 +30,6 @@ JOINT_NAMES: Mapping[str, str] = MappingProxyType(
 """Segments -> names that character animation knows; others keep theirs."""
 _CM_PER_M = 100.0
 _ROTATIONS = "Zrotation Xrotation Yrotation"
-_ORDER = "ZXY"
 _DIGITS = 6
 # Readers expect a length; markers in a joint's centre are no ends.
 _SHORTEST_END_M = 0.001
@@ -81,7 +80,8 @@ def _first_pose(reader: ResultReader, body: BodyModel) -> FloatArray:
     for part in reader.chunks():
         known = np.flatnonzero(np.isfinite(part.parameters).all(axis=1))
         if known.size:
-            return part.parameters[known[0]]
+            pose: FloatArray = part.parameters[known[0]]
+            return pose
     return body.neutral
 
 
@@ -98,7 +98,7 @@ def _channels(body: BodyModel, bones: Skeleton, parameters: FloatArray) -> Float
         if above >= 0:
             local = turned[:, above].transpose(0, 2, 1) @ local
         local = ROTATION_FILE_WORLD @ local @ ROTATION_FILE_WORLD.T
-        columns.append(Rotation.from_matrix(local).as_euler(_ORDER, degrees=True))
+        columns.append(Rotation.from_matrix(local).as_euler("ZXY", degrees=True))
     return np.concatenate(columns, axis=1)
 
 
@@ -121,10 +121,13 @@ def _hierarchy(body: BodyModel, bones: Skeleton) -> list[str]:
         segment = bones.segments[index]
         pad, inner = "\t" * depth, "\t" * (depth + 1)
         above = centres[segment.parent] if segment.parent >= 0 else centres[index]
-        channels = f"6 Xposition Yposition Zposition {_ROTATIONS}" if not depth else f"3 {_ROTATIONS}"
+        channels = (
+            f"6 Xposition Yposition Zposition {_ROTATIONS}" if not depth else f"3 {_ROTATIONS}"
+        )
+        name = JOINT_NAMES.get(segment.name, segment.name)
         lines.extend(
             [
-                f"{pad}{'JOINT' if depth else 'ROOT'} {JOINT_NAMES.get(segment.name, segment.name)}",
+                f"{pad}{'JOINT' if depth else 'ROOT'} {name}",
                 f"{pad}{{",
                 f"{inner}OFFSET {_offset(centres[index] - above)}",
                 f"{inner}CHANNELS {channels}",

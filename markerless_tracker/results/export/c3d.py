@@ -97,9 +97,7 @@ def _parameters(grid: Grid, frames: int, names: Sequence[str]) -> bytes:
                 "TRIAL",
                 [
                     _integers(3, "ACTUAL_START_FIELD", [1, 0], dimensions=(2,)),
-                    _integers(
-                        3, "ACTUAL_END_FIELD", [end % 65536, end // 65536], dimensions=(2,)
-                    ),
+                    _integers(3, "ACTUAL_END_FIELD", [end % 65536, end // 65536], dimensions=(2,)),
                     _reals(3, "CAMERA_RATE", [grid.fps]),
                 ],
             ),

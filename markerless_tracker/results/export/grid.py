@@ -51,7 +51,7 @@ class Grid:
             raise DatasetError(f"{reader.name}.trc: DataRate is {reader.fps}, expected above 0")
         self._reader = reader
         self.fps = reader.fps
-        self._restart()
+        self.left_out, self.most_off_s, self.first_ns = 0, 0.0, 0
 
     def frames(self) -> int:
         """Number of frames, by a pass over the result."""
@@ -63,7 +63,7 @@ class Grid:
         Raises:
             DatasetError: more than `LONGEST_GAP` frames are missing between two rows.
         """
-        self._restart()
+        self.left_out, self.most_off_s, self.first_ns = 0, 0.0, 0
         last, first = -1, None
         for part in self._reader.chunks():
             if not len(part):
@@ -87,6 +87,3 @@ class Grid:
             rows[frames[kept] - last - 1] = kept
             last = int(frames[kept[-1]])
             yield GridPart(part, rows)
-
-    def _restart(self) -> None:
-        self.left_out, self.most_off_s, self.first_ns = 0, 0.0, 0

@@ -2,6 +2,7 @@
 
 import warnings
 import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
@@ -14,10 +15,12 @@ from markerless_tracker.results.export.axes import ROTATION_FILE_WORLD
 from markerless_tracker.results.export.coordinates import coordinate_names
 from markerless_tracker.results.export.new_file import new_file, seconds
 from markerless_tracker.results.export.skeleton import MOST_ROTATIONS, Segment, Skeleton, skeleton
+from markerless_tracker.results.export.trc import write_renamed_trc
 from markerless_tracker.results.read import ResultReader
 from markerless_tracker.results.stored_result import stored_body
 
-_VERSION = "40500"
+_VERSION = "40000"
+"""Read by every OpenSim 4."""
 _CREDITS = (
     "Kinematics only: masses and inertias are nominal. For dynamics, scale a musculoskeletal model "
     "with the marker file."
@@ -35,6 +38,8 @@ def write_osim(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None
 
     The model has one body per segment, the coordinates of the `.mot`, the 15 markers and a cylinder
     per cone. Its default pose is the first one of the result, where inverse kinematics begins.
+    OpenSim's inverse kinematics stops at a blank row: if there are any, or if the markers have
+    other names than in NAME.trc, the setup uses NAME.ik.trc, which has the other rows.
 
     Args:
         path: the model.
@@ -45,21 +50,40 @@ def write_osim(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None
         DatasetError, BodyModelError: the files cannot be written, or the result's body is unknown.
     """
     body = stored_body(reader.summary)
-    first, last, pose = _tracked_range(reader, body)
-    _write(path, _model(body, pose, names, path.stem))
-    _write(path.with_suffix(".ik.xml"), _setup(path, reader, names, first, last))
+    extent = _extent(reader, body)
+    _write(path, _model(body, extent.pose, names, path.stem))
+    marker_file = path.with_suffix(".ik.trc")
+    if extent.blank or names != reader.marker_names or path.parent != reader.name.parent:
+        write_renamed_trc(marker_file, reader, names, blank_rows=False)
+    else:
+        marker_file = reader.name.with_name(f"{reader.name.name}.trc")
+    _write(path.with_suffix(".ik.xml"), _setup(path, marker_file.name, names, extent))
 
 
-def _tracked_range(reader: ResultReader, body: BodyModel) -> tuple[int, int, FloatArray]:
-    """First and last stamp with a pose, and the first pose (neutral without any)."""
-    first, last, pose = None, 0, body.neutral
+@dataclass(frozen=True, eq=False)
+class _Extent:
+    """First and last stamp with markers, whether rows are blank, and the first pose (p,)."""
+
+    first_ns: int
+    last_ns: int
+    blank: bool
+    pose: FloatArray
+
+
+def _extent(reader: ResultReader, body: BodyModel) -> _Extent:
+    first, last, blank = None, 0, False
+    pose: FloatArray | None = None
     for part in reader.chunks():
-        known = np.flatnonzero(np.isfinite(part.parameters).all(axis=1))
+        marked = np.isfinite(part.positions_m).any(axis=(1, 2))
+        blank = blank or not marked.all()
+        known = np.flatnonzero(marked)
         if known.size:
-            if first is None:
-                first, pose = int(part.stamps_ns[known[0]]), part.parameters[known[0]]
+            first = int(part.stamps_ns[known[0]]) if first is None else first
             last = int(part.stamps_ns[known[-1]])
-    return first or 0, last, pose
+        posed = np.flatnonzero(np.isfinite(part.parameters).all(axis=1))
+        if pose is None and posed.size:
+            pose = part.parameters[posed[0]]
+    return _Extent(first or 0, last, blank, body.neutral if pose is None else pose)
 
 
 def _model(body: BodyModel, pose: FloatArray, names: tuple[str, ...], title: str) -> Element:
@@ -86,7 +110,9 @@ def _model(body: BodyModel, pose: FloatArray, names: tuple[str, ...], title: str
     for segment in bones.segments:
         _add_joint(joints, body, bones, segment, coordinates, pose)
     markers = _set(model, "MarkerSet", "markerset")
-    for name, node, offset in zip(names, body.marker_node.tolist(), body.marker_offset, strict=True):
+    for name, node, offset in zip(
+        names, body.marker_node.tolist(), body.marker_offset, strict=True
+    ):
         place = bones.node_place[node]
         entry = SubElement(markers, "Marker", name=name)
         frame = bones.segments[bones.node_segment[node]].name
@@ -190,18 +216,15 @@ def _add_offset(parent: Element, name: str, socket: str, place: FloatArray) -> E
     return frame
 
 
-def _setup(
-    model: Path, reader: ResultReader, names: tuple[str, ...], first_ns: int, last_ns: int
-) -> Element:
+def _setup(model: Path, marker_file: str, names: tuple[str, ...], extent: _Extent) -> Element:
     document = Element("OpenSimDocument", Version=_VERSION)
     tool = SubElement(document, "InverseKinematicsTool", name=model.stem)
-    tracks = model.with_suffix(".trc") if names != reader.marker_names else reader.name
     for key, text in (
         ("model_file", model.name),
         ("constraint_weight", "Inf"),
         ("accuracy", "1e-06"),
-        ("time_range", f"{seconds(first_ns)} {seconds(last_ns)}"),
-        ("marker_file", f"{tracks.name.removesuffix('.trc')}.trc"),
+        ("time_range", f"{seconds(extent.first_ns)} {seconds(extent.last_ns)}"),
+        ("marker_file", marker_file),
         ("output_motion_file", f"{model.stem}.ik.mot"),
         ("report_errors", "true"),
     ):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from markerless_tracker.body import BodyModel, transforms
-from markerless_tracker.body.model import FIRST_TRANSLATION
+from markerless_tracker.body.model import FIRST_TRANSLATION, IntArray
 from markerless_tracker.geometry import FloatArray
 
 MOST_ROTATIONS = 3
@@ -140,7 +140,7 @@ def _with_segment(segments: list[_Open], parent: int, place: FloatArray) -> Floa
 
 
 def _goes_on(
-    segment: _Open, parent: int, fixed: FloatArray, rotates: bool, children: FloatArray
+    segment: _Open, parent: int, fixed: FloatArray, rotates: bool, children: IntArray
 ) -> bool:
     """Whether a node's move belongs to the joint of its parent's segment."""
     return (
