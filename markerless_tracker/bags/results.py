@@ -44,7 +44,7 @@ def write_result_bag(out: Path, reader: ResultReader, *, replace: bool = False) 
         # The writer creates the folder and refuses an existing one.
         folder.rmdir()
         with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-            topics = _Topics(writer, body)
+            topics = _Topics(writer, body, reader.angle_names)
             for part in reader.chunks():
                 for row, stamp in enumerate(part.stamps_ns.tolist()):
                     if not 0 <= stamp < LAST_SECOND * 10**9:
@@ -53,6 +53,7 @@ def write_result_bag(out: Path, reader: ResultReader, *, replace: bool = False) 
                         )
                     topics.state(stamp, str(part.states[row]), float(part.fitness[row]))
                     topics.pose(stamp, part.parameters[row], part.parameters_sd[row])
+                    topics.angles(stamp, part.parameters[row], part.angles_deg[row])
                     topics.markers(stamp, part.positions_m[row])
             if not topics.messages:
                 raise DatasetError(f"{reader.name}: has no frame, expected at least one")
@@ -62,10 +63,13 @@ def write_result_bag(out: Path, reader: ResultReader, *, replace: bool = False) 
 class _Topics:
     """The topics of a bag being written."""
 
-    def __init__(self, writer: Writer, body: BodyModel) -> None:
+    def __init__(self, writer: Writer, body: BodyModel, angles: tuple[str, ...]) -> None:
         self._writer, self._body = writer, body
         self.messages = 0
-        self._names = list(body.joint_names)
+        # The joints of the URDF: the reported angles but the root's, if there are any.
+        root = body.root_frame
+        self._columns = [k for k, name in enumerate(angles) if not name.startswith(f"{root}_")]
+        self._angles = [angles[column] for column in self._columns]
         self._kinds = {
             "/robot_description": "std_msgs/msg/String",
             "/state": "diagnostic_msgs/msg/DiagnosticArray",
@@ -106,10 +110,10 @@ class _Topics:
         """Write a pose (p,) and its standard deviations, if they are known."""
         if not np.isfinite(parameters).all():
             return
-        joints = self._body.joints
-        self._put("/joint_states", stamp, self._joints(stamp, parameters[joints]))
+        joints, names = self._body.joints, list(self._body.joint_names)
         if np.isfinite(deviations[joints]).all():
-            self._put("/joint_deviations", stamp, self._joints(stamp, deviations[joints]))
+            message = self._joints(stamp, names, deviations[joints])
+            self._put("/joint_deviations", stamp, message)
         T = root_transform(self._body, parameters)
         x, y, z = (float(value) for value in T[:3, 3])
         quaternion = message_type("geometry_msgs/msg/Quaternion")(
@@ -152,10 +156,18 @@ class _Topics:
         array = message_type("geometry_msgs/msg/PoseArray")
         self._put("/marker_poses", stamp, array(header=header(stamp, WORLD_FRAME), poses=poses))
 
-    def _joints(self, stamp: int, values: FloatArray) -> Any:
+    def angles(self, stamp: int, parameters: FloatArray, angles_deg: FloatArray) -> None:
+        """Write the joints: the result's angles (k,), without them the parameters (p,)."""
+        names, values = list(self._body.joint_names), parameters[self._body.joints]
+        if self._angles:
+            names, values = self._angles, np.deg2rad(angles_deg[self._columns])
+        if np.isfinite(values).all():
+            self._put("/joint_states", stamp, self._joints(stamp, names, values))
+
+    def _joints(self, stamp: int, names: list[str], values: FloatArray) -> Any:
         return message_type("sensor_msgs/msg/JointState")(
             header=header(stamp, ""),
-            name=self._names,
+            name=names,
             position=np.ascontiguousarray(values, dtype=np.float64),
             velocity=np.empty(0),
             effort=np.empty(0),

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.export.axes import ROTATION_FILE_WORLD
-from markerless_tracker.results.export.coordinates import coordinate_names
+from markerless_tracker.results.export.coordinates import coordinate_names, coordinate_values
 from markerless_tracker.results.export.new_file import new_file, seconds
 from markerless_tracker.results.export.skeleton import MOST_ROTATIONS, Segment, Skeleton, skeleton
 from markerless_tracker.results.export.trc import write_renamed_trc
@@ -107,8 +107,9 @@ def _model(body: BodyModel, pose: FloatArray, names: tuple[str, ...], title: str
         _add_cones(entry, body, bones, index)
     joints = _set(model, "JointSet", "jointset")
     coordinates = coordinate_names(body)
+    values = coordinate_values(body, pose[None])[0]
     for segment in bones.segments:
-        _add_joint(joints, body, bones, segment, coordinates, pose)
+        _add_joint(joints, body, bones, segment, coordinates, values)
     markers = _set(model, "MarkerSet", "markerset")
     for name, node, offset in zip(
         names, body.marker_node.tolist(), body.marker_offset, strict=True
@@ -128,7 +129,7 @@ def _add_joint(
     bones: Skeleton,
     segment: Segment,
     names: tuple[str, ...],
-    pose: FloatArray,
+    values: FloatArray,
 ) -> None:
     joint = SubElement(joints, "CustomJoint", name=f"{segment.name}_joint")
     parent, place = "/ground", _WORLD_IN_GROUND
@@ -139,17 +140,23 @@ def _add_joint(
         [place[:, :3] @ segment.T_parent_joint[:, :3], place[:, :3] @ segment.T_parent_joint[:, 3]]
     )
     SubElement(joint, "socket_parent_frame").text = "parent_offset"
-    SubElement(joint, "socket_child_frame").text = f"/bodyset/{segment.name}"
+    child = f"/bodyset/{segment.name}"
+    SubElement(joint, "socket_child_frame").text = "child_offset" if segment.ball else child
     coordinates = SubElement(joint, "coordinates")
     for move in segment.moves:
         entry = SubElement(coordinates, "Coordinate", name=names[move.parameter])
         low, high = body.limits[:, move.parameter]
         free = (-np.pi, np.pi) if move.rotates else (-100.0, 100.0)
-        low, high = (low, high) if np.isfinite([low, high]).all() else free
-        SubElement(entry, "default_value").text = _number(pose[move.parameter])
+        own_limits = np.isfinite([low, high]).all() and not segment.ball
+        low, high = (low, high) if own_limits else free
+        SubElement(entry, "default_value").text = _number(values[move.parameter])
         SubElement(entry, "range").text = _numbers(np.array([low, high]))
         SubElement(entry, "clamped").text = "false"
     frames = SubElement(joint, "frames")
+    if segment.ball:
+        place = np.column_stack([segment.R_parent_anatomical, place[:, 3]])
+        own = np.column_stack([segment.R_segment_anatomical, np.zeros(3)])
+        _add_offset(frames, "child_offset", child, own)
     _add_offset(frames, "parent_offset", parent, place)
     transform = SubElement(joint, "SpatialTransform")
     for kind in (True, False):

@@ -9,6 +9,14 @@ from markerless_tracker.body.model import FIRST_TRANSLATION, IntArray
 from markerless_tracker.geometry import FloatArray
 
 MOST_ROTATIONS = 3
+FIRST_COUPLED = 6
+"""Kinds of nodes from here on rotate together with their neighbours, about no axis of their own."""
+ANATOMICAL: FloatArray = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""(3, 3) OpenSim's axes of a segment, x forward, y up, z right, in the world, body neutral."""
+BALL_ORDER = "ZXY"
+"""Rotations of a ball joint, each about the axis as moved by those before: flexion, adduction,
+rotation (Rajagopal et al. 2016)."""
+_BALL_AXES = (2, 0, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +48,9 @@ class Segment:
             have rotated.
         node: the body's node whose position is that of the joint and which the segment turns with.
         R_segment_node: (3, 3) rotation from that node's axes to the segment's.
+        ball: whether the joint's rotations are those of `BALL_ORDER` between the anatomical axes of
+            parent and segment, since no axes belong to the body's parameters.
+        R_parent_anatomical, R_segment_anatomical: (3, 3) anatomical axes in parent and segment.
     """
 
     name: str
@@ -48,6 +59,9 @@ class Segment:
     moves: tuple[Move, ...]
     node: int
     R_segment_node: FloatArray
+    ball: bool
+    R_parent_anatomical: FloatArray
+    R_segment_anatomical: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +88,7 @@ class _Open:
         self.rotation = np.eye(3)
         self.node = -1
         self.names: list[str] = []
+        self.ball = False
 
     @property
     def rotations(self) -> int:
@@ -93,7 +108,7 @@ def skeleton(body: BodyModel) -> Skeleton:
         place = _joined(places[parent], fixed) if parent >= 0 else fixed
         kind = int(body.node_kind[node])
         if kind >= 0:
-            rotates = kind < FIRST_TRANSLATION
+            rotates = kind < FIRST_TRANSLATION or kind >= FIRST_COUPLED
             if not (own >= 0 and _goes_on(segments[own], parent, fixed, rotates, children)):
                 own, place = len(segments), _with_segment(segments, own, place)
             grown = segments[own]
@@ -102,6 +117,7 @@ def skeleton(body: BodyModel) -> Skeleton:
             parameter = int(body.node_parameter[node])
             grown.moves.append(Move(body.parameter_names[parameter], parameter, rotates, axis))
             grown.node = node
+            grown.ball = grown.ball or kind >= FIRST_COUPLED
         elif own < 0:
             own, place = len(segments), _with_segment(segments, own, place)
             segments[own].node = node
@@ -109,18 +125,39 @@ def skeleton(body: BodyModel) -> Skeleton:
             segments[own].names.append(names[node])
         segment_of.append(own)
         places.append(place)
-    return Skeleton(
-        tuple(
+    neutral = transforms(body, body.neutral)[:, :, :3]
+    finished: list[Segment] = []
+    for entry in segments:
+        own = places[entry.node][:, :3]
+        above, joint = ANATOMICAL, ANATOMICAL
+        if entry.parent >= 0:
+            parent_segment = finished[entry.parent]
+            R_world_parent = neutral[parent_segment.node] @ parent_segment.R_segment_node.T
+            above = R_world_parent.T @ ANATOMICAL
+        joint = (neutral[entry.node] @ own.T).T @ ANATOMICAL
+        name = entry.names[0] if entry.names else f"{entry.moves[-1].name}_link"
+        moves = tuple(entry.moves)
+        if entry.ball:
+            signs = (1.0, -1.0, -1.0) if name.startswith("l_") else (1.0, 1.0, 1.0)
+            moves = tuple(
+                Move(move.name, move.parameter, True, sign * np.eye(3)[axis])
+                for move, sign, axis in zip(entry.moves, signs, _BALL_AXES, strict=True)
+            )
+        finished.append(
             Segment(
-                name=entry.names[0] if entry.names else f"{entry.moves[-1].name}_link",
+                name=name,
                 parent=entry.parent,
                 T_parent_joint=entry.place,
-                moves=tuple(entry.moves),
+                moves=moves,
                 node=entry.node,
-                R_segment_node=places[entry.node][:, :3],
+                R_segment_node=own,
+                ball=entry.ball,
+                R_parent_anatomical=above,
+                R_segment_anatomical=joint,
             )
-            for entry in segments
-        ),
+        )
+    return Skeleton(
+        tuple(finished),
         tuple(segment_of),
         np.array(places),
     )
