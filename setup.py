@@ -58,11 +58,13 @@ setup(
     ],
     extras_require={
         "cluster": ["distributed>=2024.1"],
+        "formats": ["ezc3d>=1.5"],
         "plots": ["matplotlib>=3.8"],
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
             "hypothesis",
             "mypy",
+            'opensim>=4.5; python_version < "3.14"',
             "pytest>=7",
             "pytest-xdist",
             "ruff",

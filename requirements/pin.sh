@@ -10,6 +10,7 @@ echo "# Every package of .venv, pinned (x86-64 Linux, Python 3.11 to 3.14). Rema
         for (i = 1; i <= NR; i++) {
             dashed = "ros-" name[i]; gsub("_", "-", dashed)
             if (name[i] == "pip" || dashed in seen) continue
-            print line[i] (name[i] == "backports.zstd" ? " ; python_version < \"3.14\"" : "")
+            older = name[i] == "backports.zstd" || name[i] == "opensim"
+            print line[i] (older ? " ; python_version < \"3.14\"" : "")
         }
     }'

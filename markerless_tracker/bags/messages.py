@@ -23,7 +23,8 @@ def typestore() -> Any:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
-def _type(name: str) -> Any:
+def message_type(name: str) -> Any:
+    """A message type by its name, such as std_msgs/msg/Header."""
     return typestore().types[name]
 
 
@@ -34,18 +35,20 @@ def optical_frame(camera_name: str) -> str:
 
 def stamp_message(stamp_ns: int) -> Any:
     """builtin_interfaces/Time of a stamp in ns."""
-    return _type("builtin_interfaces/msg/Time")(sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
+    return message_type("builtin_interfaces/msg/Time")(
+        sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9
+    )
 
 
 def header(stamp_ns: int, frame: str) -> Any:
     """std_msgs/Header."""
-    return _type("std_msgs/msg/Header")(stamp=stamp_message(stamp_ns), frame_id=frame)
+    return message_type("std_msgs/msg/Header")(stamp=stamp_message(stamp_ns), frame_id=frame)
 
 
 def image_message(image: Image, stamp_ns: int, camera: CameraModel) -> Any:
     """sensor_msgs/Image: bgr8 of (h, w, 3), mono8 of (h, w)."""
     height, width = image.shape[:2]
-    return _type("sensor_msgs/msg/Image")(
+    return message_type("sensor_msgs/msg/Image")(
         header=header(stamp_ns, optical_frame(camera.name)),
         height=height,
         width=width,
@@ -66,7 +69,7 @@ def jpeg_message(image: Image, stamp_ns: int, camera: CameraModel) -> Any:
     if not done:
         raise DatasetError(f"{camera.name}: an image {image.shape} cannot be encoded as JPEG")
     kind = "mono8; jpeg compressed" if image.ndim == 2 else "bgr8; jpeg compressed bgr8"
-    return _type("sensor_msgs/msg/CompressedImage")(
+    return message_type("sensor_msgs/msg/CompressedImage")(
         header=header(stamp_ns, optical_frame(camera.name)), format=kind, data=data.reshape(-1)
     )
 
@@ -75,13 +78,13 @@ def camera_info_message(camera: CameraModel, stamp_ns: int) -> Any:
     """sensor_msgs/CameraInfo of an unrectified camera: R = 1, P = [K 0], plumb_bob."""
     lists = camera_info_fields(camera)
     arrays = {name: np.array(lists.pop(name)) for name in ("d", "k", "r", "p")}
-    return _type("sensor_msgs/msg/CameraInfo")(
+    return message_type("sensor_msgs/msg/CameraInfo")(
         header=header(stamp_ns, optical_frame(camera.name)),
         **lists,
         **arrays,
         binning_x=0,
         binning_y=0,
-        roi=_type("sensor_msgs/msg/RegionOfInterest")(
+        roi=message_type("sensor_msgs/msg/RegionOfInterest")(
             x_offset=0, y_offset=0, height=0, width=0, do_rectify=False
         ),
     )
@@ -89,10 +92,13 @@ def camera_info_message(camera: CameraModel, stamp_ns: int) -> Any:
 
 def static_transforms_message(rig: CameraRig, stamp_ns: int) -> Any:
     """tf2_msgs/TFMessage with `map` -> NAME_optical_frame of every camera."""
-    vector, quaternion = _type("geometry_msgs/msg/Vector3"), _type("geometry_msgs/msg/Quaternion")
+    vector, quaternion = (
+        message_type("geometry_msgs/msg/Vector3"),
+        message_type("geometry_msgs/msg/Quaternion"),
+    )
     stamped, inner = (
-        _type("geometry_msgs/msg/TransformStamped"),
-        _type("geometry_msgs/msg/Transform"),
+        message_type("geometry_msgs/msg/TransformStamped"),
+        message_type("geometry_msgs/msg/Transform"),
     )
     transforms = []
     for camera in rig:
@@ -108,4 +114,4 @@ def static_transforms_message(rig: CameraRig, stamp_ns: int) -> Any:
                 ),
             )
         )
-    return _type("tf2_msgs/msg/TFMessage")(transforms=transforms)
+    return message_type("tf2_msgs/msg/TFMessage")(transforms=transforms)

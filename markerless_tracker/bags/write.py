@@ -63,6 +63,7 @@ def write_bag(
     compress: str = "none",
     backgrounds: Mapping[str, Sequence[Image]] | None = None,
     progress: Callable[[int, int | None], None] | None = None,
+    replace: bool = False,
 ) -> BagSummary:
     """Write a recording, at its scale, as a bag folder.
 
@@ -79,6 +80,7 @@ def write_bag(
         compress: `none`, `zstd` (lossless chunks) or `jpeg` (lossy images).
         backgrounds: camera -> empty-scene images in the rig's size, instead of the recording's own.
         progress: called with the sets written and their number (None if unknown).
+        replace: whether an earlier bag at `out` is replaced, once the new one is complete.
 
     Raises:
         ConfigError: an unknown compression.
@@ -93,7 +95,7 @@ def write_bag(
                 "letters, digits and _"
             )
     total = None if recording.frame_count is None else -(-recording.frame_count // every)
-    with new_folder(out) as folder:
+    with new_folder(out, replace=replace) as folder:
         # The writer creates the folder and refuses an existing one.
         folder.rmdir()
         writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
@@ -117,6 +119,22 @@ def write_bag(
             write_background_model(folder / BACKGROUND / f"{name}{MODEL_SUFFIX}", model)
         size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     return BagSummary(Path(out), len(stamps), stamps[0], stamps[-1], size)
+
+
+def offered_qos(*, latched: bool) -> Qos:
+    """Reliable; a latched topic keeps its last message for late subscribers."""
+    durability = QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE
+    return Qos(
+        history=QosHistory.KEEP_LAST,
+        depth=1 if latched else 10,
+        reliability=QosReliability.RELIABLE,
+        durability=durability,
+        deadline=_FOREVER,
+        lifespan=_FOREVER,
+        liveliness=QosLiveliness.AUTOMATIC,
+        liveliness_lease_duration=_FOREVER,
+        avoid_ros_namespace_conventions=False,
+    )
 
 
 class _Topics:
@@ -151,20 +169,8 @@ class _Topics:
             self._put(self._images[camera.name], stamp, image)
 
     def _connect(self, topic: str, kind: str, *, latched: bool = False) -> Any:
-        durability = QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE
-        qos = Qos(
-            history=QosHistory.KEEP_LAST,
-            depth=1 if latched else 10,
-            reliability=QosReliability.RELIABLE,
-            durability=durability,
-            deadline=_FOREVER,
-            lifespan=_FOREVER,
-            liveliness=QosLiveliness.AUTOMATIC,
-            liveliness_lease_duration=_FOREVER,
-            avoid_ros_namespace_conventions=False,
-        )
         return self._writer.add_connection(
-            topic, kind, typestore=typestore(), offered_qos_profiles=[qos]
+            topic, kind, typestore=typestore(), offered_qos_profiles=[offered_qos(latched=latched)]
         )
 
     def _put(self, connection: Any, stamp_ns: int, message: Any) -> None:

@@ -49,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="none",
         help="none (default), zstd (lossless, smaller, slower) or jpeg (lossy, much smaller)",
     )
+    parser.add_argument("--force", action="store_true", help="replace an earlier bag at BAG")
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
 
 
@@ -76,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
             every=every,
             compress=args.compress,
             backgrounds=backgrounds,
+            replace=args.force,
             progress=lambda done, total: bars.update(task, completed=done, total=total),
         )
     for warning in recording.warnings:

@@ -4,13 +4,22 @@ import argparse
 import json
 import math
 import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.datasets import MarkerTrack, read_trc
+from markerless_tracker.body import MARKER_NAMES
+from markerless_tracker.datasets import MarkerTrack
+from markerless_tracker.datasets.markers.c3d import read_markers
+from markerless_tracker.datasets.markers.sets import MARKER_SETS, Sources, read_marker_map, renamed
 from markerless_tracker.errors import DatasetError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.results.alignment import Alignment, align
+from markerless_tracker.results.measures import Measures, measures
 from markerless_tracker.results.score import Score, score
 from markerless_tracker.results.stored import stored_frames
 
@@ -20,18 +29,41 @@ HELP = (
     "either file are not compared, nor frames that the JSON file beside a result calls LOST. With "
     "`offsets off` each joint's mean offset in the heading frame is subtracted from its errors. "
     "`inside sd` is the share of the errors per axis within 1, 2 and 3 of the standard deviations "
-    "in the JSON file."
+    "in the JSON file. MPJPE is the mean error after the pelvis is aligned in each frame, PA-MPJPE "
+    "after rotation, translation and scale are, PCK the share of joints within 150 mm after the "
+    "pelvis is aligned."
 )
 EXAMPLE = "markerless_tracker evaluate out/walk.trc recordings/walk/ground_truth.trc --skip 30"
+
+_WIDTH = 160
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "results", metavar="RESULT.trc", type=Path, nargs="+", help="marker files to evaluate"
+        "results",
+        metavar="RESULT",
+        type=Path,
+        nargs="+",
+        help="marker files to evaluate (TRC, C3D)",
     )
     parser.add_argument(
-        "reference", metavar="REFERENCE.trc", type=Path, help="marker file with the reference"
+        "reference",
+        metavar="REFERENCE",
+        type=Path,
+        help="marker file with the reference (TRC, C3D)",
+    )
+    parser.add_argument(
+        "--markers",
+        metavar="SET|MAP.yaml",
+        help=f"names of the reference's markers: {', '.join(MARKER_SETS)}, or a YAML file with "
+        "lines `LWrist: name` or `LWrist: [one, other]` (their mean)",
+    )
+    parser.add_argument(
+        "--align",
+        action="store_true",
+        help="align the worlds by one rigid transform and the clocks by one offset (both are "
+        "reported) before the comparison",
     )
     parser.add_argument(
         "--skip",
@@ -45,35 +77,88 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Figures:
+    """Everything about one result."""
+
+    score: Score
+    measures: Measures
+    alignment: Alignment | None
+
+    def as_dict(self) -> dict[str, Any]:
+        aligned = {} if self.alignment is None else {"alignment": self.alignment.as_dict()}
+        return {**self.score.as_dict(), **self.measures.as_dict(), **aligned}
+
+
 def run(args: argparse.Namespace) -> int:
     """Evaluate; returns the exit status."""
-    reference = read_trc(args.reference)
-    scores = [_score(path, reference, args.skip) for path in args.results]
+    names = None if args.markers is None else read_marker_map(args.markers)
+    reference = read_markers(args.reference)
+    if names is not None:
+        reference = _renamed(args.reference, reference, names)
+    figures = [_figures(path, reference, names, args) for path in args.results]
     if args.json:
-        single = scores[0].as_dict() if len(scores) == 1 else None
+        single = figures[0].as_dict() if len(figures) == 1 else None
         several = [
-            {"result": str(path), **figures.as_dict()}
-            for path, figures in zip(args.results, scores, strict=True)
+            {"result": str(path), **found.as_dict()}
+            for path, found in zip(args.results, figures, strict=True)
         ]
         json.dump(single or several, sys.stdout, indent=2, allow_nan=False)
         sys.stdout.write("\n")
         return 0
-    console = Console()
-    if len(scores) > 1:
-        console.print(_summary_table(args.results, scores))
-        return 0
-    figures = scores[0]
-    console.print(_joint_table(figures))
-    console.print(
+    # In a pipe rich assumes 80 columns, too few for a table of several results.
+    console = Console(width=None if sys.stdout.isatty() else _WIDTH)
+    if len(figures) > 1:
+        console.print(_summary_table(args.results, figures))
+    else:
+        console.print(_joint_table(figures[0].score))
+        _say(console, _sentence(figures[0]))
+    for path, found in zip(args.results, figures, strict=True):
+        where = f"{path}: " if len(figures) > 1 else ""
+        for line in _remarks(found):
+            _say(console, where + line)
+    return 0
+
+
+def _sentence(found: _Figures) -> str:
+    figures, more = found.score, found.measures
+    return (
         f"mean {figures.mean_mm:.1f} mm, worst frame {figures.max_mm:.1f} mm, worst joint in a "
         f"frame {figures.worst_joint_mm:.1f} mm, limbs {_text(figures.limbs_mm)} mm; "
         f"offsets off {_text(figures.offsets_off_mm)} mm, limbs "
-        f"{_text(figures.offsets_off_limbs_mm)} mm; inside 1, 2, 3 sd {_shares(figures)}; "
-        f"{figures.frames} of {figures.reference_frames} reference frames compared",
-        highlight=False,
-        soft_wrap=True,
+        f"{_text(figures.offsets_off_limbs_mm)} mm; MPJPE {_text(more.mpjpe_mm)} mm, PA-MPJPE "
+        f"{_text(more.pa_mpjpe_mm)} mm, PCK {_share(more.pck)}; inside 1, 2, 3 sd "
+        f"{_shares(figures)}; {figures.frames} of {figures.reference_frames} reference frames "
+        "compared"
     )
-    return 0
+
+
+def _remarks(found: _Figures) -> list[str]:
+    """What was not compared, and how the worlds were aligned."""
+    more, lines = found.measures, []
+    if more.only_reference:
+        lines.append(f"not compared: {', '.join(more.only_reference)} of the reference")
+    if more.only_result:
+        lines.append(f"not compared: {', '.join(more.only_result)} of the result")
+    if found.alignment is not None:
+        moved = found.alignment
+        x, y, z = (1000.0 * value for value in moved.translation_m.tolist())
+        lines.append(
+            f"aligned: rotation {moved.angle_deg:.2f} degrees, translation {x:.1f} {y:.1f} "
+            f"{z:.1f} mm, the reference's clock {1000.0 * moved.offset_s:+.1f} ms"
+        )
+    return lines
+
+
+def _say(console: Console, text: str) -> None:
+    console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+
+def _renamed(path: Path, track: MarkerTrack, names: Mapping[str, Sources]) -> MarkerTrack:
+    try:
+        return renamed(track, names)
+    except DatasetError as error:
+        raise DatasetError(f"{path}: {error}") from error
 
 
 def _count(text: str) -> int:
@@ -82,21 +167,42 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def _score(path: Path, reference: MarkerTrack, skip: int) -> Score:
-    result = read_trc(path)
-    deviations = None
+def _figures(
+    path: Path,
+    reference: MarkerTrack,
+    names: Mapping[str, Sources] | None,
+    args: argparse.Namespace,
+) -> _Figures:
+    result, deviations = read_markers(path), None
+    if names is not None and not set(result.names) & set(MARKER_NAMES):
+        # A result of another tool, with the reference's names.
+        result = _renamed(path, result, names)
+    else:
+        result, deviations = _stored(path, result)
+    alignment = None
+    try:
+        if args.align:
+            alignment = align(result, reference)
+            result, reference = alignment.apply(result, reference)
+        return _Figures(
+            score(result, reference, markers_sd_mm=deviations, skip=args.skip),
+            measures(result, reference, skip=args.skip),
+            alignment,
+        )
+    except DatasetError as error:
+        hint = "; --markers names a set of markers" if "no common marker" in str(error) else ""
+        raise DatasetError(f"{path}: {error}{hint}") from error
+
+
+def _stored(path: Path, result: MarkerTrack) -> tuple[MarkerTrack, FloatArray | None]:
+    """The result without lost frames and its deviations, if there is a JSON file beside it."""
     try:
         stored = stored_frames(path, result)
     except DatasetError as error:
         # The marker file of another tool may have any JSON file beside it.
         print(f"{path}: evaluated without states and deviations: {error}", file=sys.stderr)
         stored = None
-    if stored is not None:
-        result, deviations = stored.track, stored.markers_sd_mm
-    try:
-        return score(result, reference, markers_sd_mm=deviations, skip=skip)
-    except DatasetError as error:
-        raise DatasetError(f"{path}: {error}") from error
+    return (result, None) if stored is None else (stored.track, stored.markers_sd_mm)
 
 
 def _joint_table(figures: Score) -> Table:
@@ -117,26 +223,32 @@ def _joint_table(figures: Score) -> Table:
     return table
 
 
-def _summary_table(paths: list[Path], scores: list[Score]) -> Table:
+def _summary_table(paths: list[Path], several: list[_Figures]) -> Table:
     table = Table(title="Errors, mm")
     table.add_column("result", overflow="fold")
     for heading in (
         "mean", "worst frame", "worst joint", "limbs", "offsets off", "limbs, offsets off",
-        "inside 1, 2, 3 sd", "frames",
+        "MPJPE", "PA-MPJPE", "PCK", "inside 1, 2, 3 sd", "frames",
     ):  # fmt: skip
         table.add_column(heading, justify="right")
-    for path, figures in zip(paths, scores, strict=True):
+    for path, found in zip(paths, several, strict=True):
+        figures, more = found.score, found.measures
         millimetres = (
             figures.mean_mm, figures.max_mm, figures.worst_joint_mm, figures.limbs_mm,
-            figures.offsets_off_mm, figures.offsets_off_limbs_mm,
+            figures.offsets_off_mm, figures.offsets_off_limbs_mm, more.mpjpe_mm, more.pa_mpjpe_mm,
         )  # fmt: skip
         table.add_row(
             str(path),
             *(_text(value) for value in millimetres),
+            _share(more.pck),
             _shares(figures),
             f"{figures.frames} of {figures.reference_frames}",
         )
     return table
+
+
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
 
 
 def _shares(figures: Score) -> str:
@@ -145,5 +257,5 @@ def _shares(figures: Score) -> str:
     return ", ".join(f"{share:.3f}" for share in figures.inside_sd)
 
 
-def _text(value: float, *, sign: str = "") -> str:
-    return f"{value:{sign}.1f}" if math.isfinite(value) else "-"
+def _text(value: float | None, *, sign: str = "") -> str:
+    return "-" if value is None or not math.isfinite(value) else f"{value:{sign}.1f}"

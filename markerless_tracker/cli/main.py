@@ -31,6 +31,7 @@ VERBS: Mapping[str, str] = MappingProxyType(
     {
         "convert": "write a recording, dataset or videos as an MCAP bag",
         "track": "track the person in a recording or bag",
+        "export": "write a result in the formats of OpenSim, C3D, BVH, CSV, NumPy and ROS",
         "evaluate": "compare a result with reference markers, in mm",
         "synthesize": "render a synthetic person as a recording with exact reference markers",
         "benchmark": "measure speed and accuracy",

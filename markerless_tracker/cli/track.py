@@ -20,7 +20,7 @@ from markerless_tracker.cli.track_arguments import add_arguments
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.records import TrackState
-from markerless_tracker.results.result import ResultWriter
+from markerless_tracker.results.result import ResultWriter, check_target
 from markerless_tracker.results.run import recording_backgrounds, track_recording
 from markerless_tracker.tracking import (
     TrackerConfig,
@@ -50,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
     """Track; returns 0, or 3 if no person was found."""
     console = Console(stderr=True)
     config = read_config(args.config, _flags(args))
+    check_target(args.name, overwrite=args.force, allow="--force")
     recording = open_recording(args.source, scale=args.scale)
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
@@ -157,7 +158,15 @@ def _track(
     warnings = FrameWarnings()
     started = time.perf_counter()
     rate = args.fps or recording.fps
-    with ResultWriter(args.name, tracker.body, config, fps=rate, source=recording.name) as writer:
+    with ResultWriter(
+        args.name,
+        tracker.body,
+        config,
+        fps=rate,
+        source=recording.name,
+        overwrite=args.force,
+        keep_lost=args.keep_lost,
+    ) as writer:
         for tracked in track_recording(recording, setup, fps=args.fps):
             result, body = tracked.result, tracker.body
             writer.add(result)

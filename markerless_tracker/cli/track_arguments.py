@@ -20,6 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="path of the result files, without suffix",
     )
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
+    parser.add_argument(
+        "--force", action="store_true", help="replace the files of an earlier result of that NAME"
+    )
     _person(parser.add_argument_group("the person (all optional)"))
     _images(parser.add_argument_group("images"))
     _search(parser.add_argument_group("search"))
@@ -105,6 +108,12 @@ def _search(group: argparse._ArgumentGroup) -> None:
 
 
 def _files(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--keep-lost",
+        action="store_true",
+        help="keep the estimates of frames in the states LOST and SEARCHING in NAME.trc (default: "
+        "their rows are blank)",
+    )
     group.add_argument(
         "--debug-images",
         type=Path,

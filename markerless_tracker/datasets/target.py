@@ -9,21 +9,29 @@ from pathlib import Path
 
 from markerless_tracker.errors import DatasetError
 
+BAG_FILE = "metadata.yaml"
+"""The file that every bag folder has."""
+
 
 @contextmanager
-def new_folder(path: str | Path) -> Iterator[Path]:
+def new_folder(path: str | Path, *, replace: bool = False) -> Iterator[Path]:
     """A folder to fill; it is renamed to `path` when the block ends without an exception.
 
     Until then it is in a hidden `.NAME.partial-*` next to it, which is removed on any exception,
     Ctrl-C included. An empty folder at `path` is replaced.
 
+    Args:
+        path: the folder.
+        replace: whether a bag (a folder with `metadata.yaml`) at `path` is replaced, too.
+
     Raises:
         DatasetError: something is at `path` already, or it cannot be created.
     """
     path = Path(os.path.abspath(path))
+    earlier = replace and not path.is_symlink() and (path / BAG_FILE).is_file()
     if path.is_symlink() or (path.exists() and not path.is_dir()):
         raise DatasetError(f"{path}: exists and is not a folder, expected a new or an empty folder")
-    if path.is_dir() and any(path.iterdir()):
+    if path.is_dir() and any(path.iterdir()) and not earlier:
         raise DatasetError(f"{path}: exists and is not empty, expected a new or an empty folder")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -35,7 +43,9 @@ def new_folder(path: str | Path) -> Iterator[Path]:
         inner = holder / path.name
         inner.mkdir()
         yield inner
-        if path.is_dir():
+        if earlier:
+            path.rename(holder / f"{path.name}.earlier")
+        elif path.is_dir():
             path.rmdir()
         inner.rename(path)
     except OSError as error:

@@ -7,6 +7,7 @@ a later one replaces entries of an earlier one.
 import json
 import os
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,9 @@ from markerless_tracker.results.appended import AppendedFile, not_written
 
 FRAME_KEY = "stamp_ns"
 _FRAME = f'{{"{FRAME_KEY}": '
+_FRAMES = ' "frames": [\n'
+_END = "\n}"
+_LONGEST_HEAD = 10_000_000
 
 
 class Journal:
@@ -61,8 +65,8 @@ class Journal:
         try:
             with summary.open("w", encoding="utf-8", newline="\n") as sink:
                 head = json.dumps(_head(self._file.path), indent=1)
-                sink.write(head.removesuffix("\n}") + ',\n "frames": [')
-                separator = "\n"
+                sink.write(f"{head.removesuffix(_END)},\n{_FRAMES}")
+                separator = ""
                 for line in _lines(self._file.path):
                     if line.startswith(_FRAME):
                         sink.write(f"{separator}  {line}")
@@ -84,18 +88,72 @@ def read_summary(name: Path) -> dict[str, Any]:
     Raises:
         DatasetError: there is neither, or it is no result.
     """
+    head, frames = open_summary(name)
+    return {**head, "frames": list(frames)}
+
+
+def open_summary(name: Path) -> tuple[dict[str, Any], Iterator[dict[str, Any]]]:
+    """The entries of a result but its frames, and the frames one after the other.
+
+    Memory does not grow with the frames, unless another program has changed the layout of
+    NAME.json.
+
+    Args:
+        name: path of the result without suffix.
+
+    Raises:
+        DatasetError: there is neither NAME.json nor NAME.jsonl, or it is no result.
+    """
     path = name.with_name(name.name + ".json")
     journal = name.with_name(name.name + ".jsonl")
-    try:
-        if journal.exists() and not path.exists():
-            frames = [json.loads(line) for line in _lines(journal) if line.startswith(_FRAME)]
-            return {**_head(journal), "frames": frames}
+    if journal.exists() and not path.exists():
+        with _no_result(path):
+            return _head(journal), _parsed(journal, _lines(journal), _FRAME)
+    with _no_result(path):
+        head = _composed_head(path)
+        if head is not None:
+            return head, _parsed(path, _lines(path), f"  {_FRAME}")
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DatasetError(f"{path}: no result of a tracker ({error})") from error
     if not isinstance(content, dict) or not isinstance(content.get("frames"), list):
         raise DatasetError(f"{path}: no result of a tracker (it has no `frames`)")
-    return content
+    return content, iter(content.pop("frames"))
+
+
+@contextmanager
+def _no_result(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"{path}: no result of a tracker ({error})") from error
+
+
+def _parsed(path: Path, lines: Iterator[str], start: str) -> Iterator[dict[str, Any]]:
+    with _no_result(path):
+        for line in lines:
+            if line.startswith(start):
+                yield json.loads(line.rstrip(","))
+
+
+def _composed_head(path: Path) -> dict[str, Any] | None:
+    """The entries before the frames of a file as `Journal.compose` writes it, None of another."""
+    text = ""
+    with path.open(encoding="utf-8") as lines:
+        for line in lines:
+            if line == _FRAMES:
+                break
+            text += line
+            if len(text) > _LONGEST_HEAD:
+                return None
+        else:
+            return None
+        first = next(lines, "")
+    if not first.startswith((f"  {_FRAME}", " ]")):
+        return None
+    try:
+        head = json.loads(text.rstrip().removesuffix(",") + "}")
+    except ValueError:
+        return None
+    return head if isinstance(head, dict) else None
 
 
 def _head(path: Path) -> dict[str, Any]:

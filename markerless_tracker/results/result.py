@@ -51,6 +51,8 @@ class ResultWriter:
         fps: rate of the results, 1/s; None = as the stamps show.
         source: what was tracked, for the reader of the JSON file.
         overwrite: whether an earlier result of that name may be replaced.
+        keep_lost: whether frames in the states LOST and SEARCHING that have an estimate keep it in
+            NAME.trc; their rows are blank otherwise. NAME.json has it in any case.
 
     Attributes:
         trc_path, json_path, journal_path, subject_path: the files.
@@ -71,8 +73,10 @@ class ResultWriter:
         fps: float | None,
         source: str = "",
         overwrite: bool = True,
+        keep_lost: bool = False,
     ) -> None:
         self._name = name
+        self._keep_lost = keep_lost
         self.trc_path = _path(name, ".trc")
         self.json_path = _path(name, ".json")
         self.journal_path = _path(name, ".jsonl")
@@ -159,7 +163,9 @@ class ResultWriter:
         before = journal.size
         journal.add(_frame(result, self._segment))
         try:
-            markers_m = _MISSING if result.markers_m is None else result.markers_m
+            markers_m = result.markers_m
+            if markers_m is None or not (self._keep_lost or result.state is TrackState.TRACKING):
+                markers_m = _MISSING
             trc.add(result.stamp_ns, markers_m, self._rate())
         except DatasetError:
             journal.cut(before)
@@ -244,15 +250,20 @@ def earlier_files(name: Path) -> list[Path]:
     return [path for path in paths if path.exists()]
 
 
-def check_target(name: Path, *, overwrite: bool) -> None:
+def check_target(name: Path, *, overwrite: bool, allow: str = "`overwrite`") -> None:
     """Make sure that a result can be written, without changing an earlier one; makes the folder.
+
+    Args:
+        name: path of the result without suffix.
+        overwrite: whether an earlier result may be replaced.
+        allow: what allows it, for the message.
 
     Raises:
         DatasetError: it cannot, or there is an earlier result and `overwrite` is not set.
     """
     earlier = earlier_files(name)
     if earlier and not overwrite:
-        raise DatasetError(f"{earlier[0]}: exists already, expected a new name or `overwrite`")
+        raise DatasetError(f"{earlier[0]}: exists already, expected a new name or {allow}")
     try:
         name.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -46,7 +46,7 @@ def stored_frames(path: Path, track: MarkerTrack) -> StoredFrames | None:
     Raises:
         DatasetError: the file is no result of a tracker, or a frame of it is malformed.
     """
-    found = _summary_of(path)
+    found = summary_of(path)
     if found is None:
         return None
     name, segment = found
@@ -71,7 +71,7 @@ def stored_frames(path: Path, track: MarkerTrack) -> StoredFrames | None:
     return StoredFrames(MarkerTrack(track.names, track.stamps_ns, positions), sd_mm, lost)
 
 
-def _summary_of(path: Path) -> tuple[Path, int] | None:
+def summary_of(path: Path) -> tuple[Path, int] | None:
     """The result's path without suffix, and which of its marker files this is."""
     name = path.with_suffix("") if path.suffix.lower() == ".trc" else path
     candidates = [(name, 1)]

@@ -1,10 +1,12 @@
 """OpenSim marker files (`.trc`), Y up as Pose2Sim writes them: world = (Z, X, Y) of the file."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.errors import DatasetError
@@ -13,6 +15,8 @@ from markerless_tracker.geometry import FloatArray
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 # Largest Time in a file: stamps in ns must fit in 64 bits.
 LARGEST_TIME_S = Decimal(9_000_000_000)
+CHUNK_ROWS = 4096
+"""Rows that `TrcRows` reads at a time."""
 
 
 def read_trc(path: str | Path) -> MarkerTrack:
@@ -23,31 +27,101 @@ def read_trc(path: str | Path) -> MarkerTrack:
     Raises:
         DatasetError: the file cannot be read or is malformed; the message names file and line.
     """
-    path = Path(path)
-    try:
-        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
-    except OSError as error:
-        raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
-    if not lines or not lines[0].startswith("PathFileType"):
-        raise DatasetError(f"{path}: line 1: not a marker file, expected PathFileType")
-    if len(lines) < 5:
-        raise DatasetError(f"{path}: ends after line {len(lines)}, expected 5 lines of header")
-    names = _names(path, lines[3])
-    factor = METRES[_units(path, lines[1], lines[2])]
-    stamps: list[int] = []
-    rows: list[list[float]] = []
-    for number, line in enumerate(lines[5:], start=6):
-        if line.strip():
-            stamp, row = _row(path, number, line, len(names))
-            if stamps and stamp <= stamps[-1]:
+    with TrcRows(path) as rows:
+        stamps, chunks = [np.empty(0, dtype=np.int64)], [np.empty((0, len(rows.names), 3))]
+        for some, positions_m in rows.chunks():
+            stamps.append(some)
+            chunks.append(positions_m)
+        return MarkerTrack(rows.names, np.concatenate(stamps), np.concatenate(chunks))
+
+
+class TrcRows:
+    """The rows of a `.trc`, a chunk at a time: memory does not grow with the file.
+
+    Args:
+        path: the file.
+
+    Attributes:
+        names: (m,) the markers.
+        fps: rate that the header states, 1/s; NaN if it is no number.
+
+    Raises:
+        DatasetError: the file cannot be read or its header is malformed; names file and line.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = path = Path(path)
+        try:
+            self._file = path.open(encoding="utf-8-sig", errors="replace")
+        except OSError as error:
+            raise DatasetError(f"{path}: cannot be read: {error.strerror}") from error
+        try:
+            self._read_header()
+        except DatasetError:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> "TrcRows":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def chunks(self, rows: int = CHUNK_ROWS) -> Iterator[tuple[NDArray[np.int64], FloatArray]]:
+        """Stamps (k,) in ns and positions (k, m, 3) in m, world frame, of k <= `rows` rows.
+
+        Raises:
+            DatasetError: a row is malformed, or its time is not later than that of the row before.
+        """
+        stamps: list[int] = []
+        values: list[list[float]] = []
+        last: int | None = None
+        for number, line in enumerate(self._lines(), start=6):
+            if not line.strip():
+                continue
+            stamp, row = _row(self._path, number, line, len(self.names))
+            if last is not None and stamp <= last:
                 raise DatasetError(
-                    f"{path}: line {number}: Time {stamp / 1e9} s is not later than "
-                    f"{stamps[-1] / 1e9} s"
+                    f"{self._path}: line {number}: Time {stamp / 1e9} s is not later than "
+                    f"{last / 1e9} s"
                 )
+            last = stamp
             stamps.append(stamp)
-            rows.append(row)
-    positions = np.array(rows, dtype=np.float64).reshape(len(rows), len(names), 3) * factor
-    return MarkerTrack(names, np.array(stamps, dtype=np.int64), positions[:, :, [2, 0, 1]])
+            values.append(row)
+            if len(stamps) == rows:
+                yield self._arrays(stamps, values)
+                stamps, values = [], []
+        if stamps:
+            yield self._arrays(stamps, values)
+
+    def _arrays(
+        self, stamps: list[int], values: list[list[float]]
+    ) -> tuple[NDArray[np.int64], FloatArray]:
+        positions = np.array(values, dtype=np.float64).reshape(len(values), -1, 3) * self._factor
+        return np.array(stamps, dtype=np.int64), positions[:, :, [2, 0, 1]]
+
+    def _lines(self) -> Iterator[str]:
+        try:
+            # `yield from` would close the file with the generator.
+            for line in self._file:  # noqa: UP028
+                yield line
+        except OSError as error:
+            raise DatasetError(f"{self._path}: cannot be read: {error.strerror}") from error
+
+    def _read_header(self) -> None:
+        path = self._path
+        lines = [line.rstrip("\r\n") for line in islice(self._lines(), 5)]
+        if not lines or not lines[0].startswith("PathFileType"):
+            raise DatasetError(f"{path}: line 1: not a marker file, expected PathFileType")
+        if len(lines) < 5:
+            raise DatasetError(f"{path}: ends after line {len(lines)}, expected 5 lines of header")
+        self.names = _names(path, lines[3])
+        header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
+        self._factor = METRES[_units(path, header)]
+        try:
+            self.fps = float(header.get("DataRate", "nan"))
+        except ValueError:
+            self.fps = float("nan")
 
 
 def write_trc(path: str | Path, track: MarkerTrack, fps: float) -> None:
@@ -138,8 +212,7 @@ def _cells(point: FloatArray) -> tuple[str, ...]:
     return tuple(f"{round(float(value), 6) + 0.0:.6f}" for value in (y, z, x))
 
 
-def _units(path: Path, keys: str, values: str) -> str:
-    header = dict(zip(keys.split("\t"), values.split("\t"), strict=False))
+def _units(path: Path, header: Mapping[str, str]) -> str:
     units = header.get("Units", "").strip()
     if units not in METRES:
         raise DatasetError(

@@ -1,0 +1,179 @@
+"""A result as an MCAP bag folder: the topics that the node publishes."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.rosbag2 import StoragePlugin, Writer
+from scipy.spatial.transform import Rotation
+
+from markerless_tracker.bags.messages import WORLD_FRAME, header, message_type, typestore
+from markerless_tracker.bags.write import LAST_SECOND, offered_qos
+from markerless_tracker.body import BodyModel, root_transform
+from markerless_tracker.body.urdf import urdf
+from markerless_tracker.datasets.target import new_folder
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.results.read import ResultReader
+from markerless_tracker.results.stored_result import stored_body
+
+_NODE = "tracker"
+
+
+def write_result_bag(out: Path, reader: ResultReader, *, replace: bool = False) -> int:
+    """Write a result as a bag folder, in the world frame `map` (Z up, as ROS has it).
+
+    Topics: `/marker_poses`, `/joint_states`, `/joint_deviations`, `/root_pose`, `/tf` (`map` to the
+    body's root) and, once, the latched `/robot_description`. Frames without a pose have no message
+    but one in `/state`, which has the state of every frame.
+
+    Args:
+        out: the new folder.
+        reader: the result.
+        replace: whether an earlier bag is replaced.
+
+    Returns:
+        Number of messages.
+
+    Raises:
+        DatasetError: the folder exists or cannot be written, or a stamp does not fit in a message.
+        BodyModelError: the result's body is unknown.
+    """
+    body = stored_body(reader.summary)
+    with new_folder(out, replace=replace) as folder:
+        # The writer creates the folder and refuses an existing one.
+        folder.rmdir()
+        with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            topics = _Topics(writer, body, reader.angle_names)
+            for part in reader.chunks():
+                for row, stamp in enumerate(part.stamps_ns.tolist()):
+                    if not 0 <= stamp < LAST_SECOND * 10**9:
+                        raise DatasetError(
+                            f"{reader.name}: stamp {stamp} ns cannot be written to a ROS message"
+                        )
+                    topics.state(stamp, str(part.states[row]), float(part.fitness[row]))
+                    topics.pose(stamp, part.parameters[row], part.parameters_sd[row])
+                    topics.angles(stamp, part.parameters[row], part.angles_deg[row])
+                    topics.markers(stamp, part.positions_m[row])
+            if not topics.messages:
+                raise DatasetError(f"{reader.name}: has no frame, expected at least one")
+        return topics.messages
+
+
+class _Topics:
+    """The topics of a bag being written."""
+
+    def __init__(self, writer: Writer, body: BodyModel, angles: tuple[str, ...]) -> None:
+        self._writer, self._body = writer, body
+        self.messages = 0
+        # The joints of the URDF: the reported angles but the root's, if there are any.
+        root = body.root_frame
+        self._columns = [k for k, name in enumerate(angles) if not name.startswith(f"{root}_")]
+        self._angles = [angles[column] for column in self._columns]
+        self._kinds = {
+            "/robot_description": "std_msgs/msg/String",
+            "/state": "diagnostic_msgs/msg/DiagnosticArray",
+            "/marker_poses": "geometry_msgs/msg/PoseArray",
+            "/joint_states": "sensor_msgs/msg/JointState",
+            "/joint_deviations": "sensor_msgs/msg/JointState",
+            "/root_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
+            "/tf": "tf2_msgs/msg/TFMessage",
+        }
+        self._connections = {
+            topic: writer.add_connection(
+                topic,
+                kind,
+                typestore=typestore(),
+                offered_qos_profiles=[offered_qos(latched=topic == "/robot_description")],
+            )
+            for topic, kind in self._kinds.items()
+        }
+
+    def state(self, stamp: int, state: str, fitness: float) -> None:
+        """Write the state of a frame; before the first, the body's description."""
+        if not self.messages:
+            text = message_type("std_msgs/msg/String")(data=urdf(self._body))
+            self._put("/robot_description", stamp, text)
+        pair = message_type("diagnostic_msgs/msg/KeyValue")
+        tracked = state == "TRACKING"
+        status = message_type("diagnostic_msgs/msg/DiagnosticStatus")(
+            level=0 if tracked else 1,
+            name=f"{_NODE}: tracking",
+            message=state,
+            hardware_id="markerless_tracker",
+            values=[pair(key="state", value=state), pair(key="fitness", value=f"{fitness:.6g}")],
+        )
+        array = message_type("diagnostic_msgs/msg/DiagnosticArray")
+        self._put("/state", stamp, array(header=header(stamp, ""), status=[status]))
+
+    def pose(self, stamp: int, parameters: FloatArray, deviations: FloatArray) -> None:
+        """Write a pose (p,) and its standard deviations, if they are known."""
+        if not np.isfinite(parameters).all():
+            return
+        joints, names = self._body.joints, list(self._body.joint_names)
+        if np.isfinite(deviations[joints]).all():
+            message = self._joints(stamp, names, deviations[joints])
+            self._put("/joint_deviations", stamp, message)
+        T = root_transform(self._body, parameters)
+        x, y, z = (float(value) for value in T[:3, 3])
+        quaternion = message_type("geometry_msgs/msg/Quaternion")(
+            *Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True).tolist()
+        )
+        pose = message_type("geometry_msgs/msg/Pose")(
+            position=message_type("geometry_msgs/msg/Point")(x=x, y=y, z=z), orientation=quaternion
+        )
+        stamped = message_type("geometry_msgs/msg/PoseWithCovarianceStamped")(
+            header=header(stamp, WORLD_FRAME),
+            # The file has no covariance of the root; zero is unknown.
+            pose=message_type("geometry_msgs/msg/PoseWithCovariance")(
+                pose=pose, covariance=np.zeros(36)
+            ),
+        )
+        self._put("/root_pose", stamp, stamped)
+        transform = message_type("geometry_msgs/msg/TransformStamped")(
+            header=header(stamp, WORLD_FRAME),
+            child_frame_id=self._body.root_frame,
+            transform=message_type("geometry_msgs/msg/Transform")(
+                translation=message_type("geometry_msgs/msg/Vector3")(x=x, y=y, z=z),
+                rotation=quaternion,
+            ),
+        )
+        self._put("/tf", stamp, message_type("tf2_msgs/msg/TFMessage")(transforms=[transform]))
+
+    def markers(self, stamp: int, positions_m: FloatArray) -> None:
+        """Write the markers (15, 3), if they are known."""
+        if not np.isfinite(positions_m).all():
+            return
+        pose, point = (
+            message_type("geometry_msgs/msg/Pose"),
+            message_type("geometry_msgs/msg/Point"),
+        )
+        upright = message_type("geometry_msgs/msg/Quaternion")(x=0.0, y=0.0, z=0.0, w=1.0)
+        poses = [
+            pose(position=point(x=x, y=y, z=z), orientation=upright)
+            for x, y, z in positions_m.tolist()
+        ]
+        array = message_type("geometry_msgs/msg/PoseArray")
+        self._put("/marker_poses", stamp, array(header=header(stamp, WORLD_FRAME), poses=poses))
+
+    def angles(self, stamp: int, parameters: FloatArray, angles_deg: FloatArray) -> None:
+        """Write the joints: the result's angles (k,), without them the parameters (p,)."""
+        names, values = list(self._body.joint_names), parameters[self._body.joints]
+        if self._angles:
+            names, values = self._angles, np.deg2rad(angles_deg[self._columns])
+        if np.isfinite(values).all():
+            self._put("/joint_states", stamp, self._joints(stamp, names, values))
+
+    def _joints(self, stamp: int, names: list[str], values: FloatArray) -> Any:
+        return message_type("sensor_msgs/msg/JointState")(
+            header=header(stamp, ""),
+            name=names,
+            position=np.ascontiguousarray(values, dtype=np.float64),
+            velocity=np.empty(0),
+            effort=np.empty(0),
+        )
+
+    def _put(self, topic: str, stamp_ns: int, message: Any) -> None:
+        data = typestore().serialize_cdr(message, self._kinds[topic])
+        self._writer.write(self._connections[topic], stamp_ns, data)
+        self.messages += 1

@@ -1,0 +1,193 @@
+"""Alignment of two worlds and two clocks: one rigid transform and one time offset per recording."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from markerless_tracker.datasets.markers.track import MarkerTrack
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.results.measures import rotation_onto
+
+MOST_OFFSET_S = 5.0
+"""Largest time offset that is searched."""
+_LEAST_ROWS = 10
+_GAP_PERIODS = 1.5
+# Fractions of the result's period at which the residual is compared about the coarse offset.
+_FINE = np.arange(-8, 9) / 4.0
+# Speeds that differ by less from their mean (m/s) show no time offset.
+_LEAST_SPEED_SD = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """Where a result's world lies in that of a reference, and its clock.
+
+    Attributes:
+        rotation: (3, 3) takes directions of the result's world to the reference's.
+        translation_m: (3,) position of the result's origin in the reference's world, m.
+        offset_s: what the reference's clock shows when the result's shows 0, s.
+        rms_mm: root mean square distance of the markers after the alignment.
+    """
+
+    rotation: FloatArray
+    translation_m: FloatArray
+    offset_s: float
+    rms_mm: float
+
+    @property
+    def angle_deg(self) -> float:
+        """Angle of the rotation in degrees."""
+        cosine = np.clip((np.trace(self.rotation) - 1.0) / 2.0, -1.0, 1.0)
+        return float(np.rad2deg(np.arccos(cosine)))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The figures for JSON."""
+        return {
+            "rotation": self.rotation.tolist(),
+            "rotation_deg": self.angle_deg,
+            "translation_mm": (self.translation_m * 1000.0).tolist(),
+            "time_offset_s": self.offset_s,
+            "rms_mm": self.rms_mm,
+        }
+
+    def apply(self, result: MarkerTrack, reference: MarkerTrack) -> tuple[MarkerTrack, MarkerTrack]:
+        """The result in the reference's world, and the reference at the result's times.
+
+        The reference is interpolated linearly between neighbouring rows.
+        """
+        moved = result.positions_m @ self.rotation.T + self.translation_m
+        return (
+            MarkerTrack(result.names, result.stamps_ns, moved),
+            MarkerTrack(
+                reference.names,
+                result.stamps_ns,
+                interpolated(reference, result.stamps_ns / 1e9 + self.offset_s),
+            ),
+        )
+
+
+def align(result: MarkerTrack, reference: MarkerTrack) -> Alignment:
+    """Find the rigid transform between the worlds' axes and the offset between the clocks.
+
+    The offset that makes the markers' speeds, which depend on no frame of reference, agree best is
+    refined by the residual of the rigid alignment (least squares over all common markers and rows).
+
+    Args:
+        result: the track whose world is to be moved.
+        reference: the track that it is to be compared with.
+
+    Raises:
+        DatasetError: no common marker, fewer than 10 common rows, or markers on one line.
+    """
+    result, reference = result.with_pelvis(), reference.with_pelvis()
+    names = [name for name in reference.names if name in result.names]
+    if not names:
+        raise DatasetError(
+            f"no common marker: the result has {', '.join(result.names)}; "
+            f"the reference has {', '.join(reference.names)}"
+        )
+    result, reference = result.selected(names), reference.selected(names)
+    if min(len(result), len(reference)) < _LEAST_ROWS:
+        raise DatasetError(
+            f"cannot align {min(len(result), len(reference))} rows, expected at least {_LEAST_ROWS}"
+        )
+    period = float(np.median(np.diff(result.stamps_ns))) / 1e9
+    coarse = _coarse_offset(result, reference, period)
+    offsets = coarse + _FINE * period
+    residuals = np.array([_rms(_rigid(result, reference, offset)) for offset in offsets])
+    if not np.isfinite(residuals).any():
+        raise DatasetError("cannot align: the result and the reference share too few rows")
+    best = int(np.nanargmin(residuals))
+    offset = float(offsets[best])
+    if 0 < best < len(offsets) - 1:
+        before, at, after = residuals[best - 1 : best + 2] ** 2
+        bend = before - 2.0 * at + after
+        if np.isfinite(bend) and bend > 0.0:
+            offset += 0.5 * (before - after) / bend * period * float(_FINE[1] - _FINE[0])
+    found = _rigid(result, reference, offset)
+    if found is None:
+        raise DatasetError("cannot align: the result and the reference share too few rows")
+    return found
+
+
+def interpolated(track: MarkerTrack, times_s: FloatArray) -> FloatArray:
+    """Positions (k, m, 3) at times (k,), linear between neighbouring rows, NaN beside gaps."""
+    own = track.stamps_ns / 1e9
+    after = np.searchsorted(own, times_s).clip(1, len(own) - 1)
+    before = after - 1
+    span = own[after] - own[before]
+    share = (times_s - own[before]) / span
+    period = float(np.median(np.diff(own)))
+    inside = (share >= -1e-6) & (share <= 1.0 + 1e-6) & (span <= _GAP_PERIODS * period)
+    first, last = track.positions_m[before], track.positions_m[after]
+    share = share.clip(0.0, 1.0)[:, None, None]
+    # A row met exactly needs no neighbour.
+    mixed = np.where(
+        share < 1e-6, first, np.where(share > 1.0 - 1e-6, last, first + share * (last - first))
+    )
+    exact = (share < 1e-6) | (share > 1.0 - 1e-6)
+    return np.where(inside[:, None, None] | (exact & _near(own, times_s)), mixed, np.nan)
+
+
+def _near(own: FloatArray, times_s: FloatArray) -> FloatArray:
+    """(k, 1, 1) whether a time is that of a row, to the microsecond."""
+    after = np.searchsorted(own, times_s).clip(1, len(own) - 1)
+    gap = np.minimum(np.abs(own[after] - times_s), np.abs(own[after - 1] - times_s))
+    return (gap < 1e-6)[:, None, None]
+
+
+def _rigid(result: MarkerTrack, reference: MarkerTrack, offset_s: float) -> Alignment | None:
+    targets = interpolated(reference, result.stamps_ns / 1e9 + offset_s)
+    both = np.isfinite(result.positions_m).all(axis=2) & np.isfinite(targets).all(axis=2)
+    if both.any(axis=1).sum() < _LEAST_ROWS:
+        return None
+    points, wanted = result.positions_m[both], targets[both]
+    rotation, _ = rotation_onto(points, wanted)
+    translation = wanted.mean(axis=0) - rotation @ points.mean(axis=0)
+    errors = np.linalg.norm(points @ rotation.T + translation - wanted, axis=1)
+    return Alignment(rotation, translation, offset_s, float(np.sqrt((errors**2).mean()) * 1000.0))
+
+
+def _rms(found: Alignment | None) -> float:
+    return float("nan") if found is None else found.rms_mm
+
+
+def _coarse_offset(result: MarkerTrack, reference: MarkerTrack, period: float) -> float:
+    """Offset, a multiple of the period, at which the markers' speeds agree best.
+
+    0 where too little moves.
+    """
+    times = result.stamps_ns / 1e9
+    own = _speeds(result.positions_m, period)
+    if not np.nanstd(own) > _LEAST_SPEED_SD:
+        return 0.0
+    steps = int(MOST_OFFSET_S / period)
+    best, offset = -np.inf, 0.0
+    # Clocks may begin anywhere: the ranges' beginnings are a second guess.
+    for about in (0.0, float(reference.stamps_ns[0] - result.stamps_ns[0]) / 1e9):
+        for step in sorted(range(-steps, steps + 1), key=abs):
+            shift = about + step * period
+            other = _speeds(interpolated(reference, times + shift), period)
+            agreement = _correlation(own, other, 0.5 * own.size)
+            if agreement > best + 1e-9:
+                best, offset = agreement, shift
+        if about == 0.0 and np.isfinite(best):
+            break
+    return offset
+
+
+def _speeds(positions_m: FloatArray, period: float) -> FloatArray:
+    """(n - 1, m) speeds in m/s."""
+    return np.asarray(np.linalg.norm(np.diff(positions_m, axis=0), axis=2) / period)
+
+
+def _correlation(one: FloatArray, other: FloatArray, least: float) -> float:
+    """Correlation over the values that both hold; -inf for fewer than `least`."""
+    both = np.isfinite(one) & np.isfinite(other)
+    if both.sum() < max(least, _LEAST_ROWS):
+        return -np.inf
+    a, b = one[both] - one[both].mean(), other[both] - other[both].mean()
+    size = float(np.sqrt((a**2).sum() * (b**2).sum()))
+    return float((a * b).sum()) / size if size > 0.0 else -np.inf

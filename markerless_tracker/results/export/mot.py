@@ -1,0 +1,39 @@
+"""OpenSim motion files (`.mot`): angles in degrees, positions in metres."""
+
+from pathlib import Path
+
+from markerless_tracker.results.export.coordinates import coordinate_names, motion_columns
+from markerless_tracker.results.export.new_file import new_file, number, seconds
+from markerless_tracker.results.read import ResultReader
+from markerless_tracker.results.stored_result import stored_body
+
+
+def write_mot(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
+    """Write the joint angles, if the result has any, and the coordinates of the `.osim`.
+
+    Frames without a pose are rows of NaN, which OpenSim reads.
+
+    Args:
+        path: the file.
+        reader: the result.
+        names: the markers' names; a motion has none.
+
+    Raises:
+        DatasetError, BodyModelError: the file cannot be written, or the result's body is unknown.
+    """
+    body = stored_body(reader.summary)
+    coordinates = coordinate_names(body)
+    frames = sum(len(part) for part in reader.chunks())
+    begun = False
+    with new_file(path) as sink:
+        for part in reader.chunks():
+            columns, values = motion_columns(part, body, coordinates)
+            if not begun:
+                sink.write(
+                    f"{path.stem}\nversion=1\nnRows={frames}\nnColumns={1 + len(columns)}\n"
+                    "inDegrees=yes\nendheader\n" + "\t".join(("time", *columns)) + "\n"
+                )
+                begun = True
+            for stamp, row in zip(part.stamps_ns.tolist(), values.tolist(), strict=True):
+                cells = [number(value, 6) or "NaN" for value in row]
+                sink.write("\t".join((seconds(stamp), *cells)) + "\n")

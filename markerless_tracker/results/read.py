@@ -1,0 +1,174 @@
+"""Reading of results: NAME.trc and NAME.json side by side, a chunk at a time."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from markerless_tracker.datasets.markers.trc import TrcRows
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import TrackState
+from markerless_tracker.results.journal import open_summary
+from markerless_tracker.results.stored import summary_of
+from markerless_tracker.results.stored_result import StoredResult
+
+CHUNK_FRAMES = 4096
+"""Frames that `ResultReader.chunks` reads at a time."""
+
+
+def read_result(name: str | Path, *, keep_lost: bool = False) -> StoredResult:
+    """A result from its files, as arrays; about 2 kB of memory per frame.
+
+    Args:
+        name: NAME of NAME.trc and NAME.json (or NAME.jsonl of a run without end), or NAME.trc;
+            NAME.2 is the second part of a result whose time was set back.
+        keep_lost: whether frames in the states LOST and SEARCHING keep their estimate.
+
+    Raises:
+        DatasetError: a file is missing or malformed.
+    """
+    return StoredResult.joined(ResultReader(name, keep_lost=keep_lost).chunks())
+
+
+class ResultReader:
+    """Reads a result a chunk of frames at a time: memory does not grow with its length.
+
+    Args:
+        name: as for `read_result`.
+        keep_lost: as for `read_result`.
+
+    Attributes:
+        name: path without suffix.
+        summary: every entry of the JSON file but the frames.
+        marker_names, parameter_names, angle_names: names of the columns.
+        fps: rate of the results, 1/s.
+
+    Raises:
+        DatasetError: a file is missing or malformed.
+    """
+
+    def __init__(self, name: str | Path, *, keep_lost: bool = False) -> None:
+        path = Path(name)
+        if path.suffix.lower() != ".trc":
+            path = path.with_name(path.name + ".trc")
+        self._trc_path = path
+        self.name = path.with_suffix("")
+        found = summary_of(path)
+        if found is None:
+            raise DatasetError(f"{self.name}.json: no such file, expected a result of `track`")
+        self._summary_name, self._segment = found
+        self._keep_lost = keep_lost
+        self.summary, frames = open_summary(self._summary_name)
+        with TrcRows(path) as rows:
+            self.marker_names, self.fps = rows.names, rows.fps
+        body = self.summary.get("body")
+        names = body.get("parameters", []) if isinstance(body, dict) else []
+        self.parameter_names = tuple(str(parameter) for parameter in names)
+        # All frames with a pose have the same angles, or none.
+        posed = (frame for frame in frames if frame.get("parameters") is not None)
+        self.angle_names = tuple(next(posed, {}).get("angles") or ())
+
+    def chunks(self, size: int = CHUNK_FRAMES) -> Iterator[StoredResult]:
+        """Parts of at most `size` frames, in order; one without frames if there is none.
+
+        Raises:
+            DatasetError: a row or frame is malformed.
+        """
+        _, frames = open_summary(self._summary_name)
+        with TrcRows(self._trc_path) as rows:
+            positions = _Positions(rows)
+            part: list[tuple[dict[str, Any], FloatArray]] = []
+            empty = True
+            for number, frame in enumerate(frames):
+                if not isinstance(frame, dict) or not isinstance(frame.get("stamp_ns"), int):
+                    raise DatasetError(
+                        f"{self._summary_name}.json: frame {number}: no `stamp_ns`, expected "
+                        "whole nanoseconds"
+                    )
+                if frame.get("segment", 1) != self._segment:
+                    continue
+                part.append((frame, positions.at(frame["stamp_ns"])))
+                if len(part) == size:
+                    yield self._part(part)
+                    part, empty = [], False
+            if part or empty:
+                yield self._part(part)
+
+    def _part(self, part: list[tuple[dict[str, Any], FloatArray]]) -> StoredResult:
+        frames = [frame for frame, _ in part]
+        n, m = len(frames), len(self.marker_names)
+        states = np.array([str(frame.get("state", "")) for frame in frames], dtype="U9")
+        blank = np.zeros(n, dtype=np.bool_)
+        if not self._keep_lost:
+            blank = states != TrackState.TRACKING.value
+        filled = np.array([bool(frame.get("filled", False)) for frame in frames], dtype=np.bool_)
+        blank &= ~filled
+        positions = np.array([row for _, row in part], dtype=np.float64).reshape(n, m, 3)
+        sd = np.full((n, m, 3), np.nan)
+        angles = np.full((n, len(self.angle_names)), np.nan)
+        parameters, parameters_sd = np.full((2, n, len(self.parameter_names)), np.nan)
+        try:
+            for row, frame in enumerate(frames):
+                deviations = frame.get("markers_sd_mm") or {}
+                for column, marker in enumerate(self.marker_names):
+                    if marker in deviations:
+                        sd[row, column] = deviations[marker]
+                found = frame.get("angles") or {}
+                if found:
+                    angles[row] = [_number(found.get(name)) for name in self.angle_names]
+                if frame.get("parameters") is not None:
+                    parameters[row] = frame["parameters"]
+                if frame.get("parameters_sd") is not None:
+                    parameters_sd[row] = frame["parameters_sd"]
+            fitness = np.array([_number(frame.get("fitness")) for frame in frames], dtype=float)
+        except (TypeError, ValueError, AttributeError) as error:
+            raise DatasetError(
+                f"{self._summary_name}.json: a frame is malformed: {error}"
+            ) from error
+        for values in (positions, sd, angles, parameters, parameters_sd):
+            values[blank] = np.nan
+        return StoredResult(
+            source=str(self.summary.get("source", "")),
+            fps=self.fps,
+            summary=self.summary,
+            marker_names=self.marker_names,
+            parameter_names=self.parameter_names,
+            angle_names=self.angle_names,
+            stamps_ns=np.array([frame["stamp_ns"] for frame in frames], dtype=np.int64),
+            states=states,
+            filled=filled,
+            fitness=fitness,
+            positions_m=positions,
+            positions_sd_m=sd / 1000.0,
+            parameters=parameters,
+            parameters_sd=parameters_sd,
+            angles_deg=angles,
+        )
+
+
+class _Positions:
+    """Rows of a marker file by increasing stamp."""
+
+    def __init__(self, rows: TrcRows) -> None:
+        self._missing = np.full((len(rows.names), 3), np.nan)
+        self._rows = (
+            (stamp, row)
+            for stamps, positions in rows.chunks()
+            for stamp, row in zip(stamps.tolist(), positions, strict=True)
+        )
+        self._next = next(self._rows, None)
+
+    def at(self, stamp_ns: int) -> FloatArray:
+        """(m, 3) positions in m, NaN where the file has no row."""
+        while self._next is not None and self._next[0] < stamp_ns:
+            self._next = next(self._rows, None)
+        if self._next is None or self._next[0] != stamp_ns:
+            return self._missing
+        row: FloatArray = self._next[1]
+        return row
+
+
+def _number(value: Any) -> float:
+    return float("nan") if value is None else float(value)

@@ -1,0 +1,76 @@
+"""Files for OpenSim, read by OpenSim's own wheel."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import markers
+from markerless_tracker.cli.main import main
+
+opensim = pytest.importorskip("opensim", reason="opensim is not installed")
+
+
+@pytest.fixture
+def exported(make_result, monkeypatch):
+    """`exported(lost=)`: NAME of a result with model, motion and setup, in the current folder."""
+
+    def make(**changes) -> Path:
+        name = make_result(**changes)
+        assert main(["export", str(name), "--to", "osim,mot"]) == 0
+        monkeypatch.chdir(name.parent)
+        return name
+
+    return make
+
+
+def test_a_marker_file_with_blank_rows_and_cells_opens(make_result) -> None:
+    path = make_result(lost=[0, 3, 11]).with_suffix(".trc")
+    lines = path.read_text(encoding="utf-8").splitlines()
+    cells = lines[9].split("\t")
+    lines[9] = "\t".join([*cells[:2], "", "", "", *cells[5:44], "", "", "", ""])
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    table = opensim.TimeSeriesTableVec3(str(path))
+    assert (table.getNumRows(), table.getNumColumns()) == (12, 15)
+    assert opensim.MarkerData(str(path)).getNumFrames() == 12
+    first = table.getRowAtIndex(0)
+    assert np.isnan([first.getElt(0, column).get(0) for column in range(15)]).all()
+    assert table.getIndependentColumn()[4] == pytest.approx(1.5 + 4 / 60)
+
+
+def test_the_motion_moves_the_model_to_the_markers(exported, person, motion) -> None:
+    name = exported(lost=[2])
+    model = opensim.Model(f"{name.name}.osim")
+    state = model.initSystem()
+    table = opensim.TimeSeriesTable(f"{name.name}.mot")
+    assert opensim.Storage(f"{name.name}.mot").isInDegrees()
+    labels, values = list(table.getColumnLabels()), table.getMatrix().to_numpy()
+    assert np.isnan(values[2]).all()
+    degrees = np.rad2deg(motion)
+    columns = [person.index(label) for label in labels if "pelvis_t" not in label]
+    shown = [column for column, label in enumerate(labels) if "pelvis_t" not in label]
+    held = np.arange(len(motion)) != 2
+    assert np.abs(values[held][:, shown] - degrees[held][:, columns]).max() < 1e-5
+    for row in np.flatnonzero(held):
+        for label, value in zip(labels, values[row], strict=True):
+            metres = "pelvis_t" in label
+            coordinate = model.getCoordinateSet().get(label)
+            coordinate.setValue(state, value if metres else np.deg2rad(value), False)
+        model.realizePosition(state)
+        found = [
+            model.getMarkerSet().get(index).getLocationInGround(state).to_numpy()
+            for index in range(15)
+        ]
+        truth = markers(person, motion[row])[:, [1, 2, 0]]
+        assert np.abs(np.array(found) - truth).max() < 1e-5
+
+
+@pytest.mark.parametrize("lost", [(), (0, 4, 5)], ids=["whole", "with blank rows"])
+def test_inverse_kinematics_runs_on_the_markers_at_once(exported, lost) -> None:
+    name = exported(lost=lost)
+    assert opensim.InverseKinematicsTool(f"{name.name}.ik.xml").run()
+    errors = opensim.TimeSeriesTable(f"{name.name}_ik_marker_errors.sto")
+    assert errors.getNumRows() == 12 - len(lost)
+    rms_m = errors.getDependentColumn("marker_error_RMS").to_numpy()
+    assert rms_m.max() < 0.001
+    assert opensim.TimeSeriesTable(f"{name.name}.ik.mot").getNumRows() == 12 - len(lost)
