@@ -9,9 +9,9 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from markerless_tracker.body.angles.swing import set_rotation, swing_joints
 from markerless_tracker.body.kinematics import transforms
 from markerless_tracker.body.model import MARKER_NAMES, BodyModel
-from markerless_tracker.body.swing import set_rotation, swing_joints
 from markerless_tracker.geometry import FloatArray
 
 _NEGATIVE = ("r_hip_x", "l_knee", "r_knee", "l_shoulder_y", "l_elbow", "r_elbow")
