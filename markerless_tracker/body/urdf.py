@@ -69,10 +69,11 @@ class _Writer:
     def text(self) -> str:
         """The whole file."""
         body = self._body
-        root = body.frames[body.root_frame]
-        above = {root, -1}
-        while (node := int(body.node_parent[min(above - {-1})])) >= 0:
+        node = root = body.frames[body.root_frame]
+        above = {-1}
+        while node >= 0:
             above.add(node)
+            node = int(body.node_parent[node])
         names = {root: self._link(self._frames[root], root)}
         for frame in dict.fromkeys(body.frames.values()):
             if frame in above:

@@ -87,8 +87,10 @@ def confidence_of(
     of_root[np.diag_indices(6)] += np.repeat([floor**2, (floor / _LEVER_M) ** 2], 3)
     floors = np.full(body.size, floor / _LEVER_M)
     floors[body.translations] = floor
+    of_model = np.diag(floors**2 + of_pose)
     return Confidence(
         pose_sd=np.sqrt(np.diag(covariance) + floors**2 + of_pose),
+        pose_covariance=covariance + of_model,
         markers_sd_m=np.sqrt((of_markers + floor**2).reshape(-1, 3) + of_limbs[:, None]),
         root_covariance=0.5 * (of_root + of_root.T),
     )

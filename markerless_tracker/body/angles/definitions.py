@@ -74,8 +74,11 @@ def _sided(side: str) -> tuple[Joint, ...]:
     )
 
 
+ROOT_ANGLES = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
+"""Angles of the pelvis relative to the ground: no joint's."""
+
 JOINTS = (
-    Joint("pelvis", GROUND, ("pelvis_tilt", "pelvis_list", "pelvis_rotation")),
+    Joint("pelvis", GROUND, ROOT_ANGLES),
     Joint("thorax", "pelvis", ("lumbar_extension", "lumbar_bending", "lumbar_rotation")),
     Joint("head", "thorax", ("neck_extension", "neck_bending", "neck_rotation")),
     *_sided("r"),
