@@ -15,15 +15,26 @@ from markerless_tracker.body.model import MARKER_NAMES, BodyModel
 from markerless_tracker.geometry import FloatArray
 
 _NEGATIVE = ("r_hip_x", "l_knee", "r_knee", "l_shoulder_y", "l_elbow", "r_elbow")
-"""Published parameters whose sign is opposite to the anatomical one."""
+"""Parameters of the published 31 whose sign is opposite to the anatomical one."""
+_BENDING = ("hip_x", "knee", "shoulder_y", "elbow")
+"""Joints that bend further in the anatomically positive direction."""
 _SIDES = ("Hip", "Shoulder")
 _SHOULDER_TILT_RAD = float(np.deg2rad(12.0))
 """Published abduction of a hanging arm from the clavicle: flexion comes before it."""
 
 
 def published_sign(parameter: str) -> float:
-    """Sign of a published parameter whose anatomical angle is positive: 1 or -1."""
+    """Sign of one of the published 31 parameters whose anatomical angle is positive: 1 or -1."""
     return -1.0 if parameter in _NEGATIVE else 1.0
+
+
+def _sign(body: BodyModel, parameter: str) -> float:
+    """Sign of a parameter whose anatomical angle is positive: that of its wider limit."""
+    if parameter[2:] not in _BENDING:
+        return 1.0
+    at = body.index(parameter)
+    low, high = body.limits[:, at] - body.neutral[at]
+    return -1.0 if -low > high else 1.0
 
 
 def posture(body: BodyModel, angles_rad: Mapping[str, float]) -> FloatArray:
@@ -36,7 +47,7 @@ def posture(body: BodyModel, angles_rad: Mapping[str, float]) -> FloatArray:
     swings = swing_joints(body)
     for name, angle in angles_rad.items():
         if name in body.parameter_names and name[:-2] not in swings:
-            pose[body.index(name)] += published_sign(name) * angle
+            pose[body.index(name)] += _sign(body, name) * angle
     for joint in swings:
         x, y, z = (float(angles_rad.get(f"{joint}_{axis}", 0.0)) for axis in "xyz")
         if (x, y, z) != (0.0, 0.0, 0.0):

@@ -45,9 +45,7 @@ def marker_angles(track: MarkerTrack) -> dict[str, FloatArray]:
             angles[f"arm_elevation_{low}"] = _between(arm, -trunk)
         if f"{side}Knee" in at:
             up = _unit(at[f"{side}Hip"] - at[f"{side}Knee"])
-            x, y, z = (
-                (up * axis).sum(axis=1) for axis in _axes(at["RHip"] - at["LHip"], trunk)
-            )
+            x, y, z = ((up * axis).sum(axis=1) for axis in _axes(at["RHip"] - at["LHip"], trunk))
             angles[f"hip_flexion_{low}"] = np.rad2deg(np.arctan2(-x, y))
             angles[f"hip_adduction_{low}"] = out * np.rad2deg(np.arcsin(np.clip(z, -1.0, 1.0)))
     if trunk is not None:

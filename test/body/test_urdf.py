@@ -127,7 +127,9 @@ def test_parameters_of_other_frames_are_joints_with_their_own_names() -> None:
     _, links = link_transforms(text, values, root_transform(body, pose))
     for name, marker in zip(MARKER_NAMES, markers(body, pose), strict=True):
         np.testing.assert_allclose(links[name][:3, 3], marker, atol=1e-9)
-    (knee,) = [j for j in ElementTree.fromstring(text).findall("joint") if j.get("name") == "l_knee"]
+    (knee,) = [
+        j for j in ElementTree.fromstring(text).findall("joint") if j.get("name") == "l_knee"
+    ]
     assert knee.get("type") == "revolute"
     limits = body.limits.copy()
     limits[:, body.index("l_knee")] = -np.inf, np.inf

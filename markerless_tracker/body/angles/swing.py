@@ -8,7 +8,7 @@ singular direction is opposite to the reference: into the trunk.
 import numpy as np
 
 from markerless_tracker.body.kinematics import transforms
-from markerless_tracker.body.model import SWING_X, SWING_Y, BodyModel
+from markerless_tracker.body.model import SWING_X, SWING_Y, BodyModel, IntArray
 from markerless_tracker.geometry import FloatArray
 
 _Z = 2
@@ -22,6 +22,12 @@ def swing_joints(body: BodyModel) -> tuple[str, ...]:
         if body.node_kind[node] == _Z and above >= 0 and body.node_kind[above] == SWING_Y:
             found.append(name)
     return tuple(found)
+
+
+def twists(body: BodyModel) -> IntArray:
+    """Indices of the parameters that twist a limb about itself."""
+    nodes = [body.frames[name] for name in swing_joints(body)]
+    return np.asarray(body.node_parameter[nodes], dtype=np.int64)
 
 
 def split(rotation: FloatArray) -> tuple[float, float, float]:
@@ -55,7 +61,5 @@ def set_rotation(body: BodyModel, pose: FloatArray, joint: str, rotation: FloatA
         raise AssertionError(f"body {body.name}: node {first} is no first node of a swing")
     rest = transforms(body, body.neutral)
     before, after = rest[first, :, :3], rest[twist, :, :3]
-    for node, value in zip(
-        (first, second, twist), split(before.T @ after @ rotation), strict=True
-    ):
+    for node, value in zip((first, second, twist), split(before.T @ after @ rotation), strict=True):
         pose[body.node_parameter[node]] = value / body.node_sign[node]
