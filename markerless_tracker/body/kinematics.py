@@ -13,7 +13,6 @@ from markerless_tracker.body.model import (
 from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
 
-
 _SMALL_RAD = 1e-4
 """Below it series replace quotients of small numbers."""
 

@@ -8,7 +8,6 @@ from markerless_tracker.errors import BodyModelError, ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.config import TrackerConfig
 
-
 TWIST_RAD_S = 10.0
 """Greatest speed of a limb's rotation about itself, which images of a straight limb do not show."""
 

@@ -8,7 +8,6 @@ perpendicular to y. So any body reports angles by the same definitions.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.body.angles.definitions import GROUND, JOINTS, SEGMENTS, Joint
 from markerless_tracker.body.kinematics import carried, markers, move_axes, transforms
