@@ -195,15 +195,26 @@ class Confidence:
         markers_sd_m: (15, 3) of each marker, along the world's axes.
         root_covariance: (6, 6) of the root frame: x, y, z, and small rotations about the
             world's x, y and z axis.
+        pose_covariance: (p, p) of the parameters, `pose_sd` the roots of its diagonal; None =
+            nothing is known but the deviations.
     """
 
     pose_sd: NDArray[np.float64]
     markers_sd_m: NDArray[np.float64]
     root_covariance: NDArray[np.float64]
+    pose_covariance: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("pose_sd", "markers_sd_m", "root_covariance"):
-            object.__setattr__(self, name, locked(getattr(self, name), np.float64))
+        for name in ("pose_sd", "markers_sd_m", "root_covariance", "pose_covariance"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, locked(getattr(self, name), np.float64))
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """(p, p) covariance of the parameters; diagonal where no more is known."""
+        if self.pose_covariance is not None:
+            return self.pose_covariance
+        return np.diag(self.pose_sd**2)
 
 
 @dataclass(frozen=True, eq=False)

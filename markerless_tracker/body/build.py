@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 
 from markerless_tracker.body.description import BodyDescription, Move, parse_chain
-from markerless_tracker.body.model import MARKER_NAMES, BodyModel
+from markerless_tracker.body.model import FIRST_TRANSLATION, MARKER_NAMES, SWING_X, BodyModel
 from markerless_tracker.body.subject import Subject, fitted_lengths
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
 _AXES = "xyz"
+_FIRST_KIND = {"r": 0, "t": FIRST_TRANSLATION, "s": SWING_X}
 _PRIOR_SD_RAD = 0.6
 """Prior standard deviation of a joint for which the description states none."""
 
@@ -33,7 +34,7 @@ class _Nodes:
         fixed = np.eye(4)
         for move in chain:
             if isinstance(move.argument, str) and move.argument in self.parameters:
-                kind = _AXES.index(move.kind[1]) + (3 if move.kind[0] == "t" else 0)
+                kind = _FIRST_KIND[move.kind[0]] + _AXES.index(move.kind[1])
                 parent = self._node(
                     parent, fixed, kind, move.factor, self.parameters.index(move.argument)
                 )
@@ -53,6 +54,8 @@ class _Nodes:
 
     def constant(self, move: Move, where: str) -> FloatArray:
         """The transform (4, 4) of a move by a number or a length."""
+        if move.kind[0] == "s":
+            raise BodyModelError(f"{where}: swings by {move.argument!r}, expected a parameter")
         value = (
             move.argument if isinstance(move.argument, float) else self.lengths.get(move.argument)
         )

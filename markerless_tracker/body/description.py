@@ -14,13 +14,16 @@ from markerless_tracker.resources import config_dir
 
 _NUMBER = r"\d+(?:\.\d*)?|\.\d+"
 _MOVE = re.compile(
-    rf"([rt][xyz])\(\s*([+-]?)\s*(?:({_NUMBER})\s*\*\s*)?([A-Za-z_]\w*|{_NUMBER})\s*\)"
+    rf"([rt][xyz]|s[xy])\(\s*([+-]?)\s*(?:({_NUMBER})\s*\*\s*)?([A-Za-z_]\w*|{_NUMBER})\s*\)"
 )
 
 
 @dataclass(frozen=True)
 class Move:
-    """One elementary move of a chain: ``tz(-0.4*torso)`` translates along z by -0.4 'torso'."""
+    """One elementary move of a chain: ``tz(-0.4*torso)`` translates along z by -0.4 'torso'.
+
+    ``sx(a) sy(b)``, always together, is a swing: one rotation by the rotation vector (a, b, 0).
+    """
 
     kind: str
     factor: float
@@ -52,13 +55,17 @@ def parse_chain(text: str, where: str) -> tuple[Move, ...]:
     if _MOVE.sub("", text).strip():
         raise BodyModelError(
             f"{where}: chain {text!r} holds {_MOVE.sub('', text).strip()!r}, "
-            "expected moves such as rx(90) tz(-length) ry(parameter)"
+            "expected moves such as rx(90) tz(-length) ry(parameter) or sx(first) sy(second)"
         )
     moves = []
     for kind, sign, factor, argument in _MOVE.findall(text):
         number = argument[0].isdigit() or argument[0] == "."
         signed = (-1.0 if sign == "-" else 1.0) * float(factor or 1.0)
         moves.append(Move(kind, signed, float(argument) if number else argument))
+    kinds = [move.kind for move in moves]
+    firsts = [i for i, kind in enumerate(kinds) if kind == "sx"]
+    if kinds.count("sy") != len(firsts) or any(kinds[i + 1 : i + 2] != ["sy"] for i in firsts):
+        raise BodyModelError(f"{where}: chain {text!r}: expected sx(first) sy(second) together")
     return tuple(moves)
 
 

@@ -3,9 +3,109 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.body.model import BodyModel, IntArray
+from markerless_tracker.body.model import (
+    FIRST_TRANSLATION,
+    SWING_X,
+    SWING_Y,
+    BodyModel,
+    IntArray,
+)
 from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
+
+_SMALL_RAD = 1e-4
+"""Below it series replace quotients of small numbers."""
+
+
+@kernel
+def swing(a, b, frame):  # type: ignore[no-untyped-def]
+    """Rotate a frame (3, 4) by the rotation vector (a, b, 0) of its own axes: Rodrigues' formula.
+
+    The frame's z axis moves along the great circle towards (b, -a, 0) by the vector's length.
+    """
+    angle = np.sqrt(a * a + b * b)
+    s, c = 1.0 - angle * angle / 6.0, 0.5 - angle * angle / 24.0
+    cos = np.cos(angle)
+    if angle > _SMALL_RAD:
+        s, c = np.sin(angle) / angle, (1.0 - cos) / (angle * angle)
+    for i in range(3):
+        x, y, z = frame[i, 0], frame[i, 1], frame[i, 2]
+        across = c * (x * a + y * b)
+        frame[i, 0] = cos * x + a * across - s * b * z
+        frame[i, 1] = cos * y + b * across + s * a * z
+        frame[i, 2] = s * (b * x - a * y) + cos * z
+
+
+@kernel
+def swing_axis(before, after, second, axis):  # type: ignore[no-untyped-def]
+    """Fill axis (3,): angular velocity by one parameter of a swing, in the frames' own parent.
+
+    A column of the left Jacobian of the rotation vector, read from the rotation itself: valid up to
+    half a turn of the swing.
+
+    Args:
+        before, after: (3, 4) frames without and with the swing, of one parent frame.
+        second: whether the second parameter moves.
+    """
+    x = before[0, 2] * after[0, 0] + before[1, 2] * after[1, 0] + before[2, 2] * after[2, 0]
+    y = before[0, 2] * after[0, 1] + before[1, 2] * after[1, 1] + before[2, 2] * after[2, 1]
+    z = before[0, 2] * after[0, 2] + before[1, 2] * after[1, 2] + before[2, 2] * after[2, 2]
+    sin = np.sqrt(x * x + y * y)
+    angle = np.arctan2(sin, z)
+    ratio, c, d = 1.0, 0.5, 1.0 / 6.0
+    if angle > _SMALL_RAD:
+        ratio = angle / sin
+        c = (1.0 - z) / (angle * angle)
+        d = (angle - sin) / (angle * angle * angle)
+    a, b = ratio * y, -ratio * x
+    if second:
+        u, v, w = d * a * b, 1.0 - d * a * a, c * a
+    else:
+        u, v, w = 1.0 - d * b * b, d * a * b, -c * b
+    for i in range(3):
+        axis[i] = before[i, 0] * u + before[i, 1] * v + before[i, 2] * w
+
+
+@kernel
+def move_axis(n, kind, sign, nodes, axis):  # type: ignore[no-untyped-def]
+    """Fill axis (3,), world frame: velocity of node n, angular or not, by its parameter.
+
+    Args:
+        n: a node with a parameter.
+        kind, sign: (m,) those of the body.
+        nodes: (m, 3, 4) world transforms of the nodes.
+    """
+    move = kind[n]
+    if move == SWING_X:
+        swing_axis(nodes[n], nodes[n + 1], False, axis)
+    elif move == SWING_Y:
+        swing_axis(nodes[n - 1], nodes[n], True, axis)
+    else:
+        for i in range(3):
+            axis[i] = nodes[n, i, move % 3]
+    for i in range(3):
+        axis[i] *= sign[n]
+
+
+@kernel
+def _move_axes(moved, kind, sign, nodes, axes):  # type: ignore[no-untyped-def]
+    for i in range(moved.size):
+        move_axis(moved[i], kind, sign, nodes, axes[i])
+
+
+def move_axes(body: BodyModel, nodes: FloatArray, moved: IntArray) -> FloatArray:
+    """Velocities (k, 3) of moved nodes (k,) by their parameters, world frame.
+
+    Angular, about the nodes' origins; of nodes that translate, linear.
+
+    Args:
+        body: the body.
+        nodes: (m, 3, 4) world transforms.
+        moved: indices of nodes that have a parameter.
+    """
+    axes = np.empty((len(moved), 3))
+    _move_axes(moved, body.node_kind, body.node_sign, np.ascontiguousarray(nodes), axes)
+    return axes
 
 
 @kernel
@@ -23,11 +123,13 @@ def node_transform(n, pose, parent, fixed, kind, sign, parameter, out):  # type:
                 out[n, i, j] = a * fixed[n, 0, j] + b * fixed[n, 1, j] + c * fixed[n, 2, j]
             out[n, i, 3] += out[above, i, 3]
     move = kind[n]
-    if move >= 0:
+    if move == SWING_Y:
+        swing(sign[n - 1] * pose[parameter[n - 1]], sign[n] * pose[parameter[n]], out[n])
+    elif move >= 0 and move != SWING_X:
         value = sign[n] * pose[parameter[n]]
-        if move >= 3:
+        if move >= FIRST_TRANSLATION:
             for i in range(3):
-                out[n, i, 3] += value * out[n, i, move - 3]
+                out[n, i, 3] += value * out[n, i, move - FIRST_TRANSLATION]
         else:
             cos, sin = np.cos(value), np.sin(value)
             j, k = (move + 1) % 3, (move + 2) % 3

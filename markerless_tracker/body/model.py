@@ -24,7 +24,19 @@ LIMB_MARKERS = tuple(name for name in MARKER_NAMES if name not in ("Pelvis", "Ne
 
 
 FIRST_TRANSLATION = 3
-"""Kinds of nodes from here on are translations, the lower ones rotations."""
+"""Kinds of nodes from here on, up to `SWING_X`, are translations, the lower ones rotations."""
+SWING_X = 6
+"""Kind of the first node of a swing: moves nothing, holds the first parameter."""
+SWING_Y = 7
+"""Kind of the second: rotates by the rotation vector (a, b, 0) of both parameters.
+
+Its parent is the first, the node before it, and its fixed transform the identity.
+"""
+
+
+def is_translation(kind: IntArray) -> NDArray[np.bool_]:
+    """Which kinds (m,) of nodes translate."""
+    return np.asarray((kind >= FIRST_TRANSLATION) & (kind < SWING_X))
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,14 +44,15 @@ class BodyModel:
     """A body of p parameters, m nodes and c cones with one subject's sizes; metres, radians.
 
     A node is a fixed transform from its parent followed by at most one elementary move (rotation
-    or translation by a parameter).
+    or translation by a parameter). Two nodes in a row may share a rotation, a swing.
 
     Attributes:
         name: name of the description.
         parameter_names: (p,) names in order; joint states contain those that are not in the root.
         node_parent: (m,) parent node, -1 for the world; parents come before children.
         node_fixed: (m, 3, 4) fixed transform from the parent, before the move.
-        node_kind: (m,) 0..2 rotation about x, y, z; 3..5 translation along them; -1 no move.
+        node_kind: (m,) 0..2 rotation about x, y, z; 3..5 translation along them; `SWING_X` and
+            `SWING_Y` a swing; -1 no move.
         node_sign: (m,) factor of the parameter.
         node_parameter: (m,) index of its parameter, -1 for none.
         frames: last node of each frame by name.
@@ -144,7 +157,7 @@ class BodyModel:
     @cached_property
     def translations(self) -> IntArray:
         """Indices of the parameters that are translations, in m; the others are angles, in rad."""
-        return np.unique(self.node_parameter[self.node_kind >= FIRST_TRANSLATION])
+        return np.unique(self.node_parameter[is_translation(self.node_kind)])
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from markerless_tracker import __version__
 from markerless_tracker.body import MARKER_NAMES, BodyModel, Subject, write_subject
+from markerless_tracker.body.angles import AngleReader
 from markerless_tracker.datasets import tidy_fps
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.records import TrackResult, TrackState
@@ -95,6 +96,7 @@ class ResultWriter:
         self._trc: TrcStream | None = None
         self._segment = 1
         self._noted_body: BodyModel | None = None
+        self._angles = AngleReader(body)
 
     def __enter__(self) -> "ResultWriter":
         return self
@@ -160,8 +162,9 @@ class ResultWriter:
         if self._noted_body is not self.body:
             journal.add(self._body_entry())
             self._noted_body = self.body
+            self._angles.take(self.body)
         before = journal.size
-        journal.add(_frame(result, self._segment))
+        journal.add(_frame(result, self._segment, self._angles))
         try:
             markers_m = result.markers_m
             if markers_m is None or not (self._keep_lost or result.state is TrackState.TRACKING):
@@ -189,6 +192,7 @@ class ResultWriter:
         path = _path(self._name, f".{self._segment + 1}.trc")
         self._trc = TrcStream(path, MARKER_NAMES, self._rate())
         self._segment += 1
+        self._angles.reset()
         with suppress(DatasetError):
             # Its rows are there; only the short form of its header has no room.
             trc.finish(self._rate())
@@ -276,7 +280,7 @@ def _path(name: Path, suffix: str) -> Path:
     return name.with_name(name.name + suffix)
 
 
-def _frame(result: TrackResult, segment: int) -> dict[str, Any]:
+def _frame(result: TrackResult, segment: int, reader: AngleReader) -> dict[str, Any]:
     """A frame's entry of the JSON file."""
     return {
         "stamp_ns": result.stamp_ns,
@@ -288,9 +292,24 @@ def _frame(result: TrackResult, segment: int) -> dict[str, Any]:
         "iou": dict(result.iou),
         "exposure": {name: list(gain) for name, gain in result.exposure.items()},
         "parameters": None if result.pose is None else result.pose.tolist(),
+        **_angles(result, reader),
         **({"warnings": list(result.warnings)} if result.warnings else {}),
         **_confidence(result),
         **_limbs(result),
+    }
+
+
+def _angles(result: TrackResult, reader: AngleReader) -> dict[str, Any]:
+    """Joint angles and their standard deviations by name, degrees (docs/joint-angles.md)."""
+    if result.pose is None:
+        return {}
+    covariance = None if result.confidence is None else result.confidence.covariance
+    angles = reader.read(result.pose, result.stamp_ns, covariance)
+    entries = {"angles": angles.degrees(), "angles_sd": angles.sd_degrees()}
+    return {
+        key: {name: round(value, 2) for name, value in values.items()}
+        for key, values in entries.items()
+        if values is not None
     }
 
 

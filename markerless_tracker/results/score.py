@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.results.marker_angles import angle_errors
 
 MM_PER_M = 1000.0
 LIMBS = tuple(
@@ -45,6 +46,8 @@ class Score:
         offsets_off_mm: `mean_mm` of the same errors.
         inside_sd: shares of the errors per axis that are at most 1, 2 and 3 of the reported
             standard deviations; None if the result reports none for what is compared.
+        angles: name -> root mean square error, degrees, of angles that markers determine
+            (`marker_angles`).
         names: (m,) the joints compared.
         stamps_ns: (frames,) the reference's stamps.
         joint_mm: (frames, m), NaN where either is missing.
@@ -62,6 +65,7 @@ class Score:
     offsets_off_limbs_mm: float
     offsets_off_mm: float
     inside_sd: tuple[float, float, float] | None
+    angles: Mapping[str, float]
     names: tuple[str, ...]
     stamps_ns: NDArray[np.int64] = field(repr=False)
     joint_mm: FloatArray = field(repr=False)
@@ -83,6 +87,7 @@ class Score:
                 "all": _or_none(self.offsets_off_mm),
             },
             "inside_sd": None if self.inside_sd is None else list(self.inside_sd),
+            "angles": dict(self.angles),
         }
 
 
@@ -123,6 +128,7 @@ def score(
             f"the reference has {', '.join(reference.names)}"
         )
     rows, reference_rows = match_rows(result, reference)
+    angles = angle_errors(result.rows(rows), reference.rows(reference_rows))
     offset_m = (
         result.selected(names).positions_m[rows]
         - reference.selected(names).positions_m[reference_rows]
@@ -162,6 +168,7 @@ def score(
         offsets_off_limbs_mm=_mean_of_frames(off_mm[:, limbs]),
         offsets_off_mm=_mean_of_frames(off_mm),
         inside_sd=_inside_sd(offset_m * MM_PER_M, sd_mm),
+        angles=angles,
         names=names,
         stamps_ns=reference.stamps_ns[reference_rows],
         joint_mm=joint_mm,

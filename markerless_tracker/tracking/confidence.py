@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, markers, transforms
-from markerless_tracker.body.kinematics import carried
-from markerless_tracker.body.model import FIRST_TRANSLATION
+from markerless_tracker.body.kinematics import carried, move_axes
+from markerless_tracker.body.model import is_translation
 from markerless_tracker.fitness.contour import ContourFrame, OutlineRows, outline_rows
 from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
@@ -87,8 +87,10 @@ def confidence_of(
     of_root[np.diag_indices(6)] += np.repeat([floor**2, (floor / _LEVER_M) ** 2], 3)
     floors = np.full(body.size, floor / _LEVER_M)
     floors[body.translations] = floor
+    of_model = np.diag(floors**2 + of_pose)
     return Confidence(
         pose_sd=np.sqrt(np.diag(covariance) + floors**2 + of_pose),
+        pose_covariance=covariance + of_model,
         markers_sd_m=np.sqrt((of_markers + floor**2).reshape(-1, 3) + of_limbs[:, None]),
         root_covariance=0.5 * (of_root + of_root.T),
     )
@@ -175,13 +177,13 @@ def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     root = body.frames[body.root_frame]
     points = np.concatenate([markers(body, pose), nodes[root, None, :, 3]])
     moved = np.flatnonzero(body.node_kind >= 0)
-    kind, parameter = body.node_kind[moved], body.node_parameter[moved]
-    axes = body.node_sign[moved, None] * nodes[moved, :, kind % 3]
+    slides, parameter = is_translation(body.node_kind[moved]), body.node_parameter[moved]
+    axes = move_axes(body, nodes, moved)
     arms = np.cross(axes, points[:, None] - nodes[moved, :, 3])
-    moves = np.where((kind >= FIRST_TRANSLATION)[:, None], axes, arms)
+    moves = np.where(slides[:, None], axes, arms)
     hang = carried(body, moved)[[*body.marker_node, root]]
     moves *= hang[:, :, None]
-    turning = axes * (hang[-1] * (kind < FIRST_TRANSLATION))[:, None]
+    turning = axes * (hang[-1] * ~slides)[:, None]
     slopes, rotations = np.zeros((len(points), body.size, 3)), np.zeros((body.size, 3))
     for n, k in enumerate(parameter.tolist()):
         slopes[:, k] += moves[:, n]

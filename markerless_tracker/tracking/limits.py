@@ -3,9 +3,20 @@
 import numpy as np
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.body.angles.swing import twists
 from markerless_tracker.errors import BodyModelError, ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.config import TrackerConfig
+
+TWIST_RAD_S = 10.0
+"""Greatest speed of a limb's rotation about itself, which images of a straight limb do not show."""
+
+
+def joint_speeds(body: BodyModel) -> FloatArray:
+    """Greatest speeds (p,) that a search allows: of a limb about itself, else infinite."""
+    speeds = np.full(body.size, np.inf)
+    speeds[twists(body)] = TWIST_RAD_S
+    return speeds
 
 
 def joint_limits(body: BodyModel, config: TrackerConfig) -> FloatArray:

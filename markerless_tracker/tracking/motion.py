@@ -47,6 +47,20 @@ class MotionModel:
         moved = self.pose + self._config.prediction * bounded_ns * self.velocity_per_ns
         return np.asarray(np.clip(moved, *limits))
 
+    def reachable(self, stamp_ns: int, limits: FloatArray, speeds: FloatArray) -> FloatArray:
+        """Limits (2, p) of what can be reached by a time from the last, tracked pose.
+
+        Args:
+            stamp_ns: the time.
+            limits: (2, p) joint limits.
+            speeds: (p,) greatest speeds, rad/s and m/s; infinite where there is none.
+        """
+        elapsed_ns = self._elapsed_ns(stamp_ns)
+        if elapsed_ns == 0 or not self._tracked:
+            return limits
+        around = np.multiply.outer([-1.0, 1.0], speeds * (elapsed_ns * 1e-9)) + self.pose
+        return np.stack([np.maximum(limits[0], around[0]), np.minimum(limits[1], around[1])])
+
     def widening(self, stamp_ns: int) -> float:
         """Factor of sigma at a time: frames of the training rate since the last one, bounded."""
         elapsed_ns = self._elapsed_ns(stamp_ns)

@@ -74,10 +74,18 @@ class Searcher:
         """What each stage left in the last frame, where its algorithm goes on from that."""
 
     def frame(
-        self, observations: Mapping[str, Observation], stamp_ns: int, predicted: FloatArray
+        self,
+        observations: Mapping[str, Observation],
+        stamp_ns: int,
+        predicted: FloatArray,
+        *,
+        limits: FloatArray | None = None,
     ) -> "FrameSearch":
-        """The search of one frame, around a predicted pose (p,)."""
-        return FrameSearch(self, observations, stamp_ns, predicted)
+        """The search of one frame, around a predicted pose (p,).
+
+        Limits (2, p) may be narrower than those of the joints, as what can be reached in time.
+        """
+        return FrameSearch(self, observations, stamp_ns, predicted, limits)
 
 
 def make_searcher(
@@ -109,8 +117,10 @@ class FrameSearch:
         observations: Mapping[str, Observation],
         stamp_ns: int,
         predicted: FloatArray,
+        limits: FloatArray | None = None,
     ) -> None:
-        self.pose = predicted
+        self._limits = searcher.limits if limits is None else limits
+        self.pose = predicted if limits is None else np.clip(predicted, *limits)
         self._predicted = predicted
         self.evaluations = 0
         self.refinements = 0
@@ -175,7 +185,7 @@ class FrameSearch:
         active, centre = stage.comparison.active, stage.comparison.centre
         evaluator = searcher.fitness.prepare(self._views, stage.comparison)
         problem = Problem(
-            bounds=searcher.limits[:, active],
+            bounds=self._limits[:, active],
             centre=centre[active],
             sigma=plan.sigma[active],
             particles=plan.particles,
@@ -203,7 +213,7 @@ class FrameSearch:
             self.pose,
             config,
             priors=(Prior(self._predicted, 1.0 / plan.sigma**2), pose_prior(searcher.body)),
-            limits=searcher.limits,
+            limits=self._limits,
             iterations=plan.iterations,
             truncation_m=(config.refine.truncation_m, config.refine.truncation_end_m),
         )

@@ -18,7 +18,7 @@ from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
-from markerless_tracker.tracking.limits import check_pose
+from markerless_tracker.tracking.limits import check_pose, joint_speeds
 from markerless_tracker.tracking.motion import MotionModel
 from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
@@ -222,7 +222,10 @@ class Tracker:
                 return None
             predicted = start
             self._searcher = self._searcher_for(self.body)
-        search = self._searcher.frame(believed, stamp_ns, predicted)
+        limits = self._motion.reachable(
+            stamp_ns, self._searcher.limits, joint_speeds(self._searcher.body)
+        )
+        search = self._searcher.frame(believed, stamp_ns, predicted, limits=limits)
         sigma = self.body.sigma * self._motion.widening(stamp_ns)
         search.run(frame_stages(self.body, self.config, predicted, sigma))
         names: tuple[str, ...] = ()

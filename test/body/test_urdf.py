@@ -1,4 +1,4 @@
-"""The kinematics of the URDF are those of the body."""
+"""The kinematics of the URDF, at the reported angles, are those of the body."""
 
 import dataclasses
 import xml.etree.ElementTree as ElementTree
@@ -9,10 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.body import MARKER_NAMES, load_body, markers, root_transform, transforms
+from markerless_tracker.body.angles import AngleReader
 from markerless_tracker.body.urdf import urdf
 from markerless_tracker.errors import BodyModelError
 
 BODY = load_body("balan31", 1.8)
+BODIES = {
+    name: load_body(name, 1.8) for name in ("person31", "person34", "person35", "humaneva34")
+} | {"balan31": BODY}
 
 
 def rotation(axis, angle):
@@ -32,6 +36,13 @@ def origin(element):
     return result
 
 
+def value_of(joint, values):
+    mimic = joint.find("mimic")
+    if mimic is None:
+        return values[joint.get("name")]
+    return float(mimic.get("multiplier", "1")) * values[mimic.get("joint")]
+
+
 def link_transforms(text, values, T_world_root):
     """Forward kinematics of a URDF, as any reader of the format would do it."""
     joints = ElementTree.fromstring(text).findall("joint")
@@ -48,35 +59,46 @@ def link_transforms(text, values, T_world_root):
             if joint.get("type") in ("revolute", "continuous"):
                 axis = np.array(list(map(float, joint.find("axis").get("xyz").split())))
                 assert np.linalg.norm(axis) == pytest.approx(1)
-                move[:3, :3] = rotation(axis, values[joint.get("name")])
+                move[:3, :3] = rotation(axis, value_of(joint, values))
             known[child] = known[parent] @ origin(joint) @ move
     return root, known
 
 
-@settings(max_examples=30, deadline=None)
+@pytest.mark.parametrize("name", BODIES)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_links_and_markers_agree_with_the_body(seed) -> None:
-    pose = np.random.default_rng(seed).uniform(-3, 3, BODY.size)
-    values = dict(zip(BODY.parameter_names, pose, strict=True))
-    root, links = link_transforms(urdf(BODY), values, root_transform(BODY, pose))
+def test_links_and_markers_agree_with_the_body(name, seed) -> None:
+    body = BODIES[name]
+    pose = body.neutral + np.random.default_rng(seed).uniform(-1.2, 1.2, body.size)
+    angles = AngleReader(body).read(pose)
+    values = dict(zip(angles.names, angles.values_rad, strict=True))
+    root, links = link_transforms(urdf(body), values, root_transform(body, pose))
     assert root == "pelvis"
-    expected = markers(BODY, pose)
-    for name, marker in zip(MARKER_NAMES, expected, strict=True):
-        np.testing.assert_allclose(links[name][:3, 3], marker, atol=1e-9)
-    nodes = transforms(BODY, pose)
-    for frame, node in BODY.frames.items():
+    expected = markers(body, pose)
+    for marker_name, marker in zip(MARKER_NAMES, expected, strict=True):
+        np.testing.assert_allclose(links[marker_name][:3, 3], marker, atol=1e-9)
+    nodes = transforms(body, pose)
+    for frame, node in body.frames.items():
         np.testing.assert_allclose(links[frame][:3], nodes[node], atol=1e-9)
 
 
-def test_joints_have_names_and_limits() -> None:
-    robot = ElementTree.fromstring(urdf(BODY))
-    moving = [joint for joint in robot.findall("joint") if joint.get("type") != "fixed"]
-    assert sorted(joint.get("name") for joint in moving) == sorted(BODY.joint_names)
-    for joint in moving:
-        assert joint.get("type") == "revolute"
-        limit = joint.find("limit")
-        expected = BODY.limits[:, BODY.index(joint.get("name"))]
-        np.testing.assert_allclose([float(limit.get("lower")), float(limit.get("upper"))], expected)
+@pytest.mark.parametrize("name", BODIES)
+def test_joints_are_the_reported_angles(name) -> None:
+    body = BODIES[name]
+    robot = ElementTree.fromstring(urdf(body))
+    moving = [
+        joint
+        for joint in robot.findall("joint")
+        if joint.get("type") != "fixed" and joint.find("mimic") is None
+    ]
+    angles = [angle for angle in AngleReader(body).names if not angle.startswith("pelvis_")]
+    assert sorted(joint.get("name") for joint in moving) == sorted(angles)
+    knee = next(joint for joint in moving if joint.get("name") == "knee_angle_r")
+    assert knee.get("type") == "revolute"
+    limits = [float(knee.find("limit").get(key)) for key in ("lower", "upper")]
+    np.testing.assert_allclose(np.rad2deg(limits), [-5.0, 155.0])
+    hip = next(joint for joint in moving if joint.get("name") == "hip_flexion_r")
+    assert hip.get("type") == "continuous" and hip.find("limit") is None
 
 
 def test_cones_are_cylinders_of_their_length() -> None:
@@ -90,10 +112,28 @@ def test_cones_are_cylinders_of_their_length() -> None:
     np.testing.assert_allclose(thigh, [0, 0, BODY.lengths_m["l_thigh"] / 2])
 
 
-def test_a_free_joint_is_continuous() -> None:
-    limits = BODY.limits.copy()
-    limits[:, BODY.index("l_knee")] = -np.inf, np.inf
-    robot = ElementTree.fromstring(urdf(dataclasses.replace(BODY, limits=limits)))
+def renamed(body, old, new):
+    frames = {(new if name == old else name): node for name, node in body.frames.items()}
+    return dataclasses.replace(body, frames=frames)
+
+
+def test_parameters_of_other_frames_are_joints_with_their_own_names() -> None:
+    body = renamed(BODY, "l_knee", "left_shin")
+    pose = np.random.default_rng(1).uniform(-1, 1, body.size)
+    angles = AngleReader(body).read(pose)
+    assert "knee_angle_l" not in angles.names and "l_knee" in angles.names
+    values = dict(zip(angles.names, angles.values_rad, strict=True))
+    text = urdf(body)
+    _, links = link_transforms(text, values, root_transform(body, pose))
+    for name, marker in zip(MARKER_NAMES, markers(body, pose), strict=True):
+        np.testing.assert_allclose(links[name][:3, 3], marker, atol=1e-9)
+    (knee,) = [
+        j for j in ElementTree.fromstring(text).findall("joint") if j.get("name") == "l_knee"
+    ]
+    assert knee.get("type") == "revolute"
+    limits = body.limits.copy()
+    limits[:, body.index("l_knee")] = -np.inf, np.inf
+    robot = ElementTree.fromstring(urdf(dataclasses.replace(body, limits=limits)))
     (knee,) = [joint for joint in robot.findall("joint") if joint.get("name") == "l_knee"]
     assert knee.get("type") == "continuous" and knee.find("limit") is None
 
@@ -102,11 +142,18 @@ def test_a_parameter_of_two_joints_is_mimicked() -> None:
     parameters = BODY.node_parameter.copy()
     parameters[parameters == BODY.index("r_knee")] = BODY.index("l_knee")
     body = dataclasses.replace(BODY, node_parameter=parameters)
+    body = renamed(renamed(body, "l_knee", "left_shin"), "r_knee", "right_shin")
     joints = ElementTree.fromstring(urdf(body)).findall("joint")
-    (mimic,) = [joint for joint in joints if joint.find("mimic") is not None]
+    named = [j for j in joints if j.find("mimic") is not None and "knee" in j.get("name")]
+    (mimic,) = named
     assert mimic.find("mimic").get("joint") == "l_knee"
-    assert mimic.find("child").get("link") == "r_knee"
+    assert mimic.find("child").get("link") == "right_shin"
     assert len({joint.get("name") for joint in joints}) == len(joints)
+
+
+def test_a_swing_elsewhere_than_in_hips_and_shoulders_is_an_error() -> None:
+    with pytest.raises(BodyModelError, match="l_hip_x is part of a swing"):
+        urdf(renamed(BODIES["person31"], "l_hip", "left_thigh"))
 
 
 def test_a_frame_that_does_not_descend_from_the_root_is_an_error() -> None:
@@ -117,6 +164,5 @@ def test_a_frame_that_does_not_descend_from_the_root_is_an_error() -> None:
 
 
 def test_links_with_the_same_name_are_an_error() -> None:
-    frames = {("LKnee" if name == "l_knee" else name): node for name, node in BODY.frames.items()}
     with pytest.raises(BodyModelError, match="must be distinct"):
-        urdf(dataclasses.replace(BODY, frames=frames))
+        urdf(renamed(BODY, "l_knee", "LKnee"))

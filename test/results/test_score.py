@@ -131,6 +131,7 @@ def test_a_joint_never_compared_is_null_in_json() -> None:
         "bias",
         "offsets_off_mm",
         "inside_sd",
+        "angles",
     ]
     assert figures_back["offsets_off_mm"] == {"limbs": 0.0, "all": 0.0}
     assert figures_back["inside_sd"] is None

@@ -15,8 +15,10 @@ from collections.abc import Mapping, Sequence
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.body.model import SWING_X, SWING_Y
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.camera.model import project_camera
 from markerless_tracker.geometry import FloatArray
@@ -142,7 +144,13 @@ def _transforms(body: BodyModel, poses: FloatArray) -> FloatArray:
         else:
             out[:, k] = out[:, above, :, :3] @ fixed
             out[:, k, :, 3] += out[:, above, :, 3]
-        if kind < 0:
+        if kind < 0 or kind == SWING_X:
+            continue
+        if kind == SWING_Y:
+            pair = body.node_parameter[[k - 1, k]]
+            vector = np.zeros((len(poses), 3))
+            vector[:, :2] = body.node_sign[[k - 1, k]] * poses[:, pair]
+            out[:, k, :, :3] = out[:, k, :, :3] @ Rotation.from_rotvec(vector).as_matrix()
             continue
         value = (body.node_sign[k] * poses[:, body.node_parameter[k]])[:, None]
         if kind >= 3:

@@ -7,6 +7,8 @@ products of wrenches are summed per part, then up the tree. Derivation: docs/nor
 
 import numpy as np
 
+from markerless_tracker.body.kinematics import move_axis
+from markerless_tracker.body.model import FIRST_TRANSLATION, SWING_X
 from markerless_tracker.compiled import compiled, kernel
 
 SUMS = 27
@@ -38,20 +40,14 @@ def twist_of(node, body, nodes, twist):  # type: ignore[no-untyped-def]
     kind = body.kind[node]
     if kind < 0:
         return False
-    axis = kind % 3
-    sign = body.sign[node]
-    wx, wy, wz = (
-        sign * nodes[node, 0, axis],
-        sign * nodes[node, 1, axis],
-        sign * nodes[node, 2, axis],
-    )
-    if kind >= 3:
+    move_axis(node, body.kind, body.sign, nodes, twist[3:])
+    wx, wy, wz = twist[3], twist[4], twist[5]
+    if FIRST_TRANSLATION <= kind < SWING_X:
         twist[0], twist[1], twist[2] = wx, wy, wz
         twist[3], twist[4], twist[5] = 0.0, 0.0, 0.0
         return True
     x, y, z = nodes[node, 0, 3], nodes[node, 1, 3], nodes[node, 2, 3]
     twist[0], twist[1], twist[2] = y * wz - z * wy, z * wx - x * wz, x * wy - y * wx
-    twist[3], twist[4], twist[5] = wx, wy, wz
     return True
 
 

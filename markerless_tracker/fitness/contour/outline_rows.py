@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from markerless_tracker.body import BodyModel, cone_transforms, transforms
-from markerless_tracker.body.kinematics import carried
-from markerless_tracker.body.model import FIRST_TRANSLATION, IntArray
+from markerless_tracker.body.kinematics import carried, move_axes
+from markerless_tracker.body.model import IntArray, is_translation
 from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.geometry import FloatArray
@@ -60,12 +60,12 @@ def pose_slopes(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatAr
     """Derivatives (n, p) of the residuals by the parameters of a pose (p,)."""
     placed = transforms(body, pose)
     moved = np.flatnonzero(body.node_kind >= 0)
-    kind = body.node_kind[moved]
-    axes = body.node_sign[moved, None] * placed[moved, :, kind % 3]
+    axes = move_axes(body, placed, moved)
     out = np.zeros((len(rows.cone), body.size))
     _pose_slopes(
         surface(body, pose, rows), rows.gradient, axes,
-        np.ascontiguousarray(placed[moved, :, 3]), kind, body.node_parameter[moved],
+        np.ascontiguousarray(placed[moved, :, 3]), is_translation(body.node_kind[moved]),
+        body.node_parameter[moved],
         carried(body, moved)[body.cone_node], rows.cone, out,
     )  # fmt: skip
     return out
@@ -88,15 +88,15 @@ def _surface(placed, shape, length, cone, place, out):  # type: ignore[no-untype
 
 @kernel
 def _pose_slopes(  # type: ignore[no-untyped-def]
-    points, gradient, axes, origins, kind, parameter, hang, cone, out
+    points, gradient, axes, origins, slides, parameter, hang, cone, out
 ):
     for n in range(cone.size):
         gx, gy, gz = gradient[n, 0], gradient[n, 1], gradient[n, 2]
-        for m in range(kind.size):
+        for m in range(slides.size):
             if hang[cone[n], m] == 0.0:
                 continue
             x, y, z = axes[m, 0], axes[m, 1], axes[m, 2]
-            if kind[m] < FIRST_TRANSLATION:
+            if not slides[m]:
                 # A turn about the axis moves a point P by axis x (P - origin).
                 u, v = points[n, 0] - origins[m, 0], points[n, 1] - origins[m, 1]
                 w = points[n, 2] - origins[m, 2]

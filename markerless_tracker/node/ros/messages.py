@@ -11,6 +11,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from markerless_tracker.body import BodyModel, cone_transforms, root_transform
+from markerless_tracker.body.angles import ROOT_ANGLES, Angles
 from markerless_tracker.geometry import quaternion_from_rotation
 from markerless_tracker.node.health import Health, Level
 from markerless_tracker.node.ros.stamps import time_message
@@ -41,13 +42,9 @@ def header(stamp_ns: int, frame: str = WORLD_FRAME) -> Header:
     return Header(stamp=time_message(stamp_ns), frame_id=frame)
 
 
-def joint_state(body: BodyModel, pose: FloatArray, stamp_ns: int) -> JointState:
-    """All joints of the body but the root's, named as in its URDF; rad (m for sliding joints)."""
-    return JointState(
-        header=header(stamp_ns, ""),
-        name=list(body.joint_names),
-        position=np.asarray(pose, dtype=np.float64)[body.joints].tolist(),
-    )
+def joint_state(angles: Angles, stamp_ns: int) -> JointState:
+    """All joint angles but the pelvis', named as in the body's URDF; rad."""
+    return _joints(angles.names, angles.values_rad, stamp_ns)
 
 
 def root_pose(
@@ -61,13 +58,11 @@ def root_pose(
     return message
 
 
-def joint_deviations(body: BodyModel, confidence: Confidence, stamp_ns: int) -> JointState:
-    """Standard deviation of every joint, rad, in the field `position`."""
-    return JointState(
-        header=header(stamp_ns, ""),
-        name=list(body.joint_names),
-        position=confidence.pose_sd[body.joints].tolist(),
-    )
+def joint_deviations(angles: Angles, stamp_ns: int) -> JointState:
+    """Standard deviation of every joint angle, rad, in the field `position`; empty if unknown."""
+    if angles.sd_rad is None:
+        return JointState(header=header(stamp_ns, ""))
+    return _joints(angles.names, angles.sd_rad, stamp_ns)
 
 
 def marker_poses(markers_m: FloatArray, stamp_ns: int) -> PoseArray:
@@ -125,6 +120,16 @@ def state_message(
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
     return DiagnosticArray(header=header(stamp_ns, ""), status=[status])
+
+
+def _joints(names: tuple[str, ...], values: FloatArray, stamp_ns: int) -> JointState:
+    """A message with those of the root left out."""
+    kept = [k for k, name in enumerate(names) if name not in ROOT_ANGLES]
+    return JointState(
+        header=header(stamp_ns, ""),
+        name=[names[k] for k in kept],
+        position=[float(values[k]) for k in kept],
+    )
 
 
 def _point(xyz: FloatArray) -> Point:

@@ -8,6 +8,7 @@ from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.body.angles import AngleReader
 from markerless_tracker.body.urdf import urdf
 from markerless_tracker.node.ros import messages
 from markerless_tracker.node.ros.qos import latched_qos, output_qos
@@ -30,6 +31,7 @@ class ResultPublishers:
         self._marker_poses = node.create_publisher(PoseArray, "marker_poses", qos)
         self._markers = node.create_publisher(MarkerArray, "markers", qos)
         self._described: BodyModel | None = None
+        self._angles: AngleReader | None = None
         self._no_pose_shown = False
 
     def describe(self, body: BodyModel) -> None:
@@ -37,6 +39,9 @@ class ResultPublishers:
         if body is not self._described:
             self._descriptions.publish(String(data=urdf(body)))
             self._described = body
+            if self._angles is None:
+                self._angles = AngleReader(body)
+            self._angles.take(body)
 
     def publish(self, result: TrackResult, body: BodyModel) -> None:
         """Publish a result; without a pose viewers lose the body, once."""
@@ -47,11 +52,14 @@ class ResultPublishers:
                 self._markers.publish(messages.no_markers(stamp_ns))
             self._no_pose_shown = True
             return
-        self._joint_states.publish(messages.joint_state(body, pose, stamp_ns))
         confidence = result.confidence
+        covariance = None if confidence is None else confidence.covariance
+        assert self._angles is not None
+        angles = self._angles.read(pose, stamp_ns, covariance)
+        self._joint_states.publish(messages.joint_state(angles, stamp_ns))
         self._root_poses.publish(messages.root_pose(body, pose, stamp_ns, confidence))
         if confidence is not None:
-            self._deviations.publish(messages.joint_deviations(body, confidence, stamp_ns))
+            self._deviations.publish(messages.joint_deviations(angles, stamp_ns))
         self._marker_poses.publish(messages.marker_poses(points, stamp_ns))
         if self._markers.get_subscription_count():
             self._markers.publish(messages.body_markers(body, pose, points, stamp_ns))

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from markerless_tracker.body.anatomy import posture, published_sign
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.synthesis.motion import Angles, Course, Motion
 from markerless_tracker.synthesis.people.person import Person
@@ -126,19 +127,19 @@ class Action(Motion):
         return pose
 
     def _posture(self, phase: float) -> FloatArray:
-        pose = super()._posture(phase)
         body = self.body
+        angles = {name: self._amplitude * angle for name, angle in self._angles(phase).items()}
         for name, angle in self._habit.items():
-            pose[body.index(name)] += angle
+            angles[name] = angles.get(name, 0.0) + published_sign(name) * angle
+        pose = posture(body, angles)
         forward = body.index("thorax_y")
         pose[body.index("spine_y")] = 0.45 * pose[forward]
         pose[forward] *= 0.65
         for side in "lr":
-            # Signs of person31: hip flexion is positive, knee flexion negative.
             shin = (
-                pose[body.index(f"{side}_hip_y")]
-                + pose[body.index(f"{side}_knee")]
-                - pose[body.index("pelvis_ry")]
+                angles.get(f"{side}_hip_y", 0.0)
+                - angles.get(f"{side}_knee", 0.0)
+                - angles.get("pelvis_ry", 0.0)
             )
             pose[body.index(f"{side}_ankle")] = np.clip(-0.85 * shin, *_ANKLE_RAD)
         return pose

@@ -6,6 +6,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from visualization_msgs.msg import Marker
 
 from markerless_tracker.body import BodyModel, load_body, markers, root_transform
+from markerless_tracker.body.angles import AngleReader
 from markerless_tracker.body.urdf import urdf
 from markerless_tracker.geometry import apply, inverse, rotation_from_quaternion
 from markerless_tracker.node.health import Health, Level
@@ -38,15 +39,16 @@ def test_stamps_round_trip(stamp_ns: int) -> None:
 
 
 def test_joint_states_and_root_pose_carry_the_whole_pose(body: BodyModel, pose: np.ndarray) -> None:
-    state = messages.joint_state(body, pose, STAMP_NS)
+    angles = AngleReader(body).read(pose)
+    state = messages.joint_state(angles, STAMP_NS)
     root = messages.root_pose(body, pose, STAMP_NS)
     assert stamp_of(state) == stamp_of(root) == STAMP_NS and root.header.frame_id == "map"
     assert len(state.name) == len(state.position) == body.size - 6
     given = dict(zip(state.name, state.position, strict=True))
-    for index, name in enumerate(body.parameter_names):
-        assert (name in given) == (index not in body.root)
+    for name, value in zip(angles.names, angles.values_rad, strict=True):
+        assert (name in given) == (not name.startswith("pelvis_"))
         if name in given:
-            assert given[name] == pose[index]
+            assert given[name] == value
     # A body at a pose of these joints only, moved by the root pose, is the body.
     rootless = pose.copy()
     rootless[body.root] = 0.0
@@ -65,7 +67,7 @@ def test_joint_names_are_those_of_the_urdf(body: BodyModel, pose: np.ndarray) ->
         for joint in ElementTree.fromstring(urdf(body)).iter("joint")
         if joint.get("type") != "fixed" and joint.find("mimic") is None
     }
-    assert set(messages.joint_state(body, pose, 0).name) <= moving
+    assert set(messages.joint_state(AngleReader(body).read(pose), 0).name) == moving
 
 
 def test_marker_poses_are_the_15_in_order(body: BodyModel, pose: np.ndarray) -> None:
@@ -120,10 +122,13 @@ def test_state_levels(level: Level, number: bytes) -> None:
 
 def test_deviations_and_covariance(body: BodyModel, pose: np.ndarray) -> None:
     covariance = np.arange(36.0).reshape(6, 6)
-    sure = Confidence(np.arange(float(body.size)), np.ones((15, 3)), covariance)
-    message = messages.joint_deviations(body, sure, STAMP_NS)
-    assert message.name == messages.joint_state(body, pose, 0).name
+    sure = Confidence(np.full(body.size, 0.02), np.ones((15, 3)), covariance)
+    angles = AngleReader(body).read(pose, STAMP_NS, sure.covariance)
+    message = messages.joint_deviations(angles, STAMP_NS)
+    assert message.name == messages.joint_state(angles, 0).name
     assert stamp_of(message) == STAMP_NS
-    assert list(message.position) == [float(index) for index in body.joints]
+    given = dict(zip(message.name, message.position, strict=True))
+    assert given["knee_angle_l"] == pytest.approx(0.02)
+    assert messages.joint_deviations(AngleReader(body).read(pose), 0).name == []
     root = messages.root_pose(body, pose, STAMP_NS, sure)
     np.testing.assert_array_equal(np.reshape(root.pose.covariance, (6, 6)), covariance)
