@@ -31,8 +31,8 @@ STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
 than the person."""
 COMMON_STATURES_M = (1.56, 1.63, 1.70, 1.77, 1.84)
 """Statures that are tried besides: a bent, squatting or sitting person is taller than the hull."""
-STANDING_M = 1.45
-"""A lower hull is that of a person not standing upright."""
+STANDING_M = (1.45, 1.92)
+"""A lower hull is that of a person not standing upright, a higher one of a person reaching up."""
 _STATURE_RANGE_M = (1.2, 2.1)
 _STATURE_SD_M = 0.10
 _STATURE_WEIGHT = 0.002
@@ -225,7 +225,7 @@ class Starter:
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> tuple[FramePopulation, Population] | None:
         height_m = float(np.clip(hull.height_m, *_STATURE_RANGE_M))
-        if height_m < STANDING_M:
+        if not STANDING_M[0] <= height_m <= STANDING_M[1]:
             height_m = MEAN_STATURE_M
         body = self._body if self._sized is None else self._sized(height_m)
         self._searcher = self._searcher_for(body)
