@@ -1,4 +1,4 @@
-"""New poses from good ones: whole limbs exchanged, taken from a posture, or drawn anew.
+"""New poses from good ones: whole limbs exchanged, mirrored, taken from a posture, or drawn.
 
 A refinement converges to the nearest optimum, and a limb's optimum is far from where another limb
 explains the same silhouette: so limbs change as wholes, and the good ones are refined.
@@ -9,6 +9,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.start.mirror import Mirror
 from markerless_tracker.tracking.start.postures import joint_sd, postures
 
 _ONE_LIMB = 0.5
@@ -42,6 +43,7 @@ class Recombiner:
         radius = np.where(self._sd < _FEW, _FEW, _FREE_RAD)
         self._low = np.maximum(limits[0], body.neutral - radius)
         self._high = np.minimum(limits[1], body.neutral + radius)
+        self._mirror = Mirror(body)
         self._yaw = body.index("pelvis_rz")
         self._tilt = [body.index("pelvis_rx"), body.index("pelvis_ry")]
 
@@ -89,11 +91,13 @@ class Recombiner:
         for limb in self._limbs:
             if rng.random() > _MIXED:
                 continue
-            how = rng.integers(3)
+            how = rng.integers(4)
             if how == 0:
                 child[limb] = parents[rng.integers(len(parents))][limb]
             elif how == 1:
                 child[limb] = self._known[rng.integers(len(self._known))][limb]
+            elif how == 2:
+                child[limb] = self._mirror.of(child)[limb]
             else:
                 scale = (0.5, 1.0)[rng.integers(2)]
                 child[limb] += scale * self._sd[limb] * rng.standard_normal(len(limb))
