@@ -24,14 +24,17 @@ Measure = Callable[[Path, float | None, float, Report], Row]
 the images, receiver of the progress."""
 
 
-def add_recordings(parser: argparse.ArgumentParser, *, without: str = "unknown") -> None:
+def add_recordings(
+    parser: argparse.ArgumentParser, *, without: str = "unknown", sources: str = "+"
+) -> None:
     """Declare the recordings, the statures, the scales of the images, and the common options.
 
     Args:
         parser: receives the arguments.
         without: for the help: what holds without `--stature`.
+        sources: how many recordings, as `nargs` of argparse.
     """
-    parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
+    parser.add_argument("sources", nargs=sources, type=Path, metavar="SOURCE", help="recording")
     parser.add_argument(
         "--stature", type=list_of_each(positive), default=(), metavar="LIST",
         help=f"of the persons, m: one for all recordings or one each; default: {without}",

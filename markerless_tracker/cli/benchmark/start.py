@@ -7,10 +7,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.benchmarks import starts
+from markerless_tracker.benchmarks import postures, starts
 from markerless_tracker.benchmarks.with_truth import Report
 from markerless_tracker.cli.benchmark.arguments import count
 from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
+from markerless_tracker.errors import ConfigError
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
@@ -21,7 +22,18 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         description="Automatic starts, scored by the ground_truth.trc after some frames.",
         epilog="example: markerless_tracker benchmark start WALK BALANCE --stature 1.72,1.70",
     )
-    add_recordings(parser)
+    add_recordings(parser, sources="*")
+    parser.add_argument(
+        "--postures", type=count, metavar="N",
+        help="N generated people who squat, bend down, sit, raise or cross their arms instead",
+    )  # fmt: skip
+    parser.add_argument(
+        "--set", choices=tuple(postures.SETS), default="development",
+        help="with --postures: their scenes; nothing may be set by `test`",
+    )  # fmt: skip
+    parser.add_argument(
+        "--exact", action="store_true", help="with --postures: exact silhouettes, no images"
+    )
     parser.add_argument(
         "--every", type=count, default=10, metavar="N", help="start from every N-th frame (10)"
     )
@@ -34,15 +46,34 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and print; returns the exit status."""
+    """Measure and print; returns the exit status.
+
+    Raises:
+        ConfigError: neither recordings nor `--postures`, or both, or options of the other.
+    """
+    if (args.postures is None) == (not args.sources):
+        raise ConfigError("expected recordings or --postures N, and not both")
+    if args.postures is None and (args.exact or args.set != "development"):
+        raise ConfigError("--exact and --set are given without --postures, expected both")
+    if args.postures is not None and (args.stature or args.scale != (1.0,)):
+        raise ConfigError("--postures makes its own scenes: expected no --stature and no --scale")
     config = settings(args, "preset", "body")
     plan = starts.StartPlan(config, every=args.every, frames=args.frames, seeds=args.seeds)
 
     def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:
+        if args.postures is not None:
+            return postures.measure_postures(
+                plan, args.postures, which=args.set, exact=args.exact, report=report
+            )
         return starts.measure_starts(source, plan, stature_m=stature_m, scale=scale, report=report)
 
     def show(console: Console, rows: list[Row]) -> None:
         console.print(_table(rows, args.frames))
+        for row in rows:
+            shares = row.get("postures", {}).items()
+            if shares:
+                text = ", ".join(f"{name} {share:.0%}" for name, share in shares)
+                console.print(f"Succeeded by posture: {text}.", highlight=False)
         console.print(
             f"Error, heading: in frame {args.frames} of each start; succeeded: mean error of at "
             f"most {starts.SUCCESS_MM:g} mm; wrong heading: more than "
@@ -50,6 +81,8 @@ def run(args: argparse.Namespace) -> int:
             highlight=False,
         )
 
+    if args.postures is not None:
+        args.sources = [Path("generated")]
     return run_each(args, measure, show, width=160)
 
 

@@ -23,6 +23,11 @@ _INITIALISED_COUNT = 24
 _PER_HEADING = 2
 _CHILDREN = 480
 _REFINED = 10
+_NOVEL = 0.6
+"""Fraction of the children refined that differ from the parents and from each other: the others are
+the best, and those are mostly parents with a small change."""
+_NOVEL_M = 0.20
+"""They differ if a marker lies this far from where it was."""
 _ALIKE_M = 0.07
 """Poses whose markers lie nearer to each other than this, on average, are the same."""
 _PRIOR_WEIGHT = 4.0
@@ -114,10 +119,24 @@ class FramePopulation:
             self._searcher.config.seed, self._stamp_ns, f"generation {generation}"
         )
         children = self._recombiner.children(population.poses, round(fraction * _CHILDREN), rng)
-        best = np.argsort(self.costs(children), kind="stable")[: max(1, round(fraction * _REFINED))]
-        return self.selected(
-            np.concatenate([population.poses, self.refined(children[best], *_RECOMBINE)])
-        )
+        best = self._promising(children, population.poses, max(1, round(fraction * _REFINED)))
+        return self.selected(np.concatenate([population.poses, self.refined(best, *_RECOMBINE)]))
+
+    def _promising(self, children: FloatArray, parents: FloatArray, count: int) -> FloatArray:
+        """So many of the children (n, p): the best, and the best of those that are new."""
+        order = np.argsort(self.costs(children), kind="stable")
+        chosen = [int(i) for i in order[: count - round(_NOVEL * count)]]
+        body = self._searcher.body
+        known = [markers(body, pose) for pose in (*parents, *children[chosen])]
+        for i in map(int, order[len(chosen) :]):
+            if len(chosen) == count:
+                break
+            points = markers(body, children[i])
+            moved = np.linalg.norm(points - np.array(known), axis=2).max(axis=1)
+            if moved.min() >= _NOVEL_M:
+                chosen.append(i)
+                known.append(points)
+        return np.asarray(children[chosen])
 
     def propagated(self, population: Population) -> Population:
         """The population of the frame before, refined in this one."""

@@ -30,6 +30,11 @@ def _mirrored(angles: Mapping[str, float]) -> dict[str, float]:
     return {other[name[0]] + name[1:]: angle for name, angle in angles.items()}
 
 
+def _both(**angles: float) -> dict[str, float]:
+    """Angles of both sides."""
+    return {f"{side}_{name}": angle for side in "lr" for name, angle in angles.items()}
+
+
 POSTURES: tuple[Mapping[str, float], ...] = (
     {},
     _LEFT_STEP,
@@ -46,9 +51,15 @@ POSTURES: tuple[Mapping[str, float], ...] = (
         "l_shoulder_y": 0.8, "r_shoulder_y": 0.8,
     },
     {"l_hip_y": 1.2, "r_hip_y": 1.2, "l_knee": 1.6, "r_knee": 1.6, "pelvis_ry": 0.3},
+    _both(hip_y=2.0, knee=2.2, shoulder_y=1.0, elbow=0.5) | {"pelvis_ry": 0.4, "thorax_y": 0.4},
+    _both(hip_y=1.5, knee=1.5, shoulder_y=0.4, elbow=0.8),
+    _both(hip_y=1.1, knee=0.2, shoulder_y=1.5, elbow=0.2) | {"pelvis_ry": 1.1, "thorax_y": 0.6},
+    _both(hip_y=1.3, knee=0.3, shoulder_y=2.0, elbow=0.2) | {"pelvis_ry": 1.3, "thorax_y": 0.3},
+    _both(shoulder_y=2.8, elbow=0.3),
+    _both(shoulder_y=0.5, elbow=1.5) | {"l_shoulder_z": 1.3, "r_shoulder_z": -1.3},
 )  # fmt: skip
 """Anatomical angles (rad): standing, steps, swinging legs, raised arms, raised knees, a bow, a
-squat."""
+squat, a deep squat, sitting, bending down, arms overhead, crossed arms."""
 
 
 def postures(body: BodyModel) -> FloatArray:

@@ -1,4 +1,4 @@
-"""New poses from good ones: whole limbs exchanged, taken from a posture, or drawn anew.
+"""New poses from good ones: whole limbs exchanged, mirrored, taken from a posture, or drawn.
 
 A refinement converges to the nearest optimum, and a limb's optimum is far from where another limb
 explains the same silhouette: so limbs change as wholes, and the good ones are refined.
@@ -9,10 +9,16 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.start.mirror import Mirror
 from markerless_tracker.tracking.start.postures import joint_sd, postures
 
-_ONE_LIMB = 0.5
-"""Fraction of children with one limb drawn anew; the others mix limbs."""
+_ONE_LIMB, _KNOWN = 0.35, 0.3
+"""Fractions of children with one limb drawn anew, and with one limb, or both arms or legs, of a
+known posture or mirrored; the others mix limbs."""
+_MIRRORED = 0.25
+"""Fraction of the latter that are mirrored."""
+_NOISE = 0.3
+"""Their variation, as a fraction of the prior's deviations."""
 _MIXED = 0.35
 """Fraction of the limbs that a mixed child changes."""
 _TURNED = 0.4
@@ -42,6 +48,9 @@ class Recombiner:
         radius = np.where(self._sd < _FEW, _FEW, _FREE_RAD)
         self._low = np.maximum(limits[0], body.neutral - radius)
         self._high = np.minimum(limits[1], body.neutral + radius)
+        self._mirror = Mirror(body)
+        pairs = [body.subspaces[name] for name in ("arms", "legs") if name in body.subspaces]
+        self._groups = [*self._limbs, *pairs]
         self._yaw = body.index("pelvis_rz")
         self._tilt = [body.index("pelvis_rx"), body.index("pelvis_ry")]
 
@@ -50,8 +59,11 @@ class Recombiner:
         out = np.empty((count, self._body.size))
         for child in out:
             child[:] = parents[min(int(rng.geometric(_RANK)) - 1, len(parents) - 1)]
-            if rng.random() < _ONE_LIMB:
+            kind = rng.random()
+            if kind < _ONE_LIMB:
                 self._draw(child, self._limbs[rng.integers(len(self._limbs))], rng)
+            elif kind < _ONE_LIMB + _KNOWN:
+                self._take_known(child, self._groups[rng.integers(len(self._groups))], rng)
             else:
                 self._mix(child, parents, rng)
         return np.clip(out, self._limits[0], self._limits[1], out=out)
@@ -85,15 +97,23 @@ class Recombiner:
         low, high = self._low[limb], self._high[limb]
         child[limb] = low + (high - low) * rng.random(len(limb))
 
+    def _take_known(self, child: FloatArray, limbs: IntArray, rng: np.random.Generator) -> None:
+        mirrored = rng.random() < _MIRRORED
+        known = self._mirror.of(child) if mirrored else self._known[rng.integers(len(self._known))]
+        noise = _NOISE * self._sd[limbs] * rng.standard_normal(len(limbs))
+        child[limbs] = known[limbs] + noise
+
     def _mix(self, child: FloatArray, parents: FloatArray, rng: np.random.Generator) -> None:
         for limb in self._limbs:
             if rng.random() > _MIXED:
                 continue
-            how = rng.integers(3)
+            how = rng.integers(4)
             if how == 0:
                 child[limb] = parents[rng.integers(len(parents))][limb]
             elif how == 1:
                 child[limb] = self._known[rng.integers(len(self._known))][limb]
+            elif how == 2:
+                child[limb] = self._mirror.of(child)[limb]
             else:
                 scale = (0.5, 1.0)[rng.integers(2)]
                 child[limb] += scale * self._sd[limb] * rng.standard_normal(len(limb))

@@ -7,7 +7,6 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.anatomy import heading_difference
-from markerless_tracker.body.sizes import MEAN_STATURE_M
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.fitness.shape import fit_shape
@@ -17,26 +16,21 @@ from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull, decided_by_hull, find_hulls, hulls_part
-from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
+from markerless_tracker.tracking.start.population import FramePopulation, Population
 from markerless_tracker.tracking.start.postures import put_at
 from markerless_tracker.tracking.start.rejections import Rejections
+from markerless_tracker.tracking.start.sizing import (
+    Sized,
+    SizeSearch,
+    first_statures_m,
+    stature_cost,
+)
 from markerless_tracker.tracking.start.start_gate import StartGate
 
 SETTLING_FRAMES = 8
 """Frames from the first pose to the one from which on it is tracked like any other."""
 GENERATIONS = 7
 SECOND_GENERATIONS = 5
-STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
-"""Statures that are tried for an unknown person, in heights of the hull; raised arms make it higher
-than the person."""
-COMMON_STATURES_M = (1.56, 1.63, 1.70, 1.77, 1.84)
-"""Statures that are tried besides: a bent, squatting or sitting person is taller than the hull."""
-STANDING_M = 1.45
-"""A lower hull is that of a person not standing upright."""
-_STATURE_RANGE_M = (1.2, 2.1)
-_STATURE_SD_M = 0.10
-_STATURE_WEIGHT = 0.002
-"""A stature one standard deviation from the mean must raise f_s by this much more."""
 _FLIP_MARGIN = 0.005
 """Mean rise of f_s that the opposite heading needs before the settling ends."""
 _WALKED_M, _WALK_M_S, _WALK_BONUS = 0.05, 0.25, 0.01
@@ -45,7 +39,6 @@ _GENERATION_FRACTION = 0.5
 _SHAPE_FRAMES = 5
 _SHAPE_SLACK = 0.01
 _RESIZED_AFTER = 3
-_RESIZE = (4, (0.12, 0.05))
 _TRUNK_MARKERS = [0, 1]
 
 Select = Callable[
@@ -133,6 +126,7 @@ class Starter:
         self._seen: tuple[list[_Seen | None], list[_Seen | None]] = ([], [])
         self._leading = 0
         self._flipped = False
+        self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
         self._begun_ns = 0
         self._from_m = np.zeros(3)
 
@@ -149,6 +143,7 @@ class Starter:
         population = frame.propagated(population)
         if len(self._seen[0]) == 1:
             population = self._second_look(frame, population, observations)
+            frame, population = self._resized((frame, population), observations, stamp_ns)
         population = frame.recombined(population, 0, fraction=_GENERATION_FRACTION)
         if 1.0 - population.costs[0] < LEAST_FIT:
             self.reset()
@@ -224,51 +219,52 @@ class Starter:
     def _search(
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> tuple[FramePopulation, Population] | None:
-        height_m = float(np.clip(hull.height_m, *_STATURE_RANGE_M))
-        if height_m < STANDING_M:
-            height_m = MEAN_STATURE_M
-        body = self._body if self._sized is None else self._sized(height_m)
-        self._searcher = self._searcher_for(body)
-        near = body.neutral.copy()
-        near[[body.index(f"pelvis_t{axis}") for axis in "xyz"]] = hull.trunk_m.mean(axis=0)
-        frame = FramePopulation(self._searcher, observations, stamp_ns, near)
-        hints = None
-        if self._last_pose is not None:
-            hints = np.array([self._last_pose, put_at(body, hull, self._last_pose)])
-        population = frame.initialised(hull, hints)
+        found = self._initialised(hull, observations, stamp_ns)
         for generation in range(GENERATIONS):
-            population = frame.recombined(population, generation)
-            if self._sized is not None and generation == _RESIZED_AFTER:
-                frame, population = self._resize(
-                    frame, population, height_m, observations, stamp_ns
-                )
-        return (frame, population) if 1.0 - population.costs[0] >= LEAST_FIT else None
+            frame, population = found
+            found = frame, frame.recombined(population, generation)
+            if generation == _RESIZED_AFTER:
+                found = self._resized(found, observations, stamp_ns, hull)
+        return found if 1.0 - found[1].costs[0] >= LEAST_FIT else None
 
-    def _resize(
+    def _resized(
         self,
-        frame: FramePopulation,
-        population: Population,
-        height_m: float,
+        found: tuple[FramePopulation, Population],
         observations: Mapping[str, Observation],
         stamp_ns: int,
+        hull: Hull | None = None,
     ) -> tuple[FramePopulation, Population]:
-        """Try other statures; the one whose best pose explains the views best is kept."""
-        assert self._sized is not None and self._searcher is not None
-        best = (
-            float(population.costs[0]) + _stature_cost(height_m), frame, population, self._searcher
-        )  # fmt: skip
-        statures = {ratio * height_m for ratio in STATURES} | set(COMMON_STATURES_M)
-        for stature_m in sorted({float(np.clip(s, *_STATURE_RANGE_M)) for s in statures}):
-            searcher = self._searcher_for(self._sized(stature_m))
-            moved = scaled_to(self._searcher.body, searcher.body, population.poses)
-            other = FramePopulation(searcher, observations, stamp_ns, moved[0])
-            cost = float(other.costs(other.refined(moved[:1], *_RESIZE))[0])
-            cost += _stature_cost(stature_m)
-            if cost < best[0]:
-                best = (cost, other, Population(moved, population.costs, population.headings),
-                        searcher)  # fmt: skip
-        _, found, chosen, self._searcher = best
-        return found, chosen if found is frame else found.propagated(chosen)
+        """A population in the body of the size that fits best; with a hull all sizes are tried."""
+        assert self._searcher is not None
+        sized = Sized(*found, self._searcher)
+        if hull is None:
+            sized = self._sizes.finer(sized, observations, stamp_ns)
+        else:
+            sized = self._sizes.coarse(sized, hull, observations, stamp_ns)
+        self._searcher = sized.searcher
+        return sized.frame, sized.population
+
+    def _initialised(
+        self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
+    ) -> tuple[FramePopulation, Population]:
+        """The population to begin with: that of the stature whose best pose fits best."""
+        bodies = [(self._body, 0.0)]
+        if self._sized is not None:
+            statures = first_statures_m(hull)
+            bodies = [(self._sized(s), stature_cost(s)) for s in statures]
+        tried = []
+        for body, cost in bodies:
+            searcher = self._searcher_for(body)
+            near = body.neutral.copy()
+            near[[body.index(f"pelvis_t{axis}") for axis in "xyz"]] = hull.trunk_m.mean(axis=0)
+            frame = FramePopulation(searcher, observations, stamp_ns, near)
+            hints = None
+            if self._last_pose is not None:
+                hints = np.array([self._last_pose, put_at(body, hull, self._last_pose)])
+            population = frame.initialised(hull, hints)
+            tried.append((float(population.costs[0]) + cost, searcher, frame, population))
+        _, self._searcher, frame, population = min(tried, key=lambda one: one[0])
+        return frame, population
 
     def _note(self, frame: FramePopulation, population: Population) -> None:
         for side, seen in enumerate(self._seen):
@@ -324,8 +320,3 @@ class Starter:
     def _trunk(self, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None
         return np.asarray(markers(self._searcher.body, pose)[_TRUNK_MARKERS].mean(axis=0))
-
-
-def _stature_cost(stature_m: float) -> float:
-    """Cost of a stature by its distance from the mean, in units of f_s."""
-    return _STATURE_WEIGHT * ((stature_m - MEAN_STATURE_M) / _STATURE_SD_M) ** 2
