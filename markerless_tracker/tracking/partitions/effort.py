@@ -1,0 +1,70 @@
+"""How much is searched in a frame beside the refinement."""
+
+from markerless_tracker.errors import ConfigError
+
+WORSE = 0.01
+"""A frame is explained badly whose f lies this far below the track's usual one."""
+_MEMORY = 0.05
+
+
+class Effort:
+    """Decides which frames are searched by swarms, and which by the limbs' searches.
+
+    The refinement follows a body that moves as predicted. Swarms find what it has lost, so they
+    are needed where a frame is explained worse than this track's usual, or a limb is in doubt.
+
+    Args:
+        needed_only: whether swarms search only the frames that need them; else all frames.
+    """
+
+    def __init__(self, *, needed_only: bool) -> None:
+        self._needed_only = needed_only
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all frames."""
+        self._usual_cost: float | None = None
+        self._credit = 0.0
+        self._granted = True
+        self._doubt = False
+
+    def begin(self, effort: float, *, doubt: bool) -> None:
+        """Begin a frame.
+
+        Args:
+            effort: fraction of the frames that may be searched beside the refinement, 0 to 1.
+            doubt: whether a limb is in doubt.
+
+        Raises:
+            ConfigError: no such fraction.
+        """
+        if not 0.0 <= effort <= 1.0:
+            raise ConfigError(f"effort is {effort}, expected 0 to 1")
+        self._credit = min(1.0, self._credit + effort)
+        # Sums of fractions such as a tenth fall short of 1 by a rounding.
+        self._granted = self._credit > 1.0 - 1e-9
+        if self._granted:
+            self._credit = 0.0
+        self._doubt = doubt
+
+    @property
+    def granted(self) -> bool:
+        """Whether this frame may be searched beside the refinement."""
+        return self._granted
+
+    def wants_swarms(self, cost: float) -> bool:
+        """Whether swarms search this frame.
+
+        Args:
+            cost: of the pose after the first refinement.
+        """
+        if not self._granted:
+            return False
+        usual = self._usual_cost
+        badly = usual is None or cost > usual + WORSE
+        return badly or self._doubt or not self._needed_only
+
+    def end(self, cost: float) -> None:
+        """Take the cost of the frame's result into the usual one."""
+        usual = self._usual_cost
+        self._usual_cost = cost if usual is None else usual + _MEMORY * (cost - usual)

@@ -1,0 +1,67 @@
+"""Tests for `markerless_tracker.tracking.partitions.effort`."""
+
+import pytest
+
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.tracking.partitions.effort import WORSE, Effort
+
+
+def _settled() -> Effort:
+    effort = Effort(needed_only=True)
+    for _ in range(50):
+        effort.begin(1.0, doubt=False)
+        effort.end(0.05)
+    effort.begin(1.0, doubt=False)
+    return effort
+
+
+def test_the_first_frame_is_searched_by_swarms() -> None:
+    effort = Effort(needed_only=True)
+    effort.begin(1.0, doubt=False)
+    assert effort.wants_swarms(0.01)
+
+
+def test_a_frame_as_usual_needs_no_swarms() -> None:
+    assert not _settled().wants_swarms(0.05 + 0.9 * WORSE)
+
+
+def test_a_frame_worse_than_usual_needs_swarms() -> None:
+    assert _settled().wants_swarms(0.05 + 1.1 * WORSE)
+
+
+def test_a_limb_in_doubt_needs_swarms() -> None:
+    effort = _settled()
+    effort.begin(1.0, doubt=True)
+    assert effort.wants_swarms(0.05)
+
+
+def test_all_frames_are_searched_if_not_only_the_needed_ones_are() -> None:
+    effort = Effort(needed_only=False)
+    for _ in range(5):
+        effort.begin(1.0, doubt=False)
+        assert effort.wants_swarms(0.05)
+        effort.end(0.05)
+
+
+def test_reset_forgets_the_usual_cost() -> None:
+    effort = _settled()
+    effort.reset()
+    effort.begin(1.0, doubt=False)
+    assert effort.wants_swarms(0.05)
+
+
+@pytest.mark.parametrize(("fraction", "granted"), [(1.0, 100), (0.5, 50), (0.1, 10), (0.0, 0)])
+def test_effort_is_the_fraction_of_frames_that_are_searched(fraction: float, granted: int) -> None:
+    effort = Effort(needed_only=False)
+    count = 0
+    for _ in range(100):
+        effort.begin(fraction, doubt=False)
+        count += effort.granted
+        assert effort.wants_swarms(1.0) is effort.granted
+    assert count == granted
+
+
+@pytest.mark.parametrize("fraction", [-0.1, 1.1, float("nan")])
+def test_an_effort_that_is_no_fraction_is_refused(fraction: float) -> None:
+    with pytest.raises(ConfigError, match="effort is .*expected 0 to 1"):
+        Effort(needed_only=True).begin(fraction, doubt=False)
