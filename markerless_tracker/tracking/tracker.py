@@ -147,7 +147,7 @@ class Tracker:
         """Region of each camera's image that `step` would use at a time; None for all of it.
 
         It follows from the pose of the set before the last one, so that it is known while the last
-        one is fitted. Each camera's whole image is used once in `region.full_frame_every` steps.
+        one is fitted. The whole image is used besides where the region cuts the person off.
         """
         return self._evidence.regions(self._lookahead.current, stamp_ns)
 

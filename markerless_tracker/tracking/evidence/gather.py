@@ -47,6 +47,7 @@ class EvidenceMaker:
         self._margin_px = config.region.component_margin_px
         self._clear_px = edge_radius_px(config) + config.region.component_margin_px
         self._every = config.region.full_frame_every
+        self._follows = config.background.follow_s > 0.0
         self._pool = pool
         self.segmenters: dict[str, Segmenter] = {}
         self.take_backgrounds(backgrounds)
@@ -99,8 +100,8 @@ class EvidenceMaker:
         def one(name: str) -> SeenView:
             view = views[name]
             if isinstance(view, Observation):
-                return SeenView(view, None, True, None)
-            return self._segmented(name, view, stamp_ns, regions[name])
+                return SeenView(view, None, None, None)
+            return self._segmented(name, view, stamp_ns, regions[name], outlook.number)
 
         each: Callable[..., Iterable[SeenView]] = map if ahead else self._pool.map
         return dict(zip(views, each(one, views), strict=True))
@@ -110,16 +111,28 @@ class EvidenceMaker:
         found = self._pool.map(lambda name: self._whole(name, seen[name], stamp_ns), seen)
         return dict(zip(seen, found, strict=True))
 
-    def _segmented(self, name: str, image: Image, stamp_ns: int, region: Region | None) -> SeenView:
+    def _segmented(
+        self, name: str, image: Image, stamp_ns: int, region: Region | None, number: int
+    ) -> SeenView:
         segmenter = self._segmenter(name)
+        # A background that follows the images learns from whole ones.
+        part = None if self._whole_frame_is_due(name, number) else region
         with segmenter.lock:
-            observation = segmenter.observe(image, stamp_ns, region)
-            return SeenView(observation, image, region is None, segmenter.gain)
+            observation = segmenter.observe(image, stamp_ns, part)
+            return SeenView(observation, image, region, segmenter.gain)
 
     def _whole(self, name: str, seen: SeenView, stamp_ns: int) -> Observation:
-        if seen.whole or seen.image is None:
-            return seen.observation
-        return self._segmented(name, seen.image, stamp_ns, None).observation
+        observation = seen.observation
+        if seen.image is None or (observation.width, observation.height) == observation.size_px:
+            return observation
+        segmenter = self._segmenter(name)
+        with segmenter.lock:
+            return segmenter.observe(seen.image, stamp_ns)
+
+    def _whole_frame_is_due(self, name: str, number: int) -> bool:
+        """The cameras in rotation, so that no frame costs much more than others."""
+        shift = self._rig.names.index(name) * self._every // len(self._rig)
+        return self._follows and (number + shift) % self._every == 0
 
     def warm_up(self) -> dict[str, Observation]:
         """Compile the imaging; returns made-up observations with a rectangle as silhouette."""
@@ -170,10 +183,9 @@ class EvidenceMaker:
 
         def evidence(name: str) -> tuple[Observation, int]:
             lines, view = body_lines(self._rig[name], cones), seen[name]
-            if not view.whole:
-                found = explained_in_region(
-                    view.observation, lines, self._margin_px, self._clear_px
-                )
+            if view.region is not None:
+                part = view.observation.cut(view.region)
+                found = explained_in_region(part, lines, self._margin_px, self._clear_px)
                 if found is not None:
                     return found
             return explained_part(self._whole(name, view, stamp_ns), lines, self._margin_px)
@@ -181,22 +193,15 @@ class EvidenceMaker:
         return _kept(dict(zip(seen, self._pool.map(evidence, seen), strict=True)))
 
     def regions(self, outlook: Outlook, stamp_ns: int) -> dict[str, Region | None]:
-        """Region of each camera in the step after the next one: body and margin; None = all.
-
-        Each camera's whole frame is used every `region.full_frame_every` steps, the cameras in
-        rotation, so that no frame costs much more than others.
-        """
+        """Region of each camera in the step after the next one: body and margin; None = all."""
         predicted, margin_m = outlook.predicted(stamp_ns)
-        if margin_m is None:
+        if margin_m is None or self._every == 1:
             return dict.fromkeys(self._rig.names)
         cones = place_cones(outlook.body, predicted)
-        regions: dict[str, Region | None] = {}
-        for i, camera in enumerate(self._rig):
-            shift = i * self._every // len(self._rig)
-            whole = (outlook.number + 2 + shift) % self._every == 0
-            lines = body_lines(camera, cones)
-            regions[camera.name] = None if whole else body_region(lines, margin_m, self._clear_px)
-        return regions
+        return {
+            camera.name: body_region(body_lines(camera, cones), margin_m, self._clear_px)
+            for camera in self._rig
+        }
 
     def _check(self, views: Mapping[str, Image | Observation]) -> None:
         if not views:

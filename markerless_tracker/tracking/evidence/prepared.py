@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import Image
+from markerless_tracker.imaging import Image, Region
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.motion import MotionModel
 
@@ -47,13 +47,13 @@ class SeenView(NamedTuple):
     Attributes:
         observation: of a region or the whole frame, before components are chosen.
         image: what it was made of; None if it came ready-made.
-        whole: whether it holds all of the frame that there is.
+        region: where the components of the person are chosen; None = all of it.
         exposure: brightness of the image relative to its background's, by channel.
     """
 
     observation: Observation
     image: Image | None
-    whole: bool
+    region: Region | None
     exposure: tuple[float, ...] | None
 
 
