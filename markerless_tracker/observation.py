@@ -159,6 +159,27 @@ class Observation:
         words = None if undecided is None else pack_mask(undecided)
         return cls(camera, stamp_ns, size, offset_px, pack_mask(mask), edges, words)
 
+    def cut(self, box: tuple[int, int, int, int]) -> "Observation":
+        """The part in a box (left, top, right, bottom) of the frame, which lies in the region.
+
+        The very same if the box is the region.
+        """
+        u, v = self.offset_px
+        left, top, right, bottom = box
+        if box == (u, v, u + self.width, v + self.height):
+            return self
+        inside = np.s_[top - v : bottom - v, left - u : right - u]
+        undecided = self.undecided
+        return Observation.from_mask(
+            self.camera,
+            self.stamp_ns,
+            self.mask[inside],
+            self.edges[inside],
+            undecided=None if undecided is None else undecided[inside],
+            size_px=self.size_px,
+            offset_px=(left, top),
+        )
+
     def with_masks(self, mask: NDArray[Any], undecided: NDArray[Any] | None) -> "Observation":
         """The same view with other silhouette and undecided pixels, (h, w) of the region."""
         words = None if undecided is None else pack_mask(undecided)

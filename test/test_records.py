@@ -242,3 +242,21 @@ def test_a_region_in_its_full_frame() -> None:
     np.testing.assert_array_equal(seen.in_full_frame(mask), expected)
     whole = Observation.from_mask("cam01", 0, mask, edges)
     assert whole.in_full_frame(mask) is mask
+
+
+def test_a_part_of_an_observation_is_cut() -> None:
+    rng = np.random.default_rng(3)
+    classes = rng.integers(0, 3, (40, 90))
+    edges = rng.integers(0, 255, (40, 90), dtype=np.uint8)
+    seen = Observation.from_mask(
+        "cam01", 7, classes == 1, edges, undecided=classes == 2, size_px=(200, 100),
+        offset_px=(30, 20),
+    )  # fmt: skip
+    part = seen.cut((41, 25, 110, 60))
+    assert (part.camera, part.stamp_ns, part.size_px) == ("cam01", 7, (200, 100))
+    assert (part.offset_px, part.width, part.height) == ((41, 25), 69, 35)
+    inside = np.s_[5:40, 11:80]
+    np.testing.assert_array_equal(part.mask, (classes == 1)[inside])
+    np.testing.assert_array_equal(part.undecided, (classes == 2)[inside])
+    np.testing.assert_array_equal(part.edges, edges[inside])
+    assert seen.cut((30, 20, 120, 60)) is seen

@@ -1,6 +1,8 @@
 """Runs a tracker over a recording, through the same `Tracker.step` as the live node."""
 
+import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,7 +10,7 @@ from markerless_tracker.datasets import FrameSet, Recording, every_for_fps
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.imaging import BackgroundModel, ImagingSettings, learn_background
 from markerless_tracker.records import TrackResult
-from markerless_tracker.tracking import TrackerSetup
+from markerless_tracker.tracking import Prepared, TrackerSetup
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,9 @@ def track_recording(
 ) -> Iterator[TrackedFrame]:
     """Track from the start's frame (the first, if the start names no time) to the end.
 
+    With more than one thread the next set is read and its evidence made while a set is fitted;
+    results are the same bytes.
+
     Args:
         recording: images, at the scale of the tracker's rig.
         setup: the tracker and the time of its start pose.
@@ -54,5 +59,26 @@ def track_recording(
     """
     every = every_for_fps(recording.fps, fps)
     start = 0 if setup.start_stamp_ns is None else recording.start_index(setup.start_stamp_ns)
-    for images in recording.frames(start=start, every=every):
-        yield TrackedFrame(images, setup.tracker.step(images.images, images.stamp_ns))
+    frames = recording.frames(start=start, every=every)
+    tracker = setup.tracker
+    if (tracker.config.threads or os.cpu_count() or 1) == 1:
+        for images in frames:
+            yield TrackedFrame(images, tracker.step(images.images, images.stamp_ns))
+        return
+
+    def read() -> tuple[FrameSet, Prepared] | None:
+        images = next(frames, None)
+        if images is None:
+            return None
+        return images, tracker.prepare(images.images, images.stamp_ns)
+
+    with ThreadPoolExecutor(1, thread_name_prefix="evidence") as ahead:
+        current = ahead.submit(read).result()
+        while current is not None:
+            images, prepared = current
+            following = ahead.submit(read)
+            result = tracker.step(prepared, images.stamp_ns)
+            # What the caller does with a result may use the tracker.
+            wait([following])
+            yield TrackedFrame(images, result)
+            current = following.result()

@@ -202,7 +202,8 @@ class RegionSettings(SettingsGroup):
     full_frame_every: int = setting(
         30,
         "while the person is tracked, images are processed around the predicted body only, and "
-        "each camera's whole image once in this many frames (the pose is the same); 1 = always",
+        "with background.follow_s each camera's whole image once in this many frames (the pose is "
+        "the same); 1 = whole images always",
         least=1,
         most=100000,
     )

@@ -1,5 +1,6 @@
 """`Tracker.step`: from the views of one time to a pose."""
 
+import copy
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -10,12 +11,19 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.errors import TrackerError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.assess import Assessor, Found, Seen
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
+from markerless_tracker.tracking.evidence.prepared import (
+    Lookahead,
+    Outlook,
+    Prepared,
+    SeenView,
+)
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
 from markerless_tracker.tracking.limits import check_pose, joint_speeds
@@ -90,6 +98,7 @@ class Tracker:
         self._assessor = Assessor(rig, body, config)
         self._given = given
         self._starter = None if given else self._new_starter()
+        self._lookahead = Lookahead(self._outlook(-1), self._outlook(0))
 
     @property
     def state(self) -> TrackState:
@@ -109,6 +118,7 @@ class Tracker:
         self._assessor.reset()
         self._searcher = self._searcher_for(self.body)
         self._starter = None if self._given else self._new_starter()
+        self._lookahead.restart(self._outlook(-1), self._outlook(0))
 
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
@@ -136,32 +146,76 @@ class Tracker:
     def regions(self, stamp_ns: int) -> dict[str, Region | None]:
         """Region of each camera's image that `step` would use at a time; None for all of it.
 
-        Besides, each camera's whole image is used once in `region.full_frame_every` steps.
+        It follows from the pose of the set before the last one, so that it is known while the last
+        one is fitted. The whole image is used besides where the region cuts the person off.
         """
-        predicted = self._motion.predict(stamp_ns, self._body.limits)
-        return self._evidence.regions(self.body, predicted, self._motion.region_margin_m(stamp_ns))
+        return self._evidence.regions(self._lookahead.current, stamp_ns)
 
     def segmenter(self, camera: str) -> Segmenter | None:
         """The segmenter of a camera; None without a background."""
         return self._evidence.segmenters.get(camera)
 
-    def step(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> TrackResult:
+    def prepare(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> Prepared:
+        """Make the evidence of the set after the one that `step` deals with now.
+
+        May be called from another thread while `step` runs, once per set and in the order of the
+        sets; `step` with what it returns gives the same bytes as `step` with the views. Without a
+        step in progress, or where nothing can be made ahead, it is as good to call `step` alone.
+
+        Args:
+            views: as `step` takes them; the images must not change until their step is done.
+            stamp_ns: time of the images.
+
+        Raises:
+            ImageError, CalibrationError: as `step`.
+        """
+        # A background that follows the images must get them in the order of the steps.
+        outlook = None if self.config.background.follow_s > 0.0 else self._lookahead.take()
+        if outlook is None:
+            return Prepared(views, stamp_ns, None, {})
+        try:
+            seen = self._evidence.segment(views, stamp_ns, outlook, ahead=True)
+        except TrackerError:
+            self._lookahead.drop()
+            raise
+        return Prepared(views, stamp_ns, outlook, seen)
+
+    def step(
+        self, views: Mapping[str, Image | Observation] | Prepared, stamp_ns: int
+    ) -> TrackResult:
         """Find the pose that explains the views of one time.
 
         Args:
             views: camera name to its image (as `Segmenter.observe` takes it) or to a ready-made
-                observation; cameras may be missing.
+                observation; cameras may be missing. Or what `prepare` made of them.
             stamp_ns: time of the images; the search widens with the time since the last step.
 
         Raises:
             ImageError, CalibrationError: no view, one of an unknown camera, or one that does not
                 fit its calibration or background; names the camera.
         """
+        prepared = views if isinstance(views, Prepared) else None
+        outlook = self._lookahead.begin(prepared)
+        latest = None
+        try:
+            result = self._step(views, stamp_ns, outlook)
+            latest = self._outlook(outlook.number + 2)
+        finally:
+            self._lookahead.end(latest)
+        return result
+
+    def _step(
+        self,
+        views: Mapping[str, Image | Observation] | Prepared,
+        stamp_ns: int,
+        outlook: Outlook,
+    ) -> TrackResult:
         if self.config.search_again and self._assessor.track.given_up:
             self._assessor.give_up()
             self._starter = self._new_starter(self._motion.pose)
+        evidence = self._segmented(views, stamp_ns, outlook)
         predicted = self._motion.predict(stamp_ns, self._body.limits)
-        seen = self._observe(views, stamp_ns, predicted)
+        seen = self._observe(evidence, stamp_ns, predicted)
         if self._starter is not None:
             found = self._search_room(self._starter, seen)
         else:
@@ -172,24 +226,42 @@ class Tracker:
         else:
             result = self._assessor.found(found, self.body, self._body.limits)
             self._learn(found)
-        return replace(result, exposure=self._evidence.exposure(views))
+        exposure = {name: v.exposure for name, v in evidence.items() if v.exposure is not None}
+        return replace(result, exposure=exposure)
+
+    def _segmented(
+        self,
+        views: Mapping[str, Image | Observation] | Prepared,
+        stamp_ns: int,
+        outlook: Outlook,
+    ) -> Mapping[str, SeenView]:
+        """What was made ahead, or the same made now."""
+        if isinstance(views, Prepared):
+            if views.outlook is outlook and views.stamp_ns == stamp_ns:
+                return views.seen
+            views = views.views
+        return self._evidence.segment(views, stamp_ns, outlook)
 
     def _observe(
-        self, views: Mapping[str, Image | Observation], stamp_ns: int, predicted: FloatArray
+        self, evidence: Mapping[str, SeenView], stamp_ns: int, predicted: FloatArray
     ) -> Seen:
         """The evidence near the predicted pose (p,); of the whole views without a track."""
         if self._starter is not None:
-            observed = self._evidence.observe(views, stamp_ns)
+            observed = self._evidence.whole(evidence, stamp_ns)
             believed, notes = self._views.sort(observed, self.body, None)
             return Seen(stamp_ns, observed, believed, notes)
-        observed, left_out = self._evidence.gather(
-            views, stamp_ns, self.body, predicted, margin_m=self._motion.region_margin_m(stamp_ns)
-        )
+        observed, left_out = self._evidence.gather(evidence, stamp_ns, self.body, predicted)
         expected = predicted if self.state is TrackState.TRACKING else None
         believed, notes = self._views.sort(observed, self.body, expected)
         if self.state is not TrackState.LOST:
             believed = decide(believed, self._cameras, self.body, predicted)
         return Seen(stamp_ns, observed, believed, notes, left_out)
+
+    def _outlook(self, number: int) -> Outlook:
+        return Outlook(
+            number, self.body, copy.copy(self._motion), self._body.limits,
+            searching=self._starter is not None,
+        )  # fmt: skip
 
     def _search_room(self, starter: Starter, seen: Seen) -> Found | None:
         """Search the whole views for a person; None if there is none."""

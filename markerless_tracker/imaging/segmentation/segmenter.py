@@ -1,5 +1,7 @@
 """One camera's image to evidence: silhouette and edge map."""
 
+import threading
+
 import numpy as np
 
 from markerless_tracker.errors import ImageError
@@ -22,14 +24,19 @@ _SLACK_PX = 8
 class Segmenter:
     """Finds the person in one camera's images.
 
-    Its scratch images are reused, so one segmenter serves one thread at a time; the segmenters of
-    different cameras may run side by side (the compiled pass and OpenCV release the lock).
+    Its scratch images are reused, so `observe` and `labels` of one segmenter wait for each other;
+    the segmenters of different cameras may run side by side (the compiled passes and OpenCV release
+    the interpreter's lock).
 
     Args:
         camera: the camera's name.
         background: its empty scene.
         settings: defaults if None.
         edges: whether edge maps are read; if not, those of observations are 0.
+
+    Attributes:
+        lock: held while an image is segmented; `gain` belongs to the image of the call before it
+            under the same lock.
 
     Raises:
         ImageError: no background for this camera.
@@ -49,6 +56,7 @@ class Segmenter:
         self.background = background
         self.settings = settings or ImagingSettings()
         self._with_edges = edges
+        self.lock = threading.RLock()
         self._labeller = PixelLabeller(camera, background, self.settings)
         self._grey = self._labeller.background.is_grey
         self._size_px = width, height = background.size_px
@@ -96,8 +104,9 @@ class Segmenter:
             ImageError: not an image of the background's size and channels; names the camera.
         """
         self._check(image)
-        self._labeller.measure_exposure(image)
-        return self._labeller.label(image, self._whole, self._whole).copy()
+        with self.lock:
+            self._labeller.measure_exposure(image)
+            return self._labeller.label(image, self._whole, self._whole).copy()
 
     def observe(self, image: Image, stamp_ns: int, region: Region | None = None) -> Observation:
         """Silhouette and edge map of a region, or of the whole frame.
@@ -122,6 +131,10 @@ class Segmenter:
                 f"{self.camera}: got a region of {tuple(region)}, expected one inside the image of "
                 f"{self._size_px[0]}x{self._size_px[1]} px"
             )
+        with self.lock:
+            return self._observe(image, stamp_ns, region)
+
+    def _observe(self, image: Image, stamp_ns: int, region: Region) -> Observation:
         radius_px = edge_radius_px(self.settings) if self._with_edges else 0
         mask, undecided, zone = self._silhouette(image, region, radius_px)
         inside = region.within(zone).slices

@@ -1,6 +1,6 @@
 """The views of one time to the evidence of the tracked body, cameras side by side."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -12,8 +12,8 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter, edge_radius_px
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.evidence.prepared import Outlook, SeenView
 from markerless_tracker.tracking.evidence.selection import (
-    BodyLines,
     body_lines,
     body_region,
     explained_in_region,
@@ -47,7 +47,7 @@ class EvidenceMaker:
         self._margin_px = config.region.component_margin_px
         self._clear_px = edge_radius_px(config) + config.region.component_margin_px
         self._every = config.region.full_frame_every
-        self._calls = 0
+        self._follows = config.background.follow_s > 0.0
         self._pool = pool
         self.segmenters: dict[str, Segmenter] = {}
         self.take_backgrounds(backgrounds)
@@ -74,24 +74,65 @@ class EvidenceMaker:
             )
         self.segmenters = segmenters
 
-    def observe(
-        self, views: Mapping[str, Image | Observation], stamp_ns: int
-    ) -> dict[str, Observation]:
-        """Observations of the whole views, as they are; ready-made ones pass.
+    def segment(
+        self,
+        views: Mapping[str, Image | Observation],
+        stamp_ns: int,
+        outlook: Outlook,
+        *,
+        ahead: bool = False,
+    ) -> dict[str, SeenView]:
+        """The views segmented in the regions that follow from an outlook; ready-made ones pass.
+
+        Args:
+            views: camera name to image or observation.
+            stamp_ns: their time.
+            outlook: of the set before the last one.
+            ahead: one camera after the other in this thread, which leaves the others to a step.
 
         Raises:
             ImageError, CalibrationError: no view, an unknown camera, an image without a background
                 or one that does not fit; names the camera.
         """
         self._check(views)
+        regions = self.regions(outlook, stamp_ns)
 
-        def evidence(item: tuple[str, Image | Observation]) -> Observation:
-            name, view = item
+        def one(name: str) -> SeenView:
+            view = views[name]
             if isinstance(view, Observation):
-                return view
-            return self._segmenter(name).observe(view, stamp_ns)
+                return SeenView(view, None, None, None)
+            return self._segmented(name, view, stamp_ns, regions[name], outlook.number)
 
-        return dict(zip(views, self._pool.map(evidence, views.items()), strict=True))
+        each: Callable[..., Iterable[SeenView]] = map if ahead else self._pool.map
+        return dict(zip(views, each(one, views), strict=True))
+
+    def whole(self, seen: Mapping[str, SeenView], stamp_ns: int) -> dict[str, Observation]:
+        """Observations of the whole views, as they are."""
+        found = self._pool.map(lambda name: self._whole(name, seen[name], stamp_ns), seen)
+        return dict(zip(seen, found, strict=True))
+
+    def _segmented(
+        self, name: str, image: Image, stamp_ns: int, region: Region | None, number: int
+    ) -> SeenView:
+        segmenter = self._segmenter(name)
+        # A background that follows the images learns from whole ones.
+        part = None if self._whole_frame_is_due(name, number) else region
+        with segmenter.lock:
+            observation = segmenter.observe(image, stamp_ns, part)
+            return SeenView(observation, image, region, segmenter.gain)
+
+    def _whole(self, name: str, seen: SeenView, stamp_ns: int) -> Observation:
+        observation = seen.observation
+        if seen.image is None or (observation.width, observation.height) == observation.size_px:
+            return observation
+        segmenter = self._segmenter(name)
+        with segmenter.lock:
+            return segmenter.observe(seen.image, stamp_ns)
+
+    def _whole_frame_is_due(self, name: str, number: int) -> bool:
+        """The cameras in rotation, so that no frame costs much more than others."""
+        shift = self._rig.names.index(name) * self._every // len(self._rig)
+        return self._follows and (number + shift) % self._every == 0
 
     def warm_up(self) -> dict[str, Observation]:
         """Compile the imaging; returns made-up observations with a rectangle as silhouette."""
@@ -123,68 +164,44 @@ class EvidenceMaker:
 
     def gather(
         self,
-        views: Mapping[str, Image | Observation],
+        seen: Mapping[str, SeenView],
         stamp_ns: int,
         body: BodyModel,
         predicted: FloatArray,
-        *,
-        margin_m: float | None,
     ) -> tuple[dict[str, Observation], tuple[str, ...]]:
-        """As `observe` and then `select`, in less time while the body is tracked.
+        """As `whole` and then `select`, in less time while the body is tracked.
 
-        With a margin around the body at the predicted pose, only that region is processed,
-        except where that would change what stays, and each camera's whole frame every
-        `region.full_frame_every` calls.
+        Whole frames are segmented only where the regions would change what stays.
 
-        Raises:
-            ImageError, CalibrationError: as `observe`.
+        Args:
+            seen: of `segment`.
+            stamp_ns: time of the views.
+            body: the tracked body.
+            predicted: (p,) pose expected at that time.
         """
-        self._check(views)
-        self._calls += 1
         cones = place_cones(body, predicted)
 
-        def evidence(item: tuple[str, Image | Observation]) -> tuple[Observation, int]:
-            name, view = item
-            lines = body_lines(self._rig[name], cones)
-            if not isinstance(view, Observation):
-                segmenter = self._segmenter(name)
-                region = None
-                if not self._whole_frame_is_due(name):
-                    region = self._region(lines, margin_m)
-                if region is not None:
-                    seen = segmenter.observe(view, stamp_ns, region)
-                    found = explained_in_region(seen, lines, self._margin_px, self._clear_px)
-                    if found is not None:
-                        return found
-                view = segmenter.observe(view, stamp_ns)
-            return explained_part(view, lines, self._margin_px)
+        def evidence(name: str) -> tuple[Observation, int]:
+            lines, view = body_lines(self._rig[name], cones), seen[name]
+            if view.region is not None:
+                part = view.observation.cut(view.region)
+                found = explained_in_region(part, lines, self._margin_px, self._clear_px)
+                if found is not None:
+                    return found
+            return explained_part(self._whole(name, view, stamp_ns), lines, self._margin_px)
 
-        return _kept(dict(zip(views, self._pool.map(evidence, views.items()), strict=True)))
+        return _kept(dict(zip(seen, self._pool.map(evidence, seen), strict=True)))
 
-    def regions(
-        self, body: BodyModel, predicted: FloatArray, margin_m: float | None
-    ) -> dict[str, Region | None]:
-        """Region of each camera: a body at a pose (p,) and a margin around it; None = all."""
-        cones = place_cones(body, predicted)
+    def regions(self, outlook: Outlook, stamp_ns: int) -> dict[str, Region | None]:
+        """Region of each camera in the step after the next one: body and margin; None = all."""
+        predicted, margin_m = outlook.predicted(stamp_ns)
+        if margin_m is None or self._every == 1:
+            return dict.fromkeys(self._rig.names)
+        cones = place_cones(outlook.body, predicted)
         return {
-            camera.name: self._region(body_lines(camera, cones), margin_m) for camera in self._rig
+            camera.name: body_region(body_lines(camera, cones), margin_m, self._clear_px)
+            for camera in self._rig
         }
-
-    def _region(self, lines: BodyLines, margin_m: float | None) -> Region | None:
-        return None if margin_m is None else body_region(lines, margin_m, self._clear_px)
-
-    def exposure(self, views: Mapping[str, Image | Observation]) -> dict[str, tuple[float, ...]]:
-        """How bright the images just gathered are beside their backgrounds, by channel."""
-        return {
-            name: self.segmenters[name].gain
-            for name, view in views.items()
-            if not isinstance(view, Observation)
-        }
-
-    def _whole_frame_is_due(self, name: str) -> bool:
-        """The cameras in rotation, so that no frame costs much more than others."""
-        shift = self._rig.names.index(name) * self._every // len(self._rig)
-        return (self._calls + shift) % self._every == 0
 
     def _check(self, views: Mapping[str, Image | Observation]) -> None:
         if not views:

@@ -200,5 +200,5 @@ def _drawn(
     """Which lines (c,) can be drawn, and their points (k, n, 2) in whole pixels of the region."""
     pixels = lines.pixels - observation.offset_px
     # Not for NaN either.
-    which = (np.abs(pixels) <= 1e4).all(axis=(1, 2))
+    which = np.asarray((np.abs(pixels) <= 1e4).all(axis=(1, 2)))
     return which, np.round(pixels[which]).astype(np.int32)
