@@ -9,17 +9,26 @@ import hashlib
 import inspect
 import re
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 from numba import njit
+from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
 PACKAGE = Path(__file__).resolve().parent
+_COMPILE = "numba:compile"
 _IMPORT = r"^\s*from {}\.([\w.]+) import (?:(\w.*)|\(([^)]*)\))"
 
 Decorator = Callable[[Callable[..., Any]], Any]
+Progress = Callable[[str, int, int], None]
+"""Receives the name of a kernel that is being compiled, the number of kernels compiled so far, and
+the most that there can be."""
+
+_dispatchers: "WeakSet[Any]" = WeakSet()
 
 
 def compiled(**options: Any) -> Decorator:
@@ -32,6 +41,7 @@ def compiled(**options: Any) -> Decorator:
     def decorate(function: Callable[..., Any]) -> Any:
         dispatcher = njit(nogil=True, **options)(function)
         dispatcher._cache = _Cache(function)
+        _dispatchers.add(dispatcher)
         return dispatcher
 
     return decorate
@@ -93,6 +103,48 @@ def _compiles(source: Path, names: list[str]) -> bool:
     return "compiled import" in text or any(
         name.isupper() or f"class {name}(NamedTuple)" in text for name in names
     )
+
+
+class Compilation(event.Listener):  # type: ignore[misc]
+    """Counts what is compiled; nothing that is stored on disk already counts.
+
+    Attributes:
+        done: kernels compiled so far.
+    """
+
+    def __init__(self, report: Progress) -> None:
+        self.done = 0
+        self._report = report
+
+    def on_start(self, event: Any) -> None:
+        """Called by numba."""
+        self._tell(event)
+
+    def on_end(self, event: Any) -> None:
+        """Called by numba."""
+        if event.data["dispatcher"] in _dispatchers:
+            self.done += 1
+            self._tell(event)
+
+    def _tell(self, event: Any) -> None:
+        dispatcher = event.data["dispatcher"]
+        if dispatcher in _dispatchers:
+            self._report(dispatcher.py_func.__name__, self.done, len(_dispatchers))
+
+
+@contextmanager
+def compilation(report: Progress) -> Iterator[Compilation]:
+    """Report what is compiled in this block, in any thread.
+
+    The most that there can be are all kernels of the modules imported so far; few settings need
+    all of them.
+    """
+    listener = Compilation(report)
+    event.register(_COMPILE, listener)
+    try:
+        yield listener
+    finally:
+        event.unregister(_COMPILE, listener)
 
 
 class _Impl(CompileResultCacheImpl):  # type: ignore[misc]

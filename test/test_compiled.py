@@ -47,6 +47,46 @@ def test_an_edit_in_a_kernel_that_another_file_calls_is_noticed(tmp_path: Path) 
     assert run(tmp_path) == "4.0 Counter()"
 
 
+COUNTING = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from small.compiled import compilation, compiled
+@compiled()
+def half(x):
+    return 0.5 * x
+@compiled()
+def quarter(x):
+    return half(half(x))
+def show(*told):
+    print(*told)
+if __name__ == "__main__":
+    with compilation(show) as counted:
+        quarter(8.0), quarter(4.0)
+    print("done", counted.done)
+    half(1)
+"""
+
+
+def test_the_progress_of_a_compilation(tmp_path: Path) -> None:
+    package = tmp_path / "small"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "compiled.py").write_text((PACKAGE / "compiled.py").read_text())
+    program = tmp_path / "program.py"
+    program.write_text(COUNTING)
+
+    def told() -> list[str]:
+        done = subprocess.run(
+            [sys.executable, str(program), str(tmp_path)],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        return done.stdout.splitlines()
+
+    assert told() == ["quarter 0 2", "half 0 2", "half 1 2", "quarter 2 2", "done 2"]
+    # What is stored is not compiled again.
+    assert told() == ["done 0"]
+
+
 def test_a_kernel_depends_on_kernels_constants_and_named_tuples_that_it_imports() -> None:
     sources = kernel_sources(PACKAGE / "fitness" / "raster" / "kernels.py")
     names = {file.relative_to(PACKAGE).as_posix() for file in sources}

@@ -35,6 +35,7 @@ VERBS: Mapping[str, str] = MappingProxyType(
         "evaluate": "compare a result with reference markers, in mm",
         "synthesize": "render a synthetic person as a recording with exact reference markers",
         "benchmark": "measure speed and accuracy",
+        "compile": "compile everything for this machine, so that no first start waits for it",
     }
 )
 """Verb -> description in one line."""

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.compiled import compilation
 from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.node.tracker.learning import Learning, OpenRequest
@@ -23,6 +24,8 @@ START_TOLERANCE_NS = 4_000_000
 frames are further apart (8.3 ms at 120 fps)."""
 
 _POLL_S = 0.2
+_REPORT_S = 5.0
+"""Time between two lines of the log while kernels are compiled."""
 
 
 class Stepper(Protocol):
@@ -128,6 +131,7 @@ class TrackWorker:
         self._reset = Event()
         self._request = OpenRequest()
         self._waits = False
+        self._reported_s = 0.0
         self.fatal: str | None = None
         # Compilation cannot be interrupted and must not keep the process alive.
         self._thread = Thread(target=self._run, name="fit", daemon=True)
@@ -172,8 +176,10 @@ class TrackWorker:
             if handle is None:
                 return
             self._status.doing("compiling")
-            self._inform("compiling, up to a minute on the first start")
-            handle.tracker.warm_up()
+            self._inform("compiling what is not stored from an earlier start")
+            self._reported_s = self._clock()
+            with compilation(self._compiling):
+                handle.tracker.warm_up()
         except Exception as error:
             self.fatal = one_line(error)
             self._status.failed(self.fatal)
@@ -196,6 +202,16 @@ class TrackWorker:
         request = self._request.current
         if request is not None:
             request.refuse("the tracker ends")
+
+    def _compiling(self, _: str, done: int, most: int) -> None:
+        """Report the progress of a first start, in the log every `_REPORT_S`."""
+        self._status.doing(f"compiling {done} of at most {most} kernels")
+        now_s = self._clock()
+        if now_s - self._reported_s >= _REPORT_S:
+            self._reported_s = now_s
+            self._inform(
+                f"{self._status.activity} (`markerless_tracker compile` does it at install time)"
+            )
 
     def _make(self) -> TrackerHandle | None:
         while not self._stop.is_set():

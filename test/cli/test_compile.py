@@ -1,0 +1,41 @@
+"""The verb `compile`: afterwards a tracker compiles nothing, and neither does the verb again."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from markerless_tracker.cli.main import main
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = """
+import sys
+from markerless_tracker.cli.compile import warm_up
+from markerless_tracker.compiled import compilation
+from markerless_tracker.tracking import TrackerConfig
+with compilation(lambda *_: None) as counted:
+    warm_up(TrackerConfig(), 3)
+print(counted.done)
+"""
+
+
+def test_what_is_stored_is_not_compiled_again(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compile", "--optimizer", "sppso", "--json"]) == 0
+    first = json.loads(capsys.readouterr().out)
+    assert first["optimizers"] == ["sppso"] and first["compiled"] >= 0
+    assert main(["compile", "--optimizer", "sppso"]) == 0
+    assert capsys.readouterr().out.startswith("0 kernels compiled in ")
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.stdout.strip() == "0", done.stderr
+
+
+def test_an_unknown_optimizer_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["compile", "--optimizer", "sppso,annealing"])
+    assert ended.value.code == 2 and "'annealing'" in capsys.readouterr().err
