@@ -22,6 +22,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.records import TrackState
 from markerless_tracker.results.result import ResultWriter, check_target
 from markerless_tracker.results.run import recording_backgrounds, track_recording
+from markerless_tracker.results.smooth import Smoothing, smooth_result
 from markerless_tracker.tracking import (
     TrackerConfig,
     TrackerSetup,
@@ -51,6 +52,9 @@ def run(args: argparse.Namespace) -> int:
     console = Console(stderr=True)
     config = read_config(args.config, _flags(args))
     check_target(args.name, overwrite=args.force, allow="--force")
+    smoothing = None
+    if args.smooth is not None or args.fill_gaps is not None:
+        smoothing = Smoothing(args.smooth, args.fill_gaps or 0.0)
     recording = open_recording(args.source, scale=args.scale)
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
@@ -79,6 +83,9 @@ def run(args: argparse.Namespace) -> int:
             warn=lambda text: _warn(console, text),
             progress=lambda done: bars.update(task, completed=done),
         )
+    filled = None
+    if smoothing is not None and outcome.tracked:
+        filled = smooth_result(args.name, smoothing)
     if args.refine_calibration is not None:
         full = open_recording(args.source).rig
         write_calibration(args.refine_calibration, corrected(full, outcome.shifts, args.scale))
@@ -91,12 +98,16 @@ def run(args: argparse.Namespace) -> int:
             f"{len(outcome.warnings.kinds)} kinds of them",
         )
     if args.json:
-        json.dump(_summary(args, recording, outcome), sys.stdout, indent=2)
+        summary = _summary(args, recording, outcome)
+        if filled is not None:
+            summary["filled"] = filled
+        json.dump(summary, sys.stdout, indent=2)
         sys.stdout.write("\n")
     else:
         print(
             f"{outcome.trc_path}: {outcome.frames} frames, {outcome.tracked} tracked, "
             f"{outcome.states.get(TrackState.LOST.value, 0)} lost, {outcome.frames_per_s} frames/s"
+            + (f"; {filled} frames filled" if filled else "")
         )
     if outcome.tracked:
         return 0
