@@ -70,6 +70,18 @@ def _images(group: argparse._ArgumentGroup) -> None:
         help="scale factor of the images, at most 1 (default 1)",
     )
     group.add_argument(
+        "--time-offsets",
+        metavar="CAM=S,...|FILE",
+        help="seconds by which cameras began late, such as cam02=0.05,cam03=-0.1, or a YAML file",
+    )
+    group.add_argument(
+        "--masks",
+        type=Path,
+        metavar="DIR",
+        help="silhouettes made elsewhere, DIR/CAMERA/FRAME.png (such as cam01/000050.png), instead "
+        "of background subtraction",
+    )
+    group.add_argument(
         "--background",
         type=Path,
         metavar="DIR",

@@ -166,7 +166,7 @@ def smoothed(result: StoredResult, smoothing: Smoothing) -> tuple[StoredResult, 
     parameters, sd = np.array(result.parameters), np.array(result.parameters_sd)
     angles = np.array(result.angles_deg)
     positions, positions_sd = np.array(result.positions_m), np.array(result.positions_sd_m)
-    known = np.isfinite(parameters).all(axis=1)
+    known = np.asarray(np.isfinite(parameters).all(axis=1))
     filled = np.zeros(len(result), dtype=np.bool_)
     periods = np.full(body.size, _TURN_RAD)
     periods[body.translations] = np.inf
