@@ -6,7 +6,8 @@ The names in `__all__` are the public interface for Python programs:
   `TrackerConfig`; `Tracker.step(views, stamp_ns)` returns a `TrackResult`;
 - cameras and backgrounds: `read_calibration`, `CameraModel`, `learn_background`;
 - recordings: `open_recording`, `recording_backgrounds`, `track_recording`;
-- markers and results: `read_trc`, `write_trc`, `MarkerTrack`, `ResultWriter`, `score`.
+- markers and results: `read_trc`, `write_trc`, `MarkerTrack`, `ResultWriter`, `score`;
+  `read_result` gives a `StoredResult`, named arrays over time.
 
 They are imported at their first use, so that importing the package itself is fast.
 """
@@ -42,12 +43,14 @@ if TYPE_CHECKING:
     from markerless_tracker.records import Observation as Observation
     from markerless_tracker.records import TrackResult as TrackResult
     from markerless_tracker.records import TrackState as TrackState
+    from markerless_tracker.results.read import read_result as read_result
     from markerless_tracker.results.result import ResultWriter as ResultWriter
     from markerless_tracker.results.run import TrackedFrame as TrackedFrame
     from markerless_tracker.results.run import recording_backgrounds as recording_backgrounds
     from markerless_tracker.results.run import track_recording as track_recording
     from markerless_tracker.results.score import Score as Score
     from markerless_tracker.results.score import score as score
+    from markerless_tracker.results.stored_result import StoredResult as StoredResult
     from markerless_tracker.tracking import Tracker as Tracker
     from markerless_tracker.tracking import TrackerConfig as TrackerConfig
     from markerless_tracker.tracking import TrackerSetup as TrackerSetup
@@ -70,9 +73,11 @@ _EXPORTS = {
     ),
     "imaging": ("BackgroundModel", "learn_background"),
     "records": ("Confidence", "LimbState", "Observation", "TrackResult", "TrackState"),
+    "results.read": ("read_result",),
     "results.result": ("ResultWriter",),
     "results.run": ("TrackedFrame", "recording_backgrounds", "track_recording"),
     "results.score": ("Score", "score"),
+    "results.stored_result": ("StoredResult",),
     "tracking": ("Tracker", "TrackerConfig", "TrackerSetup", "build_tracker"),
 }
 """Public names by the module that defines them."""

@@ -18,10 +18,13 @@ from markerless_tracker.camera.calibration import write_calibration
 from markerless_tracker.cli.frame_warnings import FrameWarnings
 from markerless_tracker.cli.track_arguments import add_arguments
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
+from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
+from markerless_tracker.datasets.silhouettes import Silhouettes
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.records import TrackState
 from markerless_tracker.results.result import ResultWriter, check_target
 from markerless_tracker.results.run import recording_backgrounds, track_recording
+from markerless_tracker.results.smooth import Smoothing, smooth_result
 from markerless_tracker.tracking import (
     TrackerConfig,
     TrackerSetup,
@@ -51,7 +54,15 @@ def run(args: argparse.Namespace) -> int:
     console = Console(stderr=True)
     config = read_config(args.config, _flags(args))
     check_target(args.name, overwrite=args.force, allow="--force")
+    smoothing = None
+    if args.smooth is not None or args.fill_gaps is not None:
+        smoothing = Smoothing(args.smooth, args.fill_gaps or 0.0)
     recording = open_recording(args.source, scale=args.scale)
+    if args.time_offsets is not None:
+        recording = InStepRecording(recording, read_time_offsets(args.time_offsets))
+    silhouettes = None if args.masks is None else Silhouettes(args.masks, recording.rig)
+    if silhouettes is not None and args.debug_images is not None:
+        raise ConfigError("--debug-images shows the segmentation, which --masks replaces")
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
         console=console,
@@ -60,7 +71,11 @@ def run(args: argparse.Namespace) -> int:
         setup = build_tracker(
             recording.rig,
             config,
-            backgrounds=recording_backgrounds(recording, config, args.background),
+            backgrounds=(
+                recording_backgrounds(recording, config, args.background)
+                if silhouettes is None
+                else None
+            ),
             start_file=args.start,
             subject_file=args.subject,
             subject_from=args.subject_from,
@@ -76,9 +91,13 @@ def run(args: argparse.Namespace) -> int:
             recording,
             setup,
             config,
+            silhouettes=silhouettes,
             warn=lambda text: _warn(console, text),
             progress=lambda done: bars.update(task, completed=done),
         )
+    filled = None
+    if smoothing is not None and outcome.tracked:
+        filled = smooth_result(args.name, smoothing)
     if args.refine_calibration is not None:
         full = open_recording(args.source).rig
         write_calibration(args.refine_calibration, corrected(full, outcome.shifts, args.scale))
@@ -91,12 +110,16 @@ def run(args: argparse.Namespace) -> int:
             f"{len(outcome.warnings.kinds)} kinds of them",
         )
     if args.json:
-        json.dump(_summary(args, recording, outcome), sys.stdout, indent=2)
+        summary = _summary(args, recording, outcome)
+        if filled is not None:
+            summary["filled"] = filled
+        json.dump(summary, sys.stdout, indent=2)
         sys.stdout.write("\n")
     else:
         print(
             f"{outcome.trc_path}: {outcome.frames} frames, {outcome.tracked} tracked, "
             f"{outcome.states.get(TrackState.LOST.value, 0)} lost, {outcome.frames_per_s} frames/s"
+            + (f"; {filled} frames filled" if filled else "")
         )
     if outcome.tracked:
         return 0
@@ -147,6 +170,7 @@ def _track(
     setup: TrackerSetup,
     config: TrackerConfig,
     *,
+    silhouettes: Silhouettes | None,
     warn: Callable[[str], None],
     progress: Callable[[int], Any],
 ) -> _Outcome:
@@ -167,7 +191,7 @@ def _track(
         overwrite=args.force,
         keep_lost=args.keep_lost,
     ) as writer:
-        for tracked in track_recording(recording, setup, fps=args.fps):
+        for tracked in track_recording(recording, setup, fps=args.fps, silhouettes=silhouettes):
             result, body = tracked.result, tracker.body
             writer.add(result)
             writer.body = body

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from markerless_tracker.results.smooth import CUTOFF_HZ
 from markerless_tracker.tracking import OPTIMIZERS, PRESETS
 
 
@@ -26,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _person(parser.add_argument_group("the person (all optional)"))
     _images(parser.add_argument_group("images"))
     _search(parser.add_argument_group("search"))
+    _afterwards(parser.add_argument_group("afterwards"))
     _files(parser.add_argument_group("further files"))
 
 
@@ -68,6 +70,18 @@ def _images(group: argparse._ArgumentGroup) -> None:
         help="scale factor of the images, at most 1 (default 1)",
     )
     group.add_argument(
+        "--time-offsets",
+        metavar="CAM=S,...|FILE",
+        help="seconds by which cameras began late, such as cam02=0.05,cam03=-0.1, or a YAML file",
+    )
+    group.add_argument(
+        "--masks",
+        type=Path,
+        metavar="DIR",
+        help="silhouettes made elsewhere, DIR/CAMERA/FRAME.png (such as cam01/000050.png), instead "
+        "of background subtraction",
+    )
+    group.add_argument(
         "--background",
         type=Path,
         metavar="DIR",
@@ -104,6 +118,25 @@ def _search(group: argparse._ArgumentGroup) -> None:
         type=Path,
         metavar="FILE",
         help="settings as YAML; the options above take precedence",
+    )
+
+
+def _afterwards(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--smooth",
+        type=float,
+        nargs="?",
+        const=CUTOFF_HZ,
+        metavar="HZ",
+        help="smooth the finished result without lag, with this cutoff frequency (default "
+        f"{CUTOFF_HZ:g}); NAME.json has velocities then",
+    )
+    group.add_argument(
+        "--fill-gaps",
+        type=float,
+        metavar="S",
+        help="interpolate gaps of at most S seconds between tracked frames; the frames are marked "
+        "`filled` in NAME.json",
     )
 
 

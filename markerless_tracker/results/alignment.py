@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.errors import DatasetError
@@ -128,19 +129,22 @@ def interpolated(track: MarkerTrack, times_s: FloatArray) -> FloatArray:
         share < 1e-6, first, np.where(share > 1.0 - 1e-6, last, first + share * (last - first))
     )
     exact = (share < 1e-6) | (share > 1.0 - 1e-6)
-    return np.where(inside[:, None, None] | (exact & _near(own, times_s)), mixed, np.nan)
+    shown = inside[:, None, None] | (exact & _near(own, times_s))
+    return np.asarray(np.where(shown, mixed, np.nan))
 
 
-def _near(own: FloatArray, times_s: FloatArray) -> FloatArray:
+def _near(own: FloatArray, times_s: FloatArray) -> NDArray[np.bool_]:
     """(k, 1, 1) whether a time is that of a row, to the microsecond."""
     after = np.searchsorted(own, times_s).clip(1, len(own) - 1)
     gap = np.minimum(np.abs(own[after] - times_s), np.abs(own[after - 1] - times_s))
-    return (gap < 1e-6)[:, None, None]
+    return np.asarray((gap < 1e-6)[:, None, None])
 
 
 def _rigid(result: MarkerTrack, reference: MarkerTrack, offset_s: float) -> Alignment | None:
     targets = interpolated(reference, result.stamps_ns / 1e9 + offset_s)
-    both = np.isfinite(result.positions_m).all(axis=2) & np.isfinite(targets).all(axis=2)
+    both = np.asarray(
+        np.isfinite(result.positions_m).all(axis=2) & np.isfinite(targets).all(axis=2)
+    )
     if both.any(axis=1).sum() < _LEAST_ROWS:
         return None
     points, wanted = result.positions_m[both], targets[both]

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.datasets.markers.track import PELVIS, MarkerTrack
 from markerless_tracker.geometry import FloatArray
@@ -62,7 +63,7 @@ def measures(result: MarkerTrack, reference: MarkerTrack, *, skip: int = 0) -> M
     rows, reference_rows = match_rows(result, reference)
     found = result.selected(names).positions_m[rows]
     truth = reference.selected(names).positions_m[reference_rows]
-    both = np.isfinite(found).all(axis=2) & np.isfinite(truth).all(axis=2)
+    both = np.asarray(np.isfinite(found).all(axis=2) & np.isfinite(truth).all(axis=2))
     mpjpe = pck = None
     if PELVIS in names:
         root = names.index(PELVIS)
@@ -105,7 +106,7 @@ def rotation_onto(points: FloatArray, targets: FloatArray) -> tuple[FloatArray, 
     return np.asarray((u * signs) @ vt), scale
 
 
-def _mean_of_frames(errors: FloatArray, used: np.ndarray) -> float | None:
+def _mean_of_frames(errors: FloatArray, used: NDArray[np.bool_]) -> float | None:
     """Mean over frames of the mean over their used joints; None without any."""
     counts = used.sum(axis=1)
     rows = counts > 0

@@ -59,8 +59,12 @@ class TrcStream:
         self.rows, self.last_ns = self.rows + 1, stamp_ns
         self._file.rewrite(0, self._fixed_header(fps))
 
-    def finish(self, fps: float) -> None:
+    def finish(self, fps: float, title: str | None = None) -> None:
         """Write the header in its final form and close the file.
+
+        Args:
+            fps: rate, 1/s.
+            title: file name in line 1; None = that of the file.
 
         Raises:
             DatasetError: there is no room for the new file; the old one stays, it has every row.
@@ -69,7 +73,9 @@ class TrcStream:
         final = self.path.with_name(self.path.name + ".tmp")
         try:
             with self.path.open("rb") as rows, final.open("wb") as sink:
-                sink.write(_text(format_header(self._names, self.rows, fps, self.path.name)))
+                sink.write(
+                    _text(format_header(self._names, self.rows, fps, title or self.path.name))
+                )
                 rows.seek(self._header_size)
                 shutil.copyfileobj(rows, sink)
             os.replace(final, self.path)

@@ -1,0 +1,120 @@
+"""Cameras that began at different times, brought into step by whole frames."""
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import yaml
+
+from markerless_tracker.datasets.recording import FrameSet, Recording
+from markerless_tracker.datasets.video.rates import stamp_of
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.imaging import BackgroundModel, Image
+
+MOST_OFFSET_S = 60.0
+"""Largest difference of two cameras' offsets: sets of that duration are held in memory."""
+
+
+def read_time_offsets(text: str) -> dict[str, float]:
+    """Offsets in s by camera, from `cam01=0.02,cam03=-0.1` or a YAML file of such a mapping.
+
+    Raises:
+        ConfigError: it is neither.
+    """
+    path = Path(text)
+    try:
+        if path.suffix in (".yaml", ".yml"):
+            loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
+        else:
+            loaded = dict(entry.split("=") for entry in text.split(",") if entry)
+        return {str(name): float(value) for name, value in loaded.items()}
+    except (OSError, yaml.YAMLError, ValueError, TypeError, AttributeError) as error:
+        raise ConfigError(
+            f"time offsets {text!r}: expected cam01=SECONDS,... or a YAML file with lines "
+            f"`cam01: SECONDS` ({error})"
+        ) from error
+
+
+class InStepRecording(Recording):
+    """A recording whose cameras' clocks differ by constant offsets.
+
+    A set at time t has of each camera the frame nearest to t minus its offset: one that its camera
+    took at t if frame k was taken at k / fps + offset. Frames that are half a period off are named
+    in a warning. The first sets, which a late camera lacks, are left out.
+
+    Args:
+        recording: the recording as it is stored.
+        offsets_s: seconds by which a camera began late; 0 for cameras left out.
+
+    Raises:
+        ConfigError: a camera is unknown, or the offsets differ by more than a minute.
+    """
+
+    def __init__(self, recording: Recording, offsets_s: Mapping[str, float]) -> None:
+        unknown = sorted(set(offsets_s) - set(recording.rig.names))
+        if unknown:
+            raise ConfigError(
+                f"time offsets: no camera {', '.join(unknown)}, expected "
+                f"{', '.join(recording.rig.names)}"
+            )
+        frames = {name: offsets_s.get(name, 0.0) * recording.fps for name in recording.rig.names}
+        if not max(frames.values()) - min(frames.values()) <= MOST_OFFSET_S * recording.fps:
+            raise ConfigError(f"time offsets differ by more than {MOST_OFFSET_S:g} s")
+        self._inner = recording
+        self._shifts = {name: round(value) for name, value in frames.items()}
+        self._first = max(0, *self._shifts.values())
+        self.path, self.name, self.rig = recording.path, recording.name, recording.rig
+        self.scale, self.fps = recording.scale, recording.fps
+        count = recording.frame_count
+        self.frame_count = None if count is None else count + min(self._shifts.values())
+        self._warnings = {}
+        worst = max(abs(value - self._shifts[name]) for name, value in frames.items())
+        if worst > 0.25:
+            self.warn(
+                f"{self.name}: time offsets are met to whole frames only: up to "
+                f"{1000.0 * worst / self.fps:.1f} ms remain"
+            )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Problems found, one line each."""
+        return (*self._inner.warnings, *self._warnings.values())
+
+    def background_frames(self, folder: Path | None = None) -> dict[str, list[Image]]:
+        """As of the stored recording."""
+        return self._inner.background_frames(folder)
+
+    def background_models(self, folder: Path | None = None) -> dict[str, BackgroundModel]:
+        """As of the stored recording."""
+        return self._inner.background_models(folder)
+
+    def room_stills(self) -> dict[str, list[Image]]:
+        """As of the stored recording."""
+        return self._inner.room_stills()
+
+    def _nearest(self, stamp_ns: int) -> tuple[int, int]:
+        index, nearest_ns = self._inner._nearest(stamp_ns)
+        inside = max(index, self._first)
+        if self.frame_count is not None:
+            inside = min(inside, self.frame_count - 1)
+        # By the recording's rate, since sets outside have no stamp of their own.
+        return inside, nearest_ns + stamp_of(inside - index, self.fps)
+
+    def _read(self, start: int, every: int) -> Iterator[FrameSet]:
+        begin = max(start, self._first)
+        latest, earliest = min(self._shifts.values()), max(self._shifts.values())
+        held: deque[FrameSet] = deque(maxlen=earliest - latest + 1)
+        for stored in self._inner.frames(start=begin - earliest):
+            held.append(stored)
+            # The newest stored set completes this one.
+            index = stored.index + latest
+            if index < begin or (index - begin) % every:
+                continue
+            images = {
+                name: held[index - shift - stored.index - 1].images[name]
+                for name, shift in self._shifts.items()
+            }
+            # The stored set of that number has the stamp, while it is held.
+            near = held[index - stored.index - 1] if latest <= 0 <= earliest else stored
+            stamp_ns = near.stamp_ns + stamp_of(index - near.index, self.fps)
+            yield FrameSet(index, stamp_ns, images)

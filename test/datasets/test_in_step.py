@@ -1,0 +1,67 @@
+"""Cameras that began at different times."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from markerless_tracker.datasets import open_recording
+from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
+from markerless_tracker.errors import ConfigError, DatasetError
+
+
+@pytest.mark.parametrize(
+    ("offsets", "indices", "behind"),
+    [
+        ({}, range(12), {}),
+        ({"cam02": 3 / 60}, range(3, 12), {"cam02": 3}),
+        ({"cam01": -2 / 60}, range(10), {"cam01": -2}),
+        ({"cam01": -1 / 60, "cam02": 2 / 60}, range(2, 11), {"cam01": -1, "cam02": 2}),
+        ({"cam01": 2 / 60, "cam02": 3 / 60}, range(3, 14), {"cam01": 2, "cam02": 3}),
+    ],
+)
+def test_each_camera_shows_its_frame_of_that_time(make_recording, offsets, indices, behind) -> None:
+    stored = open_recording(make_recording(frames=12))
+    kept = [frame.images for frame in stored.frames()]
+    recording = InStepRecording(stored, offsets)
+    found = list(recording.frames())
+    assert [frame.index for frame in found] == list(indices)
+    assert recording.frame_count == indices.stop
+    for frame in found:
+        assert frame.stamp_ns == pytest.approx(frame.index * 1e9 / 60, abs=2)
+        for camera, image in frame.images.items():
+            np.testing.assert_array_equal(image, kept[frame.index - behind.get(camera, 0)][camera])
+    later = [frame.index for frame in recording.frames(start=5, every=3)]
+    assert later == list(range(5, indices.stop, 3))
+    assert recording.start_index(round(6e9 / 60)) == 6
+    assert set(recording.background_frames()) == {"cam01", "cam02"}
+
+
+def test_a_start_before_the_late_camera_is_refused(make_recording) -> None:
+    recording = InStepRecording(open_recording(make_recording(frames=12)), {"cam02": 3 / 60})
+    with pytest.raises(DatasetError, match="no frame within half a frame"):
+        recording.start_index(0)
+
+
+def test_what_remains_of_an_offset_is_reported(make_recording) -> None:
+    stored = open_recording(make_recording(frames=12))
+    assert not InStepRecording(stored, {"cam02": 3.1 / 60}).warnings
+    (warning,) = InStepRecording(stored, {"cam02": 3.4 / 60}).warnings
+    assert "up to 6.7 ms remain" in warning
+
+
+def test_impossible_offsets(make_recording, tmp_path: Path) -> None:
+    stored = open_recording(make_recording())
+    with pytest.raises(ConfigError, match="no camera cam07, expected cam01, cam02"):
+        InStepRecording(stored, {"cam07": 0.1})
+    for wrong in (100.0, float("nan")):
+        with pytest.raises(ConfigError):
+            InStepRecording(stored, {"cam01": wrong})
+    assert read_time_offsets("cam01=0.5,cam02=-0.1") == {"cam01": 0.5, "cam02": -0.1}
+    path = tmp_path / "offsets.yaml"
+    path.write_text("cam01: 0.5\n", encoding="utf-8")
+    assert read_time_offsets(str(path)) == {"cam01": 0.5}
+    path.write_text("- 1\n", encoding="utf-8")
+    for text in ("cam01", "cam01=x", str(path), str(tmp_path / "none.yaml")):
+        with pytest.raises(ConfigError, match="time offsets"):
+            read_time_offsets(text)

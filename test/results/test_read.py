@@ -1,0 +1,136 @@
+"""Results read back from their files."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import MARKER_NAMES, load_body, markers
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.records import Confidence, TrackResult, TrackState
+from markerless_tracker.results.journal import open_summary
+from markerless_tracker.results.read import ResultReader, read_result
+from markerless_tracker.results.result import ResultWriter
+from markerless_tracker.results.stored_result import velocities
+from markerless_tracker.tracking import TrackerConfig
+
+BODY = load_body("person31", 1.81)
+POSES = BODY.neutral + 0.2 * np.random.default_rng(3).normal(size=(8, BODY.size))
+PERIOD_NS = 20_000_000
+
+
+def frame(index: int, state: TrackState = TrackState.TRACKING) -> TrackResult:
+    return TrackResult(
+        stamp_ns=index * PERIOD_NS,
+        state=state,
+        pose=POSES[index],
+        markers_m=markers(BODY, POSES[index]),
+        fitness=1.25,
+        iou={"cam01": 0.75},
+        evaluations=1000,
+        confidence=Confidence(np.full(BODY.size, 0.1), np.full((15, 3), 0.02), np.eye(6)),
+    )
+
+
+def write(name: Path, lost: tuple[int, ...] = (), **options: bool) -> Path:
+    config = TrackerConfig.from_mapping({"body": "person31"})
+    with ResultWriter(name, BODY, config, fps=50.0, source="walk", **options) as writer:
+        for index in range(8):
+            writer.add(frame(index, TrackState.LOST if index in lost else TrackState.TRACKING))
+    return name
+
+
+def test_everything_comes_back(tmp_path: Path) -> None:
+    result = read_result(write(tmp_path / "a.walk", lost=(3,)))
+    assert (len(result), result.source, result.fps) == (8, "walk", 50.0)
+    assert result.marker_names == MARKER_NAMES
+    assert result.parameter_names == BODY.parameter_names
+    np.testing.assert_array_equal(result.tracked, np.arange(8) != 3)
+    np.testing.assert_allclose(result.times_s, np.arange(8) * 0.02)
+    held = result.tracked
+    np.testing.assert_array_equal(result.parameters[held], POSES[held])
+    truth = np.array([markers(BODY, pose) for pose in POSES])
+    np.testing.assert_allclose(result.positions_m[held], truth[held], atol=1e-6)
+    np.testing.assert_allclose(result.position("LKnee")[0], truth[0, 10], atol=1e-6)
+    np.testing.assert_allclose(result.sd("LKnee")[held], 0.02)
+    np.testing.assert_array_equal(result.parameter("l_knee"), result.parameters[:, 9])
+    for values in (result.positions_m, result.positions_sd_m, result.parameters):
+        assert np.isnan(values[3]).all()
+    np.testing.assert_allclose(markers(result.body(), POSES[0]), truth[0], atol=1e-12)
+    for wrong in (result.position, result.sd, result.parameter, result.angle):
+        with pytest.raises(DatasetError, match="no .* 'Nose', expected one of"):
+            wrong("Nose")
+
+
+def test_rows_of_lost_frames_are_blank_unless_kept(tmp_path: Path) -> None:
+    assert np.isnan(read_result(write(tmp_path / "a", (3,)), keep_lost=True).positions_m[3]).all()
+    kept = write(tmp_path / "b", (3,), keep_lost=True)
+    assert np.isfinite(read_result(kept, keep_lost=True).positions_m[3]).all()
+    assert np.isnan(read_result(kept).positions_m[3]).all()
+
+
+def test_a_run_without_end_is_read_from_its_journal(tmp_path: Path) -> None:
+    config = TrackerConfig.from_mapping({"body": "person31"})
+    writer = ResultWriter(tmp_path / "out", BODY, config, fps=50.0)
+    for index in range(5):
+        writer.add(frame(index))
+    result = read_result(tmp_path / "out")
+    np.testing.assert_array_equal(result.parameters, POSES[:5])
+    assert np.isfinite(result.positions_m).all()
+
+
+def test_chunks_join_to_the_whole(tmp_path: Path) -> None:
+    reader = ResultReader(write(tmp_path / "out", (3,)))
+    parts = list(reader.chunks(3))
+    assert [len(part) for part in parts] == [3, 3, 2]
+    whole = read_result(tmp_path / "out.trc")
+    joined = np.concatenate([part.positions_m for part in parts])
+    np.testing.assert_array_equal(joined, whole.positions_m)
+
+
+def test_a_summary_that_was_laid_out_anew_reads_the_same(tmp_path: Path) -> None:
+    name = write(tmp_path / "out")
+    path = name.with_suffix(".json")
+    head, frames = open_summary(name)
+    kept = list(frames)
+    path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8"))), encoding="utf-8")
+    again, more = open_summary(name)
+    assert again == head and list(more) == kept and len(kept) == 8
+
+
+def test_a_table_for_pandas(tmp_path: Path, monkeypatch) -> None:
+    result = read_result(write(tmp_path / "out", (3,)))
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(DatasetError, match="pip install pandas"):
+        result.to_pandas()
+    monkeypatch.undo()
+    pytest.importorskip("pandas", reason="pandas is not installed")
+    table = result.to_pandas()
+    assert list(table) == ["time", "joint", "x", "y", "z", "sd", "state", "filled"]
+    knee = table[table.joint == "LKnee"]
+    np.testing.assert_array_equal(knee[["x", "y", "z"]], result.position("LKnee"))
+    assert knee.state.tolist() == result.states.tolist()
+
+
+def test_velocities_follow_the_true_times() -> None:
+    stamps = np.array([0, 20, 40, 100, 120]) * 1_000_000
+    values = 3.0 * stamps[:, None] / 1e9
+    found = velocities(stamps, values, 50.0)
+    np.testing.assert_allclose(found[:, 0], 3.0)
+    lone = velocities(stamps[[0, 3]], values[[0, 3]], 50.0)
+    assert np.isnan(lone).all()
+    values[1] = np.nan
+    assert np.isnan(velocities(stamps, values, 50.0)[:2]).all()
+
+
+def test_missing_files_are_named(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match=r"none\.json: no such file"):
+        read_result(tmp_path / "none")
+    name = write(tmp_path / "out")
+    text = name.with_suffix(".json").read_text(encoding="utf-8")
+    broken = text.replace('"stamp_ns": 20000000', '"stamp_ns": "x"')
+    name.with_suffix(".json").write_text(broken, encoding="utf-8")
+    with pytest.raises(DatasetError, match="no `stamp_ns`"):
+        read_result(name)
