@@ -307,6 +307,10 @@ class Tracker:
             )
         notes = self._body.take_warnings() + tuple(f"{name}: found elsewhere" for name in names)
         jumped = np.array([i for name in names for i in self.body.subspaces[name]], dtype=np.int64)
+        # A limb that is found elsewhere jumps; the rest of the body does not.
+        kept = np.clip(search.pose, *limits)
+        kept[jumped] = search.pose[jumped]
+        search.pose = kept
         warnings = seen.notes + notes + seen.left_out
         return Found(search, stamp_ns, believed, warnings, jumped=jumped)
 

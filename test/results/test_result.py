@@ -197,3 +197,21 @@ def test_each_limb_has_its_state_where_there_is_an_estimate(tmp_path, body, conf
         "r_arm": {"state": "TRACKING", "inside_fraction": 1.0, "particle_sd_ratio": 0.25},
     }
     assert "limbs" not in without
+
+
+def test_joint_angles_stand_in_each_frame_continuous_in_time(tmp_path):
+    body = load_body("person31", 1.7)
+    sure = Confidence(np.full(body.size, 0.01), np.full((15, 3), 0.01), np.eye(6))
+    with ResultWriter(tmp_path / "out", body, TrackerConfig(), fps=60.0) as writer:
+        for k, heading in enumerate((4.6, 4.8, 5.0)):
+            pose = body.neutral.copy()
+            pose[body.index("pelvis_rz")], pose[body.index("l_knee")] = heading, -0.5
+            writer.add(result(k, pose=pose, confidence=sure))
+        writer.add(result(4, None))
+    frames = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["frames"]
+    assert "angles" not in frames[3]
+    rotations = [frame["angles"]["pelvis_rotation"] for frame in frames[:3]]
+    assert rotations == pytest.approx(np.rad2deg([4.6, 4.8, 5.0]) - 90.0, abs=0.01)
+    assert frames[0]["angles"]["knee_angle_l"] == pytest.approx(28.65, abs=0.01)
+    assert frames[0]["angles_sd"]["knee_angle_l"] == pytest.approx(0.57, abs=0.01)
+    assert list(frames[0]["angles"]) == list(frames[0]["angles_sd"])

@@ -181,3 +181,17 @@ def test_equations_that_cannot_be_solved_leave_it_unknown(scene, monkeypatch, va
     broken = replace(sums, hessian=np.full_like(sums.hessian, value))
     monkeypatch.setattr(contours, "equations", lambda *_: broken)
     assert confidence_of(scene.body, pose, contours, measured=True) is None
+
+
+def test_the_covariance_has_the_deviations_on_its_diagonal(scene) -> None:
+    pose, contours = frame_of(scene, scene.rig.names)
+    sure = confidence_of(scene.body, pose, contours, measured=True)
+    assert sure is not None
+    np.testing.assert_allclose(np.sqrt(np.diag(sure.covariance)), sure.pose_sd)
+    np.testing.assert_allclose(sure.covariance, sure.covariance.T, atol=1e-12)
+    assert np.linalg.eigvalsh(sure.covariance).min() > 0.0
+    # Both parameters of the same limb are not independent.
+    elbow, twist = scene.body.index("l_elbow"), scene.body.index("l_shoulder_z")
+    assert sure.covariance[elbow, twist] != 0.0
+    plain = replace(sure, pose_covariance=None)
+    np.testing.assert_allclose(plain.covariance, np.diag(sure.pose_sd**2))

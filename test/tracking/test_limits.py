@@ -6,7 +6,7 @@ import pytest
 from markerless_tracker.body import load_body
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.limits import joint_limits
+from markerless_tracker.tracking.limits import TWIST_RAD_S, joint_limits, joint_speeds
 
 WALKING = TrackerConfig.from_mapping({"limits": "bt_walking"})
 
@@ -26,3 +26,20 @@ def test_joints_that_the_published_body_lacks_keep_their_anatomical_limits() -> 
     np.testing.assert_array_equal(found[:, wrist], body.limits[:, wrist])
     np.testing.assert_allclose(found[:, knee], [-1.4434, 0.4701])
     assert np.isinf(found[:, body.index("pelvis_tx")]).all()
+
+
+def test_limbs_turn_about_themselves_no_faster_than_a_person_can() -> None:
+    body = load_body("person31")
+    slow = [n for n, v in zip(body.parameter_names, joint_speeds(body), strict=True) if v < np.inf]
+    assert slow == ["l_hip_z", "r_hip_z", "l_shoulder_z", "r_shoulder_z"]
+    assert joint_speeds(body)[body.index("l_hip_z")] == TWIST_RAD_S
+    assert np.isinf(joint_speeds(load_body("balan31"))).all()
+
+
+def test_published_limits_of_a_swing_are_its_anatomical_ones() -> None:
+    body = load_body("person31")
+    limits = joint_limits(body, TrackerConfig.from_mapping({"limits": "bt_walking"}))
+    swings = [i for i, n in enumerate(body.parameter_names) if "hip_" in n or "shoulder_" in n]
+    np.testing.assert_array_equal(limits[:, swings], body.limits[:, swings])
+    knee = body.index("l_knee")
+    np.testing.assert_array_equal(limits[:, knee], body.walking_limits[:, knee])

@@ -86,3 +86,16 @@ def test_reset_is_the_beginning(motion):
     motion.reset()
     assert motion.predict(2 * FRAME_NS, FREE) is motion.start
     assert motion.stamp_ns is None
+
+
+def test_what_can_be_reached_grows_with_the_time_since_a_tracked_pose(motion):
+    speeds = np.array([np.inf, 10.0, 10.0])
+    limits = np.array([[-np.inf, -np.inf, -np.inf], [np.inf, np.inf, 3.05]])
+    moved(motion, 0.0, 0)
+    low, high = motion.reachable(10_000_000, limits, speeds)
+    np.testing.assert_allclose(low, [-np.inf, 1.9, 2.9])
+    np.testing.assert_allclose(high, [np.inf, 2.1, 3.05])
+    # At rest in time, and while the person is lost, there is no bound but the limits.
+    np.testing.assert_array_equal(motion.reachable(0, limits, speeds), limits)
+    moved(motion, 0.0, 10_000_000, tracked=False)
+    np.testing.assert_array_equal(motion.reachable(20_000_000, limits, speeds), limits)

@@ -303,3 +303,15 @@ def test_scatter_is_that_of_the_last_swarm_that_varied_a_parameter(person) -> No
         changed[limb.comparison.active].all()
         and not np.delete(changed, limb.comparison.active).any()
     )
+
+
+def test_a_search_keeps_the_limits_of_what_can_be_reached(person) -> None:
+    """Swarms and refinements alike, also where the prediction is beyond them."""
+    config = settings()
+    twist = person.body.index("l_shoulder_z")
+    limits = person.body.limits.copy()
+    limits[:, twist] = person.predicted[twist] + np.array([0.1, 0.12])
+    searcher = person.searcher(config)
+    frame = searcher.frame(person.observations, STAMP_NS, person.predicted, limits=limits)
+    found = frame.run(frame_stages(person.body, config, frame.pose, person.body.sigma))
+    assert limits[0, twist] <= found[twist] <= limits[1, twist]

@@ -17,8 +17,8 @@ from markerless_tracker.body.model import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import locked
 
-SPLIT_COSINE = 0.5
-"""The split is kept, in part, where the second angle's cosine is below: within 30 degrees of 90."""
+SPLIT_COSINE = 0.7
+"""The split is kept, in part, where the second angle's cosine is below: within 45 degrees of 90."""
 SPLIT_RAD_S = float(np.deg2rad(360.0))
 """Greatest change of an angle by a change of the split alone."""
 LEAST_COSINE = 0.1
@@ -219,6 +219,7 @@ class _Split:
         self.shown = angles
         self._held = np.zeros(len(angles))
         self._own = np.zeros(len(angles))
+        self._tilt = np.arcsin(np.sin(angles[:, 1]))
 
     def follow(self, angles: FloatArray, parity: FloatArray, step_s: float) -> FloatArray:
         """The next angles (n, 3), held, from those of the pose.
@@ -235,11 +236,18 @@ class _Split:
         gap = self.shown[:, 0] - side * self.shown[:, 2] - own
         part = np.minimum(np.abs(np.cos(angles[:, 1])) / SPLIT_COSINE, 1.0)
         weight = part * part * (3.0 - 2.0 * part)
-        most = 2.0 * SPLIT_RAD_S * step_s + weight * np.abs(_wrapped(own - self._own))
+        most = 2.0 * SPLIT_RAD_S * step_s + weight**2 * np.abs(_wrapped(own - self._own))
         held = gap + np.clip(-weight * gap, -most, most)
         held = np.where((weight == 1.0) & (self._held == 0.0), 0.0, held)
-        self._own, self._held = own, held
+        # From one solution to the other the second angle jumps across 90 degrees.
+        tilt = np.arcsin(np.sin(angles[:, 1]))
+        near = SPLIT_RAD_S * step_s + np.abs(tilt - self._tilt)
+        change = angles[:, 1] - self.shown[:, 1]
+        second = np.where(
+            np.abs(change) <= near, angles[:, 1], self.shown[:, 1] + np.sign(change) * near
+        )
+        self._own, self._held, self._tilt = own, held, tilt
         self.shown = np.stack(
-            [angles[:, 0] + held / 2.0, angles[:, 1], angles[:, 2] - side * held / 2.0], axis=1
+            [angles[:, 0] + held / 2.0, second, angles[:, 2] - side * held / 2.0], axis=1
         )
         return self.shown

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.body import BodyModel, load_body, markers
+from markerless_tracker.body.anatomy import posture
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
@@ -228,18 +229,20 @@ class Person:
         return float(np.linalg.norm(gap, axis=1).mean() * 1000.0)
 
 
+_APART = {"shoulder": 0.7, "hip": 0.2}
+
+
 def person(name, seed, **angles) -> Person:
     """Limbs apart and bent, in any rotation; named angles (rad) replace drawn ones."""
     body = load_body(name, 1.75)
     rng = np.random.default_rng(seed)
-    pose = body.neutral.copy()
+    apart = {f"{side}_{joint}_x": by for side in "lr" for joint, by in _APART.items()}
+    pose = posture(body, apart)
     pose[body.joints] += rng.uniform(-0.15, 0.15, body.joints.size)
     pose[[body.index("pelvis_rz"), body.index("pelvis_tz")]] = rng.uniform(-3.0, 3.0), 0.95
-    for side, out in (("l", 0.2), ("r", -0.2)):
+    for side in "lr":
         pose[body.index(f"{side}_knee")] = rng.uniform(-0.9, -0.3)
         pose[body.index(f"{side}_elbow")] = rng.uniform(-1.2, -0.5)
-        pose[body.index(f"{side}_shoulder_x")] += 0.7
-        pose[body.index(f"{side}_hip_x")] += out
     for key, value in angles.items():
         pose[body.index(key)] = value
     rig = ring_rig(4, (656, 490), distortion=LENS)
