@@ -132,7 +132,6 @@ class FrameSearch:
                 self._observations,
                 self._views,
                 pixels_per_m=self._pixels_per_m(),
-                threads=searcher.threads,
                 step_px=searcher.config.edges.step_px,
                 mapper=searcher.mapper,
             )

@@ -1,9 +1,8 @@
-"""Residuals and normal equations of all views at a pose, serial or with one thread per view."""
+"""Residuals and normal equations of all views at a pose, and the refinement of a pose by them."""
 
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from markerless_tracker.compiled import compiled, kernel
@@ -14,6 +13,13 @@ from markerless_tracker.fitness.contour.residuals import collect_residuals
 from markerless_tracker.fitness.raster.kernels import cone_ends
 from markerless_tracker.fitness.raster.outline_arrays import LANES
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim.gauss_newton import (
+    DAMPING,
+    SOLVED,
+    StepScratch,
+    make_step_scratch,
+    solve_step,
+)
 
 
 class ContourScratch(NamedTuple):
@@ -28,6 +34,7 @@ class ContourScratch(NamedTuple):
     sums: FloatArray  # (v, m, SUMS)
     hessian: FloatArray  # (p, p)
     slope: FloatArray  # (p,)
+    step: StepScratch
 
 
 def make_contour_scratch(
@@ -44,6 +51,7 @@ def make_contour_scratch(
         np.empty((views, nodes, SUMS)),
         np.empty((parameters, parameters)),
         np.empty(parameters),
+        make_step_scratch(parameters),
     )
 
 
@@ -99,10 +107,28 @@ def _one_view(  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _total(body, views, scratch):  # type: ignore[no-untyped-def]
-    """Add the views' sums in the order of the views and fill the normal equations."""
+def _equations(  # type: ignore[no-untyped-def]
+    pose,
+    body,
+    views,
+    contours,
+    spacing_m,
+    step_px,
+    truncation_m,
+    samples,
+    residuals,
+    scratch,
+    outlines,
+):  # fmt: skip
+    """Fill residuals and normal equations at a pose (p,), the views' sums in their order."""
+    cone_ends(pose, body, scratch.nodes, scratch.world)
+    for view in range(views.size.shape[0]):
+        _one_view(
+            view, body, views, contours, spacing_m, step_px, truncation_m, samples, residuals,
+            scratch, outlines,
+        )  # fmt: skip
     sums = scratch.sums[0]
-    for view in range(1, views):
+    for view in range(1, views.size.shape[0]):
         for m in range(sums.shape[0]):
             for k in range(SUMS):
                 sums[m, k] += scratch.sums[view, m, k]
@@ -110,48 +136,52 @@ def _total(body, views, scratch):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def equations_serial(  # type: ignore[no-untyped-def]
+def descend(  # type: ignore[no-untyped-def]
     pose,
+    steps,
+    truncations,
+    precision,
+    prior_mean,
+    prior_precision,
+    bounds,
     body,
     views,
     contours,
     spacing_m,
     step_px,
-    truncation_m,
     samples,
     residuals,
     scratch,
     outlines,
 ):  # fmt: skip
-    """Fill residuals and normal equations at a pose (p,), on the calling thread."""
-    cone_ends(pose, body, scratch.nodes, scratch.world)
-    for view in range(views.size.shape[0]):
-        _one_view(
-            view, body, views, contours, spacing_m, step_px, truncation_m, samples, residuals,
+    """Normal equations at each truncation (n,), the first steps of them taken by the pose (p,).
+
+    The only compiled entry: without steps it fills the residuals and equations at the pose; with
+    as many as truncations it is `optim.refine`.
+
+    Args:
+        pose: changed in place.
+        precision: factor of the data's equations.
+        prior_mean, prior_precision: (k, p) of Gaussian priors.
+        bounds: (2, p).
+    """
+    hessian, slope = scratch.hessian, scratch.slope
+    for i in range(truncations.size):
+        _equations(
+            pose, body, views, contours, spacing_m, step_px, truncations[i], samples, residuals,
             scratch, outlines,
         )  # fmt: skip
-    _total(body, views.size.shape[0], scratch)
-
-
-@compiled(parallel=True)
-def equations_parallel(  # type: ignore[no-untyped-def]
-    pose,
-    body,
-    views,
-    contours,
-    spacing_m,
-    step_px,
-    truncation_m,
-    samples,
-    residuals,
-    scratch,
-    outlines,
-):  # fmt: skip
-    """As `equations_serial`, one thread per view. Each view has its own sums: the same result."""
-    cone_ends(pose, body, scratch.nodes, scratch.world)
-    for view in prange(views.size.shape[0]):
-        _one_view(
-            view, body, views, contours, spacing_m, step_px, truncation_m, samples, residuals,
-            scratch, outlines,
-        )  # fmt: skip
-    _total(body, views.size.shape[0], scratch)
+        if i >= steps:
+            continue
+        for a in range(pose.size):
+            slope[a] *= precision
+            for b in range(pose.size):
+                hessian[a, b] *= precision
+            for k in range(prior_mean.shape[0]):
+                hessian[a, a] += prior_precision[k, a]
+                slope[a] += prior_precision[k, a] * (pose[a] - prior_mean[k, a])
+        if solve_step(hessian, slope, pose, bounds, DAMPING, scratch.step) != SOLVED:
+            return
+        for a in range(pose.size):
+            # A sum may round to beyond a bound.
+            pose[a] = min(max(pose[a] + scratch.step.step[a], bounds[0, a]), bounds[1, a])
