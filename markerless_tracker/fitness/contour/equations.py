@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import compiled, kernel
+from markerless_tracker.compiled import compiled, inlined, kernel
 from markerless_tracker.fitness.contour.chain_kernels import SUMS, add_wrench, sum_chain
 from markerless_tracker.fitness.contour.nearest import BAND_PX
 from markerless_tracker.fitness.contour.outline_samples import MAX_SAMPLES, sample_outline
@@ -72,67 +72,12 @@ def _accumulate(view, cone_node, samples, residuals, sums):  # type: ignore[no-u
         )  # fmt: skip
 
 
-@kernel
-def _one_view(  # type: ignore[no-untyped-def]
-    view,
-    body,
-    views,
-    contours,
-    spacing_m,
-    step_px,
-    truncation_m,
-    samples,
-    residuals,
-    scratch,
-    outlines,
-):  # fmt: skip
-    world = scratch.world
-    r, t = views.rotation[view], views.translation[view]
-    depth = r[2, 0] * world[0] + r[2, 1] * world[LANES] + r[2, 2] * world[2 * LANES] + t[2]
-    spacing_px = max(1.0, spacing_m * views.intrinsics[view, 0] / max(depth, 0.5))
-    sample_outline(
-        view, views, body.cone_node.size, spacing_px, step_px, scratch, outlines, samples
-    )
-    collect_residuals(
-        view,
-        views,
-        contours,
-        truncation_m,
-        samples,
-        scratch.start[view],
-        scratch.order[view],
-        residuals,
-    )
-    _accumulate(view, body.cone_node, samples, residuals, scratch.sums[view])
-
-
-@compiled()
-def _equations(  # type: ignore[no-untyped-def]
-    pose,
-    body,
-    views,
-    contours,
-    spacing_m,
-    step_px,
-    truncation_m,
-    samples,
-    residuals,
-    scratch,
-    outlines,
-):  # fmt: skip
-    """Fill residuals and normal equations at a pose (p,), the views' sums in their order."""
-    cone_ends(pose, body, scratch.nodes, scratch.world)
-    for view in range(views.size.shape[0]):
-        _one_view(
-            view, body, views, contours, spacing_m, step_px, truncation_m, samples, residuals,
-            scratch, outlines,
-        )  # fmt: skip
-    sums = scratch.sums[0]
-    for view in range(1, views.size.shape[0]):
-        for m in range(sums.shape[0]):
-            for k in range(SUMS):
-                sums[m, k] += scratch.sums[view, m, k]
-    sum_chain(body, scratch.nodes, sums, scratch.hessian, scratch.slope)
+@inlined
+def _depth(view, views, world):  # type: ignore[no-untyped-def]
+    """Depth of the first cone's end in a view, m."""
+    r = views.rotation[view]
+    depth = r[2, 0] * world[0] + r[2, 1] * world[LANES] + r[2, 2] * world[2 * LANES]
+    return depth + views.translation[view, 2]
 
 
 @compiled()
@@ -165,12 +110,26 @@ def descend(  # type: ignore[no-untyped-def]
         prior_mean, prior_precision: (k, p) of Gaussian priors.
         bounds: (2, p).
     """
-    hessian, slope = scratch.hessian, scratch.slope
+    hessian, slope, count = scratch.hessian, scratch.slope, views.size.shape[0]
     for i in range(truncations.size):
-        _equations(
-            pose, body, views, contours, spacing_m, step_px, truncations[i], samples, residuals,
-            scratch, outlines,
-        )  # fmt: skip
+        cone_ends(pose, body, scratch.nodes, scratch.world)
+        for view in range(count):
+            focal = views.intrinsics[view, 0]
+            spacing_px = max(1.0, spacing_m * focal / max(_depth(view, views, scratch.world), 0.5))
+            sample_outline(
+                view, views, body.cone_node.size, spacing_px, step_px, scratch, outlines, samples
+            )
+            collect_residuals(
+                view, views, contours, truncations[i], samples, scratch.start[view],
+                scratch.order[view], residuals,
+            )  # fmt: skip
+            _accumulate(view, body.cone_node, samples, residuals, scratch.sums[view])
+        # The views' sums are added in their order.
+        for view in range(1, count):
+            for m in range(scratch.sums.shape[1]):
+                for k in range(SUMS):
+                    scratch.sums[0, m, k] += scratch.sums[view, m, k]
+        sum_chain(body, scratch.nodes, scratch.sums[0], hessian, slope)
         if i >= steps:
             continue
         for a in range(pose.size):
