@@ -67,7 +67,8 @@ class Searcher:
         self.config = config
         self.limits = limits
         self.threads = threads
-        self.mapper = mapper
+        # A pool of one thread would only be waited for.
+        self.mapper = mapper if threads > 1 else map
         self.cameras: Mapping[str, CameraModel] = {camera.name: camera for camera in rig}
         self.feasible = Feasibility(body, limits, config.collision)
         self.fitness = make_fitness(body, rig, config, threads=threads)

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation
+from markerless_tracker.records import MaskWords, Observation, unpack_mask
 
-UNDECIDED_PX = 2.0
-"""No residual is taken so near to undecided pixels."""
+_NEAR_UNDECIDED = np.array(
+    [[0, 0, 1, 0, 0], [0, 1, 1, 1, 0], [1, 1, 1, 1, 1], [0, 1, 1, 1, 0], [0, 0, 1, 0, 0]], np.uint8
+)
+"""No residual is taken so near to undecided pixels: within 2 px."""
 _SAME_PX = 0.5
 _FAR_PX = np.float32(1e4)
 _SMALLEST_EDGE_PX = 12
@@ -71,20 +73,25 @@ def silhouette_contour(observation: Observation, spacing_px: float) -> Silhouett
     The window is the silhouette's bounding box and a margin of a sixth of its height. The edge
     runs midway between pixels inside and outside; where the silhouette leaves the frame, and
     around specks, there are no points. The border of person and undecided pixels is no edge: there
-    are no points within `UNDECIDED_PX` of undecided pixels, and distances are very large where
+    are no points within 2 px of undecided pixels, and distances are very large where
     that border is the nearest.
     """
-    mask = observation.in_full_frame(observation.mask.view(np.uint8))
-    undecided = observation.undecided
-    height, width = mask.shape
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    words = observation.mask_words
+    width, height = observation.size_px
+    # Only the window is unpacked.
+    columns = np.flatnonzero(
+        unpack_mask(np.bitwise_or.reduce(words, axis=0)[None], observation.width)[0]
+    )
+    rows = np.flatnonzero(words.any(axis=1))
     if rows.size == 0:
         nothing = np.empty((0, 2))
         return SilhouetteContour(np.empty((0, 0), np.float32), 0, 0, nothing, nothing, np.empty(0))
     margin = max(_LEAST_MARGIN_PX, (rows[-1] - rows[0]) // 6)
+    rows, columns = rows + observation.offset_px[1], columns + observation.offset_px[0]
     top, bottom = max(0, rows[0] - margin), min(height, rows[-1] + margin + 1)
     left, right = max(0, columns[0] - margin), min(width, columns[-1] + margin + 1)
-    window = np.ascontiguousarray(mask[top:bottom, left:right])
+    corners = (int(left), int(top), int(right), int(bottom))
+    window = _unpacked(observation, words, corners)
     inside = cv2.distanceTransform(window, cv2.DIST_L2, 5)
     distance = np.asarray(cv2.distanceTransform(1 - window, cv2.DIST_L2, 5), np.float32)
     # The edge runs midway between pixels inside and outside.
@@ -92,11 +99,9 @@ def silhouette_contour(observation: Observation, spacing_px: float) -> Silhouett
     distance += window
     distance -= 0.5
     known, free = distance, None
-    if undecided is not None:
-        frame = observation.in_full_frame(undecided.view(np.uint8))
-        known, free = _without_undecided(
-            distance, window, np.ascontiguousarray(frame[top:bottom, left:right])
-        )
+    if observation.undecided_words is not None:
+        undecided = _unpacked(observation, observation.undecided_words, corners)
+        known, free = _without_undecided(distance, window, undecided, int(margin))
     contours, _ = cv2.findContours(window, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     chains: list[NDArray[Any]] = [np.empty((0, 2), dtype=np.int32)]
     spacing = [np.empty(0)]
@@ -126,26 +131,55 @@ def silhouette_contour(observation: Observation, spacing_px: float) -> Silhouett
     )
 
 
+def _unpacked(
+    observation: Observation, words: MaskWords, corners: tuple[int, int, int, int]
+) -> NDArray[np.uint8]:
+    """A packed mask of the region in a window of the frame, (h, w) of 0 and 1."""
+    left, top, right, bottom = corners
+    out = np.zeros((bottom - top, right - left), dtype=np.uint8)
+    u, v = observation.offset_px
+    # Left, top, right and bottom of what the region has of the window.
+    a, b = max(left, u), max(top, v)
+    c, d = min(right, u + observation.width), min(bottom, v + observation.height)
+    part = unpack_mask(words[b - v : d - v], observation.width)[:, a - u : c - u]
+    out[b - top : d - top, a - left : c - left] = part
+    return out
+
+
 def _without_undecided(
-    distance: NDArray[np.float32], person: NDArray[np.uint8], undecided: NDArray[np.uint8]
+    distance: NDArray[np.float32],
+    person: NDArray[np.uint8],
+    undecided: NDArray[np.uint8],
+    reach: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Distances (h, w), very large where the nearest edge borders on undecided pixels.
 
-    Also the pixels farther than `UNDECIDED_PX` from undecided ones. The nearest edge is one of
+    Also the pixels that are not near undecided ones. The nearest edge is one of
     person and background if it does not matter which of the two undecided pixels are.
 
     Args:
         distance: (h, w) to the edge of the person alone.
         person, undecided: (h, w), 0 or 1.
+        reach: rows that are farther from undecided pixels than this, px, are left as they are.
     """
-    either = person | undecided
+    some = np.flatnonzero(undecided.any(axis=1))
+    if some.size == 0:
+        return distance, np.ones(distance.shape, dtype=np.bool_)
+    # Distances up to `reach` need as much around them.
+    begin, end = int(some[0]) - 2 * reach, int(some[-1]) + 2 * reach + 1
+    wide = slice(max(0, begin), max(0, end))
+    rows = slice(max(0, begin + reach), max(0, end - reach))
+    inner = slice(rows.start - wide.start, rows.stop - wide.start)
+    either = person[wide] | undecided[wide]
     wider = np.asarray(cv2.distanceTransform(1 - either, cv2.DIST_L2, 5), np.float32)
     wider -= cv2.distanceTransform(either, cv2.DIST_L2, 5)
     wider += either
     wider -= 0.5
-    same = np.abs(wider - distance) < _SAME_PX
-    free = np.asarray(cv2.distanceTransform(1 - undecided, cv2.DIST_L2, 3) > UNDECIDED_PX)
-    return np.where(same & free, distance, _FAR_PX), free
+    same = np.abs(wider[inner] - distance[rows]) < _SAME_PX
+    free = np.asarray(cv2.dilate(undecided, _NEAR_UNDECIDED) == 0)
+    known = distance.copy()
+    known[rows][~(same & free[rows])] = _FAR_PX
+    return known, free
 
 
 @kernel
