@@ -18,7 +18,7 @@ ROOMS = """
 3  tracking
 2  fitness  datasets  synthesis  drawing
 1  camera  body  imaging  optim
-0  compiled  errors  geometry  observation  records  resources  settings
+0  compiled  errors  geometry  libraries  observation  records  resources  settings
 """
 """The picture of CONTRIBUTING.md: floors and their rooms; modules of one file on the ground."""
 

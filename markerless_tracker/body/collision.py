@@ -8,6 +8,7 @@ rule: the second cone keeps its elliptic section, and both cones are reduced by 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,45 @@ def fill_with_spheres(body: BodyModel) -> Spheres:
     )
 
 
+class Constraints(NamedTuple):
+    """Joint limits and pairs of cones that d active parameters move, as kernels read them.
+
+    Attributes:
+        active: (d,) indices of the parameters.
+        pose: (p,) the other parameters' values; the active ones change.
+        limits: (2, p); NaN if no pose is feasible.
+        moving: nodes that the active parameters move, parents first.
+        parent, fixed, kind, sign, parameter, cone_node, cone_fixed, cone_length, cone_shape: of the
+            body.
+        pairs: (k, 2) cones that must not inter-penetrate.
+        first, centre, radius: `Spheres`.
+        published: whether both cones of a pair are filled with spheres.
+        margin_m: reduction of both cones otherwise.
+        nodes: (m, 3, 4) transforms; those of moving nodes change.
+    """
+
+    active: IntArray
+    pose: FloatArray
+    limits: FloatArray
+    moving: IntArray
+    parent: IntArray
+    fixed: FloatArray
+    kind: IntArray
+    sign: FloatArray
+    parameter: IntArray
+    cone_node: IntArray
+    cone_fixed: FloatArray
+    cone_length: FloatArray
+    cone_shape: FloatArray
+    pairs: IntArray
+    first: IntArray
+    centre: FloatArray
+    radius: FloatArray
+    published: bool
+    margin_m: float
+    nodes: FloatArray
+
+
 class Feasibility:
     """Tests batches of poses against joint limits and a collision rule (compiled).
 
@@ -81,10 +121,12 @@ class Feasibility:
         if rule not in RULES:
             raise ConfigError(f"collision is {rule!r}, expected one of {', '.join(RULES)}")
         self.body = body
-        self.limits = locked(limits, float)
+        self.limits = np.array(limits, dtype=np.float64)
         self.rule = rule
         self._spheres = fill_with_spheres(body)
-        self._pairs = body.collisions if rule != "none" else np.empty((0, 2), dtype=np.int64)
+        pairs = body.collisions if rule != "none" else np.empty((0, 2), dtype=np.int64)
+        self._pairs = np.array(pairs)
+        self._known: dict[bytes, tuple[IntArray, NDArray[np.bool_], IntArray]] = {}
 
     def __call__(self, poses: FloatArray) -> NDArray[np.bool_]:
         """Mask (n,) of the poses (n, p) within the limits and without inter-penetration."""
@@ -103,39 +145,58 @@ class Feasibility:
             forgive: ignore pairs of cones that inter-penetrate at the centre. For centres found in
                 images, where an inter-penetration means that the model's sections are too wide.
         """
+        constraints = self.constraints(active, centre, forgive=forgive)
+        return lambda points: test_points(points, constraints)
+
+    def constraints(
+        self, active: IntArray, centre: FloatArray, *, forgive: bool = False
+    ) -> Constraints:
+        """What `around` tests, for compiled searches; arguments as there."""
+        # Copies: kernels are compiled once more for arrays that are read-only.
+        active = np.array(active, dtype=np.int64)
+        moving, moved, rest = self._parts(active)
         body, spheres, pairs = self.body, self._spheres, self._pairs
-        moves = moving_nodes(body, active)
-        nodes = transforms(body, centre)
-        pose = np.array(centre, dtype=np.float64)
-
-        def test(
-            points: FloatArray, active: IntArray, moving: IntArray, pairs: IntArray
-        ) -> NDArray[np.bool_]:
-            out = np.empty(len(points), dtype=np.bool_)
-            _feasible(
-                np.ascontiguousarray(points, dtype=np.float64), active, pose, self.limits, moving,
-                body.node_parent, body.node_fixed, body.node_kind, body.node_sign,
-                body.node_parameter, body.cone_node, body.cone_fixed, body.cone_length,
-                body.cone_shape, pairs, spheres.first, spheres.centre, spheres.radius,
-                self.rule == "published", MARGIN_M, nodes, out,
-            )  # fmt: skip
-            return out
-
+        every = Constraints(
+            active, np.array(centre, dtype=np.float64), self.limits, moving, body.node_parent,
+            body.node_fixed, body.node_kind, body.node_sign, body.node_parameter, body.cone_node,
+            body.cone_fixed, body.cone_length, body.cone_shape, pairs, spheres.first,
+            spheres.centre, spheres.radius, self.rule == "published", MARGIN_M,
+            transforms(body, centre),
+        )  # fmt: skip
         if forgive:
-            pairs = _apart(lambda some: bool(test(centre[None, :0], _NONE, _NONE, some)[0]), pairs)
-        either = moves[body.cone_node[pairs]].any(axis=1)
-        rest = np.setdiff1d(np.arange(body.size), active)
-        if not test(centre[None, rest], rest, _NONE, pairs[~either])[0]:
-            return lambda points: np.zeros(len(points), dtype=np.bool_)
-        moving, touching = np.flatnonzero(moves), np.ascontiguousarray(pairs[either])
-        return lambda points: test(points, active, moving, touching)
+            still = every._replace(active=_NONE, moving=_NONE)
+            kept = _apart(still, centre[None, :0])
+            pairs, moved = pairs[kept], moved[kept]
+        others = every._replace(active=rest, moving=_NONE, pairs=pairs[~moved])
+        if not test_points(centre[None, rest], others)[0]:
+            return every._replace(limits=np.full(self.limits.shape, np.nan))
+        return every._replace(pairs=pairs[moved])
+
+    def _parts(self, active: IntArray) -> tuple[IntArray, NDArray[np.bool_], IntArray]:
+        """Nodes that parameters move, pairs of cones that they do, and the other parameters."""
+        key = active.tobytes()
+        if key not in self._known:
+            moves = moving_nodes(self.body, active)
+            either = np.asarray(moves[self.body.cone_node[self._pairs]].any(axis=1))
+            rest = np.setdiff1d(np.arange(self.body.size), active)
+            self._known[key] = np.flatnonzero(moves), either, rest
+        return self._known[key]
 
 
-def _apart(keeps: Callable[[IntArray], bool], pairs: IntArray) -> IntArray:
-    """The pairs (k, 2) that satisfy a rule."""
-    if keeps(pairs):
-        return pairs
-    return pairs[[keeps(pairs[k : k + 1]) for k in range(len(pairs))]]
+def test_points(points: FloatArray, constraints: Constraints) -> NDArray[np.bool_]:
+    """Mask (n,) of the points (n, d) that satisfy constraints."""
+    out = np.empty(len(points), dtype=np.bool_)
+    are_feasible(np.array(points, dtype=np.float64), constraints, out)
+    return out
+
+
+def _apart(constraints: Constraints, point: FloatArray) -> NDArray[np.bool_]:
+    """Mask (k,) of the pairs that satisfy the rule at a point (1, d)."""
+    pairs = constraints.pairs
+    if test_points(point, constraints)[0]:
+        return np.ones(len(pairs), dtype=np.bool_)
+    ones = (constraints._replace(pairs=pairs[k : k + 1]) for k in range(len(pairs)))
+    return np.array([test_points(point, one)[0] for one in ones])
 
 
 @kernel
@@ -175,11 +236,13 @@ def _inside_cone(x, y, z, length, shape, grow):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _feasible(  # type: ignore[no-untyped-def]
-    points, active, pose, limits, moving, parent, fixed, kind, sign, parameter,
-    cone_node, cone_fixed, cone_length, cone_shape, pairs, first, centre, radius,
-    published, margin, nodes, out,
-):  # fmt: skip
+def are_feasible(points, constraints, out):  # type: ignore[no-untyped-def]
+    """Fill out (n,): whether points (n, d) satisfy `Constraints`; its pose and nodes change."""
+    c = constraints
+    active, pose, limits, pairs, nodes = c.active, c.pose, c.limits, c.pairs, c.nodes
+    cone_node, cone_fixed = c.cone_node, c.cone_fixed
+    cone_length, cone_shape = c.cone_length, c.cone_shape
+    first, centre, radius = c.first, c.centre, c.radius
     for n in range(points.shape[0]):
         good = True
         for i in range(active.size):
@@ -188,17 +251,19 @@ def _feasible(  # type: ignore[no-untyped-def]
             if not (limits[0, p] <= pose[p] <= limits[1, p]):
                 good = False
         if good and pairs.shape[0] > 0:
-            for i in range(moving.size):
-                node_transform(moving[i], pose, parent, fixed, kind, sign, parameter, nodes)
+            for i in range(c.moving.size):
+                node_transform(
+                    c.moving[i], pose, c.parent, c.fixed, c.kind, c.sign, c.parameter, nodes
+                )
             for k in range(pairs.shape[0]):
                 p, q = pairs[k, 0], pairs[k, 1]
                 for i in range(first[p], first[p + 1]):
                     x, y, z = _to_world(cone_fixed[p], centre[i, 0], centre[i, 1], centre[i, 2])
                     x, y, z = _to_world(nodes[cone_node[p]], x, y, z)
-                    if not published:
+                    if not c.published:
                         x, y, z = _from_world(nodes[cone_node[q]], x, y, z)
                         x, y, z = _from_world(cone_fixed[q], x, y, z)
-                        grow = radius[i] - 2.0 * margin
+                        grow = radius[i] - 2.0 * c.margin_m
                         if _inside_cone(x, y, z, cone_length[q], cone_shape[q], grow):
                             good = False
                             break

@@ -21,6 +21,7 @@ from typing import NoReturn
 
 from markerless_tracker import __version__
 from markerless_tracker.errors import TrackerError
+from markerless_tracker.libraries import single_threaded
 
 PROGRAM = "markerless_tracker"
 
@@ -88,6 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(verb: str, words: Sequence[str]) -> int:
+    single_threaded()
     module = importlib.import_module(f"markerless_tracker.cli.{verb}")
     parser = _Parser(
         prog=f"{PROGRAM} {verb}",

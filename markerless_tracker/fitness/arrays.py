@@ -78,16 +78,17 @@ def body_arrays(body: BodyModel) -> BodyArrays:
         raise BodyModelError(
             f"body {body.name}: {len(body.cone_names)} cones, expected {LANES} at the most"
         )
+    # Copies: kernels are compiled once more for arrays that are read-only.
     return BodyArrays(
-        body.node_parent,
-        body.node_fixed,
-        body.node_kind,
-        body.node_sign,
-        body.node_parameter,
-        body.cone_node,
-        body.cone_fixed,
-        body.cone_length,
-        body.cone_shape,
+        body.node_parent.copy(),
+        body.node_fixed.copy(),
+        body.node_kind.copy(),
+        body.node_sign.copy(),
+        body.node_parameter.copy(),
+        body.cone_node.copy(),
+        body.cone_fixed.copy(),
+        body.cone_length.copy(),
+        body.cone_shape.copy(),
     )
 
 

@@ -16,13 +16,17 @@ from markerless_tracker.fitness.raster import (
     VISIBLE,
     EdgeRule,
     evaluate,
-    evaluate_parallel,
     make_outlines,
     make_scratch,
 )
-from markerless_tracker.fitness.raster.static_layer import Drawing, split_static
+from markerless_tracker.fitness.raster.kernels import Objective
+from markerless_tracker.fitness.raster.static_layer import (
+    Split,
+    draw_static,
+    split_cones,
+)
 from markerless_tracker.fitness.terms import OVERLAP, PROJECTED, CostRule, view_terms
-from markerless_tracker.fitness.threads import parallel, usable_threads, worth_waking
+from markerless_tracker.fitness.threads import side_by_side, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Comparison, Observation
 
@@ -96,6 +100,7 @@ class Fitness:
         self.cameras = tuple(cameras)
         self.threads = usable_threads(threads)
         self._arrays = body_arrays(body)
+        self._splits: dict[tuple[bytes, bytes, bytes], Split] = {}
         self._rule = EdgeRule(
             EDGE_RULES[edge_rule],
             float(edge_spacing_px),
@@ -129,16 +134,12 @@ class Fitness:
         edge_cones: NDArray[np.bool_],
     ) -> FloatArray:
         """Counts (n, v, 4) of poses (n, p): see the columns of `terms`."""
-        everything = np.arange(self.body.size)
         cost = CostRule(1.0, 1.0, self._rule.squared, False)
-        drawing = split_static(
-            self.body, self._arrays, views.arrays, everything, self.body.neutral, silhouette_cones,
-            edge_cones, self._rule, cost, self._scratch, self._outlines,
-        )  # fmt: skip
-        cutoff_costs = np.full(len(poses), np.inf)
-        return self._run(views, drawing, poses, everything, self.body.neutral, cutoff_costs, cost)[
-            0
-        ]
+        every = np.arange(self.body.size)
+        objective = self._objective(
+            views, every, self.body.neutral, silhouette_cones, edge_cones, cost
+        )
+        return self._run(objective, poses, np.full(len(poses), np.inf))[0]
 
     def terms(self, views: Views, pose: FloatArray) -> dict[str, ViewTerms]:
         """f_s, f_e and overlap of one pose (p,), by camera name."""
@@ -151,30 +152,39 @@ class Fitness:
             found[name] = ViewTerms(float(silhouette), float(edges), float(overlap), float(covered))
         return found
 
-    def _run(
+    def _objective(
         self,
         views: Views,
-        drawing: Drawing,
-        points: FloatArray,
         active: NDArray[np.int64],
         centre: FloatArray,
-        cutoff_costs: FloatArray,
+        silhouette_cones: NDArray[np.bool_],
+        edge_cones: NDArray[np.bool_],
         cost: CostRule,
+    ) -> Objective:
+        """What points are compared with; which cones move is found once."""
+        key = (active.tobytes(), silhouette_cones.tobytes(), edge_cones.tobytes())
+        if key not in self._splits:
+            self._splits[key] = split_cones(
+                self.body, self._arrays, active, silhouette_cones, edge_cones, self._rule
+            )
+        return draw_static(
+            self._splits[key], views.arrays, centre, self._rule, cost, self._scratch, self._outlines
+        )
+
+    def _run(
+        self, objective: Objective, points: FloatArray, cutoff_costs: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Counts (n, v, 4) and costs (n,) of points (n, d)."""
-        counts = np.empty((len(points), len(views.names), 4))
+        counts = np.empty((len(points), len(objective.views.size), 4))
         costs = np.empty(len(points))
-        args = (
-            points, active, centre, cutoff_costs, drawing.body, views.arrays,
-            drawing.silhouette_cones, drawing.edge_cones, self._rule, cost, drawing.static,
-            self._scratch, self._outlines, counts, costs,
-        )  # fmt: skip
-        work_s = len(points) * len(views.names) * drawing.silhouette_cones.size * _CONE_S
-        if not worth_waking(work_s, self.threads):
-            evaluate(*args, 0, 1)
-        else:
-            with parallel(self.threads):
-                evaluate_parallel(*args)
+        work_s = counts[..., 0].size * objective.silhouette_cones.size * _CONE_S
+        threads = self.threads if worth_waking(work_s, self.threads) else 1
+        side_by_side(
+            lambda thread: evaluate(
+                points, cutoff_costs, objective, counts, costs, thread, threads
+            ),
+            threads,
+        )
         return counts, costs
 
 
@@ -190,23 +200,24 @@ class Evaluator:
 
     Called with points (n, d) of the active parameters, returns costs (n,); NaN for points that are
     not finite. Cones that these do not move are drawn when the evaluator is made.
+
+    Attributes:
+        objective: the same, for compiled searches.
     """
 
     def __init__(self, fitness: Fitness, views: Views, comparison: Comparison) -> None:
         self._fitness = fitness
-        self._views = views
         self._comparison = comparison
-        self._cost = CostRule(
+        cost = CostRule(
             float(comparison.silhouette_weight),
             float(comparison.edge_weight),
             fitness._rule.squared,
             fitness.cost == "one_sided",
         )
-        self._drawing = split_static(
-            fitness.body, fitness._arrays, views.arrays, comparison.active, comparison.centre,
+        self.objective = fitness._objective(
+            views, comparison.active, comparison.centre, comparison.silhouette_cones,
             # A term without weight is not computed.
-            comparison.silhouette_cones, comparison.edge_cones & (comparison.edge_weight != 0.0),
-            fitness._rule, self._cost, fitness._scratch, fitness._outlines,
+            comparison.edge_cones & (comparison.edge_weight != 0.0), cost,
         )  # fmt: skip
 
     def poses(self, points: FloatArray) -> FloatArray:
@@ -223,9 +234,5 @@ class Evaluator:
             cutoff_costs: (n,) cutoff per point: an evaluation may stop once its cost exceeds it,
                 and then returns a lower bound of the cost that is at least the cutoff.
         """
-        comparison = self._comparison
         cutoff_costs = np.full(len(points), np.inf) if cutoff_costs is None else cutoff_costs
-        return self._fitness._run(
-            self._views, self._drawing, np.ascontiguousarray(points), comparison.active,
-            comparison.centre, cutoff_costs, self._cost,
-        )[1]  # fmt: skip
+        return self._fitness._run(self.objective, np.array(points), cutoff_costs)[1]

@@ -1,50 +1,40 @@
-"""Number of threads, and the lock, for numba's parallel loops."""
+"""Threads for large batches of evaluations: when they save time, and where they come from.
 
-import threading
+Compiled kernels release the interpreter's lock, so that threads of Python do; numba's own would
+need every kernel compiled a second time, and take one caller at a time.
+"""
+
+import os
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
-import numba
 import numpy as np
-from numba import prange
 
-from markerless_tracker.compiled import compiled
-
-_LAYER = "workqueue"
-"""The only threading layer without a library to install. It takes one caller at a time."""
-_ONE_CALLER = threading.Lock()
 _LAUNCHES = 30
 _MARGIN = 3.0
 """Factor for a busy interpreter: threads wake slower than during the measurement."""
 
 
 def usable_threads(wanted: int) -> int:
-    """At least one thread, at most as many as numba started with."""
-    return max(1, min(wanted, int(numba.config.NUMBA_NUM_THREADS)))
+    """At least one thread, at most as many as the machine has cores."""
+    return max(1, min(wanted, os.cpu_count() or 1))
 
 
-@contextmanager
-def parallel(threads: int) -> Iterator[None]:
-    """Run a parallel kernel in this block: one caller at a time, with some threads.
-
-    The first block chooses numba's threading layer, which holds for the whole process, unless the
-    process has chosen or started one.
-    """
-    with _ONE_CALLER:
-        if numba.config.THREADING_LAYER == "default" and not _layer_started():
-            numba.config.THREADING_LAYER = _LAYER
-        numba.set_num_threads(threads)
-        yield
+def side_by_side(work: Callable[[int], object], threads: int) -> None:
+    """Run work(0) .. work(threads - 1) at the same time, the first on the calling thread."""
+    pool = _pool(threads - 1, os.getpid()) if threads > 1 else None
+    others = [pool.submit(work, thread) for thread in range(1, threads)] if pool else []
+    work(0)
+    for other in others:
+        other.result()
 
 
-def _layer_started() -> bool:
-    try:
-        numba.threading_layer()
-    except ValueError:
-        return False
-    return True
+@cache
+def _pool(threads: int, process: int) -> ThreadPoolExecutor:
+    """The pool of a process: one that was forked has none of its parent's threads."""
+    return ThreadPoolExecutor(max_workers=threads, thread_name_prefix="fitness")
 
 
 def worth_waking(work_s: float, threads: int) -> bool:
@@ -59,20 +49,11 @@ def worth_waking(work_s: float, threads: int) -> bool:
 @cache
 def launch_cost_s(threads: int) -> float:
     """Time to wake that many threads on this machine; measured once."""
-    ticks = np.zeros(threads)
     costs = []
-    with parallel(threads):
-        _nothing(ticks)
-        for _ in range(_LAUNCHES):
-            # Workers sleep between the swarm's steps.
-            time.sleep(0.0002)
-            begin = time.perf_counter()
-            _nothing(ticks)
-            costs.append(time.perf_counter() - begin)
+    for _ in range(_LAUNCHES):
+        # Threads sleep between batches.
+        time.sleep(0.0002)
+        begin = time.perf_counter()
+        side_by_side(lambda thread: None, threads)
+        costs.append(time.perf_counter() - begin)
     return float(np.median(costs))
-
-
-@compiled(parallel=True)
-def _nothing(ticks):  # type: ignore[no-untyped-def]
-    for thread in prange(ticks.size):
-        ticks[thread] += 1.0

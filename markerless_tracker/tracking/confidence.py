@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel, markers, transforms
 from markerless_tracker.body.kinematics import carried, move_axes
 from markerless_tracker.body.model import is_translation
+from markerless_tracker.body.parts import cones_of
 from markerless_tracker.fitness.contour import ContourFrame, OutlineRows, outline_rows
 from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
@@ -114,10 +115,18 @@ def disagreement_m(contours: ContourFrame, rows: OutlineRows) -> float:
         weight = rows.weight[begin:end]
         slopes = rows.gradient[begin:end] @ rotation[:2].T
         normal = slopes.T @ (weight[:, None] * slopes)
-        if np.linalg.matrix_rank(normal) == 2:
+        if _is_invertible(normal):
             shift = np.linalg.solve(normal, slopes.T @ (weight * rows.value[begin:end]))
             squares.append(float(shift @ shift) / 2.0)
     return float(np.sqrt(np.mean(squares))) if squares else 0.0
+
+
+def _is_invertible(normal: FloatArray) -> bool:
+    """Whether a symmetric, not negative matrix (2, 2) has rank 2 in floating point."""
+    trace = float(normal[0, 0] + normal[1, 1])
+    determinant = float(normal[0, 0] * normal[1, 1] - normal[0, 1] * normal[1, 0])
+    # The determinant is the product of the eigenvalues, the trace is at least the larger one.
+    return determinant > 2.0 * float(np.finfo(np.float64).eps) * trace**2
 
 
 def excesses_m(body: BodyModel, rows: OutlineRows) -> tuple[dict[str, float], float]:
@@ -139,11 +148,7 @@ def excesses_m(body: BodyModel, rows: OutlineRows) -> tuple[dict[str, float], fl
         rms = float(np.sqrt(square[cones].sum() / total)) if total > 0.0 else 0.0
         return max(rms - FITTING_M, 0.0)
 
-    def hanging(name: str) -> NDArray[np.bool_]:
-        nodes = np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name]))
-        return np.asarray(carried(body, nodes)[body.cone_node].any(axis=1))
-
-    hangs = {name: hanging(name) for name in (*body.limbs, "head") if name in body.subspaces}
+    hangs = {name: cones_of(body, name) for name in (*body.limbs, "head") if name in body.subspaces}
     trunk = np.ones(count, dtype=np.bool_)
     for others in hangs.values():
         trunk &= ~others

@@ -4,7 +4,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim import Prior, refine
+from markerless_tracker.optim import Prior
 from markerless_tracker.tracking.config import TrackerConfig
 
 
@@ -39,17 +39,11 @@ def refined_on_contours(
         iterations: Gauss-Newton steps.
         truncation_m: residuals beyond it are outliers, in the first and in the last step.
     """
-    scale = data_precision(config)
-
-    def equations(pose: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
-        sums = contours.equations(pose, truncation_m)
-        return sums.hessian * scale, sums.slope * scale
-
-    return refine(
-        equations,
+    return contours.refined(
         start,
+        precision=data_precision(config),
         priors=priors,
         bounds=limits,
         iterations=iterations,
-        truncation=truncation_m,
+        truncation_m=truncation_m,
     )

@@ -16,10 +16,11 @@ from markerless_tracker.optim import (
     Problem,
     keyed_generator,
 )
-from markerless_tracker.records import CONTOUR, Observation, SearchPlan, Stage
+from markerless_tracker.records import CONTOUR, Comparison, Observation, SearchPlan, Stage
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
+from markerless_tracker.tracking.swarms import SWARMS, SwarmSearch
 
 _NEAREST_M = 0.5
 
@@ -66,7 +67,8 @@ class Searcher:
         self.config = config
         self.limits = limits
         self.threads = threads
-        self.mapper = mapper
+        # A pool of one thread would only be waited for.
+        self.mapper = mapper if threads > 1 else map
         self.cameras: Mapping[str, CameraModel] = {camera.name: camera for camera in rig}
         self.feasible = Feasibility(body, limits, config.collision)
         self.fitness = make_fitness(body, rig, config, threads=threads)
@@ -142,7 +144,6 @@ class FrameSearch:
                 self._observations,
                 self._views,
                 pixels_per_m=self._pixels_per_m(),
-                threads=searcher.threads,
                 step_px=searcher.config.edges.step_px,
                 mapper=searcher.mapper,
             )
@@ -164,14 +165,18 @@ class FrameSearch:
         )
         cost = np.inf if costs_of is None else float(costs_of(self.pose[None])[0])
         for stage in stages:
+            found_cost = None
             if stage.plan.algorithm == CONTOUR:
                 found = self._refine(stage.plan)
             else:
-                found = self._swarm(stage.centred(self.pose))
+                found, own_cost = self._swarm(stage.centred(self.pose))
+                if contour is not None and _same_terms(stage.comparison, contour.comparison):
+                    found_cost = own_cost
             if costs_of is None:
                 self.pose = found
                 continue
-            found_cost = float(costs_of(found[None])[0])
+            if found_cost is None:
+                found_cost = float(costs_of(found[None])[0])
             if found_cost < cost - stage.plan.min_improvement:
                 self.pose, cost = found, found_cost
         return self.pose
@@ -180,7 +185,32 @@ class FrameSearch:
         """How well the estimate explains each view."""
         return self._searcher.fitness.terms(self._views, self.pose)
 
-    def _swarm(self, stage: Stage) -> FloatArray:
+    def _swarm(self, stage: Stage) -> tuple[FloatArray, float | None]:
+        """The pose (p,) that a swarm finds, and its cost if that is known."""
+        searcher, plan = self._searcher, stage.plan
+        rng = keyed_generator(searcher.config.seed, self._stamp_ns, stage.name)
+        if plan.algorithm not in SWARMS:
+            return self._filter(stage, rng), None
+        active, centre = stage.comparison.active, stage.comparison.centre
+        search = SwarmSearch(
+            centre=centre[active],
+            sigma=plan.sigma[active],
+            bounds=np.ascontiguousarray(searcher.limits[:, active]),
+            count=plan.particles,
+            iterations=plan.iterations,
+            rng=rng,
+            constraints=searcher.feasible.constraints(active, centre, forgive=self._forgiving),
+            objective=searcher.fitness.prepare(self._views, stage.comparison).objective,
+        )
+        particles = SWARMS[plan.algorithm](search, **plan.options)
+        self._note(stage, plan.evaluations, particles.best.std(axis=0))
+        pose = centre.copy()
+        pose[active] = particles.found
+        cost = float(particles.found_cost[0])
+        return pose, cost if np.isfinite(cost) else None
+
+    def _filter(self, stage: Stage, rng: np.random.Generator) -> FloatArray:
+        """The pose (p,) that an algorithm finds that is not compiled as a whole."""
         searcher, plan = self._searcher, stage.plan
         active, centre = stage.comparison.active, stage.comparison.centre
         evaluator = searcher.fitness.prepare(self._views, stage.comparison)
@@ -190,20 +220,27 @@ class FrameSearch:
             sigma=plan.sigma[active],
             particles=plan.particles,
             iterations=plan.iterations,
-            feasible=searcher.feasible.around(
-                active, centre, forgive=searcher.config.collision == "elliptic"
-            ),
-            rng=keyed_generator(searcher.config.seed, self._stamp_ns, stage.name),
+            feasible=searcher.feasible.around(active, centre, forgive=self._forgiving),
+            rng=rng,
             memory=searcher.particle_sets.get(stage.name),
         )
         optimizer = ALGORITHMS[plan.algorithm](problem, **plan.options)
         best = optimizer.run(evaluator, early=True)
-        self.evaluations += optimizer.evaluations
-        with np.errstate(invalid="ignore", divide="ignore"):
-            self.particle_sd_ratio[active] = optimizer.particle_sd_ratio / problem.sigma
+        self._note(stage, optimizer.evaluations, optimizer.particle_sd_ratio)
         if optimizer.memory is not None:
             searcher.particle_sets[stage.name] = optimizer.memory
         return np.asarray(evaluator.poses(best[None])[0])
+
+    @property
+    def _forgiving(self) -> bool:
+        return self._searcher.config.collision == "elliptic"
+
+    def _note(self, stage: Stage, evaluations: int, sd: FloatArray) -> None:
+        """Take what a swarm spent, and the standard deviation (d,) of its particles."""
+        active = stage.comparison.active
+        self.evaluations += evaluations
+        with np.errstate(invalid="ignore", divide="ignore"):
+            self.particle_sd_ratio[active] = sd / stage.plan.sigma[active]
 
     def _refine(self, plan: SearchPlan) -> FloatArray:
         searcher, config = self._searcher, self._searcher.config
@@ -223,6 +260,14 @@ class FrameSearch:
         searcher = self._searcher
         at = self.pose[[searcher.body.index(f"pelvis_t{axis}") for axis in "xyz"]]
         return {name: pixels_per_m(searcher.cameras[name], at) for name in self._views.names}
+
+
+def _same_terms(one: Comparison, other: Comparison) -> bool:
+    """Whether two comparisons give a pose the same cost."""
+    weights = [(c.silhouette_weight, c.edge_weight) for c in (one, other)]
+    sampled = one.edge_weight == 0.0 or np.array_equal(one.edge_cones, other.edge_cones)
+    drawn = np.array_equal(one.silhouette_cones, other.silhouette_cones)
+    return weights[0] == weights[1] and sampled and drawn
 
 
 def pixels_per_m(camera: CameraModel, point_m: FloatArray) -> float:

@@ -123,11 +123,9 @@ class Tracker:
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
         blank = self._evidence.warm_up()
-        # The most work and the least: whether threads are woken depends on it.
-        for views in (blank, dict(list(blank.items())[:1])):
-            self._starter, self._assessor.track = None, Track(Phase.TRACKING)
-            self.step(views, 0)
-            self.reset()
+        self._starter, self._assessor.track = None, Track(Phase.TRACKING)
+        self.step(blank, 0)
+        self.reset()
         self._body.warm_up(self._searcher_for, blank, self._motion.pose)
         self.reset()
 

@@ -1,15 +1,19 @@
 """When several threads are used; the result does not depend on it."""
 
-import os
 import subprocess
 import sys
+import threading
 
-import numba
 import numpy as np
 import pytest
 
 from markerless_tracker.fitness import Fitness, threads
-from markerless_tracker.fitness.threads import launch_cost_s, usable_threads, worth_waking
+from markerless_tracker.fitness.threads import (
+    launch_cost_s,
+    side_by_side,
+    usable_threads,
+    worth_waking,
+)
 
 
 def test_threads_are_woken_if_they_save_time(monkeypatch):
@@ -20,29 +24,33 @@ def test_threads_are_woken_if_they_save_time(monkeypatch):
     assert not worth_waking(5e-4, 2)
 
 
-def test_the_threading_layer_is_chosen_at_the_first_launch_not_at_import():
+def test_work_is_done_once_by_each_thread():
+    done = []
+    side_by_side(lambda thread: done.append((thread, threading.get_ident())), 3)
+    assert sorted(thread for thread, _ in done) == [0, 1, 2]
+    assert dict(done)[0] == threading.get_ident() and len({where for _, where in done}) > 1
+
+
+def test_what_a_thread_raises_is_raised():
+    def work(thread):
+        if thread == 1:
+            raise ValueError("from the other thread")
+
+    with pytest.raises(ValueError, match="from the other thread"):
+        side_by_side(work, 2)
+
+
+def test_a_forked_process_has_threads_of_its_own():
+    """Those of its parent do not exist in it."""
     program = (
-        "import numba, markerless_tracker.tracking as _; print(numba.config.THREADING_LAYER);"
-        "from markerless_tracker.fitness.threads import launch_cost_s; launch_cost_s(1);"
-        "print(numba.threading_layer())"
+        "import os; from markerless_tracker.fitness.threads import side_by_side;"
+        "side_by_side(print, 2); child = os.fork(); side_by_side(print, 2);"
+        "child and os.waitpid(child, 0)"
     )
     result = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True,
-        env={k: v for k, v in os.environ.items() if k != "NUMBA_THREADING_LAYER"},
-    )  # fmt: skip
-    assert result.stdout.split() == ["default", "workqueue"]
-
-
-@pytest.mark.parametrize(
-    ("layer", "started", "expected"),
-    [("default", False, "workqueue"), ("default", True, "default"), ("omp", False, "omp")],
-)
-def test_a_layer_that_the_process_chose_or_started_is_kept(monkeypatch, layer, started, expected):
-    monkeypatch.setattr(numba.config, "THREADING_LAYER", layer)
-    monkeypatch.setattr(threads, "_layer_started", lambda: started)
-    monkeypatch.setattr(numba, "set_num_threads", lambda count: None)
-    with threads.parallel(2):
-        assert expected == numba.config.THREADING_LAYER
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert sorted(result.stdout.split()) == ["0"] * 3 + ["1"] * 3
 
 
 def test_waking_threads_costs_something():

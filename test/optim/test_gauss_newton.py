@@ -226,3 +226,44 @@ def test_the_same_again_gives_the_same_bytes() -> None:
         run(Recorded(h, minimum), np.full(4, 0.3), bounds=bounds, priors=(prior,)) for _ in range(2)
     )
     assert first.tobytes() == second.tobytes()
+
+
+# --- against NumPy -----------------------------------------------------------------------------
+
+
+def numpy_step(hessian, slope, x, bounds, damping):
+    """`damped_step` with NumPy's solution of the equations."""
+    a = hessian + np.diag(damping * np.diag(hessian) + 1e-12)
+    low, high = bounds[0] - x, bounds[1] - x
+    step = np.linalg.solve(a, -slope)
+    below, above = step < low, step > high
+    for _ in range(10):
+        held = below | above
+        if not held.any():
+            break
+        free = ~held
+        step[held] = np.where(below, low, high)[held]
+        right = -slope[free] - a[np.ix_(free, held)] @ step[held]
+        step[free] = np.linalg.solve(a[np.ix_(free, free)], right)
+        pull = -(a @ step + slope)
+        now_below, now_above = (
+            (step < low) | (below & (pull < 0)),
+            (step > high) | (above & (pull > 0)),
+        )
+        if (now_below == below).all() and (now_above == above).all():
+            break
+        below, above = now_below, now_above
+    return np.clip(x + step, *bounds) - x
+
+
+@settings(max_examples=60, deadline=None)
+@given(SEEDS, st.sampled_from([1, 3, 31]), st.sampled_from([0.1, 0.4, np.inf]))
+def test_a_step_against_numpy(seed, size, most) -> None:
+    rng = np.random.default_rng(seed)
+    h, minimum = quadratic(rng, size)
+    x = rng.uniform(-min(most, 1.0), min(most, 1.0), size)
+    bounds = np.array([np.full(size, -most), np.full(size, most)])
+    slope = h @ (x - minimum)
+    np.testing.assert_allclose(
+        damped_step(h, slope, x, bounds, 1e-3), numpy_step(h, slope, x, bounds, 1e-3), atol=1e-9
+    )

@@ -9,14 +9,15 @@ from markerless_tracker.body import BodyModel, load_body, markers
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
+from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.optim import Sppso
 from markerless_tracker.records import CONTOUR, Observation
 from markerless_tracker.synthesis import ring_rig
-from markerless_tracker.tracking import TrackerConfig, refinement
+from markerless_tracker.tracking import TrackerConfig, search
 from markerless_tracker.tracking.partitions.frame import contour_stage, frame_stages
 from markerless_tracker.tracking.partitions.sppso import sppso_stages
 from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.swarms import SWARMS
 
 BODY = load_body("person31", 1.75)
 RIG = ring_rig(4, (320, 240))
@@ -79,19 +80,21 @@ def person() -> Person:
 def found(monkeypatch) -> list[tuple[str, FloatArray]]:
     """Every stage's own result, in order: poses of refinements, points of swarms."""
     results: list[tuple[str, FloatArray]] = []
-    plain_refine, plain_run = refinement.refine, Sppso.run
+    plain_refine, plain_run = ContourFrame.refined, SWARMS["sppso"]
 
     def refine(*args, **kwargs):
         results.append((CONTOUR, plain_refine(*args, **kwargs)))
         return results[-1][1]
 
-    def run(self, evaluate, **kwargs):
-        best = plain_run(self, evaluate, **kwargs)
-        results.append(("sppso", evaluate.poses(best[None])[0]))
-        return best
+    def run(search, **kwargs):
+        particles = plain_run(search, **kwargs)
+        pose = search.objective.centre.copy()
+        pose[search.objective.active] = particles.found
+        results.append(("sppso", pose))
+        return particles
 
-    monkeypatch.setattr(refinement, "refine", refine)
-    monkeypatch.setattr(Sppso, "run", run)
+    monkeypatch.setattr(ContourFrame, "refined", refine)
+    monkeypatch.setattr(search, "SWARMS", {"sppso": run})
     return results
 
 
@@ -149,12 +152,12 @@ def test_parameters_that_the_first_stage_holds_count_in_the_comparison(person, m
     predicted = person.pose.copy()
     predicted[arms] = np.clip(predicted[arms] + 0.4, *person.body.limits[:, arms])
 
-    def refine(equations, start, **_):
+    def refine(contours, start, **_):
         pose = start.copy()
         pose[arms] = person.pose[arms]
         return pose
 
-    monkeypatch.setattr(refinement, "refine", refine)
+    monkeypatch.setattr(ContourFrame, "refined", refine)
     shown = replace(person, predicted=predicted)
     root, _ = sppso_stages(person.body, config, predicted, 0.1 * person.body.sigma)
     contour = contour_stage("align", person.body, config, predicted, person.body.sigma)
@@ -168,11 +171,11 @@ def test_a_refinement_that_goes_astray_is_left_behind(person, monkeypatch) -> No
     config = settings()
     asked = []
 
-    def astray(equations, start, **_):
+    def astray(contours, start, **_):
         asked.append(start.copy())
         return person.body.neutral.copy()
 
-    monkeypatch.setattr(refinement, "refine", astray)
+    monkeypatch.setattr(ContourFrame, "refined", astray)
     frame = searched(person, config)
     np.testing.assert_array_equal(asked[0], person.predicted)
     np.testing.assert_array_equal(asked[1], frame.pose)
@@ -182,20 +185,19 @@ def test_a_refinement_that_goes_astray_is_left_behind(person, monkeypatch) -> No
 
 def test_a_refinement_that_hits_is_not_spoilt_by_the_swarm(person, monkeypatch) -> None:
     config = settings(edge_weight=0.0)
-    monkeypatch.setattr(refinement, "refine", lambda *_, **__: person.pose.copy())
+    monkeypatch.setattr(ContourFrame, "refined", lambda *_, **__: person.pose.copy())
     np.testing.assert_array_equal(searched(person, config).pose, person.pose)
 
 
 def test_each_stage_starts_from_the_estimate_so_far(person, monkeypatch) -> None:
     config, centres = settings(), []
-    plain = Sppso.__init__
 
-    def watched(self, problem, **kwargs):
-        centres.append(problem.centre.copy())
-        plain(self, problem, **kwargs)
+    def watched(stage, **kwargs):
+        centres.append(stage.centre.copy())
+        return SWARMS["sppso"](stage, **kwargs)
 
-    monkeypatch.setattr(Sppso, "__init__", watched)
-    monkeypatch.setattr(refinement, "refine", lambda *_, **__: person.pose.copy())
+    monkeypatch.setattr(search, "SWARMS", {"sppso": watched})
+    monkeypatch.setattr(ContourFrame, "refined", lambda *_, **__: person.pose.copy())
     searched(person, config)
     np.testing.assert_array_equal(centres[0], person.pose[person.body.root])
 
@@ -206,16 +208,16 @@ def test_refinement_is_told_limits_beliefs_and_reach(person, monkeypatch) -> Non
     )
     given = []
 
-    def refine(equations, start, **kwargs):
+    def refine(contours, start, **kwargs):
         given.append(kwargs)
         # Wherever the search went since, the belief is about the prediction.
         return person.pose.copy()
 
-    monkeypatch.setattr(refinement, "refine", refine)
+    monkeypatch.setattr(ContourFrame, "refined", refine)
     searched(person, config)
     assert len(given) == 2
     for kwargs in given:
-        assert kwargs["truncation"] == (0.2, 0.05) and kwargs["iterations"] == 3
+        assert kwargs["truncation_m"] == (0.2, 0.05) and kwargs["iterations"] == 3
         np.testing.assert_array_equal(kwargs["bounds"], person.body.limits)
         predicted, posture = kwargs["priors"]
         np.testing.assert_array_equal(predicted.mean, person.predicted)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.fitness.contour import frame as contours
 from markerless_tracker.imaging import Segmenter
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.tracking import Tracker, TrackerConfig
@@ -296,16 +295,6 @@ class TestViews:
         for array in (result.pose, result.markers_m):
             with pytest.raises(ValueError, match="read-only"):
                 array[0] = 0.0
-
-
-def test_warming_up_meets_the_most_and_the_least_work(
-    make_tracker, refined_settings, frames, monkeypatch
-):
-    """Else the kernel for few views would be compiled when a camera fails."""
-    asked = set()
-    monkeypatch.setattr(contours, "worth_waking", lambda work_s, threads: asked.add(work_s))
-    make_tracker(refined_settings).warm_up()
-    assert min(asked) * len(frames[0].images) == pytest.approx(max(asked))
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,11 @@
-"""Residuals and normal equations of all views at a pose, serial or with one thread per view."""
+"""Residuals and normal equations of all views at a pose, and the refinement of a pose by them."""
 
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import compiled, kernel
+from markerless_tracker.compiled import compiled, inlined, kernel
 from markerless_tracker.fitness.contour.chain_kernels import SUMS, add_wrench, sum_chain
 from markerless_tracker.fitness.contour.nearest import BAND_PX
 from markerless_tracker.fitness.contour.outline_samples import MAX_SAMPLES, sample_outline
@@ -14,6 +13,13 @@ from markerless_tracker.fitness.contour.residuals import collect_residuals
 from markerless_tracker.fitness.raster.kernels import cone_ends
 from markerless_tracker.fitness.raster.outline_arrays import LANES
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim.gauss_newton import (
+    DAMPING,
+    SOLVED,
+    StepScratch,
+    make_step_scratch,
+    solve_step,
+)
 
 
 class ContourScratch(NamedTuple):
@@ -28,6 +34,7 @@ class ContourScratch(NamedTuple):
     sums: FloatArray  # (v, m, SUMS)
     hessian: FloatArray  # (p, p)
     slope: FloatArray  # (p,)
+    step: StepScratch
 
 
 def make_contour_scratch(
@@ -44,6 +51,7 @@ def make_contour_scratch(
         np.empty((views, nodes, SUMS)),
         np.empty((parameters, parameters)),
         np.empty(parameters),
+        make_step_scratch(parameters),
     )
 
 
@@ -64,94 +72,75 @@ def _accumulate(view, cone_node, samples, residuals, sums):  # type: ignore[no-u
         )  # fmt: skip
 
 
-@kernel
-def _one_view(  # type: ignore[no-untyped-def]
-    view,
-    body,
-    views,
-    contours,
-    spacing_m,
-    step_px,
-    truncation_m,
-    samples,
-    residuals,
-    scratch,
-    outlines,
-):  # fmt: skip
-    world = scratch.world
-    r, t = views.rotation[view], views.translation[view]
-    depth = r[2, 0] * world[0] + r[2, 1] * world[LANES] + r[2, 2] * world[2 * LANES] + t[2]
-    spacing_px = max(1.0, spacing_m * views.intrinsics[view, 0] / max(depth, 0.5))
-    sample_outline(
-        view, views, body.cone_node.size, spacing_px, step_px, scratch, outlines, samples
-    )
-    collect_residuals(
-        view,
-        views,
-        contours,
-        truncation_m,
-        samples,
-        scratch.start[view],
-        scratch.order[view],
-        residuals,
-    )
-    _accumulate(view, body.cone_node, samples, residuals, scratch.sums[view])
+@inlined
+def _depth(view, views, world):  # type: ignore[no-untyped-def]
+    """Depth of the first cone's end in a view, m."""
+    r = views.rotation[view]
+    depth = r[2, 0] * world[0] + r[2, 1] * world[LANES] + r[2, 2] * world[2 * LANES]
+    return depth + views.translation[view, 2]
 
 
 @compiled()
-def _total(body, views, scratch):  # type: ignore[no-untyped-def]
-    """Add the views' sums in the order of the views and fill the normal equations."""
-    sums = scratch.sums[0]
-    for view in range(1, views):
-        for m in range(sums.shape[0]):
-            for k in range(SUMS):
-                sums[m, k] += scratch.sums[view, m, k]
-    sum_chain(body, scratch.nodes, sums, scratch.hessian, scratch.slope)
-
-
-@compiled()
-def equations_serial(  # type: ignore[no-untyped-def]
+def descend(  # type: ignore[no-untyped-def]
     pose,
+    steps,
+    truncations,
+    precision,
+    prior_mean,
+    prior_precision,
+    bounds,
     body,
     views,
     contours,
     spacing_m,
     step_px,
-    truncation_m,
     samples,
     residuals,
     scratch,
     outlines,
 ):  # fmt: skip
-    """Fill residuals and normal equations at a pose (p,), on the calling thread."""
-    cone_ends(pose, body, scratch.nodes, scratch.world)
-    for view in range(views.size.shape[0]):
-        _one_view(
-            view, body, views, contours, spacing_m, step_px, truncation_m, samples, residuals,
-            scratch, outlines,
-        )  # fmt: skip
-    _total(body, views.size.shape[0], scratch)
+    """Normal equations at each truncation (n,), the first steps of them taken by the pose (p,).
 
+    The only compiled entry: without steps it fills the residuals and equations at the pose; with
+    as many as truncations it is `optim.refine`.
 
-@compiled(parallel=True)
-def equations_parallel(  # type: ignore[no-untyped-def]
-    pose,
-    body,
-    views,
-    contours,
-    spacing_m,
-    step_px,
-    truncation_m,
-    samples,
-    residuals,
-    scratch,
-    outlines,
-):  # fmt: skip
-    """As `equations_serial`, one thread per view. Each view has its own sums: the same result."""
-    cone_ends(pose, body, scratch.nodes, scratch.world)
-    for view in prange(views.size.shape[0]):
-        _one_view(
-            view, body, views, contours, spacing_m, step_px, truncation_m, samples, residuals,
-            scratch, outlines,
-        )  # fmt: skip
-    _total(body, views.size.shape[0], scratch)
+    Args:
+        pose: changed in place.
+        precision: factor of the data's equations.
+        prior_mean, prior_precision: (k, p) of Gaussian priors.
+        bounds: (2, p).
+    """
+    hessian, slope, count = scratch.hessian, scratch.slope, views.size.shape[0]
+    for i in range(truncations.size):
+        cone_ends(pose, body, scratch.nodes, scratch.world)
+        for view in range(count):
+            focal = views.intrinsics[view, 0]
+            spacing_px = max(1.0, spacing_m * focal / max(_depth(view, views, scratch.world), 0.5))
+            sample_outline(
+                view, views, body.cone_node.size, spacing_px, step_px, scratch, outlines, samples
+            )
+            collect_residuals(
+                view, views, contours, truncations[i], samples, scratch.start[view],
+                scratch.order[view], residuals,
+            )  # fmt: skip
+            _accumulate(view, body.cone_node, samples, residuals, scratch.sums[view])
+        # The views' sums are added in their order.
+        for view in range(1, count):
+            for m in range(scratch.sums.shape[1]):
+                for k in range(SUMS):
+                    scratch.sums[0, m, k] += scratch.sums[view, m, k]
+        sum_chain(body, scratch.nodes, scratch.sums[0], hessian, slope)
+        if i >= steps:
+            continue
+        for a in range(pose.size):
+            slope[a] *= precision
+            for b in range(pose.size):
+                hessian[a, b] *= precision
+            for k in range(prior_mean.shape[0]):
+                hessian[a, a] += prior_precision[k, a]
+                slope[a] += prior_precision[k, a] * (pose[a] - prior_mean[k, a])
+        if solve_step(hessian, slope, pose, bounds, DAMPING, scratch.step) != SOLVED:
+            return
+        for a in range(pose.size):
+            # A sum may round to beyond a bound.
+            pose[a] = min(max(pose[a] + scratch.step.step[a], bounds[0, a]), bounds[1, a])

@@ -8,11 +8,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.fitness.arrays import BodyArrays, Views, body_arrays
-from markerless_tracker.fitness.contour.equations import (
-    equations_parallel,
-    equations_serial,
-    make_contour_scratch,
-)
+from markerless_tracker.fitness.contour.equations import descend, make_contour_scratch
 from markerless_tracker.fitness.contour.outline_samples import Samples, make_samples
 from markerless_tracker.fitness.contour.residuals import Residuals, make_residuals
 from markerless_tracker.fitness.contour.silhouette_contour import (
@@ -21,14 +17,14 @@ from markerless_tracker.fitness.contour.silhouette_contour import (
     silhouette_contour,
 )
 from markerless_tracker.fitness.raster import Outlines, make_outlines
-from markerless_tracker.fitness.threads import parallel, usable_threads, worth_waking
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import Prior
+from markerless_tracker.optim.gauss_newton import truncations
 from markerless_tracker.records import Observation
 
 SPACING_M = 0.02
 """Distance of neighbouring outline points along the outline, m."""
-_VIEW_S = 0.07e-3
-"""Approximate time of one view's equations on one thread."""
+_NO_BOUNDS = np.empty((2, 0))
 
 Mapper = Callable[..., "object"]
 
@@ -56,7 +52,6 @@ class ContourFrame:
         cameras: cameras by name.
         observations: the evidence of the views, by camera name.
         views: the same views as `lay_out_views` gives them.
-        threads: 1, or more for one thread per view; the result does not depend on it.
         pixels_per_m: size of a metre at the body, px, by camera name.
         step_px: distance outward of an outline point at which no cone may cover the pixel.
         mapper: `map`, or a thread pool's.
@@ -70,14 +65,12 @@ class ContourFrame:
         views: Views,
         *,
         pixels_per_m: Mapping[str, float],
-        threads: int = 1,
         step_px: float = 2.0,
         mapper: Callable[..., object] = map,
     ) -> None:
         self.body = body
         self.views = views
         self._arrays: BodyArrays = body_arrays(body)
-        self._threads = usable_threads(threads)
         self._step_px = step_px
 
         def edge(name: str) -> SilhouetteContour:
@@ -107,13 +100,50 @@ class ContourFrame:
     def collect(self, pose: FloatArray, truncation_m: float, body: BodyModel | None = None) -> None:
         """Fill `samples` and `residuals` at a pose (p,), of another body's shape if given."""
         arrays = self._arrays if body is None else body_arrays(body)
-        args = (
-            np.ascontiguousarray(pose, dtype=np.float64), arrays, self.views.arrays, self.contours,
-            SPACING_M, self._step_px, truncation_m, self.samples, self.residuals, self._scratch,
-            self._outlines,
+        none = np.empty((0, pose.size))
+        self._descend(pose, 0, np.array([truncation_m]), 1.0, none, none, _NO_BOUNDS, arrays)
+
+    def refined(
+        self,
+        start: FloatArray,
+        *,
+        precision: float,
+        priors: tuple[Prior, ...],
+        bounds: FloatArray,
+        iterations: int,
+        truncation_m: tuple[float, float],
+    ) -> FloatArray:
+        """A pose (p,) refined as `optim.refine` does, in one compiled call.
+
+        Args:
+            start: (p,) where to begin.
+            precision: factor from these normal equations to those of -log p, 1 / m³.
+            priors, bounds, iterations: as for `optim.refine`.
+            truncation_m: residuals beyond it are outliers, in the first and in the last step.
+        """
+        mean = np.array([prior.mean for prior in priors]).reshape(-1, start.size)
+        weight = np.array([prior.precision for prior in priors]).reshape(-1, start.size)
+        reach = truncations(*truncation_m, iterations)
+        begin = np.clip(start, *bounds)
+        return self._descend(
+            begin, iterations, reach, precision, mean, weight, bounds, self._arrays
+        )
+
+    def _descend(
+        self,
+        pose: FloatArray,
+        steps: int,
+        reach: FloatArray,
+        precision: float,
+        mean: FloatArray,
+        weight: FloatArray,
+        bounds: FloatArray,
+        arrays: BodyArrays,
+    ) -> FloatArray:
+        pose = np.array(pose, dtype=np.float64)
+        descend(
+            pose, steps, reach, precision, mean, weight, np.array(bounds, dtype=np.float64), arrays,
+            self.views.arrays, self.contours, SPACING_M, self._step_px, self.samples,
+            self.residuals, self._scratch, self._outlines,
         )  # fmt: skip
-        if not worth_waking(len(self.views.names) * _VIEW_S, self._threads):
-            equations_serial(*args)
-            return
-        with parallel(self._threads):
-            equations_parallel(*args)
+        return pose

@@ -4,7 +4,7 @@ Kernels import each other from their own modules: stored kernels are named after
 """
 
 from markerless_tracker.fitness.raster.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule
-from markerless_tracker.fitness.raster.kernels import evaluate, evaluate_parallel, make_scratch
+from markerless_tracker.fitness.raster.kernels import evaluate, make_scratch
 from markerless_tracker.fitness.raster.outline_arrays import Outlines, make_outlines
 
 __all__ = [
@@ -14,7 +14,6 @@ __all__ = [
     "EdgeRule",
     "Outlines",
     "evaluate",
-    "evaluate_parallel",
     "make_outlines",
     "make_scratch",
 ]

@@ -6,17 +6,17 @@ thread, counted against the observed silhouette and cleared, so nothing is alloc
 A result depends on its particle alone, hence not on the number of threads.
 """
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from markerless_tracker.body.kinematics import node_transform
-from markerless_tracker.compiled import compiled, kernel
+from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.raster.edge_samples import (
     OUTLINE,
     VISIBLE,
+    EdgeRule,
     recount_static,
     sample_cone,
 )
@@ -27,9 +27,19 @@ from markerless_tracker.fitness.raster.fill import (
     fill_outline,
 )
 from markerless_tracker.fitness.raster.outline import find_outlines
-from markerless_tracker.fitness.raster.outline_arrays import HIDDEN, LANES, outlines_of
-from markerless_tracker.fitness.terms import EDGE_COUNT, EDGE_SUM, OVERLAP, PROJECTED, view_cost
+from markerless_tracker.fitness.raster.outline_arrays import HIDDEN, LANES, Outlines, outlines_of
+from markerless_tracker.fitness.terms import (
+    EDGE_COUNT,
+    EDGE_SUM,
+    OVERLAP,
+    PROJECTED,
+    CostRule,
+    view_cost,
+)
 from markerless_tracker.geometry import FloatArray
+
+if TYPE_CHECKING:
+    from markerless_tracker.fitness.arrays import BodyArrays, ViewArrays
 
 _ROUNDING = 1e-9
 """Upper bound of the rounding errors of a sum of a few costs."""
@@ -80,6 +90,34 @@ class StaticLayer(NamedTuple):
     sample_start: NDArray[np.int64]
     samples: NDArray[np.int64]
     least: FloatArray
+
+
+class Objective(NamedTuple):
+    """What the poses of one search are compared with, as kernels read it.
+
+    Attributes:
+        active: (d,) indices of the parameters that vary.
+        centre: (p,) values of the others.
+        body: all nodes, and the cones that are drawn for every pose.
+        views: the evidence.
+        silhouette_cones: (c,) whether each of these cones is part of the silhouette.
+        edge_cones: (c, 2) whether its sides, and the edge of its far end, are sampled.
+        rule, cost: how edges are sampled, and the weights of the terms.
+        static: the cones that are drawn once.
+        scratch, outlines: working memory.
+    """
+
+    active: NDArray[np.int64]
+    centre: FloatArray
+    body: "BodyArrays"
+    views: "ViewArrays"
+    silhouette_cones: NDArray[np.bool_]
+    edge_cones: NDArray[np.bool_]
+    rule: EdgeRule
+    cost: CostRule
+    static: StaticLayer
+    scratch: Scratch
+    outlines: Outlines
 
 
 @kernel
@@ -189,27 +227,24 @@ def compare_view(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def evaluate(  # type: ignore[no-untyped-def]
-    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, static,
-    scratch, outlines, counts, costs, thread, threads,
-):  # fmt: skip
+def evaluate(points, cutoff_costs, objective, counts, costs, thread, threads):  # type: ignore[no-untyped-def]
     """Fill costs (n,) and counts (n, v, 4) of points (n, d) on the calling thread.
 
     Only every `threads`-th point is evaluated, from point `thread` on.
 
     Args:
         points: values of the active parameters.
-        active: (d,) their indices; the others are at centre (p,).
         cutoff_costs: (n,) cutoff per particle: an evaluation may stop once its cost exceeds it.
             The cost is then a lower bound of at least the cutoff, and the counts of the remaining
             views are not filled.
-        body: the moving cones, and all nodes.
-        body_cones, edge_cones: see `compare_view`.
-        rule, cost: see `EdgeRule` and `CostRule`.
+        objective: see `Objective`.
 
     NaN for points that are not finite.
     """
-    out = outlines_of(outlines, thread)
+    o = objective
+    active, centre, body, views = o.active, o.centre, o.body, o.views
+    static, scratch = o.static, o.scratch
+    out = outlines_of(o.outlines, thread)
     pose = scratch.pose[thread]
     bits, used, order = scratch.bits[thread], scratch.used[thread], scratch.order[thread]
     nodes, world = scratch.nodes[thread], scratch.world[thread]
@@ -243,23 +278,9 @@ def evaluate(  # type: ignore[no-untyped-def]
             if low >= cutoff_costs[n]:
                 break
             compare_view(
-                body_cones, edge_cones, views, view, rule, static, world, out, bits, used, order,
-                counts[n, view],
+                o.silhouette_cones, o.edge_cones, views, view, o.rule, static, world, out, bits,
+                used, order, counts[n, view],
             )  # fmt: skip
-            total += view_cost(counts[n, view], views.observed[view], cost)
+            total += view_cost(counts[n, view], views.observed[view], o.cost)
             low = total / seen
         costs[n] = low
-
-
-@compiled(parallel=True)
-def evaluate_parallel(  # type: ignore[no-untyped-def]
-    points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost, static,
-    scratch, outlines, counts, costs,
-):  # fmt: skip
-    """As `evaluate`, on as many threads as the scratch memory has room for."""
-    threads = scratch.bits.shape[0]
-    for thread in prange(threads):
-        evaluate(
-            points, active, centre, cutoff_costs, body, views, body_cones, edge_cones, rule, cost,
-            static, scratch, outlines, counts, costs, thread, threads,
-        )  # fmt: skip

@@ -14,7 +14,7 @@ from markerless_tracker.fitness.arrays import BodyArrays, ViewArrays
 from markerless_tracker.fitness.raster.bits import popcount
 from markerless_tracker.fitness.raster.edge_samples import OUTLINE, VISIBLE, EdgeRule, sample_cone
 from markerless_tracker.fitness.raster.fill import clear_used, fill_outline
-from markerless_tracker.fitness.raster.kernels import Scratch, StaticLayer, cone_ends
+from markerless_tracker.fitness.raster.kernels import Objective, Scratch, StaticLayer, cone_ends
 from markerless_tracker.fitness.raster.outline import find_outlines
 from markerless_tracker.fitness.raster.outline_arrays import HIDDEN, Outlines, outlines_of
 from markerless_tracker.fitness.terms import (
@@ -34,36 +34,40 @@ _SPARE = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
-    """How the poses of one search are drawn.
+class Cones:
+    """Some cones of a body: arrays, whether each is part of the silhouette, its sampled edges."""
+
+    arrays: BodyArrays
+    silhouette: NDArray[np.bool_]
+    edges: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """Which cones a search moves: the same in every frame.
 
     Attributes:
-        body: all nodes, and the cones that are drawn for every pose.
-        silhouette_cones: (c,) whether each of these cones is part of the silhouette.
-        edge_cones: (c, 2) whether its sides, and the edge of its far end, are sampled.
-        static: the cones that are drawn once.
+        active: (d,) indices of the parameters that vary.
+        moving: nodes that they move, parents first.
+        drawn: the cones that are drawn for every pose.
+        rest: those that are drawn once.
     """
 
-    body: BodyArrays
-    silhouette_cones: NDArray[np.bool_]
-    edge_cones: NDArray[np.bool_]
-    static: StaticLayer
+    active: IntArray
+    moving: IntArray
+    drawn: Cones
+    rest: Cones
 
 
-def split_static(
+def split_cones(
     body: BodyModel,
     arrays: BodyArrays,
-    views: ViewArrays,
     active: IntArray,
-    centre: FloatArray,
     silhouette_cones: NDArray[np.bool_],
     edge_cones: NDArray[np.bool_],
     rule: EdgeRule,
-    cost: CostRule,
-    scratch: Scratch,
-    outlines: Outlines,
-) -> Drawing:
-    """Draw the cones that do not depend on the active parameters (d,), at a centre (p,).
+) -> Split:
+    """The cones that the active parameters (d,) move, and the others.
 
     Which edges are visible depends on the order of all cones in depth: if visible edges are
     sampled, no cone is static.
@@ -71,42 +75,61 @@ def split_static(
     Args:
         body: the body.
         arrays: see `body_arrays`.
-        views: the views.
         active: the parameters that vary.
-        centre: the pose of the others.
         silhouette_cones: (c,) cones that are part of the silhouette.
         edge_cones: (c,) cones whose edges are sampled.
-        rule, cost: how edges are sampled, and the weights of the terms.
-        scratch, outlines: working memory.
+        rule: how edges are sampled.
     """
     sampled = body.cone_edges & edge_cones[:, None]
     needed = silhouette_cones | sampled.any(axis=1)
     moves = moving_nodes(body, active)
     if rule.rule == VISIBLE and sampled.any():
         moves[:] = True
-    drawn = np.flatnonzero(needed & moves[body.cone_node])
-    rest = np.flatnonzero(needed & ~moves[body.cone_node])
+    drawn, rest = (
+        Cones(_some(arrays, cones), silhouette_cones[cones], sampled[cones])
+        for cones in (
+            np.flatnonzero(needed & moves[body.cone_node]),
+            np.flatnonzero(needed & ~moves[body.cone_node]),
+        )
+    )
+    # A copy: kernels are compiled once more for arrays that are read-only.
+    return Split(np.array(active, dtype=np.int64), np.flatnonzero(moves), drawn, rest)
+
+
+def draw_static(
+    split: Split,
+    views: ViewArrays,
+    centre: FloatArray,
+    rule: EdgeRule,
+    cost: CostRule,
+    scratch: Scratch,
+    outlines: Outlines,
+) -> Objective:
+    """Draw the cones that do not move, at a centre (p,); arguments as in `Objective`."""
+    centre = np.array(centre, dtype=np.float64)
+    drawn, rest = split.drawn, split.rest
+    size = rest.silhouette.size
     count = len(views.size)
-    nodes = np.empty((body.node_parent.size, 3, 4))
-    cone_ends(centre, arrays, nodes, scratch.world[0])
+    nodes = np.empty((drawn.arrays.parent.size, 3, 4))
     counts = np.zeros((count, 4))
     least = np.zeros(count + 1)
     start = np.zeros(count + 1, dtype=np.int64)
-    bits = np.zeros(views.mask.size if rest.size else 0, dtype=np.uint64)
+    bits = np.zeros(views.mask.size if size else 0, dtype=np.uint64)
     listed = np.empty((0, 2), dtype=np.int64)
-    if rest.size:
+    sides = int(rest.edges.sum()) * _SIDES if rule.rule == OUTLINE else 0
+    if sides:
         # Listed samples lie inside the frame, which bounds their number per side.
         longest = ceil(int(views.size.sum(axis=1).max()) / rule.spacing_px) + _SPARE
-        sides = int(sampled[rest].sum()) * _SIDES if rule.rule == OUTLINE else 0
         listed = np.empty((count * sides * longest, 2), dtype=np.int64)
-        _draw_static(
-            centre, _some(arrays, rest), views, silhouette_cones[rest], sampled[rest], rule, cost,
-            scratch.used[0], nodes, scratch.world[0], outlines, bits, counts, start, listed, least,
-        )  # fmt: skip
-    static = StaticLayer(
-        np.flatnonzero(moves), nodes, bits, counts, start, listed[: start[-1]], least,
+    _draw_static(
+        centre, rest.arrays, views, rest.silhouette, rest.edges, rule, cost, scratch.used[0], nodes,
+        scratch.world[0], outlines, bits, counts, start, listed, least,
     )  # fmt: skip
-    return Drawing(_some(arrays, drawn), silhouette_cones[drawn], sampled[drawn], static)
+    static = StaticLayer(split.moving, nodes, bits, counts, start, listed[: start[-1]], least)
+    return Objective(
+        split.active, centre, drawn.arrays, views, drawn.silhouette, drawn.edges, rule, cost,
+        static, scratch, outlines,
+    )  # fmt: skip
 
 
 def _some(arrays: BodyArrays, cones: NDArray[np.int64]) -> BodyArrays:
@@ -124,8 +147,10 @@ def _draw_static(  # type: ignore[no-untyped-def]
     centre, body, views, silhouette_cones, edge_cones, rule, cost, used, nodes, world, outlines,
     bits, counts, start, listed, least,
 ):  # fmt: skip
-    """Fill the fields of `StaticLayer` from the cones of `body`."""
+    """Fill the fields of `StaticLayer` from the cones of `body`, if it has any."""
     cone_ends(centre, body, nodes, world)
+    if silhouette_cones.size == 0:
+        return
     out = outlines_of(outlines, 0)
     nothing = bits[:0]
     kept = 0

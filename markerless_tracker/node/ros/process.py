@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from markerless_tracker.errors import ConfigError, TrackerError
+from markerless_tracker.libraries import single_threaded
 from markerless_tracker.node.ros.profile import apply_profile
 
 NOT_INSTALLED = (
@@ -80,6 +81,7 @@ def run_executable(
             returns the exit code.
         argv: arguments without the program's name; those of this process if None.
     """
+    single_threaded()
     with StopSignals() as stop:
         try:
             apply_profile()

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
-from markerless_tracker.body.kinematics import carried
+from markerless_tracker.body.parts import cones_of
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation
+from markerless_tracker.records import Observation, unpack_mask
 from markerless_tracker.tracking.search import pixels_per_m
 
 MARGIN_M = 0.03
@@ -54,21 +54,41 @@ def _left_over(
     observation: Observation, covered: NDArray[np.bool_], scale: float
 ) -> list[tuple[float, FloatArray]]:
     """Area (px) and centre (2,) of the regions that are farther than the margin from the body."""
-    u, v = observation.offset_px
-    window = covered[v : v + observation.height, u : u + observation.width]
-    side = 2 * max(1, round(MARGIN_M * scale)) + 1
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    near = cv2.dilate(np.ascontiguousarray(window).view(np.uint8), disc).view(np.bool_)
-    rest = observation.mask & ~near
+    box = _box(observation)
+    if box is None:
+        return []
+    reach = max(1, round(MARGIN_M * scale))
+    (u, v), (left, top, right, bottom) = observation.offset_px, box
+    # The silhouette's box, and around it what may cover it.
+    at = max(0, u + left - reach), max(0, v + top - reach)
+    around = covered[at[1] : v + bottom + reach, at[0] : u + right + reach]
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    near = cv2.dilate(np.ascontiguousarray(around).view(np.uint8), disc).view(np.bool_)
+    near = near[v + top - at[1] :, u + left - at[0] :][: bottom - top, : right - left]
+    words = observation.mask_words[top:bottom, left // 64 :]
+    rest = unpack_mask(words, right - left) & ~near
     least_px = LEAST_M2 * scale**2
     if np.count_nonzero(rest) < least_px:
         return []
     count, _, stats, centres = cv2.connectedComponentsWithStats(rest.view(np.uint8))
     return [
-        (float(stats[n, cv2.CC_STAT_AREA]), centres[n] + observation.offset_px)
+        (float(stats[n, cv2.CC_STAT_AREA]), centres[n] + (u + left, v + top))
         for n in range(1, count)
         if stats[n, cv2.CC_STAT_AREA] >= least_px
     ]
+
+
+def _box(observation: Observation) -> tuple[int, int, int, int] | None:
+    """Left, top, right and bottom of a region's silhouette, px, ends excluded; None without one.
+
+    Left and right are those of words of 64 pixels.
+    """
+    words = observation.mask_words
+    rows, columns = np.flatnonzero(words.any(axis=1)), np.flatnonzero(words.any(axis=0))
+    if rows.size == 0:
+        return None
+    right = min(observation.width, 64 * (int(columns[-1]) + 1))
+    return 64 * int(columns[0]), int(rows[0]), right, int(rows[-1]) + 1
 
 
 def _axes(body: BodyModel, pose: FloatArray) -> dict[str, FloatArray]:
@@ -77,8 +97,7 @@ def _axes(body: BodyModel, pose: FloatArray) -> dict[str, FloatArray]:
     ends = placed[:, :, 3] + body.cone_length[:, None] * placed[:, :, 2]
     axes = {}
     for name in body.limbs:
-        nodes = np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name]))
-        hangs = carried(body, nodes)[body.cone_node].any(axis=1)
+        hangs = cones_of(body, name)
         axes[name] = np.concatenate([placed[hangs, :, 3], ends[hangs]])
     return axes
 

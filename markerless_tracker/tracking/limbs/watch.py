@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
+from markerless_tracker.body.model import IntArray
+from markerless_tracker.body.parts import cones_of
 from markerless_tracker.camera import CameraRig, project_camera
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
-from markerless_tracker.records import LimbState, Observation, TrackState
+from markerless_tracker.records import LimbState, MaskWords, Observation, TrackState
 from markerless_tracker.tracking.limbs.search import other_limb
 from markerless_tracker.tracking.limbs.unexplained import limbs_unexplained
 from markerless_tracker.tracking.loss import LimbTrack
@@ -137,9 +139,7 @@ def inside_fractions(
     seen = [_look(points, observation, rig) for observation in observations.values()]
     fractions = {}
     for name in body.limbs:
-        nodes = np.flatnonzero(np.isin(body.node_parameter, body.subspaces[name]))
-        below = np.isin(body.cone_node, list(_below(body, nodes)))
-        own = np.repeat(below, _ALONG.size)
+        own = np.repeat(cones_of(body, name), _ALONG.size)
         values = [
             float(inside[own].sum()) / float(framed[own].sum())
             for framed, inside in seen
@@ -148,14 +148,6 @@ def inside_fractions(
         if values:
             fractions[name] = float(np.mean(values))
     return fractions
-
-
-def _below(body: BodyModel, nodes: np.ndarray[tuple[int], np.dtype[np.int64]]) -> set[int]:
-    below = {int(node) for node in nodes}
-    for node, above in enumerate(body.node_parent):
-        if int(above) in below:
-            below.add(node)
-    return below
 
 
 def _look(
@@ -167,11 +159,16 @@ def _look(
         last = np.array(observation.size_px) - 1
         framed = np.asarray((pixels >= 0.0).all(axis=1) & (pixels <= last).all(axis=1))
     inside = np.zeros(len(points), dtype=np.bool_)
-    mask, undecided = observation.mask, observation.undecided
     u, v = (np.round(pixels[framed]) - observation.offset_px).astype(np.int64).T
-    there = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
+    there = (u >= 0) & (v >= 0) & (u < observation.width) & (v < observation.height)
     seen = np.flatnonzero(framed)[there]
-    inside[seen] = mask[v[there], u[there]]
-    if undecided is not None:
-        framed[seen] &= ~undecided[v[there], u[there]]
+    inside[seen] = _bits(observation.mask_words, u[there], v[there])
+    if observation.undecided_words is not None:
+        framed[seen] &= ~_bits(observation.undecided_words, u[there], v[there])
     return framed, inside
+
+
+def _bits(words: MaskWords, u: IntArray, v: IntArray) -> NDArray[np.bool_]:
+    """A packed mask at pixels (n,)."""
+    shift = (u % 64).astype(np.uint64)
+    return np.asarray((words[v, u // 64] >> shift) & np.uint64(1), dtype=np.bool_)

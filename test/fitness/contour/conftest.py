@@ -42,7 +42,7 @@ class Scene:
         return silhouette_contour(self.observations[camera.name], self.spacing_px)
 
 
-def scene(name, seed, make_pose, *, lens=(0.0,) * 5, cameras=4, size=(656, 490), threads=1):
+def scene(name, seed, make_pose, *, lens=(0.0,) * 5, cameras=4, size=(656, 490)):
     body = load_body(name, 1.75)
     rig = ring_rig(cameras, size, distance_m=DISTANCE_M, distortion=lens)
     pose = make_pose(body, np.random.default_rng(seed), spread_m=0.2)
@@ -56,14 +56,14 @@ def scene(name, seed, make_pose, *, lens=(0.0,) * 5, cameras=4, size=(656, 490),
     frame = ContourFrame(
         body, {c.name: c for c in rig}, observations, views,
         pixels_per_m={c.name: c.matrix[0, 0] / DISTANCE_M for c in rig},
-        threads=threads, step_px=STEP_PX,
+        step_px=STEP_PX,
     )  # fmt: skip
     return Scene(body, rig, pose, observations, frame)
 
 
 @pytest.fixture(scope="session")
 def make_scene() -> Callable[..., Scene]:
-    """`make(body_name, seed, make_pose, *, lens, cameras, size, threads)`."""
+    """`make(body_name, seed, make_pose, *, lens, cameras, size)`."""
     return scene
 
 

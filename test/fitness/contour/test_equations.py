@@ -1,11 +1,10 @@
-"""Normal equations against finite differences; the same with any number of threads."""
+"""Normal equations against finite differences; the same whatever was asked before."""
 
 import numpy as np
 import pytest
 
 from markerless_tracker.body import cone_transforms, transforms
 from markerless_tracker.camera import project_camera
-from markerless_tracker.fitness import threads
 from markerless_tracker.fitness.arrays import body_arrays
 from markerless_tracker.fitness.contour.chain_kernels import SUMS, add_wrench, sum_chain
 
@@ -94,12 +93,9 @@ def test_the_slope_points_downhill(posed, disturbed) -> None:
     assert costs[1] < costs[0] and costs[2] < costs[1] and costs[3] < 0.5 * costs[0]
 
 
-def test_threads_and_earlier_calls_change_nothing(
-    monkeypatch, make_pose, make_scene, disturbed
-) -> None:
-    monkeypatch.setattr(threads, "launch_cost_s", lambda count: 0.0)
-    one = make_scene("person31", 9, make_pose, lens=LENS, threads=1)
-    two = make_scene("person31", 9, make_pose, lens=LENS, threads=2)
+def test_earlier_calls_change_nothing(make_pose, make_scene, disturbed) -> None:
+    one = make_scene("person31", 9, make_pose, lens=LENS)
+    two = make_scene("person31", 9, make_pose, lens=LENS)
     pose = disturbed(one)
     first = one.frame.equations(pose, 0.1)
     one.frame.equations(one.pose, 0.02)

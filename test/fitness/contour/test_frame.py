@@ -202,7 +202,7 @@ class Person:
     pose: FloatArray
     observations: dict[str, Observation]
 
-    def frame(self, *, threads=1, black=()) -> ContourFrame:
+    def frame(self, *, black=()) -> ContourFrame:
         seen = dict(self.observations)
         for name in black:
             nothing = np.zeros_like(seen[name].edges)
@@ -213,7 +213,6 @@ class Person:
             seen,
             Fitness(self.body, self.rig.cameras).lay_out(seen),
             pixels_per_m={camera.name: camera.matrix[0, 0] / 4.5 for camera in self.rig},
-            threads=threads,
         )
 
     def start(self, seed, *, offset_m=0.06, turn_rad=0.15) -> tuple[FloatArray, Prior]:
@@ -256,14 +255,41 @@ def person(name, seed, **angles) -> Person:
 
 
 def refined(shown: Person, frame: ContourFrame, start: FloatArray, prior: Prior, iterations=12):
+    return frame.refined(
+        start, precision=PRECISION, priors=(prior,), bounds=shown.body.limits,
+        iterations=iterations, truncation_m=(0.2, 0.03),
+    )  # fmt: skip
+
+
+def refined_slowly(
+    shown: Person, frame: ContourFrame, start: FloatArray, priors: tuple[Prior, ...]
+):
+    """The same by `optim.refine`, with NumPy's solution of each step."""
+
     def equations(pose, truncation_m):
         sums = frame.equations(pose, truncation_m)
         return sums.hessian * PRECISION, sums.slope * PRECISION
 
     return refine(
-        equations, start, priors=(prior,), bounds=shown.body.limits, iterations=iterations,
+        equations, start, priors=priors, bounds=shown.body.limits, iterations=5,
         truncation=(0.2, 0.03),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("beliefs", [0, 1, 2])
+def test_the_compiled_refinement_is_the_written_one(beliefs) -> None:
+    """Whatever the number of priors; the start lies on some limits."""
+    shown = person("person31", 3)
+    start, prior = shown.start(7)
+    start[shown.body.index("l_knee")] = 0.1
+    priors = (prior, Prior(shown.pose, np.full(start.size, 4.0)))[:beliefs]
+    slow = refined_slowly(shown, shown.frame(), start, priors)
+    fast = shown.frame().refined(
+        start, precision=PRECISION, priors=priors, bounds=shown.body.limits, iterations=5,
+        truncation_m=(0.2, 0.03),
+    )  # fmt: skip
+    np.testing.assert_allclose(fast, slow, atol=1e-9)
+    assert shown.error_mm(fast) < 0.5 * shown.error_mm(start)
 
 
 @pytest.mark.parametrize("name", ["balan31", "person31"])
@@ -283,13 +309,11 @@ def test_a_small_disturbance_needs_few_iterations() -> None:
     assert shown.error_mm(start) > 20.0 and shown.error_mm(found) < 3.0
 
 
-def test_threads_give_the_same_bytes() -> None:
+def test_a_refinement_can_be_repeated() -> None:
     shown = person("person31", 1)
     start, prior = shown.start(1)
-    once, again, threaded = (
-        refined(shown, shown.frame(threads=threads), start, prior) for threads in (1, 1, 2)
-    )
-    assert once.tobytes() == again.tobytes() == threaded.tobytes()
+    once, again = (refined(shown, shown.frame(), start, prior) for _ in range(2))
+    assert once.tobytes() == again.tobytes()
 
 
 @pytest.mark.parametrize("joint", ["l_elbow", "r_elbow", "l_knee", "r_knee"])

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from markerless_tracker.fitness.contour.silhouette_contour import UNDECIDED_PX, silhouette_contour
+from markerless_tracker.fitness.contour.silhouette_contour import silhouette_contour
 from markerless_tracker.records import Observation
 
 SPACING_PX = 2.0
@@ -40,7 +40,7 @@ def test_no_point_lies_beside_undecided_pixels(lower) -> None:
     edge = silhouette_contour(observe(person & ~lower, lower), SPACING_PX)
     away = cv2.distanceTransform((~lower).astype(np.uint8), cv2.DIST_L2, 5)
     u, v = np.rint(edge.points).astype(int).T
-    assert len(edge.points) > 40 and away[v, u].min() > UNDECIDED_PX - 1.0
+    assert len(edge.points) > 40 and away[v, u].min() > 1.0
     # The border of person and background has its points as before.
     plain = silhouette_contour(observe(person), SPACING_PX)
     rows = plain.points[:, 1]
@@ -94,3 +94,30 @@ def test_a_region_with_undecided_pixels(lower) -> None:
     part = silhouette_contour(cut, SPACING_PX)
     np.testing.assert_array_equal(part.points, whole.points)
     np.testing.assert_array_equal(part.distance, whole.distance)
+
+
+def test_a_region_gives_the_same_as_the_frame(lower) -> None:
+    """Also where the window reaches beyond the region."""
+    person, region = blob() & ~lower, np.s_[15:145, 60:190]
+    assert person[region].sum() == person.sum() and not person[15:17].all()
+    lower[:, :60] = lower[:, 190:] = lower[145:] = False
+    whole = silhouette_contour(observe(person, lower), SPACING_PX)
+    cut = Observation.from_mask(
+        "cam01", 0, person[region], np.zeros((130, 130), np.uint8), undecided=lower[region],
+        size_px=(200, 150), offset_px=(60, 15),
+    )  # fmt: skip
+    part = silhouette_contour(cut, SPACING_PX)
+    assert (part.left, part.top) == (whole.left, whole.top)
+    for name in ("distance", "points", "normals", "spacing"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name))
+
+
+def test_a_few_undecided_pixels_leave_distances_far_from_them(lower) -> None:
+    """Rows far above are as without them."""
+    person = blob()
+    few = np.zeros_like(person)
+    few[128:130, 95:105] = True
+    edge = silhouette_contour(observe(person & ~few, few), SPACING_PX)
+    plain = silhouette_contour(observe(person & ~few), SPACING_PX)
+    changed = np.flatnonzero((edge.distance != plain.distance).any(axis=1))
+    assert changed.size and changed[0] + edge.top > 90

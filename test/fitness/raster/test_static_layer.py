@@ -61,7 +61,7 @@ def test_only_moving_parts_are_drawn_for_every_pose(scene, body, rig):
 
     def drawn(active) -> int:
         comparison = of_part(body, active, pose, edge_weight=1.0)
-        return fitness.prepare(views, comparison)._drawing.silhouette_cones.size
+        return fitness.prepare(views, comparison).objective.silhouette_cones.size
 
     assert drawn(body.subspaces["l_arm"]) == 2
     assert drawn(body.root) == drawn(np.arange(body.size)) == len(body.cone_names)
@@ -136,9 +136,6 @@ def test_early_termination_saves_views(scene, body, rig):
     untouched = np.full((1, len(views.names), 4), -7.0)
     costs = np.empty(1)
     evaluate_some(
-        point[None].copy(), body.root, pose, np.array([-np.inf]), evaluate._drawing.body,
-        views.arrays, evaluate._drawing.silhouette_cones, evaluate._drawing.edge_cones,
-        fitness._rule, evaluate._cost, evaluate._drawing.static, fitness._scratch,
-        fitness._outlines, untouched, costs, 0, 1,
+        point[None].copy(), np.array([-np.inf]), evaluate.objective, untouched, costs, 0, 1
     )  # fmt: skip
     assert (untouched == -7.0).all()

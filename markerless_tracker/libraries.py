@@ -1,0 +1,19 @@
+"""Threads of the numerical libraries: none beside the package's own.
+
+A pose has some thirty parameters. For matrices of that size a library's threads only wait for each
+other, and take the cores from the threads that work.
+"""
+
+import os
+
+VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""They are read when the library is loaded."""
+
+
+def single_threaded() -> None:
+    """One thread in BLAS and OpenMP, unless the environment says otherwise.
+
+    For programs, before they import NumPy; without effect afterwards.
+    """
+    for name in VARIABLES:
+        os.environ.setdefault(name, "1")

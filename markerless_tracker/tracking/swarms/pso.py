@@ -1,0 +1,75 @@
+"""HPSO's, GLPSO's and PSO's swarm, compiled: `optim.pso` over one stage of a frame."""
+
+import numpy as np
+
+from markerless_tracker.compiled import compiled, kernel
+from markerless_tracker.optim.pso import check_inertia, inertia
+from markerless_tracker.optim.sampling import ATTEMPTS
+from markerless_tracker.tracking.swarms.particles import (
+    Particles,
+    begin,
+    confine,
+    draw,
+    leader,
+    learn,
+    left_over,
+    place,
+    take_all,
+)
+from markerless_tracker.tracking.swarms.search import SwarmSearch
+
+
+def run_pso(
+    search: SwarmSearch,
+    *,
+    inertia_max: float = 2.0,
+    inertia_min: float = 0.1,
+    acceleration: float = 2.05,
+) -> Particles:
+    """Spend a stage's budget; settings and errors as for `optim.Pso`."""
+    check_inertia(inertia_max, inertia_min)
+    particles = search.particles()
+    steps = range(2, search.iterations + 1)
+    inertias = [inertia(k, search.iterations, inertia_max, inertia_min) for k in steps]
+    _swarm(
+        search.rng, particles, np.array(inertias), acceleration, search.centre, search.sigma,
+        search.bounds, search.constraints, search.objective,
+    )  # fmt: skip
+    return particles
+
+
+@compiled(error_model="numpy")
+def _swarm(  # type: ignore[no-untyped-def]
+    rng, particles, inertias, c, centre, sigma, bounds, constraints, objective
+):
+    count = particles.x.shape[0]
+    begin(rng, particles, centre, sigma, bounds, True, constraints)
+    learn(particles, 0, count, objective)
+    for k in range(inertias.size):
+        left = take_all(particles, 0, count)
+        for _ in range(ATTEMPTS):
+            _propose(rng, particles, left, inertias[k], c, sigma)
+            confine(particles, left, bounds)
+            left = left_over(particles, left, constraints)
+            if left == 0:
+                break
+        place(particles, 0, count, left)
+        learn(particles, 0, count, objective)
+
+
+@kernel
+def _propose(rng, particles, count, w, c, sigma):  # type: ignore[no-untyped-def]
+    """Moves of the first `count` particles in `todo`, as `optim.pso.inertia_step`."""
+    d = sigma.size
+    draw(rng, particles, 2 * count * d)
+    x, best = particles.x, particles.best
+    first = leader(particles, 0, x.shape[0])
+    for k in range(count):
+        n = particles.todo[k]
+        for i in range(d):
+            r1, r2 = particles.draws[k * d + i], particles.draws[(count + k) * d + i]
+            speed = w * particles.v[n, i] + c * r1 * (best[n, i] - x[n, i])
+            speed += c * r2 * (best[first, i] - x[n, i])
+            speed = min(max(speed, -2.0 * sigma[i]), 2.0 * sigma[i])
+            particles.moved[n, i] = speed
+            particles.there[n, i] = x[n, i] + speed
