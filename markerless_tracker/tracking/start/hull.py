@@ -36,6 +36,11 @@ FLOOR_M = 0.08
 """Below this height above the floor, z = 0, undecided pixels are taken for shadows."""
 LEAST_PERSON = 0.25
 """Fraction of a lump's points that two cameras must see as person."""
+HIGH_M = 0.35
+"""Shadows on the floor hardly make hulls higher than this: the trunk is looked for above it."""
+ASIDE_M = 0.45
+"""So far aside of the trunk, points lower than `HIGH_M` that no two cameras show as person, and
+those on the floor, are shadows."""
 _RADIUS_M = 5.0
 _UP_M = 2.5
 _FAR_M = 4.0
@@ -50,11 +55,13 @@ class Hull:
         points_m: (n, 3) points of a grid with spacing `FINE_M` that lie in it, world frame.
         depth_m: (n,) how deep each lies in the lump.
         views: how many cameras see it.
+        trunk_m: (m, 3) the thick part: points that lie at least half as deep as the deepest.
     """
 
     points_m: FloatArray
     depth_m: FloatArray
     views: int
+    trunk_m: FloatArray
 
     @property
     def low_m(self) -> float:
@@ -71,10 +78,27 @@ class Hull:
         """From its lowest to its highest point, without what the grid's spacing adds."""
         return self.high_m - self.low_m - FINE_M
 
-    @property
-    def trunk_m(self) -> FloatArray:
-        """(m, 3) the thick part: points that lie at least half as deep as the deepest."""
-        return np.asarray(self.points_m[self.depth_m >= _TRUNK_SHARE * self.depth_m.max()])
+    @classmethod
+    def without_shadows(
+        cls, points_m: FloatArray, depth_m: FloatArray, views: int, person: NDArray[np.bool_]
+    ) -> "Hull":
+        """The lump without what lies on the floor beside the person.
+
+        Args:
+            points_m: (n, 3) points of the lump.
+            depth_m: (n,) how deep each lies in it.
+            views: how many cameras see it.
+            person: (n,) whether two cameras show a point as person.
+        """
+        high = (points_m[:, 2] > HIGH_M) & person
+        if FINE_M**3 * high.sum() < LEAST_VOLUME_M3:
+            high = np.ones(len(points_m), dtype=np.bool_)
+        thick = high & (depth_m >= _TRUNK_SHARE * depth_m[high].max())
+        trunk = points_m[thick]
+        aside = np.linalg.norm((points_m - trunk.mean(axis=0))[:, :2], axis=1) > ASIDE_M
+        low = (points_m[:, 2] < FLOOR_M) | ((points_m[:, 2] < HIGH_M) & ~person)
+        kept = ~(aside & low) | thick
+        return cls(points_m[kept], depth_m[kept], views, trunk)
 
 
 def find_hulls(
@@ -182,7 +206,9 @@ def _fine(
         return None
     if float(person[largest].mean()) < LEAST_PERSON:
         return None
-    return Hull(points, FINE_M * depth[largest], int(np.median(looking[largest])))
+    return Hull.without_shadows(
+        points, FINE_M * depth[largest], int(np.median(looking[largest])), person[largest]
+    )
 
 
 @dataclass(frozen=True, eq=False)
