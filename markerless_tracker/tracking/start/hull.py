@@ -56,12 +56,14 @@ class Hull:
         depth_m: (n,) how deep each lies in the lump.
         views: how many cameras see it.
         trunk_m: (m, 3) the thick part: points that lie at least half as deep as the deepest.
+        sure_m: (k, 3) points that are no shadow: high enough, or person in two views.
     """
 
     points_m: FloatArray
     depth_m: FloatArray
     views: int
     trunk_m: FloatArray
+    sure_m: FloatArray
 
     @property
     def low_m(self) -> float:
@@ -98,7 +100,8 @@ class Hull:
         aside = np.linalg.norm((points_m - trunk.mean(axis=0))[:, :2], axis=1) > ASIDE_M
         low = (points_m[:, 2] < FLOOR_M) | ((points_m[:, 2] < HIGH_M) & ~person)
         kept = ~(aside & low) | thick
-        return cls(points_m[kept], depth_m[kept], views, trunk)
+        sure = kept & (person | (points_m[:, 2] > HIGH_M))
+        return cls(points_m[kept], depth_m[kept], views, trunk, points_m[sure])
 
 
 def find_hulls(
@@ -158,11 +161,11 @@ def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Obs
 
 
 def decided_by_hull(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
-    """The observation with undecided pixels as person where the hull's points fall."""
+    """The observation with undecided pixels as person where sure points of the hull fall."""
     undecided = observation.undecided
     if undecided is None:
         return observation
-    pixels = project_camera(hull.points_m, camera) - observation.offset_px
+    pixels = project_camera(hull.sure_m, camera) - observation.offset_px
     with np.errstate(invalid="ignore"):
         u, v = np.round(pixels).T
         framed = (u >= 0) & (v >= 0) & (u < observation.width) & (v < observation.height)
