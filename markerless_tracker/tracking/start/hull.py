@@ -36,6 +36,11 @@ FLOOR_M = 0.08
 """Below this height above the floor, z = 0, undecided pixels are taken for shadows."""
 LEAST_PERSON = 0.25
 """Fraction of a lump's points that two cameras must see as person."""
+HIGH_M = 0.35
+"""Shadows on the floor hardly make hulls higher than this: the trunk is looked for above it."""
+ASIDE_M = 0.45
+"""So far aside of the trunk, points lower than `HIGH_M` that no two cameras show as person, and
+those on the floor, are shadows."""
 _RADIUS_M = 5.0
 _UP_M = 2.5
 _FAR_M = 4.0
@@ -50,11 +55,15 @@ class Hull:
         points_m: (n, 3) points of a grid with spacing `FINE_M` that lie in it, world frame.
         depth_m: (n,) how deep each lies in the lump.
         views: how many cameras see it.
+        trunk_m: (m, 3) the thick part: points that lie at least half as deep as the deepest.
+        sure_m: (k, 3) points that are no shadow: high enough, or person in two views.
     """
 
     points_m: FloatArray
     depth_m: FloatArray
     views: int
+    trunk_m: FloatArray
+    sure_m: FloatArray
 
     @property
     def low_m(self) -> float:
@@ -71,10 +80,28 @@ class Hull:
         """From its lowest to its highest point, without what the grid's spacing adds."""
         return self.high_m - self.low_m - FINE_M
 
-    @property
-    def trunk_m(self) -> FloatArray:
-        """(m, 3) the thick part: points that lie at least half as deep as the deepest."""
-        return np.asarray(self.points_m[self.depth_m >= _TRUNK_SHARE * self.depth_m.max()])
+    @classmethod
+    def without_shadows(
+        cls, points_m: FloatArray, depth_m: FloatArray, views: int, person: NDArray[np.bool_]
+    ) -> "Hull":
+        """The lump without what lies on the floor beside the person.
+
+        Args:
+            points_m: (n, 3) points of the lump.
+            depth_m: (n,) how deep each lies in it.
+            views: how many cameras see it.
+            person: (n,) whether two cameras show a point as person.
+        """
+        high = (points_m[:, 2] > HIGH_M) & person
+        if FINE_M**3 * high.sum() < LEAST_VOLUME_M3:
+            high = np.ones(len(points_m), dtype=np.bool_)
+        thick = high & (depth_m >= _TRUNK_SHARE * depth_m[high].max())
+        trunk = points_m[thick]
+        aside = np.linalg.norm((points_m - trunk.mean(axis=0))[:, :2], axis=1) > ASIDE_M
+        low = (points_m[:, 2] < FLOOR_M) | ((points_m[:, 2] < HIGH_M) & ~person)
+        kept = ~(aside & low) | thick
+        sure = kept & (person | (points_m[:, 2] > HIGH_M))
+        return cls(points_m[kept], depth_m[kept], views, trunk, points_m[sure])
 
 
 def find_hulls(
@@ -134,11 +161,11 @@ def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Obs
 
 
 def decided_by_hull(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
-    """The observation with undecided pixels as person where the hull's points fall."""
+    """The observation with undecided pixels as person where sure points of the hull fall."""
     undecided = observation.undecided
     if undecided is None:
         return observation
-    pixels = project_camera(hull.points_m, camera) - observation.offset_px
+    pixels = project_camera(hull.sure_m, camera) - observation.offset_px
     with np.errstate(invalid="ignore"):
         u, v = np.round(pixels).T
         framed = (u >= 0) & (v >= 0) & (u < observation.width) & (v < observation.height)
@@ -182,7 +209,9 @@ def _fine(
         return None
     if float(person[largest].mean()) < LEAST_PERSON:
         return None
-    return Hull(points, FINE_M * depth[largest], int(np.median(looking[largest])))
+    return Hull.without_shadows(
+        points, FINE_M * depth[largest], int(np.median(looking[largest])), person[largest]
+    )
 
 
 @dataclass(frozen=True, eq=False)
