@@ -32,6 +32,7 @@ from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.person.estimate import BodyEstimate
 from markerless_tracker.tracking.person.first_frame import StartMarkers
+from markerless_tracker.tracking.person.resting import at_rest
 from markerless_tracker.tracking.search import make_searcher
 from markerless_tracker.tracking.start.starter import Starter
 from markerless_tracker.tracking.states import Phase, Track
@@ -80,6 +81,8 @@ class Tracker:
         self.config = config
         given = start_pose is not None
         start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
+        if given and body.measured:
+            body = at_rest(body, start)
         self._body = BodyEstimate(
             body, config, shape_known=shape_known, start_markers=start_markers, person=person
         )

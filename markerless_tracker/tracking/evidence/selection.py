@@ -177,10 +177,9 @@ def _only(
     if kept[1:].all():
         return observation, 0
     selected = kept[labels]
-    mask, undecided = observation.mask, observation.undecided
-    part = observation.with_masks(
-        mask & selected, None if undecided is None else undecided & selected
-    )
+    mask = observation.mask
+    # A shadow away from the body remains one: it is no lit floor.
+    part = observation.with_masks(mask & selected, observation.undecided)
     return part, int((mask & ~selected).sum())
 
 

@@ -1,5 +1,7 @@
 """Search of one limb alone over its whole range, while the rest of the body stays."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from markerless_tracker.body.model import IntArray
@@ -9,6 +11,8 @@ from markerless_tracker.tracking.start.recombination import Recombiner
 
 DRAWS = 120
 """First draws of a limb: half from the pose prior, half uniform."""
+AIMED, AIMED_OF = 60, 1000
+"""Where silhouette is unexplained: further draws that reach there, the best of so many."""
 LAYERS = (0.4, 0.2)
 """Then the best are varied, twice, by these fractions of the prior's standard deviations."""
 _PARENTS, _CHILDREN = 6, 10
@@ -22,6 +26,7 @@ def other_limb(
     pose: FloatArray,
     limb: IntArray,
     rng: np.random.Generator,
+    aim: Callable[[FloatArray, int], FloatArray] | None = None,
 ) -> tuple[FloatArray, float]:
     """The best pose (p,) that is found with a limb elsewhere, and its cost 1 - f_s.
 
@@ -34,6 +39,8 @@ def other_limb(
         pose: (p,) where the rest of the body is.
         limb: the limb's parameters.
         rng: draws.
+        aim: keeps those poses, of many and at most so many, that reach where the limb may be; first
+            draws are chosen by it, too.
     """
     half = DRAWS // 2
     poses = np.concatenate(
@@ -42,6 +49,12 @@ def other_limb(
             recombiner.with_limb(pose, limb, DRAWS - half, rng),
         ]
     )
+    if aim is not None:
+        many = [
+            recombiner.with_prior_limb(pose, limb, AIMED_OF // 2, rng),
+            recombiner.with_limb(pose, limb, AIMED_OF // 2, rng),
+        ]
+        poses = np.concatenate([poses, aim(np.concatenate(many), AIMED)])
     costs = frame.costs(poses)
     for fraction in LAYERS:
         best = np.argsort(costs, kind="stable")[:_PARENTS]

@@ -1,6 +1,7 @@
 """Regions of silhouette that the body leaves unexplained, and the limbs that may belong there."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -20,13 +21,29 @@ LEAST_M2 = 0.004
 """Area of the smallest region that counts, at the body: half of a hand."""
 
 
+@dataclass(frozen=True, eq=False)
+class Unexplained:
+    """Silhouette that the body does not cover.
+
+    Attributes:
+        limbs: that may belong there, the likeliest first.
+        regions: by camera with such a region, the pixels (h, w) of its frame.
+    """
+
+    limbs: tuple[str, ...]
+    regions: Mapping[str, NDArray[np.bool_]]
+
+
 def limbs_unexplained(
     body: BodyModel,
     pose: FloatArray,
     observations: Mapping[str, Observation],
     rig: CameraRig,
 ) -> tuple[str, ...]:
-    """Limbs that lie nearest to unexplained regions of silhouette, the largest region first.
+    """Limbs that may belong to unexplained regions of silhouette, the likeliest first.
+
+    A region counts by its area for the limb nearest to it, by half of it for the second, by a third
+    for the third of those that are long enough to lie there.
 
     Args:
         body: the body.
@@ -34,29 +51,44 @@ def limbs_unexplained(
         observations: the silhouettes.
         rig: the cameras.
     """
+    return look_unexplained(body, pose, observations, rig).limbs
+
+
+def look_unexplained(
+    body: BodyModel,
+    pose: FloatArray,
+    observations: Mapping[str, Observation],
+    rig: CameraRig,
+) -> Unexplained:
+    """As `limbs_unexplained`, with the regions."""
     if not body.limbs:
-        return ()
+        return Unexplained((), {})
     axes = _axes(body, pose)
+    reach = {name: _reach(points) for name, points in axes.items()}
     middle = np.concatenate(list(axes.values())).mean(axis=0)
     masks = body_masks(body, pose, [rig[name] for name in observations])
     areas: dict[str, float] = {}
+    regions: dict[str, NDArray[np.bool_]] = {}
     for name, observation in observations.items():
         camera = rig[name]
         scale = pixels_per_m(camera, middle)
-        left_over = _left_over(observation, masks[name], scale)
+        rest, left_over = _left_over(observation, masks[name], scale)
+        if left_over:
+            regions[name] = observation.in_full_frame(rest)
         for area_px, centre in left_over:
-            limb = _nearest(axes, camera, centre)
-            areas[limb] = areas.get(limb, 0.0) + area_px / scale**2
-    return tuple(sorted(areas, key=lambda limb: -areas[limb]))
+            for rank, limb in enumerate(_within_reach(axes, reach, camera, centre, scale)):
+                areas[limb] = areas.get(limb, 0.0) + area_px / scale**2 / (1 + rank)
+    return Unexplained(tuple(sorted(areas, key=lambda limb: -areas[limb])), regions)
 
 
 def _left_over(
     observation: Observation, covered: NDArray[np.bool_], scale: float
-) -> list[tuple[float, FloatArray]]:
-    """Area (px) and centre (2,) of the regions that are farther than the margin from the body."""
+) -> tuple[NDArray[np.bool_], list[tuple[float, FloatArray]]]:
+    """Pixels (h, w) farther than the margin from the body; their regions' areas and centres."""
+    rest = np.zeros((observation.height, observation.width), dtype=np.bool_)
     box = _box(observation)
     if box is None:
-        return []
+        return rest, []
     reach = max(1, round(MARGIN_M * scale))
     (u, v), (left, top, right, bottom) = observation.offset_px, box
     # The silhouette's box, and around it what may cover it.
@@ -66,12 +98,13 @@ def _left_over(
     near = cv2.dilate(np.ascontiguousarray(around).view(np.uint8), disc).view(np.bool_)
     near = near[v + top - at[1] :, u + left - at[0] :][: bottom - top, : right - left]
     words = observation.mask_words[top:bottom, left // 64 :]
-    rest = unpack_mask(words, right - left) & ~near
+    part = unpack_mask(words, right - left) & ~near
     least_px = LEAST_M2 * scale**2
-    if np.count_nonzero(rest) < least_px:
-        return []
-    count, _, stats, centres = cv2.connectedComponentsWithStats(rest.view(np.uint8))
-    return [
+    if np.count_nonzero(part) < least_px:
+        return rest, []
+    rest[top:bottom, left:right] = part
+    count, _, stats, centres = cv2.connectedComponentsWithStats(part.view(np.uint8))
+    return rest, [
         (float(stats[n, cv2.CC_STAT_AREA]), centres[n] + (u + left, v + top))
         for n in range(1, count)
         if stats[n, cv2.CC_STAT_AREA] >= least_px
@@ -102,8 +135,27 @@ def _axes(body: BodyModel, pose: FloatArray) -> dict[str, FloatArray]:
     return axes
 
 
-def _nearest(axes: Mapping[str, FloatArray], camera: CameraModel, centre: FloatArray) -> str:
-    def gap(name: str) -> float:
-        return float(np.nanmin(np.linalg.norm(project_camera(axes[name], camera) - centre, axis=1)))
+def _reach(points: FloatArray) -> float:
+    """Length (m) of a limb along its cones, from points at both ends of each."""
+    starts, ends = points[: len(points) // 2], points[len(points) // 2 :]
+    return float(np.linalg.norm(ends - starts, axis=1).sum())
 
-    return min(axes, key=gap)
+
+def _within_reach(
+    axes: Mapping[str, FloatArray],
+    reach: Mapping[str, float],
+    camera: CameraModel,
+    centre: FloatArray,
+    scale: float,
+) -> list[str]:
+    """Limbs that are long enough for a region (2,), the nearest first; all if none is.
+
+    A limb at a wrong place may be far from its own region, and another limb nearer.
+    """
+    gaps = {}
+    for name, points in axes.items():
+        off = np.linalg.norm(project_camera(points, camera) - centre, axis=1)
+        if np.isfinite(off).any():
+            gaps[name] = (float(np.nanmin(off)), float(off[0]))
+    near = sorted(gaps, key=lambda name: gaps[name][0])
+    return [name for name in near if gaps[name][1] <= reach[name] * scale] or near

@@ -5,6 +5,7 @@ all limbs are searched elsewhere in rotation.
 """
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,9 @@ from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import LimbState, MaskWords, Observation, TrackState
+from markerless_tracker.tracking.limbs.aimed import most_aimed
 from markerless_tracker.tracking.limbs.search import other_limb
-from markerless_tracker.tracking.limbs.unexplained import limbs_unexplained
+from markerless_tracker.tracking.limbs.unexplained import look_unexplained
 from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.population import FramePopulation
@@ -44,6 +46,7 @@ class LimbWatch:
         """Forget the limbs so far."""
         self._tracks: dict[str, LimbTrack] = {}
         self._next = 0
+        self._unexplained = 0
         self._rotated_ns: int | None = None
 
     @property
@@ -93,8 +96,8 @@ class LimbWatch:
             The pose (p,), and the names of the limbs that were taken from elsewhere.
         """
         body, config = searcher.body, searcher.config
-        unexplained = limbs_unexplained(body, pose, observations, self._rig)
-        due = self._due(body, stamp_ns, unexplained)
+        unexplained = look_unexplained(body, pose, observations, self._rig)
+        due = self._due(body, stamp_ns, unexplained.limbs)
         if not due:
             return pose, ()
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
@@ -103,7 +106,13 @@ class LimbWatch:
         found = []
         for name in due:
             rng = keyed_generator(config.seed, stamp_ns, f"{name} elsewhere")
-            other, other_cost = other_limb(frame, recombiner, pose, body.subspaces[name], rng)
+            limb = body.subspaces[name]
+            aim = None
+            if unexplained.regions:
+                aim = partial(
+                    most_aimed, body, limb=limb, regions=unexplained.regions, rig=self._rig
+                )
+            other, other_cost = other_limb(frame, recombiner, pose, limb, rng, aim)
             if other_cost < cost - config.min_improvement:
                 pose, cost = other, other_cost
                 found.append(name)
@@ -113,13 +122,24 @@ class LimbWatch:
         """Limbs to search: lost, near unexplained silhouette, and at times the next in rotation."""
         if not body.limbs:
             return []
-        lost = [*self.lost, *(name for name in unexplained[:2] if name not in self.lost)]
+        suspects = self._suspects(unexplained)
+        lost = [*self.lost, *(name for name in suspects if name not in self.lost)]
         if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < ROTATION_NS:
             return lost
         self._rotated_ns = stamp_ns
         name = body.limbs[self._next % len(body.limbs)]
         self._next += 1
         return lost if name in lost else [*lost, name]
+
+
+    def _suspects(self, unexplained: tuple[str, ...]) -> list[str]:
+        """The likeliest limb, and the others in rotation while silhouette stays unexplained."""
+        if not unexplained:
+            self._unexplained = 0
+            return []
+        self._unexplained += 1
+        first, *others = unexplained
+        return [first, *others[(self._unexplained - 1) % len(others) :][:1]] if others else [first]
 
 
 def inside_fractions(

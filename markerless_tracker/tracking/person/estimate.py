@@ -181,6 +181,9 @@ class BodyEstimate:
         self.body, pose = shape_of_first_frame(
             self.generic, pose, self._start_markers, contours, self._config, self.limits
         )
+        # Other lengths make another body, which knows nothing of this person's posture.
+        known = self.generic
+        self.body = replace(self.body, prior_mean=known.prior_mean, prior_sd=known.prior_sd)
         # The generic sections on the lengths that were settled with the first frame.
         prior = replace(self.body, cone_shape=self.generic.cone_shape)
         self.sections_fitted = True

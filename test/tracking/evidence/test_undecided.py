@@ -6,6 +6,7 @@ import pytest
 
 from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking.evidence.undecided import NEAR_PX, decide
 
 
@@ -54,3 +55,56 @@ def test_a_region_is_decided_as_the_frame(body, camera, pose, covered) -> None:
 def test_two_classes_are_passed_on(body, camera, pose, covered) -> None:
     seen = observe(covered, None)
     assert decide({"cam01": seen}, {"cam01": camera}, body, pose) == {"cam01": seen}
+
+
+@pytest.fixture(scope="module")
+def standing():
+    """A scene, its pose, and observations that show the body and nothing else."""
+    scene = SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=3)
+    pose = scene.frame(0)[2]
+    return scene, pose, body_masks(scene.body, pose, scene.rig.cameras)
+
+
+def decided(standing, name, undecided, dark=None):
+    """What is person in one view, where pixels are undecided there, and `dark` in the others."""
+    scene, pose, masks = standing
+    cameras = {camera.name: camera for camera in scene.rig}
+    seen = {}
+    for other, mask in masks.items():
+        left = undecided if other == name else (dark or {}).get(other, np.zeros_like(mask))
+        nothing = np.zeros(mask.shape, np.uint8)
+        left = left & ~mask
+        seen[other] = Observation.from_mask(other, 0, mask, nothing, undecided=left)
+    return decide(seen, cameras, scene.body, pose)[name].mask & undecided & ~grown(masks[name], 1)
+
+
+def grown(mask, px):
+    return cv2.dilate(mask.astype(np.uint8), np.ones((2 * px + 1,) * 2, np.uint8)) > 0
+
+
+def test_a_patch_that_ends_beside_the_body_is_person_one_that_goes_on_is_not(standing) -> None:
+    scene, _, masks = standing
+    name = scene.rig.names[0]
+    mask = masks[name]
+    # Beside the head, whose floor points are far away.
+    top = int(np.flatnonzero(mask.any(axis=1))[0]) + 3
+    right = int(np.flatnonzero(mask[top])[-1])
+    for length, person in ((4, True), (60, False)):
+        patch = np.zeros_like(mask)
+        patch[top : top + 3, right : right + length] = True
+        assert decided(standing, name, patch).any() == person
+
+
+def test_a_long_patch_is_person_where_others_see_its_floor_lit(standing) -> None:
+    """Beside the shin, going on to the side; in the other views the floor is lit or darkened."""
+    scene, pose, masks = standing
+    name = scene.rig.names[0]
+    mask = masks[name]
+    low = int(np.flatnonzero(mask.any(axis=1))[-1]) - 15
+    right = int(np.flatnonzero(mask[low])[-1])
+    patch = np.zeros_like(mask)
+    patch[low : low + 3, right : right + 60] = True
+    person = decided(standing, name, patch)
+    assert person.any() and not person[:, right + 30 :].any()
+    dark = {other: np.ones_like(shown) for other, shown in masks.items()}
+    assert not decided(standing, name, patch, dark).any()

@@ -6,7 +6,7 @@ import pytest
 from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.limbs.unexplained import limbs_unexplained
+from markerless_tracker.tracking.limbs.unexplained import limbs_unexplained, look_unexplained
 
 
 @pytest.fixture(scope="module")
@@ -66,3 +66,15 @@ def test_a_region_names_the_same(standing) -> None:
             size_px=seen.size_px, offset_px=(30, 7),
         )  # fmt: skip
     assert limbs_unexplained(scene.body, pose, cut, scene.rig)[:1] == ("l_arm",)
+
+
+def test_every_limb_that_is_long_enough_is_named_after_the_nearest(standing) -> None:
+    """A raised hand is beyond the reach of the other arm."""
+    scene, pose = standing
+    seen = observed(scene, raised(scene, pose, "l_arm"))
+    found = look_unexplained(scene.body, pose, seen, scene.rig)
+    assert found.limbs[0] == "l_arm" and "r_arm" not in found.limbs
+    kick = observed(scene, raised(scene, pose, "l_leg", 0.7))
+    assert {"l_leg", "r_leg"} <= set(limbs_unexplained(scene.body, pose, kick, scene.rig))
+    for name, region in found.regions.items():
+        assert region.any() and not (region & ~seen[name].mask).any()

@@ -9,6 +9,7 @@ from markerless_tracker.body import MARKER_NAMES, markers
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
+from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import ROTATION_NS, LimbWatch, inside_fractions
 from markerless_tracker.tracking.loss import LIMB_LOST_BELOW, LIMB_REGAINED_ABOVE
 from markerless_tracker.tracking.search import Searcher
@@ -130,8 +131,8 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
 
 def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch) -> None:
     scene, seen, _, hidden = balancing
-    explained = "markerless_tracker.tracking.limbs.watch.limbs_unexplained"
-    monkeypatch.setattr(explained, lambda *_: ())
+    explained = "markerless_tracker.tracking.limbs.watch.look_unexplained"
+    monkeypatch.setattr(explained, lambda *_: Unexplained((), {}))
 
     def found(stamps, threads=1):
         searcher = searcher_of(scene, threads)
@@ -153,6 +154,26 @@ def test_a_limb_near_unexplained_silhouette_is_searched_in_every_frame(balancing
     for stamp_ns in (0, 1, ROTATION_NS - 1):
         names = watch.recover(searcher, contours, seen, stamp_ns, hidden)[1]
         assert "l_arm" in names
+
+
+def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monkeypatch) -> None:
+    """The likeliest is searched in every frame, and one of the others."""
+    scene, seen, pose, _ = balancing
+    limbs = ("r_leg", "l_leg", "r_arm", "l_arm")
+    for name, value in (
+        ("look_unexplained", lambda *_: Unexplained(limbs, {})),
+        ("other_limb", lambda _f, _r, at, limb, *_: searched.append(limb.tobytes()) or (at, 9.0)),
+    ):
+        monkeypatch.setattr(f"markerless_tracker.tracking.limbs.watch.{name}", value)
+    searcher, watch, searched = searcher_of(scene), LimbWatch(scene.rig), []
+    contours = contours_of(searcher, seen, pose)
+    watch.recover(searcher, contours, seen, 0, pose)
+    searched.clear()
+    for stamp_ns in (1, 2, 3):
+        watch.recover(searcher, contours, seen, stamp_ns, pose)
+    name_of = {scene.body.subspaces[name].tobytes(): name for name in limbs}
+    names = [name_of[limb] for limb in searched]
+    assert names[::2] == ["r_leg"] * 3 and set(names[1::2]) == {"l_leg", "r_arm", "l_arm"}
 
 
 def test_the_same_search_gives_the_same_bytes_with_any_number_of_threads(standing) -> None:

@@ -1,0 +1,56 @@
+"""The person's resting posture of trunk, shoulders and head, from a measured start pose.
+
+Where a skeleton has the shoulders, the neck and the top of the head relative to the trunk is a
+matter of its definition and of the person: angles of clavicles, thorax and head at rest differ
+between people, and between systems that measure them, by more than they move. A measured start pose
+shows them, the posture of that moment included; of what differs from left to right, or exceeds
+what people differ by, the posture is the likelier cause.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.geometry import FloatArray
+
+MIDDLE = ("thorax_y", "head_y")
+"""Bending of trunk and head forward: alike on both sides."""
+PAIRED = {"clavicle_x": -1.0, "clavicle_y": 1.0}
+"""Parameters with a left and a right one, and the factor from one to the other in a body at rest
+that is alike on both sides."""
+MOST_SD = 2.0
+"""Largest shift of the resting posture, in standard deviations of the prior of poses."""
+NARROWER = 0.5
+"""Factor of the prior's standard deviation, of trunk and shoulders about the person's own posture:
+they move less than people, and definitions of joint centres, differ."""
+_NARROWED = ("thorax_y", "thorax_z", "l_clavicle_x", "l_clavicle_y", "r_clavicle_x", "r_clavicle_y")
+
+
+def at_rest(body: BodyModel, start: FloatArray) -> BodyModel:
+    """The body whose prior of poses is centred at the person's own resting posture.
+
+    Args:
+        body: with measured lengths.
+        start: (p,) measured pose.
+    """
+    index = {name: i for i, name in enumerate(body.parameter_names)}
+    mean = body.prior_mean.copy()
+    off = start - body.prior_mean
+    for name in MIDDLE:
+        if name in index:
+            _shift(mean, body, index[name], off[index[name]])
+    for name, factor in PAIRED.items():
+        if f"l_{name}" in index and f"r_{name}" in index:
+            left, right = index[f"l_{name}"], index[f"r_{name}"]
+            both = 0.5 * (off[left] + factor * off[right])
+            _shift(mean, body, left, both)
+            _shift(mean, body, right, factor * both)
+    sd = body.prior_sd.copy()
+    sd[[index[name] for name in _NARROWED if name in index]] *= NARROWER
+    return replace(body, prior_mean=mean, prior_sd=sd)
+
+
+def _shift(mean: FloatArray, body: BodyModel, at: int, by: float) -> None:
+    most = MOST_SD * float(body.prior_sd[at])
+    mean[at] += float(np.clip(by, -most, most))
