@@ -230,6 +230,7 @@ class TrackResult:
         iou: per camera, overlap (IoU) of the silhouette and the projected body.
         evaluations: evaluations of the objective that the swarms spent on this frame.
         refinements: iterations of contour refinement spent on this frame.
+        effort: as given to `Tracker.step`.
         observations: the evidence each camera gave.
         warnings: what the user should know about this frame, one line each.
         confidence: how sure the pose is, None without contour refinement.
@@ -246,6 +247,7 @@ class TrackResult:
     iou: Mapping[str, float]
     evaluations: int
     refinements: int = 0
+    effort: float = 1.0
     observations: Mapping[str, Observation] = field(default_factory=dict, repr=False)
     warnings: tuple[str, ...] = ()
     confidence: Confidence | None = None

@@ -56,6 +56,12 @@ class RefineSettings(SettingsGroup):
         least=0.01,
         most=1e6,
     )
+    swarms: str = setting(
+        "needed",
+        "which frames swarms search beside the refinement; needed: those that the refinement "
+        "explains worse than the track's usual, or with a limb in doubt; always: all",
+        choices=("needed", "always"),
+    )
     limb_sigma: float = setting(
         4.0,
         "with refinement: sigma of each limb's own small swarm, as a factor of the published one",

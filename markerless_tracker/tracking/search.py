@@ -109,6 +109,7 @@ class FrameSearch:
     Attributes:
         pose: (p,) the estimate so far.
         evaluations, refinements: what was spent.
+        cost: of the estimate, 1 - f, after `run` with a refinement; else infinite.
         particle_sd_ratio: (p,) standard deviation of the particles over that of the first sample,
             in the last swarm that varied a parameter; NaN without one.
     """
@@ -126,6 +127,7 @@ class FrameSearch:
         self._predicted = predicted
         self.evaluations = 0
         self.refinements = 0
+        self.cost = np.inf
         self.particle_sd_ratio = np.full(searcher.body.size, np.nan)
         self._searcher = searcher
         self._observations = observations
@@ -149,12 +151,22 @@ class FrameSearch:
             )
         return self._contours
 
-    def run(self, stages: tuple[Stage, ...]) -> FloatArray:
+    def run(
+        self,
+        stages: tuple[Stage, ...],
+        *,
+        wants_swarms: Callable[[float], bool] = lambda _: True,
+    ) -> FloatArray:
         """Run stages from the estimate so far; returns the new one (p,).
 
         Swarms alone: the last one's best, as published. With contour refinement among them a
         stage's result is taken only if it explains the views better: the swarm rescues a refinement
         that is stuck, the refinement sharpens the swarm. A stage may require a least rise of f.
+
+        Args:
+            stages: in order.
+            wants_swarms: whether swarms search beside a refinement, given the cost of the estimate
+                before the first of them; asked once.
         """
         # A contour stage uses every parameter and every cone.
         contour = next((stage for stage in stages if stage.plan.algorithm == CONTOUR), None)
@@ -164,7 +176,12 @@ class FrameSearch:
             else self._searcher.fitness.prepare(self._views, contour.comparison)
         )
         cost = np.inf if costs_of is None else float(costs_of(self.pose[None])[0])
+        swarms: bool | None = None
         for stage in stages:
+            if costs_of is not None and stage.plan.algorithm != CONTOUR:
+                swarms = wants_swarms(cost) if swarms is None else swarms
+                if not swarms:
+                    continue
             found_cost = None
             if stage.plan.algorithm == CONTOUR:
                 found = self._refine(stage.plan)
@@ -179,6 +196,7 @@ class FrameSearch:
                 found_cost = float(costs_of(found[None])[0])
             if found_cost < cost - stage.plan.min_improvement:
                 self.pose, cost = found, found_cost
+        self.cost = cost
         return self.pose
 
     def terms(self) -> dict[str, ViewTerms]:

@@ -28,6 +28,7 @@ from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
 from markerless_tracker.tracking.limits import check_pose, joint_speeds
 from markerless_tracker.tracking.motion import MotionModel
+from markerless_tracker.tracking.partitions.effort import Effort
 from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.person.estimate import BodyEstimate
@@ -100,6 +101,7 @@ class Tracker:
         self._motion = MotionModel(start, config)
         self._assessor = Assessor(rig, body, config)
         self._given = given
+        self._effort = Effort(needed_only=config.refine.swarms == "needed")
         self._starter = None if given else self._new_starter()
         self._lookahead = Lookahead(self._outlook(-1), self._outlook(0))
 
@@ -119,6 +121,7 @@ class Tracker:
         self._motion.reset()
         self._body.reset()
         self._assessor.reset()
+        self._effort.reset()
         self._searcher = self._searcher_for(self.body)
         self._starter = None if self._given else self._new_starter()
         self._lookahead.restart(self._outlook(-1), self._outlook(0))
@@ -182,7 +185,10 @@ class Tracker:
         return Prepared(views, stamp_ns, outlook, seen)
 
     def step(
-        self, views: Mapping[str, Image | Observation] | Prepared, stamp_ns: int
+        self,
+        views: Mapping[str, Image | Observation] | Prepared,
+        stamp_ns: int,
+        effort: float = 1.0,
     ) -> TrackResult:
         """Find the pose that explains the views of one time.
 
@@ -190,11 +196,15 @@ class Tracker:
             views: camera name to its image (as `Segmenter.observe` takes it) or to a ready-made
                 observation; cameras may be missing. Or what `prepare` made of them.
             stamp_ns: time of the images; the search widens with the time since the last step.
+            effort: fraction of the frames, 0 to 1, in which swarms and searches for limbs may run
+                beside the refinement. Less than 1 where images come faster than they are tracked.
 
         Raises:
+            ConfigError: the effort is no such fraction.
             ImageError, CalibrationError: no view, one of an unknown camera, or one that does not
                 fit its calibration or background; names the camera.
         """
+        self._effort.begin(effort, doubt=bool(self._assessor.limbs.lost))
         prepared = views if isinstance(views, Prepared) else None
         outlook = self._lookahead.begin(prepared)
         latest = None
@@ -203,7 +213,7 @@ class Tracker:
             latest = self._outlook(outlook.number + 2)
         finally:
             self._lookahead.end(latest)
-        return result
+        return replace(result, effort=effort)
 
     def _step(
         self,
@@ -300,9 +310,13 @@ class Tracker:
         )
         search = self._searcher.frame(believed, stamp_ns, predicted, limits=limits)
         sigma = self.body.sigma * self._motion.widening(stamp_ns)
-        search.run(frame_stages(self.body, self.config, predicted, sigma))
+        stages = frame_stages(self.body, self.config, predicted, sigma)
+        search.run(stages, wants_swarms=self._effort.wants_swarms)
         names: tuple[str, ...] = ()
-        if self.config.search_again and self.config.refinement != "none":
+        refined = self.config.refinement != "none"
+        if refined:
+            self._effort.end(search.cost)
+        if refined and self.config.search_again and self._effort.granted:
             search.pose, names = self._assessor.limbs.recover(
                 self._searcher, search.contours, believed, stamp_ns, search.pose
             )

@@ -131,7 +131,6 @@ class LimbWatch:
         self._next += 1
         return lost if name in lost else [*lost, name]
 
-
     def _suspects(self, unexplained: tuple[str, ...]) -> list[str]:
         """The likeliest limb, and the others in rotation while silhouette stays unexplained."""
         if not unexplained:
