@@ -116,7 +116,7 @@ def searched(person, config, chosen=None, *, threads=1):
 
 @pytest.mark.parametrize("edge_weight", [0.0, 0.5])
 def test_the_best_of_prediction_and_stages_wins(person, found, edge_weight) -> None:
-    config = settings(edge_weight=edge_weight)
+    config = settings(edge_weight=edge_weight, min_improvement=0.0)
     frame = searched(person, config)
     assert [kind for kind, _ in found] == [CONTOUR, *["sppso"] * 6, CONTOUR]
     tried = [person.predicted, *(pose for _, pose in found)]
