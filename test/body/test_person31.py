@@ -100,7 +100,7 @@ def test_the_prior_sd_of_poses() -> None:
     assert [of(f"head_{a}") for a in "xyz"] == [0.3] * 3
     assert of("l_knee") == of("r_shoulder_x") == 0.6
     # The rotation of a limb about itself, which straight limbs do not show, varies less.
-    assert of("l_hip_z") == of("r_hip_z") == 0.4 and of("l_shoulder_z") == 0.5
+    assert of("l_hip_z") == of("r_hip_z") == 0.25 and of("l_shoulder_z") == 0.5
 
 
 # --- cones --------------------------------------------------------------------------------------

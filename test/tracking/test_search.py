@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import BodyModel, load_body, markers
+from markerless_tracker.body.anatomy import posture
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
@@ -61,12 +62,11 @@ class Person:
 @pytest.fixture(scope="module")
 def person() -> Person:
     rng = np.random.default_rng(12)
-    pose = BODY.neutral.copy()
+    pose = posture(BODY, {"l_shoulder_x": 0.6, "r_shoulder_x": 0.6})
     pose[BODY.joints] += rng.uniform(-0.15, 0.15, BODY.joints.size)
     pose[[BODY.index("pelvis_rz"), BODY.index("pelvis_tz")]] = 0.7, 0.95
     for side in "lr":
         pose[BODY.index(f"{side}_knee")] = pose[BODY.index(f"{side}_elbow")] = -0.6
-        pose[BODY.index(f"{side}_shoulder_x")] += 0.6
     predicted = np.clip(pose + 2.0 * BODY.sigma * rng.standard_normal(BODY.size), *BODY.limits)
     observations = {}
     for camera in RIG:

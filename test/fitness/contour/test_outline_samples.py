@@ -217,7 +217,7 @@ def test_more_samples_than_fit() -> None:
     frame = ContourFrame(body, {camera.name: camera}, blank, views, pixels_per_m={camera.name: 80})
     pose = body.neutral.copy()
     pose[body.index("pelvis_tz")] = 0.95
-    pose[body.index("l_shoulder_x")] += 1.2
+    pose[body.index("l_shoulder_y")] += 1.2
     found = frame.equations(pose, 0.1)
     assert frame.samples.count[0] == MAX_SAMPLES
     assert np.isfinite(found.cost) and np.isfinite(frame.samples.world[0]).all()

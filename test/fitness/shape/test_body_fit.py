@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import load_description, markers
+from markerless_tracker.body.anatomy import posture
 from markerless_tracker.body.sizes import PROPORTION_SD, Sizes
 from markerless_tracker.fitness.shape.body_fit import BodyFit
 from markerless_tracker.fitness.shape.sections import RADIUS_RANGE
@@ -31,15 +32,14 @@ def person(seed):
 def poses(seed):
     """Poses (n, p) of a person moving all limbs."""
     rng = np.random.default_rng(seed)
-    out = np.tile(GENERIC.neutral, (FRAMES, 1))
+    apart = {f"{side}_shoulder_x": 0.6 for side in "lr"} | {f"{s}_hip_x": 0.2 for s in "lr"}
+    out = np.tile(posture(GENERIC, apart), (FRAMES, 1))
     out[:, GENERIC.joints] += rng.uniform(-0.25, 0.25, (FRAMES, GENERIC.joints.size))
     out[:, GENERIC.index("pelvis_tz")] = 1.0
     out[:, GENERIC.index("pelvis_rz")] = 0.4
-    for side, sign in (("l", 1.0), ("r", -1.0)):
+    for side in "lr":
         out[:, GENERIC.index(f"{side}_knee")] = rng.uniform(-1.0, -0.2, FRAMES)
         out[:, GENERIC.index(f"{side}_elbow")] = rng.uniform(-1.2, -0.3, FRAMES)
-        out[:, GENERIC.index(f"{side}_hip_x")] += 0.2 * sign
-        out[:, GENERIC.index(f"{side}_shoulder_x")] += 0.6
     return out
 
 

@@ -28,7 +28,7 @@ def observed(scene, pose, undecided=None):
 
 def raised(scene, pose, limb, angle=2.0):
     changed = pose.copy()
-    name = {"arm": "shoulder_x", "leg": "hip_x"}[limb[2:]]
+    name = {"arm": "shoulder_y", "leg": "hip_x"}[limb[2:]]
     changed[scene.body.index(f"{limb[0]}_{name}")] += angle
     return changed
 

@@ -46,7 +46,7 @@ def standing():
     scene = SyntheticScene(body="person31", motion="stand", size_px=SIZE_PX, seed=3)
     _, masks, pose = scene.frame(0)
     raised = pose.copy()
-    raised[scene.body.index("l_shoulder_x")] += 2.0
+    raised[scene.body.index("l_shoulder_y")] += 2.0
     return scene, observed(masks), pose, raised
 
 
