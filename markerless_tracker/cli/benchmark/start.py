@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from markerless_tracker.benchmarks import postures, starts
+from markerless_tracker.benchmarks.silhouettes.generated import SETS
 from markerless_tracker.benchmarks.with_truth import Report
 from markerless_tracker.cli.benchmark.arguments import count
 from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
@@ -28,7 +29,7 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         help="N generated people who squat, bend down, sit, raise or cross their arms instead",
     )  # fmt: skip
     parser.add_argument(
-        "--set", choices=tuple(postures.SETS), default="development",
+        "--set", choices=tuple(SETS), default="development",
         help="with --postures: their scenes; nothing may be set by `test`",
     )  # fmt: skip
     parser.add_argument(

@@ -105,3 +105,23 @@ def test_undecided_pixels_under_the_hull_are_person(person) -> None:
     plain = observe(name, masks[name], nothing)
     assert decided_by_hull(plain, scene.rig[name], hull) is plain
     assert hulls_part(plain, scene.rig[name], hull) is plain
+
+
+def test_a_shadow_beside_the_person_is_left_out(person) -> None:
+    """A patch that all views show as undecided, 0.7 m aside of the person and up to the shins."""
+    scene, masks = person
+    pelvis = scene.markers(0)[0]
+    grid = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 60)] * 3), axis=-1).reshape(-1, 3)
+    patch = pelvis * [1.0, 1.0, 0.0] + [0.45, 0.0, 0.12] + grid * [0.45, 0.15, 0.12]
+    seen = {}
+    for name, mask in masks.items():
+        u, v = np.round(project_camera(patch, scene.rig[name])).astype(int).T
+        framed = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
+        shadow = np.zeros_like(mask)
+        shadow[v[framed], u[framed]] = True
+        seen[name] = observe(name, mask | shadow, shadow & ~mask)
+    hull = next(find_hulls(cameras(scene), seen))
+    aside = hull.points_m[:, 0] - hull.trunk_m[:, 0].mean() > 0.6
+    assert not aside.any()
+    assert np.linalg.norm(hull.trunk_m.mean(axis=0)[:2] - pelvis[:2]) < 0.2
+    assert hull.sure_m[:, 2].min() < 0.2 and len(hull.sure_m) < len(hull.points_m)
