@@ -120,14 +120,16 @@ class LimbWatch:
         """Limbs to search: lost, near unexplained silhouette, and at times the next in rotation."""
         if not body.limbs:
             return []
-        lost = [*self.lost, *(name for name in self._suspects(unexplained) if name not in self.lost)]
+        lost = [
+            *self.lost,
+            *(name for name in self._suspects(unexplained) if name not in self.lost),
+        ]
         if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < ROTATION_NS:
             return lost
         self._rotated_ns = stamp_ns
         name = body.limbs[self._next % len(body.limbs)]
         self._next += 1
         return lost if name in lost else [*lost, name]
-
 
     def _suspects(self, unexplained: tuple[str, ...]) -> list[str]:
         """The likeliest limb, and the others in rotation while silhouette stays unexplained."""
