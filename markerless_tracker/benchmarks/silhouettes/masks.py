@@ -142,10 +142,16 @@ def measure(
     tallies = {method: _Tally() for method in ("own", "mog2", "knn")}
     with _one_thread():
         for count, views in enumerate(scene.frames()):
-            for camera, exact in views.masks(scene.rig).items():
+            masks = views.masks(scene.rig)
+            own = {name: _timed(methods[name]["own"], views.images[name]) for name in masks}
+            decided = _decided({name: found for name, (found, _) in own.items()}, scene, views)
+            for camera, exact in masks.items():
                 image = views.images[camera]
                 for method, tally in tallies.items():
-                    (mask, undecided), ms = _timed(methods[camera][method], image)
+                    if method == "own":
+                        (mask, undecided), ms = own[camera]
+                    else:
+                        (mask, undecided), ms = _timed(methods[camera][method], image)
                     tally.ms.setdefault(camera, []).append(ms)
                     if method == "own":
                         before = mask_scores(mask, exact, undecided)
@@ -155,8 +161,8 @@ def measure(
                             tally.selected.setdefault(camera, []).append(
                                 mask_scores(selected[0], exact, selected[1]).iou
                             )
-                        elif undecided is not None and views.pose is not None:
-                            mask, undecided = _decided(mask, undecided, scene, views, camera)
+                        else:
+                            mask, undecided = decided[camera]
                         if picture is not None:
                             drawn = draw_mask_errors(image, mask, exact, undecided)
                             picture(camera, views.index, drawn)
@@ -282,14 +288,15 @@ def _selected(
 
 
 def _decided(
-    mask: Mask, undecided: Mask, scene: SilhouetteScene, views: ImageSet, camera: str
-) -> tuple[Mask, Mask | None]:
-    """Person and undecided pixels after the body at the reference has decided."""
-    assert views.pose is not None
-    seen = {camera: _observation(camera, mask, undecided)}
-    cameras = {camera: scene.rig[camera]}
-    decided = decide(seen, cameras, views.body, views.pose)[camera]
-    return decided.mask, decided.undecided
+    found: Mapping[str, tuple[Mask, Mask | None]], scene: SilhouetteScene, views: ImageSet
+) -> Mapping[str, tuple[Mask, Mask | None]]:
+    """Person and undecided pixels after the body at the reference, if known, has decided."""
+    if views.pose is None or not views.exact:
+        return found
+    seen = {name: _observation(name, *of) for name, of in found.items()}
+    cameras = {name: scene.rig[name] for name in found}
+    decided = decide(seen, cameras, views.body, views.pose)
+    return {name: (of.mask, of.undecided) for name, of in decided.items()}
 
 
 def _observation(camera: str, mask: Mask, undecided: Mask | None) -> Observation:

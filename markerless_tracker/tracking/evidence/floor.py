@@ -1,4 +1,4 @@
-"""The floor test: an undecided pixel whose floor point others see in full light is no shadow.
+"""The floor test: an undecided pixel whose floor point other cameras see lit is no shadow.
 
 A shadow lies on the floor, the plane z = 0 of the calibrated world: the floor point behind such a
 pixel is darkened alike in every camera that sees it. The floor point behind a pixel of the person

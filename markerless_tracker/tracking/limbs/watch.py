@@ -122,8 +122,10 @@ class LimbWatch:
         """Limbs to search: lost, near unexplained silhouette, and at times the next in rotation."""
         if not body.limbs:
             return []
-        suspects = self._suspects(unexplained)
-        lost = [*self.lost, *(name for name in suspects if name not in self.lost)]
+        lost = [
+            *self.lost,
+            *(name for name in self._suspects(unexplained) if name not in self.lost),
+        ]
         if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < ROTATION_NS:
             return lost
         self._rotated_ns = stamp_ns

@@ -50,6 +50,18 @@ def test_a_blob_far_from_the_body_is_left_out(camera, body, pose, person):
     np.testing.assert_array_equal(kept.edges, np.full(person.shape, 9))
 
 
+def test_undecided_pixels_stay_undecided_where_the_silhouette_is_left_out(
+    camera, body, pose, person
+) -> None:
+    blob = with_blob(person, 5) & ~person
+    shadow = np.roll(blob, 30, axis=0)
+    seen = observe(person | blob, undecided=shadow)
+    kept, left_out = explained_part(seen, camera, body, pose, 0)
+    np.testing.assert_array_equal(kept.mask, person)
+    np.testing.assert_array_equal(kept.undecided, shadow)
+    assert left_out == 144
+
+
 def test_a_blob_within_the_margin_stays(camera, body, pose, person):
     first = int(np.flatnonzero(person[80:92].any(axis=0))[0])
     mask = with_blob(person, first - 20, 12)
