@@ -17,6 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from markerless_tracker.camera.calibration import write_calibration
 from markerless_tracker.cli.frame_warnings import FrameWarnings
 from markerless_tracker.cli.track_arguments import add_arguments
+from markerless_tracker.compiled import compilation
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
 from markerless_tracker.datasets.silhouettes import Silhouettes
@@ -82,8 +83,9 @@ def run(args: argparse.Namespace) -> int:
             stature=args.stature,
         )
         bars.update(task, description="compiling")
-        setup.tracker.warm_up()
-        bars.update(
+        with compilation(lambda _, done, most: bars.update(task, completed=done, total=most)):
+            setup.tracker.warm_up()
+        bars.reset(
             task, description=f"tracking {recording.name}", total=_total(recording, setup, args.fps)
         )
         outcome = _track(

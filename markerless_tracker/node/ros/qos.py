@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.callback_groups import CallbackGroup
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 IMAGE_DEPTH = 5
@@ -48,6 +49,8 @@ class FollowingSubscription:
         callback: as for ``rclpy.node.Node.create_subscription``.
         depth: messages the middleware keeps.
         raw: whether the callback gets the serialised bytes.
+        polled: whether messages are taken by `poll` alone; the executor then spends no time on
+            them.
     """
 
     def __init__(
@@ -59,9 +62,11 @@ class FollowingSubscription:
         *,
         depth: int = IMAGE_DEPTH,
         raw: bool = False,
+        polled: bool = False,
     ) -> None:
         self._node, self._kind, self._topic, self._callback = node, kind, topic, callback
         self._depth, self._raw = depth, raw
+        self._group = _NotExecuted() if polled else None
         self._reliable = True
         self._subscription = self._subscribe()
 
@@ -76,8 +81,36 @@ class FollowingSubscription:
             self._node.destroy_subscription(self._subscription)
             self._subscription = self._subscribe()
 
+    def poll(self) -> None:
+        """Call back with the newest message that waits, if any; from the executor's thread."""
+        newest = None
+        handle = self._subscription.handle
+        with handle:
+            while (taken := handle.take_message(self._kind, self._raw)) is not None:
+                newest = taken
+        if newest is not None:
+            self._callback(newest[0])
+
     def _subscribe(self) -> Any:
         qos = image_qos(reliable=self._reliable, depth=self._depth)
         return self._node.create_subscription(
-            self._kind, self._topic, self._callback, qos, raw=self._raw
+            self._kind,
+            self._topic,
+            self._callback,
+            qos,
+            raw=self._raw,
+            callback_group=self._group,
         )
+
+
+class _NotExecuted(CallbackGroup):
+    """Its subscriptions are left out when an executor waits."""
+
+    def can_execute(self, entity: Any) -> bool:
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        pass

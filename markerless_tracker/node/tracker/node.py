@@ -11,7 +11,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from sensor_msgs.msg import CameraInfo, Image
 from std_srvs.srv import Trigger
 
 from markerless_tracker.camera import CameraRig
@@ -22,7 +21,7 @@ from markerless_tracker.node.ros.cdr import ImageMessage
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
 from markerless_tracker.node.ros.images import decode_image
 from markerless_tracker.node.ros.notices import Notices
-from markerless_tracker.node.ros.qos import FollowingSubscription, latched_qos
+from markerless_tracker.node.ros.qos import latched_qos
 from markerless_tracker.node.tracker import parameters
 from markerless_tracker.node.tracker.announcer import Announcer
 from markerless_tracker.node.tracker.inputs import CameraInput
@@ -32,6 +31,7 @@ from markerless_tracker.node.tracker.publishers import ResultPublishers
 from markerless_tracker.node.tracker.setup import RigSource, build
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
+from markerless_tracker.node.tracker.topics import CameraTopics
 from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, TrackWorker
 from markerless_tracker.tracking import Tracker
 
@@ -153,16 +153,7 @@ class TrackerNode(GivenNode):
         )
 
     def _listen(self) -> None:
-        self._subscriptions_followed = []
-        for source in self._inputs:
-            self._subscriptions_followed += [
-                FollowingSubscription(
-                    self, Image, source.image_topic, _numbered(source.on_image), raw=True
-                ),
-                FollowingSubscription(
-                    self, CameraInfo, source.info_topic, source.on_info_bytes, depth=1, raw=True
-                ),
-            ]
+        self._topics = CameraTopics(self, self._inputs, clock=self._seconds)
         self._source.listen(self, self._warn)
         self.create_service(Trigger, "~/reset", self._on_reset)
         # Images must be received while the request is answered.
@@ -307,8 +298,7 @@ class TrackerNode(GivenNode):
         for source in self._inputs:
             name = source.name
             missing += source.missing(name in silent, name in left_out, others_send, now_s)
-        for subscription in self._subscriptions_followed:
-            subscription.follow()
+        self._topics.tick()
         missing += self._source.missing()
         message = self._publish_state(missing)
         message.header.stamp = self.get_clock().now().to_msg()
@@ -329,15 +319,6 @@ class TrackerNode(GivenNode):
 def _yield_to_executor() -> Generator[None, None, None]:
     """Return to the executor."""
     yield
-
-
-def _numbered(take: Callable[[bytes, int | None], None]) -> Callable[[bytes, Any], None]:
-    """A callback with the publisher's sequence number of each message."""
-
-    def callback(message: bytes, info: Any) -> None:
-        take(message, info["publication_sequence_number"])
-
-    return callback
 
 
 def _decode(sizes_px: dict[str, tuple[int, int]], name: str, message: ImageMessage) -> Any:
