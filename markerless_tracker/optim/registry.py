@@ -1,6 +1,6 @@
 """The algorithms that search one stage, by name."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from markerless_tracker.optim.apf import Apf
 from markerless_tracker.optim.base import Optimizer
@@ -9,7 +9,7 @@ from markerless_tracker.optim.pf import Pf
 from markerless_tracker.optim.pso import Pso
 from markerless_tracker.optim.sppso import Sppso
 
-ALGORITHMS: Mapping[str, Callable[..., Optimizer]] = {
+ALGORITHMS: dict[str, Callable[..., Optimizer]] = {
     "sppso": Sppso,
     "pso": Pso,
     "mcpso": Mcpso,
@@ -18,5 +18,6 @@ ALGORITHMS: Mapping[str, Callable[..., Optimizer]] = {
 }
 """What `SearchPlan.algorithm` may name; its `options` are the class' keyword arguments.
 
+A program may replace an entry by an `Optimizer` of its own (examples/own_optimizer.py).
 HPSO, H-MCPSO and GLPSO are stages of these: see `tracking.partitions`.
 """

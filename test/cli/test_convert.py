@@ -104,3 +104,20 @@ def test_a_target_that_is_not_empty_is_not_changed(make_recording, tmp_path: Pat
     assert main(["convert", str(folder), str(folder)]) == 1
     assert "exists and is not empty" in capsys.readouterr().err
     assert (folder / "cam01.mkv").is_file()
+
+
+def test_an_earlier_bag_is_replaced_with_force_only(make_recording, tmp_path: Path, capsys) -> None:
+    bag = tmp_path / "bag"
+    assert main(["convert", str(make_recording(frames=3)), str(bag)]) == 0
+    longer = str(make_recording("longer", frames=5))
+    assert main(["convert", longer, str(bag)]) == 1
+    assert "exists and is not empty" in capsys.readouterr().err
+    assert open_recording(bag).frame_count == 3
+    assert main(["convert", longer, str(bag), "--force"]) == 0
+    assert open_recording(bag).frame_count == 5
+    other = tmp_path / "mine"
+    other.mkdir()
+    (other / "notes.txt").write_text("kept", encoding="utf-8")
+    assert main(["convert", longer, str(other), "--force"]) == 1
+    assert (other / "notes.txt").read_text(encoding="utf-8") == "kept"
+    assert not list(tmp_path.glob(".*"))

@@ -47,6 +47,16 @@ def test_images_in_memory(run_example) -> None:
     assert "right wrist" in lines[3]
 
 
+@pytest.mark.parametrize("name", ["own_optimizer", "own_cost", "own_segmenter"])
+def test_parts_of_ones_own(run_example, name: str) -> None:
+    lines = run_example(name, "--frames", "3")
+    assert len(lines) == 3 and lines[0].startswith("0: ")
+    assert "TRACKING" in lines[2], "the person is found and tracked"
+    assert float(lines[2].rpartition(" ")[2]) > 0.85
+
+
 def test_every_example_is_tested(project_root: Path) -> None:
     names = {path.stem for path in (project_root / "examples").glob("*.py")}
-    assert names == {"listen", "track_arrays", "track_recording"}
+    assert names == {
+        "listen", "track_arrays", "track_recording", "own_optimizer", "own_cost", "own_segmenter",
+    }  # fmt: skip

@@ -1,8 +1,11 @@
 """NumPy archive with every array of a result."""
 
 import io
+import shutil
+import tempfile
 import zipfile
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +34,8 @@ _ARRAYS: dict[str, Callable[[StoredResult], NDArray[Any]]] = {
 def write_npz(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
     """Write the arrays of `StoredResult`, positions Y up, and `marker_names`, `axes`, `fps`.
 
-    `numpy.load(path)` reads them. One pass over the result per array keeps memory flat.
+    `numpy.load(path)` reads them. Each array grows in a file of its own, beside `path`, until the
+    archive is put together: memory stays flat.
 
     Args:
         path: the file.
@@ -41,22 +45,33 @@ def write_npz(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
     Raises:
         DatasetError: it cannot be written.
     """
-    frames = sum(len(part) for part in reader.chunks())
-    with new_file(path, binary=True) as sink, zipfile.ZipFile(sink, "w") as archive:
-        for name, array_of in _ARRAYS.items():
-            with archive.open(_entry(name), "w", force_zip64=True) as entry:
-                for index, part in enumerate(reader.chunks()):
+    with (
+        new_file(path, binary=True) as sink,
+        tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder,
+        zipfile.ZipFile(sink, "w") as archive,
+    ):
+        frames = 0
+        kinds: dict[str, NDArray[Any]] = {}
+        with ExitStack() as files:
+            rows = {name: files.enter_context((Path(folder) / name).open("wb")) for name in _ARRAYS}
+            for part in reader.chunks():
+                frames += len(part)
+                for name, array_of in _ARRAYS.items():
                     array = np.ascontiguousarray(array_of(part))
-                    if not index:
-                        np.lib.format.write_array_header_2_0(
-                            entry,
-                            {
-                                "descr": np.lib.format.dtype_to_descr(array.dtype),
-                                "fortran_order": False,
-                                "shape": (frames, *array.shape[1:]),
-                            },
-                        )
-                    entry.write(array.tobytes())
+                    kinds[name] = array[:0]
+                    rows[name].write(array.tobytes())
+        for name, kind in kinds.items():
+            with archive.open(_entry(name), "w", force_zip64=True) as entry:
+                np.lib.format.write_array_header_2_0(
+                    entry,
+                    {
+                        "descr": np.lib.format.dtype_to_descr(kind.dtype),
+                        "fortran_order": False,
+                        "shape": (frames, *kind.shape[1:]),
+                    },
+                )
+                with (Path(folder) / name).open("rb") as stored:
+                    shutil.copyfileobj(stored, entry, 1 << 20)
         for name, value in (
             ("marker_names", np.array(names)),
             ("parameter_names", np.array(reader.parameter_names, dtype=np.str_)),
