@@ -43,9 +43,13 @@ def test_what_a_thread_raises_is_raised():
 def test_a_forked_process_has_threads_of_its_own():
     """Those of its parent do not exist in it."""
     program = (
-        "import os; from markerless_tracker.fitness.threads import side_by_side;"
-        "side_by_side(print, 2); child = os.fork(); side_by_side(print, 2);"
-        "child and os.waitpid(child, 0)"
+        "import os; from markerless_tracker.fitness.threads import side_by_side\n"
+        "def note(thread): os.write(1, b'%d ' % thread)\n"
+        "side_by_side(note, 2)\n"
+        "child = os.fork()\n"
+        "side_by_side(note, 2)\n"
+        "if child: os.waitpid(child, 0)\n"
+        "else: os._exit(0)\n"
     )
     result = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120

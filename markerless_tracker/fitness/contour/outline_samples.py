@@ -198,7 +198,8 @@ def sample_outline(view, views, cones, spacing_px, step_px, scratch, outlines, s
     pixel, normal, point = samples.pixel[view], samples.normal[view], samples.world[view]
     depth, length = samples.depth[view], samples.length[view]
     cone, shape = samples.cone[view], samples.shape[view]
-    kept = 0
+    # Not a literal, for which functions would be compiled once more.
+    kept = np.int64(0)
     for c in range(cones):
         if forms[c] == HIDDEN:
             continue

@@ -106,7 +106,7 @@ def collect_residuals(view, views, contours, truncation_m, samples, start, order
     distance, distance_start = contours.distance, contours.distance_start[view]
     left, top = contours.window[view, 0], contours.window[view, 1]
     width, height = contours.window[view, 2], contours.window[view, 3]
-    n = 0
+    n = np.int64(0)
     cost = 0.0
     limit = truncation_m * truncation_m / 6.0
     focal = 1.0 / k[0]

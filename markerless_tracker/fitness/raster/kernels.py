@@ -187,6 +187,7 @@ def compare_view(  # type: ignore[no-untyped-def]
     if rule.rule == VISIBLE:
         _nearest_first(cones, out.ends, order)
     edge_sum, edge_count, sampled = 0, 0, False
+    none = np.int64(0)
     for i in range(cones):
         c = order[i]
         if out.form[c] == HIDDEN:
@@ -196,7 +197,7 @@ def compare_view(  # type: ignore[no-untyped-def]
             if rule.rule != OUTLINE:
                 more, number, _ = sample_cone(
                     c, count, edge_cones, out, bits, static.bits, start, views.edges, edge_start,
-                    width, height, rule, static.samples[:0], 0,
+                    width, height, rule, static.samples[:0], none,
                 )  # fmt: skip
                 edge_sum, edge_count = edge_sum + more, edge_count + number
         if body_cones[c]:
@@ -206,7 +207,7 @@ def compare_view(  # type: ignore[no-untyped-def]
             if out.form[c] != HIDDEN and (edge_cones[c, 0] or edge_cones[c, 1]):
                 more, number, _ = sample_cone(
                     c, count, edge_cones, out, bits, static.bits, start, views.edges, edge_start,
-                    width, height, rule, static.samples[:0], 0,
+                    width, height, rule, static.samples[:0], none,
                 )  # fmt: skip
                 edge_sum, edge_count = edge_sum + more, edge_count + number
     if not beside:

@@ -153,7 +153,8 @@ def _draw_static(  # type: ignore[no-untyped-def]
         return
     out = outlines_of(outlines, 0)
     nothing = bits[:0]
-    kept = 0
+    # Not literals, for which functions would be compiled once more.
+    kept, first = np.int64(0), np.int64(0)
     for view in range(views.size.shape[0]):
         width, height, words = views.size[view, 0], views.size[view, 1], views.words[view]
         at = views.mask_start[view]
@@ -166,7 +167,7 @@ def _draw_static(  # type: ignore[no-untyped-def]
         for c in range(silhouette_cones.size):
             if out.form[c] != HIDDEN:
                 more, number, kept = sample_cone(
-                    c, count, edge_cones, out, own, nothing, 0, views.edges,
+                    c, count, edge_cones, out, own, nothing, first, views.edges,
                     views.edge_start[view], width, height, rule, listed, kept,
                 )  # fmt: skip
                 counts[view, EDGE_SUM] += more

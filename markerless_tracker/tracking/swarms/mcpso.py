@@ -59,19 +59,19 @@ def _swarms(  # type: ignore[no-untyped-def]
     objective,
 ):  # fmt: skip
     """ends: (s + 2,) where each of the s sub-swarms begins, and the master, and the end."""
-    subs, count = ends[-2], ends[-1]
+    first, subs, count = np.int64(0), ends[-2], ends[-1]
     begin(rng, particles, centre, sigma, bounds, True, constraints)
-    learn(particles, 0, count, objective)
+    learn(particles, first, count, objective)
     for k in range(inertias.size):
-        left = take_all(particles, 0, subs)
+        left = take_all(particles, first, subs)
         for _ in range(ATTEMPTS):
             _propose_subs(rng, particles, left, ends, inertias[k], c, sigma)
             confine(particles, left, bounds)
             left = left_over(particles, left, constraints)
             if left == 0:
                 break
-        place(particles, 0, subs, left)
-        learn(particles, 0, subs, objective)
+        place(particles, first, subs, left)
+        learn(particles, first, subs, objective)
         phi = _migrate(particles, ends)
         weight = phi if weighted else 1.0
         left = take_all(particles, subs, count)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body.collision import are_feasible
-from markerless_tracker.compiled import kernel
+from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.raster.kernels import evaluate
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim.sampling import ATTEMPTS
@@ -121,7 +121,8 @@ def place(particles, start, stop, count):  # type: ignore[no-untyped-def]
 def begin(rng, particles, centre, sigma, bounds, confined, constraints):  # type: ignore[no-untyped-def]
     """First positions and velocities, as `optim.sampling.gaussian_sample`."""
     n, d = particles.x.shape
-    count = take_all(particles, 0, n)
+    start = np.int64(0)
+    count = take_all(particles, start, n)
     for _ in range(ATTEMPTS):
         for k in range(count):
             row = particles.todo[k]
@@ -138,13 +139,13 @@ def begin(rng, particles, centre, sigma, bounds, confined, constraints):  # type
     for row in range(n):
         for i in range(d):
             particles.moved[row, i] = (-1.0 + 2.0 * rng.random()) * sigma[i]
-    place(particles, 0, n, 0)
+    place(particles, start, n, start)
     for row in range(n):
         for i in range(d):
             particles.best[row, i] = particles.x[row, i]
 
 
-@kernel
+@inlined
 def learn(particles, start, stop, objective):  # type: ignore[no-untyped-def]
     """Evaluate the particles from start to stop; they and `found` learn from the costs.
 

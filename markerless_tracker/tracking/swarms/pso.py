@@ -42,19 +42,19 @@ def run_pso(
 def _swarm(  # type: ignore[no-untyped-def]
     rng, particles, inertias, c, centre, sigma, bounds, constraints, objective
 ):
-    count = particles.x.shape[0]
+    start, count = np.int64(0), particles.x.shape[0]
     begin(rng, particles, centre, sigma, bounds, True, constraints)
-    learn(particles, 0, count, objective)
-    for k in range(inertias.size):
-        left = take_all(particles, 0, count)
-        for _ in range(ATTEMPTS):
-            _propose(rng, particles, left, inertias[k], c, sigma)
-            confine(particles, left, bounds)
-            left = left_over(particles, left, constraints)
-            if left == 0:
-                break
-        place(particles, 0, count, left)
-        learn(particles, 0, count, objective)
+    for k in range(inertias.size + 1):
+        if k > 0:
+            left = take_all(particles, start, count)
+            for _ in range(ATTEMPTS):
+                _propose(rng, particles, left, inertias[k - 1], c, sigma)
+                confine(particles, left, bounds)
+                left = left_over(particles, left, constraints)
+                if left == 0:
+                    break
+            place(particles, start, count, left)
+        learn(particles, start, count, objective)
 
 
 @kernel

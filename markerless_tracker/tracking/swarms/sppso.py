@@ -49,17 +49,18 @@ def _swarm(  # type: ignore[no-untyped-def]
     """The swarm's best is that before each batch of particles."""
     count = particles.x.shape[0]
     begin(rng, particles, centre, sigma, bounds, False, constraints)
-    for start in range(0, count, batch):
-        learn(particles, start, start + batch, objective)
-    for k in range(accelerations.size):
+    for k in range(accelerations.size + 1):
         for start in range(0, count, batch):
-            left = take_all(particles, start, start + batch)
-            for _ in range(ATTEMPTS):
-                _propose(rng, particles, left, accelerations[k], constrictions[k], sigma)
-                left = left_over(particles, left, constraints)
-                if left == 0:
-                    break
-            place(particles, start, start + batch, left)
+            if k > 0:
+                left = take_all(particles, start, start + batch)
+                for _ in range(ATTEMPTS):
+                    _propose(
+                        rng, particles, left, accelerations[k - 1], constrictions[k - 1], sigma
+                    )
+                    left = left_over(particles, left, constraints)
+                    if left == 0:
+                        break
+                place(particles, start, start + batch, left)
             learn(particles, start, start + batch, objective)
 
 
