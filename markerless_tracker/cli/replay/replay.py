@@ -15,7 +15,7 @@ from markerless_tracker.node.watch import StateWatch
 READY_S = 900.0
 """Time for the tracker to start; the first start compiles, on a busy machine for minutes."""
 
-STUCK_S = 120.0
+STUCK_S = 600.0
 """Time without progress, in real time beyond the bag's own, after which a replay is given up."""
 
 _QUIET_S = 5.0
