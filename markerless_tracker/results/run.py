@@ -1,14 +1,13 @@
 """Runs a tracker over a recording, through the same `Tracker.step` as the live node."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from markerless_tracker.datasets import FrameSet, Recording, every_for_fps
 from markerless_tracker.datasets.empty_scene import backgrounds_of
-from markerless_tracker.datasets.silhouettes import Silhouettes
-from markerless_tracker.imaging import BackgroundModel, Image, ImagingSettings, learn_background
-from markerless_tracker.records import Observation, TrackResult
+from markerless_tracker.imaging import BackgroundModel, ImagingSettings, learn_background
+from markerless_tracker.records import TrackResult
 from markerless_tracker.tracking import TrackerSetup
 
 
@@ -40,11 +39,7 @@ def recording_backgrounds(
 
 
 def track_recording(
-    recording: Recording,
-    setup: TrackerSetup,
-    *,
-    fps: float | None = None,
-    silhouettes: Silhouettes | None = None,
+    recording: Recording, setup: TrackerSetup, *, fps: float | None = None
 ) -> Iterator[TrackedFrame]:
     """Track from the start's frame (the first, if the start names no time) to the end.
 
@@ -52,7 +47,6 @@ def track_recording(
         recording: images, at the scale of the tracker's rig.
         setup: the tracker and the time of its start pose.
         fps: keep every k-th frame from the start frame on; None = all.
-        silhouettes: evidence made elsewhere, instead of the images.
 
     Raises:
         ConfigError: the recording's rate is no multiple of `fps`.
@@ -61,7 +55,4 @@ def track_recording(
     every = every_for_fps(recording.fps, fps)
     start = 0 if setup.start_stamp_ns is None else recording.start_index(setup.start_stamp_ns)
     for images in recording.frames(start=start, every=every):
-        views: Mapping[str, Image | Observation] = images.images
-        if silhouettes is not None:
-            views = silhouettes.views(images.index, images.stamp_ns)
-        yield TrackedFrame(images, setup.tracker.step(views, images.stamp_ns))
+        yield TrackedFrame(images, setup.tracker.step(images.images, images.stamp_ns))
