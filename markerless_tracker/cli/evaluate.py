@@ -18,8 +18,8 @@ from markerless_tracker.datasets.markers.c3d import read_markers
 from markerless_tracker.datasets.markers.sets import MARKER_SETS, Sources, read_marker_map, renamed
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.results.alignment import Alignment, align
-from markerless_tracker.results.measures import Measures, measures
+from markerless_tracker.results.comparison.alignment import Alignment, align
+from markerless_tracker.results.comparison.measures import Measures, measures
 from markerless_tracker.results.score import Score, score
 from markerless_tracker.results.stored import stored_frames
 

@@ -20,7 +20,7 @@ from markerless_tracker.cli.track_arguments import add_arguments
 from markerless_tracker.compiled import compilation
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
-from markerless_tracker.datasets.silhouettes import Silhouettes
+from markerless_tracker.datasets.silhouettes import SilhouetteRecording
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.records import TrackState
 from markerless_tracker.results.result import ResultWriter, check_target
@@ -61,9 +61,10 @@ def run(args: argparse.Namespace) -> int:
     recording = open_recording(args.source, scale=args.scale)
     if args.time_offsets is not None:
         recording = InStepRecording(recording, read_time_offsets(args.time_offsets))
-    silhouettes = None if args.masks is None else Silhouettes(args.masks, recording.rig)
-    if silhouettes is not None and args.debug_images is not None:
-        raise ConfigError("--debug-images shows the segmentation, which --masks replaces")
+    if args.masks is not None:
+        if args.debug_images is not None:
+            raise ConfigError("--debug-images shows the segmentation, which --masks replaces")
+        recording = SilhouetteRecording(recording, args.masks)
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
         console=console,
@@ -74,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
             config,
             backgrounds=(
                 recording_backgrounds(recording, config, args.background)
-                if silhouettes is None
+                if args.masks is None
                 else None
             ),
             start_file=args.start,
@@ -93,7 +94,6 @@ def run(args: argparse.Namespace) -> int:
             recording,
             setup,
             config,
-            silhouettes=silhouettes,
             warn=lambda text: _warn(console, text),
             progress=lambda done: bars.update(task, completed=done),
         )
@@ -172,7 +172,6 @@ def _track(
     setup: TrackerSetup,
     config: TrackerConfig,
     *,
-    silhouettes: Silhouettes | None,
     warn: Callable[[str], None],
     progress: Callable[[int], Any],
 ) -> _Outcome:
@@ -193,7 +192,7 @@ def _track(
         overwrite=args.force,
         keep_lost=args.keep_lost,
     ) as writer:
-        for tracked in track_recording(recording, setup, fps=args.fps, silhouettes=silhouettes):
+        for tracked in track_recording(recording, setup, fps=args.fps):
             result, body = tracked.result, tracker.body
             writer.add(result)
             writer.body = body

@@ -1,38 +1,47 @@
 """Silhouettes made elsewhere, as images on disk: `DIR/CAMERA/FRAME.png`."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
-from markerless_tracker.camera import CameraRig
+from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.datasets.video.images import numbered_files, read_image
 from markerless_tracker.errors import DatasetError
+from markerless_tracker.imaging import Image
 from markerless_tracker.imaging.images import scale_image
 from markerless_tracker.observation import Observation
 
 _PERSON = 128
 
 
-class Silhouettes:
-    """A folder per camera with an image per frame: person from 128 on, background below.
+class SilhouetteRecording(Recording):
+    """A recording whose sets hold observations, which `Tracker.step` takes in place of images.
 
-    Files are named by the number of their frame in the recording, such as 000050.png.
+    A folder per camera has an image per frame: person from 128 on, background below. Files are
+    named by the number of their frame in the recording, such as 000050.png; images of another size
+    than the recording's are scaled. A camera without a file for a frame is missing in its set.
 
     Args:
+        recording: the recording, for its stamps.
         folder: holds a folder for every camera.
-        rig: the cameras, at the scale of the tracker's images; images of another size are scaled.
 
     Raises:
         DatasetError: a camera has no folder, or a file's name is no number.
     """
 
-    def __init__(self, folder: Path, rig: CameraRig) -> None:
+    def __init__(self, recording: Recording, folder: Path) -> None:
+        self._inner, rig = recording, recording.rig
+        self.path, self.name, self.rig = recording.path, recording.name, rig
+        self.scale, self.fps = recording.scale, recording.fps
+        self.frame_count = recording.frame_count
+        self._warnings = {}
         missing = [name for name in rig.names if not (folder / name).is_dir()]
         if missing:
             raise DatasetError(
                 f"{folder}: no folder {', '.join(missing)}, expected one of silhouettes per camera"
             )
-        self._rig = rig
         self._files: dict[str, dict[int, Path]] = {}
         for name in rig.names:
             files = numbered_files(folder / name)
@@ -43,18 +52,24 @@ class Silhouettes:
                     )
             self._files[name] = {int(file.stem): file for file in files}
 
-    def views(self, index: int, stamp_ns: int) -> dict[str, Observation]:
-        """Observations of the cameras that have a silhouette of a frame, without edges.
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Problems found, one line each."""
+        return self._inner.warnings
 
-        Args:
-            index: number of the frame in the recording.
-            stamp_ns: its stamp.
+    def _nearest(self, stamp_ns: int) -> tuple[int, int]:
+        return self._inner._nearest(stamp_ns)
 
-        Raises:
-            DatasetError, ImageError: an image cannot be read.
-        """
+    def _read(self, start: int, every: int) -> Iterator[FrameSet]:
+        for frame in self._inner.frames(start=start, every=every):
+            views = self._views(frame.index, frame.stamp_ns)
+            # The type of a set knows images only; the tracker takes both.
+            yield FrameSet(frame.index, frame.stamp_ns, cast("dict[str, Image]", views))
+
+    def _views(self, index: int, stamp_ns: int) -> dict[str, Observation]:
+        """Observations of the cameras that have a silhouette of a frame, without edges."""
         found = {}
-        for camera in self._rig:
+        for camera in self.rig:
             file = self._files[camera.name].get(index)
             if file is not None:
                 image = read_image(file)

@@ -22,13 +22,14 @@ from markerless_tracker.body.angles import AngleReader
 from markerless_tracker.datasets import tidy_fps
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.records import TrackResult, TrackState
-from markerless_tracker.results.appended import check_writable, not_written
+from markerless_tracker.results.appended import not_written
 from markerless_tracker.results.journal import Journal
+from markerless_tracker.results.target import check_target as check_target
+from markerless_tracker.results.target import earlier_files, path_of
 from markerless_tracker.results.trc_stream import TrcStream
 from markerless_tracker.tracking import TrackerConfig
 
 _DEPENDENCIES = ("numpy", "numba", "opencv-python-headless", "scipy")
-_SUFFIXES = (".trc", ".json", ".jsonl")
 _UNKNOWN_FPS = 60.0
 _STEPS = 1000
 _MISSING = np.full((len(MARKER_NAMES), 3), np.nan)
@@ -78,10 +79,10 @@ class ResultWriter:
     ) -> None:
         self._name = name
         self._keep_lost = keep_lost
-        self.trc_path = _path(name, ".trc")
-        self.json_path = _path(name, ".json")
-        self.journal_path = _path(name, ".jsonl")
-        self.subject_path = _path(name, ".subject.yaml")
+        self.trc_path = path_of(name, ".trc")
+        self.json_path = path_of(name, ".json")
+        self.journal_path = path_of(name, ".jsonl")
+        self.subject_path = path_of(name, ".subject.yaml")
         self._earlier = earlier_files(name)
         check_target(name, overwrite=overwrite)
         self.body = body
@@ -183,13 +184,13 @@ class ResultWriter:
             # From here on the journal is what there is to read.
             self.json_path.unlink(missing_ok=True)
             number = 2
-            while (path := _path(self._name, f".{number}.trc")).exists():
+            while (path := path_of(self._name, f".{number}.trc")).exists():
                 path.unlink()
                 number += 1
         return self._journal, self._trc
 
     def _next_segment(self, trc: TrcStream) -> TrcStream:
-        path = _path(self._name, f".{self._segment + 1}.trc")
+        path = path_of(self._name, f".{self._segment + 1}.trc")
         self._trc = TrcStream(path, MARKER_NAMES, self._rate())
         self._segment += 1
         self._angles.reset()
@@ -246,38 +247,6 @@ class ResultWriter:
             "settings": self._config.as_mapping(),
             "versions": versions(),
         }
-
-
-def earlier_files(name: Path) -> list[Path]:
-    """Files of an earlier result of that name."""
-    paths = (_path(name, suffix) for suffix in _SUFFIXES)
-    return [path for path in paths if path.exists()]
-
-
-def check_target(name: Path, *, overwrite: bool, allow: str = "`overwrite`") -> None:
-    """Make sure that a result can be written, without changing an earlier one; makes the folder.
-
-    Args:
-        name: path of the result without suffix.
-        overwrite: whether an earlier result may be replaced.
-        allow: what allows it, for the message.
-
-    Raises:
-        DatasetError: it cannot, or there is an earlier result and `overwrite` is not set.
-    """
-    earlier = earlier_files(name)
-    if earlier and not overwrite:
-        raise DatasetError(f"{earlier[0]}: exists already, expected a new name or {allow}")
-    try:
-        name.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise not_written(_path(name, ".json"), error) from error
-    for suffix in _SUFFIXES:
-        check_writable(_path(name, suffix))
-
-
-def _path(name: Path, suffix: str) -> Path:
-    return name.with_name(name.name + suffix)
 
 
 def _frame(result: TrackResult, segment: int, reader: AngleReader) -> dict[str, Any]:

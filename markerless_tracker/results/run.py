@@ -1,16 +1,15 @@
 """Runs a tracker over a recording, through the same `Tracker.step` as the live node."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
 from markerless_tracker.datasets import FrameSet, Recording, every_for_fps
 from markerless_tracker.datasets.empty_scene import backgrounds_of
-from markerless_tracker.datasets.silhouettes import Silhouettes
-from markerless_tracker.imaging import BackgroundModel, Image, ImagingSettings, learn_background
-from markerless_tracker.records import Observation, TrackResult
+from markerless_tracker.imaging import BackgroundModel, ImagingSettings, learn_background
+from markerless_tracker.records import TrackResult
 from markerless_tracker.tracking import Prepared, TrackerSetup
 
 
@@ -42,11 +41,7 @@ def recording_backgrounds(
 
 
 def track_recording(
-    recording: Recording,
-    setup: TrackerSetup,
-    *,
-    fps: float | None = None,
-    silhouettes: Silhouettes | None = None,
+    recording: Recording, setup: TrackerSetup, *, fps: float | None = None
 ) -> Iterator[TrackedFrame]:
     """Track from the start's frame (the first, if the start names no time) to the end.
 
@@ -57,7 +52,6 @@ def track_recording(
         recording: images, at the scale of the tracker's rig.
         setup: the tracker and the time of its start pose.
         fps: keep every k-th frame from the start frame on; None = all.
-        silhouettes: evidence made elsewhere, instead of the images.
 
     Raises:
         ConfigError: the recording's rate is no multiple of `fps`.
@@ -67,22 +61,16 @@ def track_recording(
     start = 0 if setup.start_stamp_ns is None else recording.start_index(setup.start_stamp_ns)
     frames = recording.frames(start=start, every=every)
     tracker = setup.tracker
-
-    def views_of(images: FrameSet) -> Mapping[str, Image | Observation]:
-        if silhouettes is None:
-            return images.images
-        return silhouettes.views(images.index, images.stamp_ns)
-
     if (tracker.config.threads or os.cpu_count() or 1) == 1:
         for images in frames:
-            yield TrackedFrame(images, tracker.step(views_of(images), images.stamp_ns))
+            yield TrackedFrame(images, tracker.step(images.images, images.stamp_ns))
         return
 
     def read() -> tuple[FrameSet, Prepared] | None:
         images = next(frames, None)
         if images is None:
             return None
-        return images, tracker.prepare(views_of(images), images.stamp_ns)
+        return images, tracker.prepare(images.images, images.stamp_ns)
 
     with ThreadPoolExecutor(1, thread_name_prefix="evidence") as ahead:
         current = ahead.submit(read).result()

@@ -10,6 +10,7 @@ from markerless_tracker.cli.main import main
 from markerless_tracker.results.read import read_result
 
 opensim = pytest.importorskip("opensim", reason="opensim is not installed")
+opensim.Logger.removeFileSink()
 
 
 @pytest.fixture

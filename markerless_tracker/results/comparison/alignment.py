@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.results.measures import rotation_onto
+from markerless_tracker.results.comparison.measures import rotation_onto
 
 MOST_OFFSET_S = 5.0
 """Largest time offset that is searched."""
