@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from threading import Event, Thread
 from typing import Any, Protocol
 
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from markerless_tracker.compiled import compilation
 from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.imaging import BackgroundModel
+from markerless_tracker.node.tracker.ahead import Ahead, Taken
+from markerless_tracker.node.tracker.effort import EffortRule, Lateness
 from markerless_tracker.node.tracker.learning import Learning, OpenRequest
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
@@ -34,8 +37,11 @@ class Stepper(Protocol):
     def warm_up(self) -> None:
         """Compile all kernels of a step."""
 
-    def step(self, views: Mapping[str, Any], stamp_ns: int) -> TrackResult:
-        """Track one set of images."""
+    def prepare(self, views: Mapping[str, Any], stamp_ns: int) -> Any:
+        """Make the evidence of the next set while one is tracked."""
+
+    def step(self, views: Any, stamp_ns: int, effort: float = 1.0) -> TrackResult:
+        """Track one set of images, or what was prepared of it."""
 
     def reset(self) -> None:
         """Forget the person."""
@@ -132,6 +138,7 @@ class TrackWorker:
         self._request = OpenRequest()
         self._waits = False
         self._reported_s = 0.0
+        self._effort = EffortRule()
         self.fatal: str | None = None
         # Compilation cannot be interrupted and must not keep the process alive.
         self._thread = Thread(target=self._run, name="fit", daemon=True)
@@ -191,14 +198,21 @@ class TrackWorker:
         self._status.became_ready(activity, now_s=self._clock())
         self._inform(f"ready, {activity}")
         gate = StartGate(handle.start_ns)
+        ahead = Ahead(
+            self._sets, partial(self._evidence, handle), poll_s=_POLL_S, clock=self._clock
+        )
         while not self._stop.is_set():
-            matched = self._sets.take(_POLL_S)
-            if matched is not None:
-                self._handle(handle, gate, matched)
-                self._end(matched)
+            asked_s = self._clock()
+            taken = ahead.next()
+            if taken is not None:
+                ahead.fitting()
+                self._handle(handle, gate, taken, self._clock() - asked_s)
+                ahead.fitted()
+                self._end(taken.matched)
             request = self._request.current
             if request is not None:
                 request.refuse_if_overdue(self._status.activity)
+        ahead.close()
         request = self._request.current
         if request is not None:
             request.refuse("the tracker ends")
@@ -221,7 +235,17 @@ class TrackWorker:
             self._stop.wait(_POLL_S)
         return None
 
-    def _handle(self, handle: TrackerHandle, gate: StartGate, matched: MatchedSet[Any]) -> None:
+    def _evidence(self, handle: TrackerHandle, matched: MatchedSet[Any]) -> tuple[Images, Any]:
+        """The set's images, and what the tracker takes of them."""
+        images = self._decoded(handle, matched)
+        if self.learning:
+            return images, images
+        return images, handle.tracker.prepare(images, matched.stamp_ns)
+
+    def _handle(
+        self, handle: TrackerHandle, gate: StartGate, taken: Taken, waited_s: float
+    ) -> None:
+        matched = taken.matched
         learning = self._request.current
         try:
             if matched.restarted:
@@ -236,7 +260,9 @@ class TrackWorker:
                 self._status.dropped("before_start")
                 self._status.doing("waiting for the start frame")
                 return
-            images = self._decoded(handle, matched)
+            if taken.error is not None:
+                raise taken.error
+            images, views = taken.made
             if learning is None and self._waits:
                 self._status.dropped("while_learning")
                 self._status.doing("waiting for learn_background")
@@ -250,10 +276,9 @@ class TrackWorker:
                     return
             else:
                 self._status.doing("processing images")
-            # EFFORT: once `Tracker.step` takes one, hand it `EffortRule.take(Lateness(...))` here
-            # (effort.py): `matched.replaced`, `matched.period_s`, the time since `arrived_s`, and
-            # how long `take` waited in `_run`.
-            result = handle.tracker.step(images, matched.stamp_ns)
+            age_s = max(0.0, self._clock() - matched.arrived_s)
+            lateness = Lateness(matched.replaced, waited_s, age_s, matched.period_s)
+            result = handle.tracker.step(views, matched.stamp_ns, self._effort.take(lateness))
             finished_s = self._clock()
         except Exception as error:
             # The next set may be fine.

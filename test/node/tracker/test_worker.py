@@ -46,7 +46,10 @@ class FakeTracker:
         if self.error:
             raise self.error
 
-    def step(self, views: Any, stamp_ns: int) -> TrackResult:
+    def prepare(self, views: Any, stamp_ns: int) -> Any:
+        return views
+
+    def step(self, views: Any, stamp_ns: int, effort: float = 1.0) -> TrackResult:
         self.threads.add(threading.get_ident())
         self.free.wait(60)
         if self.error:

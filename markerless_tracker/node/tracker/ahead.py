@@ -1,0 +1,103 @@
+"""The next set is taken, and its evidence made, while the set before it is fitted."""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from threading import Event
+from typing import Any
+
+from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
+
+_RECENT = 0.2
+_SPARE_S = 0.002
+_STALE = 2
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A set that was taken, and what was made of it.
+
+    Attributes:
+        matched: the set.
+        made: what `make` returned; None if it raised.
+        error: what it raised.
+    """
+
+    matched: MatchedSet[Any]
+    made: Any = None
+    error: Exception | None = None
+
+
+class Ahead:
+    """Takes the newest set and makes its evidence, in a thread beside the one that fits.
+
+    The set is taken as late as its evidence will be ready when the fit ends, so that it is the
+    newest. One that waited while two newer ones became complete is left out.
+
+    Args:
+        sets: source of the complete sets.
+        make: called in the thread beside with a set.
+        poll_s: how long a set is waited for.
+        clock: monotonic time in s.
+    """
+
+    def __init__(
+        self,
+        sets: Synchronizer[Any],
+        make: Callable[[MatchedSet[Any]], Any],
+        *,
+        poll_s: float,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._sets = sets
+        self._make = make
+        self._poll_s = poll_s
+        self._clock = clock
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
+        self._following: Future[Taken | None] | None = None
+        self._fitted = Event()
+        self._began_s = 0.0
+        self._fit_s = 0.0
+        self._make_s = 0.0
+
+    def next(self) -> Taken | None:
+        """The set to fit now; None if none came in time."""
+        following, self._following = self._following, None
+        taken = self._take(0.0) if following is None else following.result()
+        if taken is not None and self._sets.newer >= _STALE:
+            self._sets.note_skipped()
+            taken = self._take(0.0)
+        return taken
+
+    def fitting(self) -> None:
+        """A fit begins: the next set is made beside it."""
+        self._fitted.clear()
+        self._began_s = self._clock()
+        delay_s = max(0.0, self._fit_s - 1.5 * self._make_s - _SPARE_S)
+        self._following = self._pool.submit(self._take, delay_s)
+
+    def fitted(self) -> None:
+        """The fit ended."""
+        self._fit_s += _RECENT * (self._clock() - self._began_s - self._fit_s)
+        self._fitted.set()
+
+    def close(self) -> None:
+        """Take no more sets."""
+        self._fitted.set()
+        self._sets.wake()
+        self._pool.shutdown()
+
+    def _take(self, delay_s: float) -> Taken | None:
+        if delay_s > 0.0:
+            self._fitted.wait(delay_s)
+        matched = self._sets.take(self._poll_s)
+        if matched is None:
+            return None
+        began_s = self._clock()
+        try:
+            return Taken(matched, self._make(matched))
+        except Exception as error:
+            return Taken(matched, error=error)
+        finally:
+            self._make_s += _RECENT * (self._clock() - began_s - self._make_s)
