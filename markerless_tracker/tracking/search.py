@@ -134,6 +134,8 @@ class FrameSearch:
         self._stamp_ns = stamp_ns
         self._views = searcher.fitness.lay_out(observations)
         self._contours: ContourFrame | None = None
+        self._whole: Comparison | None = None
+        self._costs_of: Callable[[FloatArray], FloatArray] | None = None
 
     @property
     def contours(self) -> ContourFrame:
@@ -151,52 +153,35 @@ class FrameSearch:
             )
         return self._contours
 
-    def run(
-        self,
-        stages: tuple[Stage, ...],
-        *,
-        wants_swarms: Callable[[float], bool] = lambda _: True,
-    ) -> FloatArray:
+    def run(self, stages: tuple[Stage, ...]) -> FloatArray:
         """Run stages from the estimate so far; returns the new one (p,).
 
-        Swarms alone: the last one's best, as published. With contour refinement among them a
-        stage's result is taken only if it explains the views better: the swarm rescues a refinement
-        that is stuck, the refinement sharpens the swarm. A stage may require a least rise of f.
-
-        Args:
-            stages: in order.
-            wants_swarms: whether swarms search beside a refinement, given the cost of the estimate
-                before the first of them; asked once.
+        Swarms alone: the last one's best, as published. Once there was contour refinement, in this
+        call or before, a stage's result is taken only if it explains the views better: the swarm
+        rescues a refinement that is stuck, the refinement sharpens the swarm. A stage may require a
+        least rise of f.
         """
-        # A contour stage uses every parameter and every cone.
         contour = next((stage for stage in stages if stage.plan.algorithm == CONTOUR), None)
-        costs_of = (
-            None
-            if contour is None
-            else self._searcher.fitness.prepare(self._views, contour.comparison)
-        )
-        cost = np.inf if costs_of is None else float(costs_of(self.pose[None])[0])
-        swarms: bool | None = None
+        if contour is not None and self._whole is None:
+            # A contour stage uses every parameter and every cone.
+            self._whole = contour.comparison
+            self._costs_of = self._searcher.fitness.prepare(self._views, self._whole)
+            self.cost = float(self._costs_of(self.pose[None])[0])
         for stage in stages:
-            if costs_of is not None and stage.plan.algorithm != CONTOUR:
-                swarms = wants_swarms(cost) if swarms is None else swarms
-                if not swarms:
-                    continue
             found_cost = None
             if stage.plan.algorithm == CONTOUR:
                 found = self._refine(stage.plan)
             else:
                 found, own_cost = self._swarm(stage.centred(self.pose))
-                if contour is not None and _same_terms(stage.comparison, contour.comparison):
+                if self._whole is not None and _same_terms(stage.comparison, self._whole):
                     found_cost = own_cost
-            if costs_of is None:
+            if self._costs_of is None:
                 self.pose = found
                 continue
             if found_cost is None:
-                found_cost = float(costs_of(found[None])[0])
-            if found_cost < cost - stage.plan.min_improvement:
-                self.pose, cost = found, found_cost
-        self.cost = cost
+                found_cost = float(self._costs_of(found[None])[0])
+            if found_cost < self.cost - stage.plan.min_improvement:
+                self.pose, self.cost = found, found_cost
         return self.pose
 
     def terms(self) -> dict[str, ViewTerms]:

@@ -310,12 +310,9 @@ class Tracker:
         )
         search = self._searcher.frame(believed, stamp_ns, predicted, limits=limits)
         sigma = self.body.sigma * self._motion.widening(stamp_ns)
-        stages = frame_stages(self.body, self.config, predicted, sigma)
-        search.run(stages, wants_swarms=self._effort.wants_swarms)
+        self._effort.search(search, self.body, self.config, predicted, sigma)
         names: tuple[str, ...] = ()
         refined = self.config.refinement != "none"
-        if refined:
-            self._effort.end(search.cost)
         if refined and self.config.search_again and self._effort.granted:
             search.pose, names = self._assessor.limbs.recover(
                 self._searcher, search.contours, believed, stamp_ns, search.pose

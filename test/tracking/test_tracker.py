@@ -6,7 +6,7 @@ import pytest
 from markerless_tracker.imaging import Segmenter
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.tracking import Tracker, TrackerConfig
-from markerless_tracker.tracking import tracker as module
+from markerless_tracker.tracking.partitions import effort
 
 
 def errors_mm(result, frame):
@@ -167,13 +167,13 @@ class TestTime:
     def spreads(self, monkeypatch):
         """The spread of the search in every frame, relative to the published one."""
         seen: list[float] = []
-        real = module.frame_stages
+        real = effort.frame_stages
 
         def spy(body, config, centre, sigma):
             seen.append(float(np.median(sigma / body.sigma)))
             return real(body, config, centre, sigma)
 
-        monkeypatch.setattr(module, "frame_stages", spy)
+        monkeypatch.setattr(effort, "frame_stages", spy)
         return seen
 
     def test_spreads_follow_the_time_between_frames(
@@ -201,13 +201,13 @@ class TestTime:
         self, make_tracker, frames, swarm_settings, monkeypatch
     ):
         centres = []
-        real = module.frame_stages
+        real = effort.frame_stages
 
         def spy(body, config, centre, sigma):
             centres.append(centre.copy())
             return real(body, config, centre, sigma)
 
-        monkeypatch.setattr(module, "frame_stages", spy)
+        monkeypatch.setattr(effort, "frame_stages", spy)
         for prediction in (0.0, 0.5):
             tracker = make_tracker(swarm_settings, prediction=prediction)
             centres.clear()

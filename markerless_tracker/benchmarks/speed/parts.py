@@ -227,7 +227,9 @@ def _frames(
     """
     whole = _tracker(scene, config, backgrounds)
     fit = _tracker(scene, config, {})
-    segmenters = {n: Segmenter(n, backgrounds[n], config) for n in backgrounds}
+    segmenters = {
+        n: Segmenter(n, backgrounds[n], config, edges=config.edge_weight > 0.0) for n in backgrounds
+    }
     names = ("background", "edges", "imaging", "fitness", "total", "thousand")
     best = {name: np.full(len(observed), np.inf) for name in names}
     with ThreadPoolExecutor(max_workers=min(config.threads, len(segmenters))) as pool:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from markerless_tracker.compiled import compilation
 from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.imaging import BackgroundModel
-from markerless_tracker.node.tracker.ahead import Ahead, Taken
-from markerless_tracker.node.tracker.effort import EffortRule, Lateness
 from markerless_tracker.node.tracker.learning import Learning, OpenRequest
+from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
+from markerless_tracker.node.tracker.pace.effort import EffortRule, Lateness
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
 from markerless_tracker.records import TrackResult

@@ -1,6 +1,15 @@
 """How much is searched in a frame beside the refinement."""
 
+from markerless_tracker.body import BodyModel
 from markerless_tracker.errors import ConfigError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.partitions.frame import (
+    contour_stage,
+    frame_stages,
+    rescue_stages,
+)
+from markerless_tracker.tracking.search import FrameSearch
 
 WORSE = 0.01
 """A frame is explained badly whose f lies this far below the track's usual one."""
@@ -51,6 +60,29 @@ class Effort:
     def granted(self) -> bool:
         """Whether this frame may be searched beside the refinement."""
         return self._granted
+
+    def search(
+        self,
+        search: FrameSearch,
+        body: BodyModel,
+        config: TrackerConfig,
+        centre: FloatArray,
+        sigma: FloatArray,
+    ) -> None:
+        """Search a frame with the stages of `frame_stages`, swarms where they are needed.
+
+        Args:
+            search: the frame's.
+            body, config, centre, sigma: as for `frame_stages`.
+        """
+        if config.refinement == "none":
+            search.run(frame_stages(body, config, centre, sigma))
+            return
+        search.run((contour_stage("align", body, config, centre, sigma),))
+        if self.wants_swarms(search.cost):
+            search.run(rescue_stages(body, config, centre, sigma))
+        search.run((contour_stage("polish", body, config, centre, sigma),))
+        self.end(search.cost)
 
     def wants_swarms(self, cost: float) -> bool:
         """Whether swarms search this frame.

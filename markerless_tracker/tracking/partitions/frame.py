@@ -30,15 +30,24 @@ def frame_stages(
     Raises:
         ConfigError: the budget cannot be spent exactly.
     """
-    widened = swarm_sigma(body, config, sigma)
-    swarm = STAGES[config.optimizer](body, config, centre, widened)
     if config.refinement == "none":
-        return swarm
+        widened = swarm_sigma(body, config, sigma)
+        return STAGES[config.optimizer](body, config, centre, widened)
     return (
         contour_stage("align", body, config, centre, sigma),
+        *rescue_stages(body, config, centre, sigma),
+        contour_stage("polish", body, config, centre, sigma),
+    )
+
+
+def rescue_stages(
+    body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
+) -> tuple[Stage, ...]:
+    """The swarms between the two refinements of a frame; arguments as for `frame_stages`."""
+    swarm = STAGES[config.optimizer](body, config, centre, swarm_sigma(body, config, sigma))
+    return (
         *(stage.planned(min_improvement=config.min_improvement) for stage in swarm),
         *limb_stages(body, config, centre, sigma),
-        contour_stage("polish", body, config, centre, sigma),
     )
 
 

@@ -2,7 +2,7 @@ from collections.abc import Callable
 
 import pytest
 
-from markerless_tracker.node.tracker.effort import (
+from markerless_tracker.node.tracker.pace.effort import (
     EARLY_SETS,
     LATE_SETS,
     LEAST,

@@ -1,4 +1,4 @@
-"""Tests for `markerless_tracker.node.tracker.ahead`."""
+"""Tests for `markerless_tracker.node.tracker.pace.ahead`."""
 
 import threading
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from markerless_tracker.node.tracker.ahead import Ahead, Taken
+from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
 from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
 
 
