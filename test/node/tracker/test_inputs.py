@@ -85,6 +85,7 @@ def test_good_images_are_stored_as_they_came(bench: Bench) -> None:
         (image(encoding="bgr8"), "cam02/image_raw: 32 bytes"),
         (image()[:60], "cam02/image_raw: a message of 60 bytes is cut"),
     ],
+    ids=["encoding", "wide", "high", "channels", "cut"],
 )
 def test_bad_images_are_counted_and_reported_with_every_occurrence(
     bench: Bench, bad: Any, says: str
