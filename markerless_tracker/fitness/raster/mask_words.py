@@ -42,6 +42,23 @@ def cut_words(frame, left, top, width, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def paste_words(frame, left, top, width, out):  # type: ignore[no-untyped-def]
+    """As `cut_words`, of a part that may go beyond the frame; 0 there."""
+    height, count = frame.shape
+    shift, first = np.uint64(left & 63), left >> 6
+    for v in range(out.shape[0]):
+        for w in range(out.shape[1]):
+            word, at = np.uint64(0), first + w
+            if 0 <= top + v < height:
+                if 0 <= at < count:
+                    word = frame[top + v, at] >> shift
+                if shift != np.uint64(0) and 0 <= at + 1 < count:
+                    word |= frame[top + v, at + 1] << (np.uint64(64) - shift)
+            out[v, w] = word
+    trim(out, width)
+
+
+@kernel
 def spread(words, v, w):  # type: ignore[no-untyped-def]
     """Word w of row v, and the bits whose left, right, upper or lower neighbour is set."""
     height, count = words.shape

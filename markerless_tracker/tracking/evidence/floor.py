@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.compiled import kernel
-from markerless_tracker.fitness.raster.lens import lens
+from markerless_tracker.fitness.raster.lens import pixel
 from markerless_tracker.fitness.raster.mask_words import has
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import MaskWords
 
 PENUMBRA_PX = 2
 """Background so near to what is not background may be half in shadow, and is not called lit."""
-_NEAREST_M = 1e-6
 
 
 class FloorView(NamedTuple):
@@ -78,16 +77,9 @@ def _look(  # type: ignore[no-untyped-def]
     """Mark the points (n, 3) that a view shows lit, and those that it shows darkened."""
     height = person.shape[0]
     for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        depth = to_camera[2, 0] * x + to_camera[2, 1] * y + to_camera[2, 2] * z + to_camera[2, 3]
+        u, v = pixel(points[i, 0], points[i, 1], points[i, 2], to_camera, matrix, distortion)
+        u, v = u - offset[0], v - offset[1]
         # Not for NaN either.
-        if not depth > _NEAREST_M:
-            continue
-        a = to_camera[0, 0] * x + to_camera[0, 1] * y + to_camera[0, 2] * z + to_camera[0, 3]
-        b = to_camera[1, 0] * x + to_camera[1, 1] * y + to_camera[1, 2] * z + to_camera[1, 3]
-        a, b = lens(a / depth, b / depth, distortion)
-        u = np.rint(matrix[0, 0] * a + matrix[0, 1] * b + matrix[0, 2]) - offset[0]
-        v = np.rint(matrix[1, 1] * b + matrix[1, 2]) - offset[1]
         if not (u >= 0.0 and v >= 0.0 and u < width and v < height):
             continue
         column, row = np.int64(u), np.int64(v)

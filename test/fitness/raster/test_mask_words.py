@@ -10,6 +10,7 @@ from markerless_tracker.fitness.raster.mask_words import (
     grow_rows,
     grow_square,
     has,
+    paste_words,
     spread,
     trim,
 )
@@ -69,6 +70,19 @@ def test_a_part_is_cut(box) -> None:
     part = mask[top : top + height, left : left + width]
     np.testing.assert_array_equal(out, pack_mask(part))
     assert [has(out, u, 0) for u in range(width)] == part[0].tolist()
+
+
+@pytest.mark.parametrize(
+    "box", ((-3, -2, 210, 60), (-70, 5, 90, 10), (150, 40, 120, 30), (5, 1, 9, 9))
+)
+def test_a_part_that_goes_beyond_the_frame_is_empty_there(box) -> None:
+    left, top, width, height = box
+    mask = random_mask(200, 0.5)
+    out = np.empty((height, (width + 63) // 64), np.uint64)
+    paste_words(pack_mask(mask), left, top, width, out)
+    wide = np.pad(mask, 100)
+    part = wide[100 + top :, 100 + left :][:height, :width]
+    np.testing.assert_array_equal(out, pack_mask(part))
 
 
 @pytest.mark.parametrize("width", WIDTHS)
