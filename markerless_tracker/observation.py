@@ -36,7 +36,7 @@ def pack_mask(mask: NDArray[Any]) -> MaskWords:
 def unpack_mask(words: MaskWords, width: int) -> NDArray[np.bool_]:
     """The mask (h, width) that `pack_mask` packed."""
     raw = np.ascontiguousarray(words, dtype="<u8").view(np.uint8)
-    return np.unpackbits(raw, axis=1, count=width, bitorder="little").astype(np.bool_)
+    return np.unpackbits(raw, axis=1, count=width, bitorder="little").view(np.bool_)
 
 
 @dataclass(frozen=True, eq=False)

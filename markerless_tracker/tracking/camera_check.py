@@ -12,15 +12,20 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.fitness.arrays import lay_out_views
+from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
-from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.search import Searcher, pixels_per_m
 
 DISAGREES_M = 0.030
 """A systematic shift of this much, at the body, is the calibration's."""
-EVERY_NS = 160_000_000
+EVERY_NS, LATER_EVERY_NS = 160_000_000, 800_000_000
+"""Time between the first `MANY_CHECKS` checks, and between those after them."""
+MANY_CHECKS = 12
+"""Their median says already how large a lasting shift is; more of them need not come so often."""
 LEAST_VIEWS = 3
 """With two cameras that disagree, either may be wrong."""
 _FIRST_NS = 300_000_000
@@ -64,6 +69,8 @@ class CameraCheck:
         self._config = config
         self._first_ns: int | None = None
         self._last_ns: int | None = None
+        self._checks = 0
+        self._searcher: Searcher | None = None
         self._suspects: frozenset[str] = frozenset()
         self._found: dict[str, list[tuple[float, float, float]]] = {n: [] for n in rig.names}
 
@@ -73,21 +80,25 @@ class CameraCheck:
             return
         if self._first_ns is None:
             self._first_ns = result.stamp_ns
+        every_ns = EVERY_NS if self._checks < MANY_CHECKS else LATER_EVERY_NS
         if result.stamp_ns - self._first_ns < _FIRST_NS or (
-            self._last_ns is not None and result.stamp_ns - self._last_ns < EVERY_NS
+            self._last_ns is not None and result.stamp_ns - self._last_ns < every_ns
         ):
             return
         seen = {n: o for n, o in result.observations.items() if o.mask_words.any()}
         if len(seen) < LEAST_VIEWS:
             return
         self._last_ns = result.stamp_ns
-        searcher = Searcher(self._rig, body, self._config, limits=body.limits, threads=1)
+        self._checks += 1
+        if self._searcher is None or self._searcher.body is not body:
+            self._searcher = Searcher(self._rig, body, self._config, limits=body.limits, threads=1)
+        searcher = self._searcher
         for name in seen:
             others = {n: o for n, o in seen.items() if n != name and n not in self._suspects}
             if len(others) < LEAST_VIEWS - 1:
                 continue
             pose = _refined(searcher, others, result)
-            shift = _shift(searcher, seen[name], self._rig[name], pose, result.stamp_ns)
+            shift = _shift(searcher, seen[name], self._rig[name], pose)
             if shift is not None:
                 self._found[name].append(shift)
         self._suspect()
@@ -110,6 +121,7 @@ class CameraCheck:
         if len(self._rig) - len(self._suspects) - 1 < LEAST_VIEWS:
             return
         self._suspects |= {worst[0]}
+        self._checks = 0
         for name in self._found:
             if name not in self._suspects:
                 self._found[name] = []
@@ -164,35 +176,33 @@ def _refined(
 
 
 def _shift(
-    searcher: Searcher,
-    observation: Observation,
-    camera: CameraModel,
-    pose: FloatArray,
-    stamp_ns: int,
+    searcher: Searcher, observation: Observation, camera: CameraModel, pose: FloatArray
 ) -> tuple[float, float, float] | None:
     """Shift (u, v) px of one view that lays the body over it, and px per metre.
 
     Weighted least squares on the contours' residuals, repeated with the camera moved by the shift
     so far, since residuals count the less the larger they are.
     """
-    to_camera = camera.T_cam_world
+    to_camera, name = camera.T_cam_world, camera.name
     at = pose[[searcher.body.index(f"pelvis_t{axis}") for axis in "xyz"]]
     depth = float(to_camera[2, :3] @ at + to_camera[2, 3])
     if depth <= 0.0:
         return None
     focal = np.array([camera.matrix[0, 0], camera.matrix[1, 1]])
+    views = lay_out_views([camera], {name: observation})
+    contours = ContourFrame(
+        searcher.body,
+        {name: camera},
+        {name: observation},
+        views,
+        pixels_per_m={name: pixels_per_m(camera, at)},
+        step_px=searcher.config.edges.step_px,
+    )
+    # The silhouette stays; only the principal point is moved over it.
+    centre = views.arrays.intrinsics[0, [2, 4]]
     shift = np.zeros(2)
     for _ in range(_SHIFTS):
-        matrix = camera.matrix.copy()
-        matrix[:2, 2] += shift
-        alone = Searcher(
-            CameraRig((replace(camera, matrix=matrix),)),
-            searcher.body,
-            searcher.config,
-            limits=searcher.limits,
-            threads=1,
-        )
-        contours = alone.frame({camera.name: observation}, stamp_ns, pose).contours
+        views.arrays.intrinsics[0, [2, 4]] = centre + shift
         contours.collect(pose, _WIDE_M)
         rows = slice(int(contours.residuals.count[0]))
         value, weight = contours.residuals.value[0, rows], contours.residuals.weight[0, rows]

@@ -10,10 +10,19 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.camera_check import CameraCheck, Shift, corrected, describe
+from markerless_tracker.tracking.camera_check import (
+    EVERY_NS,
+    LATER_EVERY_NS,
+    MANY_CHECKS,
+    CameraCheck,
+    Shift,
+    corrected,
+    describe,
+)
 
 CONFIG = TrackerConfig(threads=1)
 FRAME_NS = 200_000_000
+_FIRST = 400_000_000
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +89,12 @@ def test_few_checks_and_lost_frames_say_nothing(scene) -> None:
     check = CameraCheck(scene.rig, CONFIG)
     check.add(TrackResult(0, TrackState.LOST, None, None, float("nan"), {}, 0), scene.body)
     assert check.shifts() == {}
+
+
+def test_after_many_checks_the_next_ones_come_less_often(scene) -> None:
+    dense = MANY_CHECKS * max(EVERY_NS, FRAME_NS)
+    later = 2 * LATER_EVERY_NS
+    frames = (_FIRST + dense + later) // FRAME_NS + 1
+    shifts = checked(scene, scene.rig, frames)
+    most = MANY_CHECKS + later // LATER_EVERY_NS
+    assert MANY_CHECKS < shifts["cam01"].checks <= most < frames - _FIRST // FRAME_NS

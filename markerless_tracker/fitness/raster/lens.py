@@ -1,6 +1,10 @@
 """The lens model on the plane at focal length 1: OpenCV's k1 k2 p1 p2 k3."""
 
+import numpy as np
+
 from markerless_tracker.compiled import kernel
+
+_NEAREST_M = 1e-6
 
 
 @kernel
@@ -15,6 +19,28 @@ def lens(a, b, distortion):  # type: ignore[no-untyped-def]
         a * radial + 2.0 * p1 * ab + p2 * (r2 + 2.0 * a * a),
         b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * ab,
     )
+
+
+@kernel
+def pixel(x, y, z, to_camera, matrix, distortion):  # type: ignore[no-untyped-def]
+    """The whole pixel (u, v) nearest to a point of the world, m; NaN behind the camera.
+
+    Args:
+        x, y, z: the point.
+        to_camera: (4, 4) world to camera.
+        matrix: (3, 3) intrinsics, px.
+        distortion: (5,) of `lens`.
+    """
+    t = to_camera
+    depth = t[2, 0] * x + t[2, 1] * y + t[2, 2] * z + t[2, 3]
+    # Not for NaN either.
+    if not depth > _NEAREST_M:
+        return np.nan, np.nan
+    a = (t[0, 0] * x + t[0, 1] * y + t[0, 2] * z + t[0, 3]) / depth
+    b = (t[1, 0] * x + t[1, 1] * y + t[1, 2] * z + t[1, 3]) / depth
+    a, b = lens(a, b, distortion)
+    u = matrix[0, 0] * a + matrix[0, 1] * b + matrix[0, 2]
+    return np.rint(u), np.rint(matrix[1, 1] * b + matrix[1, 2])
 
 
 @kernel

@@ -19,29 +19,35 @@ from markerless_tracker.fitness.raster.outline_arrays import (
     outlines_of,
 )
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import unpack_mask
+from markerless_tracker.records import MaskWords, unpack_mask
 
 
 def body_masks(
     body: BodyModel, pose: FloatArray, cameras: Sequence[CameraModel]
 ) -> dict[str, NDArray[np.bool_]]:
     """By camera, the mask (h, w) of the pixels whose centres a body at a pose (p,) covers."""
+    packed = body_words(body, pose, cameras)
+    return {camera.name: unpack_mask(packed[camera.name], camera.size_px[0]) for camera in cameras}
+
+
+def body_words(
+    body: BodyModel, pose: FloatArray, cameras: Sequence[CameraModel]
+) -> dict[str, MaskWords]:
+    """As `body_masks`, packed as `pack_mask` does."""
     views = camera_arrays(cameras)
     arrays = body_arrays(body)
     height = int(views.size[:, 1].max())
     outlines = make_outlines(1, height)
     world = np.ones(18 * LANES)
     cone_ends(np.ascontiguousarray(pose), arrays, np.empty((body.node_parent.size, 3, 4)), world)
-    masks = {}
+    packed = {}
     for view, camera in enumerate(cameras):
-        width, height = camera.size_px
-        words = int(views.words[view])
+        height, words = camera.size_px[1], int(views.words[view])
         bits = np.zeros(words * height, dtype=np.uint64)
         used = np.empty((words, 2), dtype=np.int64)
         _fill(view, views, len(body.cone_names), world, outlines, bits, used)
-        rows = np.ascontiguousarray(bits.reshape(words, height).T)
-        masks[camera.name] = unpack_mask(rows, width)
-    return masks
+        packed[camera.name] = np.ascontiguousarray(bits.reshape(words, height).T)
+    return packed
 
 
 @kernel

@@ -7,17 +7,25 @@ Three rules, the nearer to the body the less they ask for:
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
-from markerless_tracker.fitness.raster.silhouette import body_masks
+from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.raster.mask_words import (
+    cut_words,
+    flood,
+    grow_square,
+    has,
+    spread,
+    trim,
+)
+from markerless_tracker.fitness.raster.silhouette import body_words
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import Region
-from markerless_tracker.records import Observation
+from markerless_tracker.observation import locked
+from markerless_tracker.records import MaskWords, Observation
 from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, lit_elsewhere
 from markerless_tracker.tracking.search import pixels_per_m
 
@@ -27,9 +35,6 @@ BESIDE_M = 0.06
 """Undecided pixels so near to the body belong to the person unless they may be a shadow's."""
 FLOOR_M = 3.0
 """Distance from the body of floor points that are tested: farther ones may lie behind a wall."""
-_PENUMBRA_PX = 2
-
-Mask = NDArray[np.bool_]
 
 
 def decide(
@@ -45,77 +50,159 @@ def decide(
     open_ = [name for name, seen in observed.items() if seen.undecided_words is not None]
     if not open_:
         return dict(observed)
-    bodies = body_masks(body, pose, [cameras[name] for name in observed])
+    bodies = body_words(body, pose, [cameras[name] for name in observed])
     views = {name: _view(seen, cameras[name], bodies[name]) for name, seen in observed.items()}
     root_m = pose[[body.index(f"pelvis_t{axis}") for axis in "xyz"]]
     decided = dict(observed)
     for name in open_:
         others = [view for other, view in views.items() if other != name]
         person = _explained(views[name], others, root_m)
-        seen, undecided = observed[name], views[name].undecided
-        decided[name] = seen.with_masks(seen.mask | person, undecided & ~person)
+        if person.any():
+            seen, undecided = observed[name], views[name].undecided
+            decided[name] = replace(
+                seen, mask_words=seen.mask_words | person, undecided_words=undecided & ~person
+            )
     return decided
 
 
-def _view(seen: Observation, camera: CameraModel, covered: Mask) -> FloorView:
-    u, v = seen.offset_px
-    body = np.ascontiguousarray(covered[v : v + seen.height, u : u + seen.width])
-    undecided = seen.undecided
-    return FloorView(
-        camera,
-        seen.offset_px,
-        np.zeros_like(body) if undecided is None else undecided,
-        ~_grown(seen.not_background, _PENUMBRA_PX),
-        _grown(body, NEAR_PX, round_=True),
-    )
+def _view(seen: Observation, camera: CameraModel, covered: MaskWords) -> FloorView:
+    undecided = seen.undecided_words
+    if undecided is None:
+        undecided = locked(np.zeros_like(seen.mask_words), np.uint64)
+    near = np.empty(seen.mask_words.shape, dtype=np.uint64)
+    _near(covered, *seen.offset_px, seen.width, np.empty_like(near), near)
+    return FloorView(camera, seen.offset_px, seen.width, seen.mask_words, undecided, near)
 
 
-def _explained(view: FloorView, others: list[FloorView], root_m: FloatArray) -> Mask:
-    """The undecided pixels (h, w) that are person.
+def _explained(view: FloorView, others: list[FloorView], root_m: FloatArray) -> MaskWords:
+    """The undecided pixels that are person, packed.
 
     Args:
         view: the view, `hidden` being what the body covers, and the next pixel.
         others: the other views.
         root_m: (3,) where the body is, m.
     """
-    near = view.hidden
-    person = view.undecided & near
-    left, top, width, height = cv2.boundingRect(near.view(np.uint8))
-    if width == 0:
-        return person
+    person = view.undecided & view.hidden
     radius = max(1, round(BESIDE_M * pixels_per_m(view.camera, root_m)))
-    # One pixel more, so that patches which go on are seen to do so.
-    box = Region(left, top, left + width, top + height).grown(radius + 1, near.shape[::-1])
-    part = box.slices
-    beside = _grown(np.ascontiguousarray(near[part]), radius)
-    open_ = view.undecided[part] & ~near[part]
-    tested = open_ & beside
-    if not tested.any():
+    beside, tested, away, going_on = (np.empty_like(view.hidden) for _ in range(4))
+    rows = np.empty(len(tested), dtype=np.bool_)
+    if not _beside(view.undecided, view.hidden, radius, view.width, beside, tested):
         return person
-    # One pixel of four stands for the others.
-    rows, columns = 2 * np.stack(np.nonzero(tested[::2, ::2]))
-    corner = np.add(view.offset_px, (box.left, box.top))
-    points = floor_points(np.column_stack([columns, rows]) + corner.astype(float), view.camera)
-    points[np.linalg.norm(points[:, :2] - root_m[:2], axis=1) > FLOOR_M] = np.nan
-    yes = lit_elsewhere(points, others)
-    found = np.zeros_like(open_)
-    found[rows[yes], columns[yes]] = True
-    found[1:] |= found[:-1]
-    found[:, 1:] |= found[:, :-1]
-    found &= tested
-    person[part] |= found
-    open_ &= ~found
-    count, labels = cv2.connectedComponents(open_.view(np.uint8), connectivity=4)
-    ends = np.ones(count, dtype=np.bool_)
-    ends[labels[~beside]] = False
-    ends[0] = False
-    person[part] |= ends[labels]
-    return person
+    if _going_on(view.undecided, beside, tested, away, rows, going_on):
+        # Patches that end there are person whatever the floor test says.
+        height, width = len(tested), view.width
+        pixels = np.empty(((height // 2 + 1) * (width // 2 + 1), 2))
+        count = _floor_pixels(view.hidden, tested, going_on, radius, width, pixels)
+        pixels = pixels[:count]
+        points = floor_points(pixels + view.offset_px, view.camera)
+        points[np.linalg.norm(points[:, :2] - root_m[:2], axis=1) > FLOOR_M] = np.nan
+        found = pixels[lit_elsewhere(points, others)].astype(np.int64)
+        _take(found, tested, person, width)
+        _going_on(view.undecided, beside, tested, away, rows, going_on)
+    return np.asarray(person | (tested & ~going_on))
 
 
-def _grown(mask: Mask, radius: int, *, round_: bool = False) -> Mask:
-    """A mask (h, w) grown by a disc or a square of that radius, px."""
-    shape = cv2.MORPH_ELLIPSE if round_ else cv2.MORPH_RECT
-    side = 2 * radius + 1
-    kernel = cv2.getStructuringElement(shape, (side, side))
-    return np.asarray(cv2.dilate(mask.view(np.uint8), kernel), dtype=np.uint8).view(np.bool_)
+@kernel
+def _near(covered, left, top, width, window, near):  # type: ignore[no-untyped-def]
+    """Fill `near` (h, k) with a window of what the body covers, and the next pixel.
+
+    Args:
+        covered: words of the frame.
+        left, top: of the window in the frame.
+        width: of the window, px.
+        window: (h, k), changed.
+    """
+    cut_words(covered, left, top, width, window)
+    for v in range(near.shape[0]):
+        for w in range(near.shape[1]):
+            near[v, w] = spread(window, v, w)
+    trim(near, width)
+
+
+@kernel
+def _beside(undecided, near, radius, width, beside, tested):  # type: ignore[no-untyped-def]
+    """Fill what lies beside the body, with the body, and which of it is undecided; if any is."""
+    for v in range(near.shape[0]):
+        for w in range(near.shape[1]):
+            beside[v, w] = near[v, w]
+    grow_square(beside, radius, width)
+    anything = np.uint64(0)
+    for v in range(near.shape[0]):
+        for w in range(near.shape[1]):
+            tested[v, w] = undecided[v, w] & beside[v, w] & ~near[v, w]
+            anything |= tested[v, w]
+    return anything != np.uint64(0)
+
+
+@kernel
+def _going_on(undecided, beside, tested, away, open_rows, out):  # type: ignore[no-untyped-def]
+    """Fill `out` with the tested pixels of patches that go on beyond `beside`; if there are any."""
+    # Neighbours across the boundary begin; the flood stays within what is tested.
+    height, count = tested.shape
+    for v in range(height):
+        for w in range(count):
+            away[v, w] = undecided[v, w] & ~beside[v, w]
+    anything = np.uint64(0)
+    for v in range(height):
+        for w in range(count):
+            out[v, w] = tested[v, w] & spread(away, v, w)
+            anything |= out[v, w]
+    if anything == np.uint64(0):
+        return False
+    flood(out, tested, open_rows)
+    return True
+
+
+@kernel
+def _floor_pixels(near, tested, going_on, radius, width, pixels):  # type: ignore[no-untyped-def]
+    """Fill the pixels (n, 2) that the floor test is asked for; returns their number.
+
+    One pixel of four stands for the others: the first of a block of two by two, from the corner of
+    what lies beside the body on, if any of the block's is of a patch that goes on.
+    """
+    height, count = tested.shape
+    left, top = width, height
+    for v in range(height):
+        for u in range(width):
+            if (u & 63) == 0 and near[v, u >> 6] == np.uint64(0):
+                continue
+            if has(near, u, v):
+                left, top = min(left, u), min(top, v)
+                break
+    left, top = max(0, left - radius - 1), max(0, top - radius - 1)
+    found = 0
+    for v in range(top, height, 2):
+        if not _any_tested(tested, v):
+            continue
+        for u in range(left, width, 2):
+            if not has(tested, u, v):
+                continue
+            goes = False
+            for row in range(v, min(v + 2, height)):
+                for column in range(u, min(u + 2, width)):
+                    goes |= has(going_on, column, row)
+            if goes:
+                pixels[found, 0], pixels[found, 1] = u, v
+                found += 1
+    return found
+
+
+@kernel
+def _any_tested(tested, v):  # type: ignore[no-untyped-def]
+    """Whether a row holds a bit."""
+    for w in range(tested.shape[1]):
+        if tested[v, w] != np.uint64(0):
+            return True
+    return False
+
+
+@kernel
+def _take(found, tested, person, width):  # type: ignore[no-untyped-def]
+    """Take the tested pixels of the blocks that begin at pixels (n, 2): they are person."""
+    for i in range(found.shape[0]):
+        u, v = found[i, 0], found[i, 1]
+        for row in range(v, min(v + 2, tested.shape[0])):
+            for column in range(u, min(u + 2, width)):
+                bit = np.uint64(1) << np.uint64(column & 63)
+                person[row, column >> 6] |= tested[row, column >> 6] & bit
+                tested[row, column >> 6] &= ~bit

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.kinematics import moving_nodes, node_transforms
 from markerless_tracker.body.model import IntArray
-from markerless_tracker.camera import CameraRig, project_camera
+from markerless_tracker.camera import CameraRig
 from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.raster.lens import pixel
 from markerless_tracker.geometry import FloatArray
 
 ALONG = np.array([0.3, 0.6, 0.9])
@@ -42,18 +43,25 @@ def most_aimed(
         body.node_sign, body.node_parameter, body.cone_node[cones], body.cone_fixed[cones],
         body.cone_length[cones], ALONG, np.empty((body.node_parent.size, 3, 4)), points,
     )  # fmt: skip
-    hits = np.zeros(len(poses))
+    hits = np.zeros(len(poses), dtype=np.int64)
     for name, region in regions.items():
-        pixels = np.round(project_camera(points.reshape(-1, 3), rig[name]))
-        height, width = region.shape
-        with np.errstate(invalid="ignore"):
-            inside = (pixels >= 0.0).all(axis=1) & (pixels < (width, height)).all(axis=1)
-        hit = np.zeros(len(pixels), dtype=np.bool_)
-        u, v = pixels[inside].astype(np.int64).T
-        hit[inside] = region[v, u]
-        hits += hit.reshape(len(poses), -1).sum(axis=1)
+        camera = rig[name]
+        _count_hits(points, camera.T_cam_world, camera.matrix, camera.distortion, region, hits)
     best = np.argsort(-hits, kind="stable")[:count]
-    return poses[best[hits[best] > 0.0]]
+    return poses[best[hits[best] > 0]]
+
+
+@kernel
+def _count_hits(points, to_camera, matrix, distortion, region, hits):  # type: ignore[no-untyped-def]
+    """Add, for each of n poses, how many of its points (n, k, 3) a view has in a region (h, w)."""
+    height, width = region.shape
+    for i in range(points.shape[0]):
+        for j in range(points.shape[1]):
+            u, v = pixel(
+                points[i, j, 0], points[i, j, 1], points[i, j, 2], to_camera, matrix, distortion
+            )
+            if u >= 0.0 and v >= 0.0 and u < width and v < height:
+                hits[i] += region[np.int64(v), np.int64(u)]
 
 
 @kernel

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -10,9 +11,13 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.body.parts import cones_of
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
-from markerless_tracker.fitness.raster.silhouette import body_masks
+from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.raster.bits import count_bits
+from markerless_tracker.fitness.raster.mask_words import cut_words, grow_rows, paste_words
+from markerless_tracker.fitness.raster.silhouette import body_words
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation, unpack_mask
+from markerless_tracker.observation import locked
+from markerless_tracker.records import MaskWords, Observation, unpack_mask
 from markerless_tracker.tracking.search import pixels_per_m
 
 MARGIN_M = 0.03
@@ -66,14 +71,14 @@ def look_unexplained(
     axes = _axes(body, pose)
     reach = {name: _reach(points) for name, points in axes.items()}
     middle = np.concatenate(list(axes.values())).mean(axis=0)
-    masks = body_masks(body, pose, [rig[name] for name in observations])
+    covered = body_words(body, pose, [rig[name] for name in observations])
     areas: dict[str, float] = {}
     regions: dict[str, NDArray[np.bool_]] = {}
     for name, observation in observations.items():
         camera = rig[name]
         scale = pixels_per_m(camera, middle)
-        rest, left_over = _left_over(observation, masks[name], scale)
-        if left_over:
+        rest, left_over = _left_over(observation, covered[name], scale)
+        if rest is not None:
             regions[name] = observation.in_full_frame(rest)
         for area_px, centre in left_over:
             for rank, limb in enumerate(_within_reach(axes, reach, camera, centre, scale)):
@@ -82,46 +87,69 @@ def look_unexplained(
 
 
 def _left_over(
-    observation: Observation, covered: NDArray[np.bool_], scale: float
-) -> tuple[NDArray[np.bool_], list[tuple[float, FloatArray]]]:
-    """Pixels (h, w) farther than the margin from the body; their regions' areas and centres."""
-    rest = np.zeros((observation.height, observation.width), dtype=np.bool_)
-    box = _box(observation)
-    if box is None:
-        return rest, []
-    reach = max(1, round(MARGIN_M * scale))
-    (u, v), (left, top, right, bottom) = observation.offset_px, box
-    # The silhouette's box, and around it what may cover it.
-    at = max(0, u + left - reach), max(0, v + top - reach)
-    around = covered[at[1] : v + bottom + reach, at[0] : u + right + reach]
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    near = cv2.dilate(np.ascontiguousarray(around).view(np.uint8), disc).view(np.bool_)
-    near = near[v + top - at[1] :, u + left - at[0] :][: bottom - top, : right - left]
-    words = observation.mask_words[top:bottom, left // 64 :]
-    part = unpack_mask(words, right - left) & ~near
-    least_px = LEAST_M2 * scale**2
-    if np.count_nonzero(part) < least_px:
-        return rest, []
-    rest[top:bottom, left:right] = part
-    count, _, stats, centres = cv2.connectedComponentsWithStats(part.view(np.uint8))
-    return rest, [
-        (float(stats[n, cv2.CC_STAT_AREA]), centres[n] + (u + left, v + top))
-        for n in range(1, count)
+    observation: Observation, covered: MaskWords, scale: float
+) -> tuple[NDArray[np.bool_] | None, list[tuple[float, FloatArray]]]:
+    """Pixels (h, w) farther than the margin from the body; their regions' areas and centres.
+
+    None and no region if there is none that counts.
+
+    Args:
+        observation: the view.
+        covered: the body in its frame, packed.
+        scale: size of a metre at the body, px.
+    """
+    reach, least_px = max(1, round(MARGIN_M * scale)), LEAST_M2 * scale**2
+    seen = observation.mask_words
+    shape = seen.shape[0] + 2 * reach, (observation.width + 2 * reach + 63) // 64
+    rest, around, near = np.empty_like(seen), np.zeros(shape, np.uint64), np.zeros(shape, np.uint64)
+    count = _beyond(
+        seen, covered, *observation.offset_px, observation.width, _disc(reach), around, near, rest
+    )
+    if count < least_px:
+        return None, []
+    part = unpack_mask(rest, observation.width)
+    left, top, width, height = cv2.boundingRect(part.view(np.uint8))
+    box = np.ascontiguousarray(part[top : top + height, left : left + width])
+    regions, _, stats, centres = cv2.connectedComponentsWithStats(box.view(np.uint8))
+    corner = np.add(observation.offset_px, (left, top))
+    found = [
+        (float(stats[n, cv2.CC_STAT_AREA]), centres[n] + corner)
+        for n in range(1, regions)
         if stats[n, cv2.CC_STAT_AREA] >= least_px
     ]
+    return (part, found) if found else (None, [])
 
 
-def _box(observation: Observation) -> tuple[int, int, int, int] | None:
-    """Left, top, right and bottom of a region's silhouette, px, ends excluded; None without one.
+@cache
+def _disc(radius: int) -> NDArray[np.int64]:
+    """(2 r + 1,) half of the width of each row of a disc, px; read-only."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    return np.asarray(locked(disc.sum(axis=1, dtype=np.int64) // 2, np.int64))
 
-    Left and right are those of words of 64 pixels.
+
+@kernel
+def _beyond(  # type: ignore[no-untyped-def]
+    seen, covered, left, top, width, half_widths, around, near, rest
+):
+    """Fill `rest` with the silhouette beyond a disc's radius r of the body; counts its pixels.
+
+    Args:
+        seen: (h, k) silhouette of a window of the frame.
+        covered: words of the frame, of the body.
+        left, top: of the window in the frame.
+        width: of the window, px.
+        half_widths: (2 r + 1,) of the disc.
+        around, near: (h + 2 r, m) empty, for the window and r pixels around it; changed.
+        rest: (h, k).
     """
-    words = observation.mask_words
-    rows, columns = np.flatnonzero(words.any(axis=1)), np.flatnonzero(words.any(axis=0))
-    if rows.size == 0:
-        return None
-    right = min(observation.width, 64 * (int(columns[-1]) + 1))
-    return 64 * int(columns[0]), int(rows[0]), right, int(rows[-1]) + 1
+    radius = half_widths.size // 2
+    paste_words(covered, left - radius, top - radius, width + 2 * radius, around)
+    grow_rows(around, half_widths, width + 2 * radius, near)
+    cut_words(near, radius, radius, width, rest)
+    for v in range(rest.shape[0]):
+        for w in range(rest.shape[1]):
+            rest[v, w] = seen[v, w] & ~rest[v, w]
+    return count_bits(rest)
 
 
 def _axes(body: BodyModel, pose: FloatArray) -> dict[str, FloatArray]:

@@ -4,6 +4,8 @@ A refinement converges to the nearest optimum, and a limb's optimum is far from 
 explains the same silhouette: so limbs change as wholes, and the good ones are refined.
 """
 
+from functools import cached_property
+
 import numpy as np
 
 from markerless_tracker.body import BodyModel
@@ -43,16 +45,23 @@ class Recombiner:
         self._body = body
         self._limits = limits
         self._sd = joint_sd(body)
-        self._known = postures(body)
         self._limbs = [body.subspaces[step[0]] for step in body.steps("six")[1:]]
         radius = np.where(self._sd < _FEW, _FEW, _FREE_RAD)
         self._low = np.maximum(limits[0], body.neutral - radius)
         self._high = np.minimum(limits[1], body.neutral + radius)
-        self._mirror = Mirror(body)
         pairs = [body.subspaces[name] for name in ("arms", "legs") if name in body.subspaces]
         self._groups = [*self._limbs, *pairs]
         self._yaw = body.index("pelvis_rz")
         self._tilt = [body.index("pelvis_rx"), body.index("pelvis_ry")]
+
+    # Draws of a limb need neither of these, and both take milliseconds.
+    @cached_property
+    def _known(self) -> FloatArray:
+        return postures(self._body)
+
+    @cached_property
+    def _mirror(self) -> Mirror:
+        return Mirror(self._body)
 
     def children(self, parents: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
         """Children (count, p) of poses (n, p), the best parent first."""

@@ -1,11 +1,18 @@
 """A pixel whose floor point another camera sees in full light is no shadow on the floor."""
 
+import cv2
 import numpy as np
 import pytest
 
 from markerless_tracker.camera import project_camera
+from markerless_tracker.records import pack_mask
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, lit_elsewhere
+from markerless_tracker.tracking.evidence.floor import (
+    PENUMBRA_PX,
+    FloorView,
+    floor_points,
+    lit_elsewhere,
+)
 
 
 @pytest.fixture(scope="module")
@@ -14,10 +21,15 @@ def rig():
 
 
 def view(camera, undecided=None, lit=None, hidden=None, offset_px=(0, 0)) -> FloorView:
+    """All that is neither lit nor undecided is person."""
     width, height = camera.size_px
-    nothing = np.zeros((height - offset_px[1], width - offset_px[0]), dtype=np.bool_)
-    masks = (nothing if mask is None else mask for mask in (undecided, lit, hidden))
-    return FloorView(camera, offset_px, *masks)
+    width -= offset_px[0]
+    nothing = np.zeros((height - offset_px[1], width), dtype=np.bool_)
+    undecided, lit, hidden = (nothing if m is None else m for m in (undecided, lit, hidden))
+    # Whatever is lit has as much background around it as it needs.
+    clear = cv2.dilate(lit.astype(np.uint8), np.ones((2 * PENUMBRA_PX + 1,) * 2, np.uint8)) > 0
+    masks = (pack_mask(mask) for mask in (~clear & ~undecided, undecided, hidden))
+    return FloorView(camera, offset_px, width, *masks)
 
 
 def marked(camera, points, offset_px=(0, 0)):
@@ -70,3 +82,14 @@ def test_a_window_says_the_same_as_its_frame(rig) -> None:
     u, v = (np.floor(project_camera(FLOOR, camera).min(axis=0)) - 3).astype(int)
     window = view(camera, lit=marked(camera, FLOOR, (u, v)), offset_px=(u, v))
     assert lit_elsewhere(FLOOR, [window]).all()
+
+
+def test_background_beside_the_person_may_be_half_in_shadow(rig) -> None:
+    camera = rig.cameras[0]
+    for gap, lit in ((PENUMBRA_PX, False), (PENUMBRA_PX + 1, True)):
+        u, v = np.round(project_camera(FLOOR[:1], camera)).astype(int)[0]
+        seen = view(camera, lit=marked(camera, FLOOR[:1]))
+        person = np.zeros(camera.size_px[::-1], dtype=np.bool_)
+        person[v + gap, u] = True
+        seen = seen._replace(person=pack_mask(person))
+        assert lit_elsewhere(FLOOR[:1], [seen]).all() == lit
