@@ -4,6 +4,8 @@ A refinement converges to the nearest optimum, and a limb's optimum is far from 
 explains the same silhouette: so limbs change as wholes, and the good ones are refined.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from markerless_tracker.body import BodyModel
@@ -48,7 +50,7 @@ class Recombiner:
         radius = np.where(self._sd < _FEW, _FEW, _FREE_RAD)
         self._low = np.maximum(limits[0], body.neutral - radius)
         self._high = np.minimum(limits[1], body.neutral + radius)
-        self._mirror = Mirror(body)
+        self._mirror = _mirror(body)
         pairs = [body.subspaces[name] for name in ("arms", "legs") if name in body.subspaces]
         self._groups = [*self._limbs, *pairs]
         self._yaw = body.index("pelvis_rz")
@@ -120,3 +122,8 @@ class Recombiner:
         if rng.random() < _TURNED:
             child[self._yaw] += _YAW_RAD * rng.standard_normal()
             child[self._tilt] += _TILT_RAD * rng.standard_normal(2)
+
+
+@lru_cache(maxsize=4)
+def _mirror(body: BodyModel) -> Mirror:
+    return Mirror(body)
