@@ -70,3 +70,7 @@ def test_a_window_says_the_same_as_its_frame(rig) -> None:
     u, v = (np.floor(project_camera(FLOOR, camera).min(axis=0)) - 3).astype(int)
     window = view(camera, lit=marked(camera, FLOOR, (u, v)), offset_px=(u, v))
     assert lit_elsewhere(FLOOR, [window]).all()
+
+
+def test_no_pixels_have_no_floor_points(rig) -> None:
+    assert floor_points(np.empty((0, 2)), rig.cameras[0]).shape == (0, 3)
