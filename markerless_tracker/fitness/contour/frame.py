@@ -1,5 +1,6 @@
 """Contour evidence of a frame, and the normal equations that contour refinement solves."""
 
+import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -77,6 +78,21 @@ class ContourFrame:
             return silhouette_contour(observations[name], SPACING_M * pixels_per_m[name])
 
         self.contours = join_edges(list(mapper(edge, views.names)))  # type: ignore[call-overload]
+        self._allocate()
+
+    def with_body(self, body: BodyModel) -> "ContourFrame":
+        """The same evidence for a body of the same kind, with working memory of its own.
+
+        Two such frames can be compared with poses at the same time.
+        """
+        other = copy.copy(self)
+        other.body, other._arrays = body, body_arrays(body)
+        other._allocate()
+        return other
+
+    def _allocate(self) -> None:
+        """Make the working memory."""
+        body, views = self.body, self.views
         count = len(views.names)
         most = int(np.diff(self.contours.point_start).max())
         self.samples: Samples = make_samples(count)

@@ -2,18 +2,21 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body import BodyModel
 from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.fitness.contour import ContourFrame
+from markerless_tracker.fitness.threads import side_by_side, usable_threads
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull
+from markerless_tracker.tracking.start.many_poses import markers_of_many
 from markerless_tracker.tracking.start.postures import first_guesses
 from markerless_tracker.tracking.start.recombination import Recombiner
 
@@ -90,7 +93,11 @@ class FramePopulation:
         self._costs = searcher.fitness.prepare(
             self.contours.views, Comparison.whole(near, len(searcher.body.cone_names))
         )
-        self._recombiner = Recombiner(searcher.body, searcher.limits)
+        self._beside = [self.contours]
+
+    @cached_property
+    def _recombiner(self) -> Recombiner:
+        return Recombiner(self._searcher.body, self._searcher.limits)
 
     def initialised(self, hull: Hull, hints: FloatArray | None = None) -> Population:
         """The best first guesses of every heading, and hints (n, p), refined."""
@@ -127,15 +134,18 @@ class FramePopulation:
         order = np.argsort(self.costs(children), kind="stable")
         chosen = [int(i) for i in order[: count - round(_NOVEL * count)]]
         body = self._searcher.body
-        known = [markers(body, pose) for pose in (*parents, *children[chosen])]
+        points = markers_of_many(body, children)
+        known = np.concatenate([markers_of_many(body, parents), points[chosen]])
+        # Squared distance to the nearest of those known so far, of each child.
+        gaps_m2 = np.full(len(children), np.inf)
+        for other in known:
+            np.minimum(gaps_m2, _farthest_m2(points, other), out=gaps_m2)
         for i in map(int, order[len(chosen) :]):
             if len(chosen) == count:
                 break
-            points = markers(body, children[i])
-            moved = np.linalg.norm(points - np.array(known), axis=2).max(axis=1)
-            if moved.min() >= _NOVEL_M:
+            if gaps_m2[i] >= _NOVEL_M**2:
                 chosen.append(i)
-                known.append(points)
+                np.minimum(gaps_m2, _farthest_m2(points, points[i]), out=gaps_m2)
         return np.asarray(children[chosen])
 
     def propagated(self, population: Population) -> Population:
@@ -150,24 +160,29 @@ class FramePopulation:
     def refined(
         self, poses: FloatArray, iterations: int, truncation: tuple[float, float]
     ) -> FloatArray:
-        """Poses (n, p), each refined on the contours."""
+        """Poses (n, p), each refined on the contours; side by side, each by one thread."""
         searcher = self._searcher
         prior = pose_prior(searcher.body, _PRIOR_WEIGHT)
-        return np.array(
-            [
-                refined_on_contours(
-                    self.contours, pose, searcher.config, priors=(prior,),
+        threads = max(1, min(usable_threads(searcher.threads), len(poses)))
+        while len(self._beside) < threads:
+            self._beside.append(self.contours.with_body(searcher.body))
+        out = np.array(poses)
+
+        def work(thread: int) -> None:
+            for i in range(thread, len(out), threads):
+                out[i] = refined_on_contours(
+                    self._beside[thread], out[i], searcher.config, priors=(prior,),
                     limits=searcher.limits, iterations=iterations, truncation_m=truncation,
-                )
-                for pose in poses
-            ]
-        )  # fmt: skip
+                )  # fmt: skip
+
+        side_by_side(work, threads)
+        return out
 
     def selected(self, poses: FloatArray) -> Population:
         """The best of poses (n, p) that differ, among them some of each quarter of the headings."""
         costs = self.costs(poses)
         order = [int(i) for i in np.argsort(costs, kind="stable") if np.isfinite(costs[i])]
-        points = {i: markers(self._searcher.body, poses[i]) for i in order}
+        points = markers_of_many(self._searcher.body, poses)
         headings = {i: heading(points[i]) for i in order}
         kept: list[int] = []
         quarters = [0, 0, 0, 0]
@@ -188,6 +203,11 @@ def scaled_to(body: BodyModel, other: BodyModel, poses: FloatArray) -> FloatArra
     """Poses (n, p) of one body for another of the same kind: markers' middles stay in place."""
     out = poses.copy()
     at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
-    for pose in out:
-        pose[at] += markers(body, pose).mean(axis=0) - markers(other, pose).mean(axis=0)
+    out[:, at] += (markers_of_many(body, poses) - markers_of_many(other, poses)).mean(axis=1)
     return out
+
+
+def _farthest_m2(points: FloatArray, other: FloatArray) -> FloatArray:
+    """Squared distance (n,) of the markers (n, 15, 3) that moved farthest from others (15, 3)."""
+    apart = points - other
+    return np.asarray(np.einsum("nij,nij->ni", apart, apart).max(axis=1))

@@ -1,13 +1,15 @@
 """Generic postures to begin with, placed at a hull's trunk, in every heading."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
-from markerless_tracker.body import BodyModel, cone_transforms
+from markerless_tracker.body import BodyModel
 from markerless_tracker.body.anatomy import posture
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.start.hull import Hull
+from markerless_tracker.tracking.start.many_poses import transforms_of_many
 
 HEADINGS = 16
 VARIATIONS = 48
@@ -62,8 +64,9 @@ POSTURES: tuple[Mapping[str, float], ...] = (
 squat, a deep squat, sitting, bending down, arms overhead, crossed arms."""
 
 
+@lru_cache(maxsize=4)
 def postures(body: BodyModel) -> FloatArray:
-    """The postures (k, p) at the origin, facing along x."""
+    """The postures (k, p) at the origin, facing along x; not to be changed."""
     return np.array([posture(body, angles) for angles in POSTURES])
 
 
@@ -94,8 +97,9 @@ def first_guesses(
         out[k, :, body.index("pelvis_rz")] += 2.0 * np.pi * k / HEADINGS
     np.clip(out, limits[0], limits[1], out=out)
     at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
-    for pose in out.reshape(-1, body.size):
-        pose[at] += middle - _trunk_middle(body, pose)
+    out[..., at] += middle - _trunk_middles(body, out.reshape(-1, body.size)).reshape(
+        HEADINGS, -1, 3
+    )
     return out
 
 
@@ -103,12 +107,16 @@ def put_at(body: BodyModel, hull: Hull, pose: FloatArray) -> FloatArray:
     """A pose (p,) with its trunk moved to where the hull's is."""
     moved = pose.copy()
     at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
-    moved[at] += hull.trunk_m.mean(axis=0) - _trunk_middle(body, pose)
+    moved[at] += hull.trunk_m.mean(axis=0) - _trunk_middles(body, pose[None])[0]
     return moved
 
 
-def _trunk_middle(body: BodyModel, pose: FloatArray) -> FloatArray:
-    cones = [i for i, name in enumerate(body.cone_names) if name in _LIKE_TRUNK]
-    placed = cone_transforms(body, pose)[cones or slice(None)]
-    length = body.cone_length[cones or slice(None)]
-    return np.asarray((placed[:, :, 3] + 0.5 * length[:, None] * placed[:, :, 2]).mean(axis=0))
+def _trunk_middles(body: BodyModel, poses: FloatArray) -> FloatArray:
+    """Middle (n, 3) of the trunk's cones at poses (n, p), m."""
+    named = [i for i, name in enumerate(body.cone_names) if name in _LIKE_TRUNK]
+    cones = np.array(named or range(len(body.cone_names)))
+    fixed = body.cone_fixed[cones]
+    middle = fixed[:, :, 3] + 0.5 * body.cone_length[cones, None] * fixed[:, :, 2]
+    nodes = transforms_of_many(body, poses)[:, body.cone_node[cones]]
+    placed = np.matmul(nodes[..., :3], middle[:, :, None])[..., 0] + nodes[..., 3]
+    return np.asarray(placed.mean(axis=1))

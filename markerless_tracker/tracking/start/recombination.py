@@ -4,7 +4,7 @@ A refinement converges to the nearest optimum, and a limb's optimum is far from 
 explains the same silhouette: so limbs change as wholes, and the good ones are refined.
 """
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -61,7 +61,7 @@ class Recombiner:
 
     @cached_property
     def _mirror(self) -> Mirror:
-        return Mirror(self._body)
+        return _mirror(self._body)
 
     def children(self, parents: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
         """Children (count, p) of poses (n, p), the best parent first."""
@@ -129,3 +129,8 @@ class Recombiner:
         if rng.random() < _TURNED:
             child[self._yaw] += _YAW_RAD * rng.standard_normal()
             child[self._tilt] += _TILT_RAD * rng.standard_normal(2)
+
+
+@lru_cache(maxsize=4)
+def _mirror(body: BodyModel) -> Mirror:
+    return Mirror(body)

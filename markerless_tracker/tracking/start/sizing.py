@@ -30,6 +30,7 @@ FINER = (0.94, 0.97, 1.03)
 """Factors of the stature that are tried once the girth is known."""
 _FINER_GIRTHS = (0.95, 1.05)
 _ITERATIONS, _TRUNCATION_M = 4, (0.12, 0.05)
+_APART_M = 0.025
 _STATURE_RANGE_M = (1.2, 2.1)
 _STATURE_SD_M = 0.10
 _WEIGHT = 0.002
@@ -53,7 +54,12 @@ def statures_m(hull: Hull) -> Iterator[float]:
     if height_m < STANDING_M[0]:
         height_m = MEAN_STATURE_M
     tried = {ratio * height_m for ratio in STATURES} | set(COMMON_STATURES_M)
-    yield from sorted({float(np.clip(s, *_STATURE_RANGE_M)) for s in tried})
+    last = -np.inf
+    for stature in sorted({float(np.clip(s, *_STATURE_RANGE_M)) for s in tried}):
+        # Those nearer to each other are told apart by the finer factors.
+        if stature - last >= _APART_M:
+            last = stature
+            yield stature
 
 
 def stature_cost(stature_m: float) -> float:
@@ -165,7 +171,8 @@ class SizeSearch:
         for stature_m, girth in sizes:
             searcher = self._searcher_for(self._made(stature_m, girth))
             moved = scaled_to(known, searcher.body, poses)
-            frame = FramePopulation(searcher, observations, stamp_ns, moved[0])
+            contours = found.frame.contours.with_body(searcher.body)
+            frame = FramePopulation(searcher, observations, stamp_ns, moved[0], contours=contours)
             refined = frame.refined(moved[:1], _ITERATIONS, _TRUNCATION_M)
             cost = float(frame.costs(refined)[0]) + self._cost(stature_m, girth)
             if cost < least:

@@ -1,6 +1,6 @@
 """The automatic start: a person is found in one frame, the heading is confirmed over some more."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,6 +39,11 @@ _GENERATION_FRACTION = 0.5
 _SHAPE_FRAMES = 5
 _SHAPE_SLACK = 0.01
 _RESIZED_AFTER = 3
+_FINER_AFTER = 1
+"""Frames after the second look: one frame need not wait for both."""
+_FITS = 0.85
+"""From this f_s on a generation that gains less than `_GAIN` is the last one."""
+_GAIN = 0.002
 _TRUNK_MARKERS = [0, 1]
 
 Select = Callable[
@@ -143,6 +148,7 @@ class Starter:
         population = frame.propagated(population)
         if len(self._seen[0]) == 1:
             population = self._second_look(frame, population, observations)
+        elif len(self._seen[0]) == 1 + _FINER_AFTER:
             frame, population = self._resized((frame, population), observations, stamp_ns)
         population = frame.recombined(population, 0, fraction=_GENERATION_FRACTION)
         if 1.0 - population.costs[0] < LEAST_FIT:
@@ -211,20 +217,16 @@ class Starter:
         hull = next(find_hulls(self._cameras, observations), None)
         if hull is None:
             return population
-        fresh = frame.initialised(hull)
-        for generation in range(1, 1 + SECOND_GENERATIONS):
-            fresh = frame.recombined(fresh, generation)
+        fresh = _improved(frame, frame.initialised(hull), range(1, 1 + SECOND_GENERATIONS))
         return frame.selected(np.concatenate([population.poses, fresh.poses]))
 
     def _search(
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> tuple[FramePopulation, Population] | None:
-        found = self._initialised(hull, observations, stamp_ns)
-        for generation in range(GENERATIONS):
-            frame, population = found
-            found = frame, frame.recombined(population, generation)
-            if generation == _RESIZED_AFTER:
-                found = self._resized(found, observations, stamp_ns, hull)
+        frame, population = self._initialised(hull, observations, stamp_ns)
+        population = _improved(frame, population, range(1 + _RESIZED_AFTER))
+        found = self._resized((frame, population), observations, stamp_ns, hull)
+        found = found[0], _improved(*found, range(1 + _RESIZED_AFTER, GENERATIONS))
         return found if 1.0 - found[1].costs[0] >= LEAST_FIT else None
 
     def _resized(
@@ -320,3 +322,16 @@ class Starter:
     def _trunk(self, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None
         return np.asarray(markers(self._searcher.body, pose)[_TRUNK_MARKERS].mean(axis=0))
+
+
+def _improved(
+    frame: FramePopulation, population: Population, generations: Iterable[int]
+) -> Population:
+    """A population after generations; fewer where the best fits well and hardly improves."""
+    for generation in generations:
+        before = population.costs[0]
+        population = frame.recombined(population, generation)
+        cost = population.costs[0]
+        if before - cost < _GAIN and 1.0 - cost >= _FITS:
+            break
+    return population

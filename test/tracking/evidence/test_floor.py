@@ -93,3 +93,7 @@ def test_background_beside_the_person_may_be_half_in_shadow(rig) -> None:
         person[v + gap, u] = True
         seen = seen._replace(person=pack_mask(person))
         assert lit_elsewhere(FLOOR[:1], [seen]).all() == lit
+
+
+def test_no_pixels_have_no_floor_points(rig) -> None:
+    assert floor_points(np.empty((0, 2)), rig.cameras[0]).shape == (0, 3)

@@ -1,0 +1,76 @@
+"""Populations of one frame: the same with any number of threads."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from markerless_tracker.body import cone_transforms, markers
+from markerless_tracker.drawing import silhouette
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.search import make_searcher
+from markerless_tracker.tracking.start.many_poses import markers_of_many, transforms_of_many
+from markerless_tracker.tracking.start.population import FramePopulation
+from markerless_tracker.tracking.start.postures import POSTURES, postures
+from markerless_tracker.tracking.start.starter import _improved
+
+
+def refined(threads: int) -> np.ndarray:
+    scene = SyntheticScene(body="person31", size_px=(256, 192), seed=2)
+    pose = scene.motion.pose(0.0)
+    views = {
+        camera.name: Observation.from_mask(
+            camera.name, 0, silhouette(scene.body, pose, camera), np.zeros((192, 256), np.uint8)
+        )
+        for camera in scene.rig
+    }
+    searcher = make_searcher(
+        scene.body, rig=scene.rig, config=TrackerConfig(threads=threads), threads=threads
+    )
+    frame = FramePopulation(searcher, views, 0, pose)
+    rng = np.random.default_rng(1)
+    return frame.refined(pose + 0.05 * rng.standard_normal((5, pose.size)), 3, (0.15, 0.05))
+
+
+def test_refined_poses_are_the_same_with_any_number_of_threads() -> None:
+    np.testing.assert_array_equal(refined(1), refined(2))
+
+
+def test_many_poses_at_once_are_placed_as_one_by_one() -> None:
+    body = SyntheticScene(body="person31", seed=2).body
+    poses = postures(body)
+    assert poses.shape == (len(POSTURES), body.size)
+    np.testing.assert_allclose(
+        markers_of_many(body, poses), [markers(body, pose) for pose in poses], atol=1e-12
+    )
+    cones = transforms_of_many(body, poses)[:, body.cone_node]
+    np.testing.assert_allclose(
+        np.matmul(cones[..., :3], body.cone_fixed[:, :, 3:])[..., 0] + cones[..., 3],
+        [cone_transforms(body, pose)[:, :, 3] for pose in poses],
+        atol=1e-12,
+    )
+
+
+class Improving:
+    """A frame in which every generation lowers the costs by the next of some gains."""
+
+    def __init__(self, *gains: float) -> None:
+        self.gains = gains
+        self.seen: list[int] = []
+
+    def recombined(self, population, generation):
+        self.seen.append(generation)
+        return SimpleNamespace(costs=population.costs - self.gains[generation])
+
+
+def test_a_good_fit_that_no_longer_improves_ends_the_generations() -> None:
+    frame = Improving(0.01, 0.0, 0.01, 0.0)
+    _improved(frame, SimpleNamespace(costs=np.array([0.10])), range(4))
+    assert frame.seen == [0, 1]
+
+
+def test_a_poor_fit_gets_all_generations() -> None:
+    frame = Improving(0.01, 0.0, 0.01, 0.0)
+    _improved(frame, SimpleNamespace(costs=np.array([0.30])), range(4))
+    assert frame.seen == [0, 1, 2, 3]
