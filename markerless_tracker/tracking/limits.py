@@ -3,19 +3,37 @@
 import numpy as np
 
 from markerless_tracker.body import BodyModel
-from markerless_tracker.body.angles.swing import twists
+from markerless_tracker.body.angles.swing import straightness, twists
 from markerless_tracker.errors import BodyModelError, ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.config import TrackerConfig
 
-TWIST_RAD_S = 10.0
-"""Greatest speed of a limb's rotation about itself, which images of a straight limb do not show."""
+TWIST_RAD_S = 8.0
+"""Greatest speed of the rotation about itself of a limb with a bent knee or elbow."""
+STRAIGHT_TWIST_RAD_S = 3.0
+"""The same of a straight limb, of which images do not show it."""
+NECK_RAD_S = 4.0
+"""Greatest speed of each rotation of the head relative to the trunk: a fast turn to look aside."""
+ELBOW_RAD_S = 12.0
+"""Greatest speed of an elbow: reached in reaching and catching, exceeded in throws only."""
+_NECK = ("head_x", "head_y", "head_z")
+_ELBOWS = ("l_elbow", "r_elbow")
 
 
-def joint_speeds(body: BodyModel) -> FloatArray:
-    """Greatest speeds (p,) that a search allows: of a limb about itself, else infinite."""
+def joint_speeds(body: BodyModel, pose: FloatArray) -> FloatArray:
+    """Greatest speeds (p,) that a search allows from a pose (p,), rad/s; infinite where none is.
+
+    Those of limbs about themselves, of the neck and the elbows. Bodies without a swing and a twist,
+    as those published, have none.
+    """
     speeds = np.full(body.size, np.inf)
-    speeds[twists(body)] = TWIST_RAD_S
+    own = twists(body)
+    if not own.size:
+        return speeds
+    straight = straightness(body, pose)
+    speeds[own] = TWIST_RAD_S + straight * (STRAIGHT_TWIST_RAD_S - TWIST_RAD_S)
+    for names, speed in ((_NECK, NECK_RAD_S), (_ELBOWS, ELBOW_RAD_S)):
+        speeds[[body.index(name) for name in names if name in body.parameter_names]] = speed
     return speeds
 
 

@@ -252,7 +252,10 @@ class FrameSearch:
             self.contours,
             self.pose,
             config,
-            priors=(Prior(self._predicted, 1.0 / plan.sigma**2), pose_prior(searcher.body)),
+            priors=(
+                Prior(self._predicted, 1.0 / plan.sigma**2),
+                pose_prior(searcher.body, at=self._predicted),
+            ),
             limits=self._limits,
             iterations=plan.iterations,
             truncation_m=(config.refine.truncation_m, config.refine.truncation_end_m),

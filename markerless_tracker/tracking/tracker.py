@@ -306,7 +306,7 @@ class Tracker:
             predicted = start
             self._searcher = self._searcher_for(self.body)
         limits = self._motion.reachable(
-            stamp_ns, self._searcher.limits, joint_speeds(self._searcher.body)
+            stamp_ns, self._searcher.limits, joint_speeds(self._searcher.body, self._motion.pose)
         )
         search = self._searcher.frame(believed, stamp_ns, predicted, limits=limits)
         sigma = self.body.sigma * self._motion.widening(stamp_ns)

@@ -206,7 +206,7 @@ class TestRefusals:
 
     def test_a_result_that_cannot_be_written(self, track, walk, tmp_path):
         (tmp_path / "out.trc").mkdir()
-        line = refusal(track("--start", walk / "ground_truth.trc"))
+        line = refusal(track("--force", "--start", walk / "ground_truth.trc"))
         assert f"{tmp_path / 'out.trc'}: cannot be written" in line
 
     def test_debug_images_that_cannot_be_written(self, track, walk, tmp_path):

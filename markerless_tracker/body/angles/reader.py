@@ -4,7 +4,7 @@ Three angles describe a rotation in two ways: (a, b, c) and (a + 180, 180 - b, c
 full turns. The one nearest to the last frame's is reported. Where the second angle is near 90
 degrees the first and the third rotate about one axis: their sum (or difference) is what the pose
 says, and how it is split between them is kept from the last frame, the more the nearer it is to
-90 degrees, and from then on approaches the pose's own split no faster than `SPLIT_RAD_S`.
+90 degrees, and from then on approaches the pose's own split as fast as `SPLIT_RAD_S` allows.
 """
 
 from dataclasses import dataclass
@@ -19,8 +19,9 @@ from markerless_tracker.records import locked
 
 SPLIT_COSINE = 0.7
 """The split is kept, in part, where the second angle's cosine is below: within 45 degrees of 90."""
-SPLIT_RAD_S = float(np.deg2rad(360.0))
-"""Greatest change of an angle by a change of the split alone."""
+SPLIT_RAD_S = float(np.deg2rad(600.0))
+"""The split changes as far as neither angle gets faster than this, where the sum is slower."""
+_ACROSS_RAD_S = float(np.deg2rad(360.0))
 LEAST_COSINE = 0.1
 """Standard deviations of the first and third angle do not grow beyond this cosine."""
 MOST_SD_RAD = float(np.pi / np.sqrt(3.0))
@@ -236,12 +237,14 @@ class _Split:
         gap = self.shown[:, 0] - side * self.shown[:, 2] - own
         part = np.minimum(np.abs(np.cos(angles[:, 1])) / SPLIT_COSINE, 1.0)
         weight = part * part * (3.0 - 2.0 * part)
-        most = 2.0 * SPLIT_RAD_S * step_s + weight**2 * np.abs(_wrapped(own - self._own))
+        both = angles[:, 0] + side * angles[:, 2] - self.shown[:, 0] - side * self.shown[:, 2]
+        free = np.maximum(2.0 * SPLIT_RAD_S * step_s - np.abs(both), 0.0)
+        most = np.maximum(free, weight**8 * np.abs(_wrapped(own - self._own)))
         held = gap + np.clip(-weight * gap, -most, most)
         held = np.where((weight == 1.0) & (self._held == 0.0), 0.0, held)
         # From one solution to the other the second angle jumps across 90 degrees.
         tilt = np.arcsin(np.sin(angles[:, 1]))
-        near = SPLIT_RAD_S * step_s + np.abs(tilt - self._tilt)
+        near = _ACROSS_RAD_S * step_s + np.abs(tilt - self._tilt)
         change = angles[:, 1] - self.shown[:, 1]
         second = np.where(
             np.abs(change) <= near, angles[:, 1], self.shown[:, 1] + np.sign(change) * near

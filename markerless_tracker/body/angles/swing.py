@@ -11,7 +11,10 @@ from markerless_tracker.body.kinematics import transforms
 from markerless_tracker.body.model import SWING_X, SWING_Y, BodyModel, IntArray
 from markerless_tracker.geometry import FloatArray
 
+BENT_RAD = float(np.deg2rad(30.0))
+"""From here on a bent knee or elbow shows a limb's rotation about itself."""
 _Z = 2
+_HINGES = {"hip": "knee", "shoulder": "elbow"}
 
 
 def swing_joints(body: BodyModel) -> tuple[str, ...]:
@@ -28,6 +31,24 @@ def twists(body: BodyModel) -> IntArray:
     """Indices of the parameters that twist a limb about itself."""
     nodes = [body.frames[name] for name in swing_joints(body)]
     return np.asarray(body.node_parameter[nodes], dtype=np.int64)
+
+
+def straightness(body: BodyModel, pose: FloatArray) -> FloatArray:
+    """How straight the limbs of `twists` (k,) are at a pose (p,): 1 with a straight knee or elbow.
+
+    0 from `BENT_RAD` on, and for a limb without such a joint. Images of a straight limb do not show
+    its rotation about itself; a bent one shows it by the sine of the flexion.
+    """
+    found = []
+    for joint in swing_joints(body):
+        side, _, name = joint.partition("_")
+        hinge = f"{side}_{_HINGES.get(name, '')}"
+        if hinge not in body.parameter_names:
+            found.append(0.0)
+            continue
+        flexion = min(abs(float(pose[body.index(hinge)])), BENT_RAD)
+        found.append(1.0 - float(np.sin(flexion) / np.sin(BENT_RAD)) ** 2)
+    return np.array(found)
 
 
 def split(rotation: FloatArray) -> tuple[float, float, float]:

@@ -1,87 +1,251 @@
-"""The coordinates of a result as OpenSim names and measures them: degrees, metres, Y up."""
+"""The coordinates of a result as OpenSim names and measures them: degrees, metres, Y up.
+
+Those of a joint with reported angles (docs/joint-angles.md) are these angles, between the segments'
+anatomical axes; the translations of the pelvis follow the axes of the marker file. What has no
+reported angles has the body's own parameters. An arm's angles are relative to the thorax, but it
+hangs on a clavicle: an extra segment at the shoulder, which undoes the clavicle's rotation, carries
+it. Its coordinates `NAME_back` are the clavicle's with the sign reversed.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from markerless_tracker.body import BodyModel
+from markerless_tracker.body import BodyModel, transforms
+from markerless_tracker.body.angles import AngleReader
+from markerless_tracker.body.angles.segments import joint_frames, reported_joints
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.results.export.axes import FROM_WORLD
-from markerless_tracker.results.export.skeleton import poses, skeleton
+from markerless_tracker.results.export.axes import FROM_WORLD, ROTATION_FILE_WORLD
+from markerless_tracker.results.export.skeleton import Skeleton, skeleton
 from markerless_tracker.results.stored_result import StoredResult
 
-_AXES = "xyz"
-_BALL_MOVES = ("flexion", "adduction", "rotation")
+BACK = "_back"
+"""Ending of a coordinate that undoes another one."""
+_AXES = "XYZ"
+_CONSTANT_RAD = 1e-9
+_GROUND_M = 100.0
+_WORLD_IN_GROUND: FloatArray = np.column_stack([ROTATION_FILE_WORLD, np.zeros(3)])
 
 
-def coordinate_names(body: BodyModel) -> tuple[str, ...]:
-    """Names (p,) of the coordinates of the exported `.osim`, in the order of the parameters.
+@dataclass(frozen=True, eq=False)
+class Coordinate:
+    """One coordinate of a joint.
 
-    Those of the body's parameters; the translations of the root along x, y, z of the world are
-    named by the axis of OpenSim's ground that they follow. A ball joint whose parameters have no
-    axes has the coordinates `NAME_flexion_S`, `NAME_adduction_S` and `NAME_rotation_S` of side S.
+    Attributes:
+        name: of the coordinate.
+        axis: (3,) unit vector in the joint's frame at zero, sign included.
+        rotates: rotation, else translation.
+        limits: (2,) its range, rad or m.
     """
-    renamed = {f"_t{_AXES[world]}": f"_t{_AXES[axis]}" for axis, world in enumerate(FROM_WORLD)}
-    names = list(body.parameter_names)
-    for index in set(body.root.tolist()) & set(body.translations.tolist()):
-        stem, ending = names[index][:-3], names[index][-3:]
-        names[index] = stem + renamed.get(ending, ending)
-    for segment in skeleton(body).segments:
-        if segment.ball:
-            side, _, stem = segment.name.partition("_")
-            if not stem:
-                side, stem = "", side
-            ending = f"_{side}" if side else ""
-            for move, what in zip(segment.moves, _BALL_MOVES, strict=True):
-                names[move.parameter] = f"{stem}_{what}{ending}"
-    return tuple(names)
+
+    name: str
+    axis: FloatArray
+    rotates: bool
+    limits: FloatArray
 
 
-def coordinate_values(body: BodyModel, parameters: FloatArray) -> FloatArray:
-    """Values (n, p) of the coordinates in m and rad, of poses (n, p); NaN where the pose is."""
-    bones = skeleton(body)
-    values = np.array(parameters, dtype=np.float64)
-    known = np.flatnonzero(np.isfinite(values).all(axis=1))
-    balls = [segment for segment in bones.segments if segment.ball]
-    if not balls or not known.size:
-        return values
-    nodes = [segment.node for segment in bones.segments]
-    axes = poses(body, nodes, values[known])[..., :3]
-    for segment in balls:
-        own = axes[:, bones.segments.index(segment)] @ segment.R_segment_node.T
-        above = bones.segments[segment.parent]
-        parent = axes[:, segment.parent] @ above.R_segment_node.T
-        relative = (
-            segment.R_parent_anatomical.T
-            @ parent.transpose(0, 2, 1)
-            @ own
-            @ segment.R_segment_anatomical
+@dataclass(frozen=True, eq=False)
+class ModelJoint:
+    """A joint of the exported model.
+
+    Attributes:
+        child, parent: names of the segments; the parent of the first is `ground`.
+        T_parent_joint: (3, 4) pose of the joint at zero in the parent.
+        R_child_joint: (3, 3) the joint's axes in the child.
+        coordinates: in order, each rotation about the axis as moved by those before.
+    """
+
+    child: str
+    parent: str
+    T_parent_joint: FloatArray
+    R_child_joint: FloatArray
+    coordinates: tuple[Coordinate, ...]
+
+
+class Coordinates:
+    """The coordinates of a body's model and their values.
+
+    Args:
+        body: the body.
+
+    Attributes:
+        bones: its segments.
+        joints: parents first; more than the segments where extra ones undo a rotation.
+        names: of all coordinates, in the order of the joints.
+    """
+
+    def __init__(self, body: BodyModel) -> None:
+        self._body = body
+        self.bones: Skeleton = skeleton(body)
+        self._frames = joint_frames(body)
+        self._reader = AngleReader(body)
+        self._between = reported_joints(body)
+        self._own: dict[str, int] = {}
+        self._unnamed: dict[str, tuple[int, int]] = {}
+        self._root = -1
+        self.joints = tuple(self._joints())
+        self.names = tuple(c.name for joint in self.joints for c in joint.coordinates)
+
+    def values(
+        self,
+        parameters: FloatArray,
+        names: Sequence[str] = (),
+        angles_rad: FloatArray | None = None,
+    ) -> FloatArray:
+        """Values (n, k) of the coordinates, m and rad, of poses (n, p); NaN where the pose is.
+
+        Args:
+            parameters: the poses.
+            names: of angles that are known already.
+            angles_rad: (n, len(names)) these angles; others are computed.
+        """
+        found = np.full((len(parameters), len(self.names)), np.nan)
+        for row in np.flatnonzero(np.isfinite(parameters).all(axis=1)):
+            at = dict(self._pose_values(parameters[row]))
+            if angles_rad is not None:
+                at.update(zip(names, angles_rad[row].tolist(), strict=True))
+            found[row] = [
+                -at[name.removesuffix(BACK)] if name.endswith(BACK) else at[name]
+                for name in self.names
+            ]
+        return found
+
+    def factors(self) -> FloatArray:
+        """(k,) from m and rad to the m and degrees of a motion file."""
+        rotates = [c.rotates for joint in self.joints for c in joint.coordinates]
+        return np.where(rotates, np.rad2deg(1.0), 1.0)
+
+    def _pose_values(self, pose: FloatArray) -> dict[str, float]:
+        angles = self._reader.read(pose)
+        at = dict(zip(angles.names, angles.values_rad.tolist(), strict=True))
+        at.update({name: float(pose[index]) for name, index in self._own.items()})
+        nodes = transforms(self._body, pose)
+        if self._root >= 0:
+            place = nodes[self._root, :, 3]
+            for k, world in enumerate(FROM_WORLD):
+                at[f"pelvis_t{_AXES[k].lower()}"] = float(place[world])
+        relative = self._frames.relative(nodes)
+        for name, (joint, which) in self._unnamed.items():
+            at[name] = float(_euler(relative[joint], self._frames.joints[joint].order)[which])
+            at[name] *= self._frames.joints[joint].signs[which]
+        return at
+
+    def _joints(self) -> list[ModelJoint]:
+        reported = {
+            self.bones.node_segment[int(node)]: k for k, node in enumerate(self._frames.node)
+        }
+        found: list[ModelJoint] = []
+        for index in range(len(self.bones.segments)):
+            if index in reported:
+                found.extend(self._anatomical(index, reported[index], found))
+            else:
+                found.append(self._of_parameters(index))
+        return found
+
+    def _anatomical(self, index: int, k: int, before: list[ModelJoint]) -> list[ModelJoint]:
+        """The joint of a segment with reported angles, after the one that undoes a clavicle's."""
+        segment, joint = self.bones.segments[index], self._frames.joints[k]
+        own = self._axes_in_segment(int(self._frames.node[k]), self._frames.fixed[k])
+        name, parent = segment.name, "ground"
+        coordinates = self._angles(k)
+        at = segment.T_parent_joint[:, 3]
+        if segment.parent < 0:
+            self._root = segment.node
+            limits = np.array([-_GROUND_M, _GROUND_M])
+            moves = [
+                Coordinate(f"pelvis_t{a.lower()}", np.eye(3)[i], False, limits)
+                for i, a in enumerate(_AXES)
+            ]
+            # Translations are those of the ground; rotations begin with its axes.
+            return [ModelJoint(name, parent, np.eye(4)[:3], own, (*moves, *coordinates))]
+        parent = self.bones.segments[segment.parent].name
+        if self._between[joint] is None:
+            reference = self._axes_in_segment(
+                int(self._frames.reference[k]), self._frames.reference_fixed[k]
+            )
+            return [ModelJoint(name, parent, np.column_stack([reference, at]), own, coordinates)]
+        over = next(other for other in before if other.child == parent)
+        undone = tuple(
+            Coordinate(c.name + BACK, c.axis, True, np.sort(-c.limits))
+            for c in reversed(over.coordinates)
         )
-        found = Rotation.from_matrix(relative).as_euler("ZXY")
-        for column, move in enumerate(segment.moves):
-            values[known, move.parameter] = found[:, column] * move.axis.sum()
-    return values
+        base = f"{name}_base"
+        place = np.column_stack([over.R_child_joint, at])
+        # The base has the axes of the thorax, whatever the clavicle does.
+        return [
+            ModelJoint(base, parent, place, np.eye(3), undone),
+            ModelJoint(name, base, np.eye(4)[:3], own, coordinates),
+        ]
+
+    def _axes_in_segment(self, node: int, fixed: FloatArray) -> FloatArray:
+        return np.asarray(self.bones.node_place[node][:, :3] @ fixed)
+
+    def _angles(self, k: int) -> tuple[Coordinate, ...]:
+        """The angles of a joint that change; those without a name get one of their axis."""
+        joint = self._frames.joints[k]
+        limits = np.array([-np.pi, np.pi])
+        found = []
+        for which, (name, axis, sign) in enumerate(
+            zip(joint.names, joint.order, joint.signs, strict=True)
+        ):
+            if not name or name not in self._reader.names:
+                if not self._changes(k, which):
+                    continue
+                name = f"{joint.segment}_{_AXES[axis].lower()}"
+                self._unnamed[name] = (k, which)
+            found.append(Coordinate(name, sign * np.eye(3)[axis], True, limits))
+        return tuple(found)
+
+    def _changes(self, k: int, which: int) -> bool:
+        rng = np.random.default_rng(0)
+        for _ in range(4):
+            pose = self._body.neutral + rng.uniform(-0.3, 0.3, self._body.size)
+            relative = self._frames.relative(transforms(self._body, pose))[k]
+            if abs(_euler(relative, self._frames.joints[k].order)[which]) > _CONSTANT_RAD:
+                return True
+        return False
+
+    def _of_parameters(self, index: int) -> ModelJoint:
+        """A joint without reported angles, by the body's own parameters."""
+        segment = self.bones.segments[index]
+        place, parent = segment.T_parent_joint, "ground"
+        if segment.parent >= 0:
+            parent = self.bones.segments[segment.parent].name
+        else:
+            rotation = _WORLD_IN_GROUND[:, :3]
+            place = np.column_stack([rotation @ place[:, :3], rotation @ place[:, 3]])
+        free = {True: np.pi, False: _GROUND_M}
+        coordinates = []
+        for move in segment.moves:
+            self._own[move.name] = move.parameter
+            low, high = self._body.limits[:, move.parameter]
+            if not np.isfinite([low, high]).all():
+                low, high = -free[move.rotates], free[move.rotates]
+            coordinates.append(
+                Coordinate(move.name, move.axis, move.rotates, np.array([low, high]))
+            )
+        return ModelJoint(segment.name, parent, place, np.eye(3), tuple(coordinates))
+
+
+def _euler(rotation: FloatArray, order: tuple[int, int, int]) -> FloatArray:
+    turn = Rotation.from_matrix(rotation)
+    return np.asarray(turn.as_euler("ZXY") if order == (2, 0, 1) else turn.as_euler("YXZ"))
 
 
 def motion_columns(
-    part: StoredResult, body: BodyModel, names: Sequence[str]
+    part: StoredResult, coordinates: Coordinates
 ) -> tuple[tuple[str, ...], FloatArray]:
-    """Columns of a `.mot`: the result's joint angles, if it has any, then the model's coordinates.
+    """Columns of a `.mot`: the model's coordinates, the angles as the result has them.
 
     Args:
         part: the frames, n of them.
-        body: the tracked body, p parameters.
-        names: (p,) of `coordinate_names`.
+        coordinates: of the tracked body.
 
     Returns:
         The columns' names and values (n, k), in degrees and metres.
     """
-    factors = np.full(body.size, np.rad2deg(1.0))
-    factors[body.translations] = 1.0
-    values = coordinate_values(body, part.parameters) * factors
-    fresh = [column for column, name in enumerate(part.angle_names) if name not in names]
-    return (
-        (*(part.angle_names[column] for column in fresh), *names),
-        np.concatenate([part.angles_deg[:, fresh], values], axis=1),
-    )
+    known = np.deg2rad(part.angles_deg)
+    values = coordinates.values(part.parameters, part.angle_names, known)
+    return coordinates.names, values * coordinates.factors()

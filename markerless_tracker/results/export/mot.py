@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from markerless_tracker.results.export.coordinates import coordinate_names, motion_columns
+from markerless_tracker.results.export.coordinates import Coordinates, motion_columns
 from markerless_tracker.results.export.new_file import new_file, number, seconds
 from markerless_tracker.results.read import ResultReader
 from markerless_tracker.results.stored_result import stored_body
 
 
 def write_mot(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
-    """Write the joint angles, if the result has any, and the coordinates of the `.osim`.
+    """Write the coordinates of the `.osim`: the result's joint angles, the place of the pelvis.
 
     Frames without a pose are rows of NaN, which OpenSim reads.
 
@@ -22,12 +22,12 @@ def write_mot(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
         DatasetError, BodyModelError: the file cannot be written, or the result's body is unknown.
     """
     body = stored_body(reader.summary)
-    coordinates = coordinate_names(body)
+    coordinates = Coordinates(body)
     frames = sum(len(part) for part in reader.chunks())
     begun = False
     with new_file(path) as sink:
         for part in reader.chunks():
-            columns, values = motion_columns(part, body, coordinates)
+            columns, values = motion_columns(part, coordinates)
             if not begun:
                 sink.write(
                     f"{path.stem}\nversion=1\nnRows={frames}\nnColumns={1 + len(columns)}\n"

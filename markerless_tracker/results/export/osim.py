@@ -2,6 +2,7 @@
 
 import warnings
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
@@ -11,10 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.results.export.axes import ROTATION_FILE_WORLD
-from markerless_tracker.results.export.coordinates import coordinate_names, coordinate_values
+from markerless_tracker.results.export.coordinates import BACK, Coordinates, ModelJoint
 from markerless_tracker.results.export.new_file import new_file, seconds
-from markerless_tracker.results.export.skeleton import MOST_ROTATIONS, Segment, Skeleton, skeleton
+from markerless_tracker.results.export.skeleton import MOST_ROTATIONS, Skeleton
 from markerless_tracker.results.export.trc import write_renamed_trc
 from markerless_tracker.results.read import ResultReader
 from markerless_tracker.results.stored_result import stored_body
@@ -27,8 +27,6 @@ _CREDITS = (
 )
 # Nominal: OpenSim assembles no model with massless segments.
 _MASS_KG, _INERTIA = "1", "0.01 0.01 0.01 0 0 0"
-_NO_ROTATION: FloatArray = np.eye(4)[:3]
-_WORLD_IN_GROUND: FloatArray = np.column_stack([ROTATION_FILE_WORLD, np.zeros(3)])
 # OpenSim's cylinders lie along y, cones along z.
 _Z_TO_Y: FloatArray = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]).T
 
@@ -36,7 +34,8 @@ _Z_TO_Y: FloatArray = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.
 def write_osim(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
     """Write NAME.osim and NAME.ik.xml, the setup of OpenSim's inverse kinematics on the TRC.
 
-    The model has one body per segment, the coordinates of the `.mot`, the 15 markers and a cylinder
+    The model has one body per segment (and one that undoes a clavicle's rotation, below
+    the arm), the coordinates of the `.mot`, the 15 markers and a cylinder
     per cone. Its default pose is the first one of the result, where inverse kinematics begins.
     OpenSim's inverse kinematics stops at a blank row: if there are any, or if the markers have
     other names than in NAME.trc, the setup uses NAME.ik.trc, which has the other rows.
@@ -87,7 +86,8 @@ def _extent(reader: ResultReader, body: BodyModel) -> _Extent:
 
 
 def _model(body: BodyModel, pose: FloatArray, names: tuple[str, ...], title: str) -> Element:
-    bones = skeleton(body)
+    coordinates = Coordinates(body)
+    bones = coordinates.bones
     document = Element("OpenSimDocument", Version=_VERSION)
     model = SubElement(document, "Model", name=title)
     for key, text in (
@@ -99,17 +99,19 @@ def _model(body: BodyModel, pose: FloatArray, names: tuple[str, ...], title: str
         SubElement(model, key).text = text
     SubElement(model, "Ground", name="ground")
     bodies = _set(model, "BodySet", "bodyset")
-    for index, segment in enumerate(bones.segments):
-        entry = SubElement(bodies, "Body", name=segment.name)
+    segment_of = {segment.name: k for k, segment in enumerate(bones.segments)}
+    for joint in coordinates.joints:
+        entry = SubElement(bodies, "Body", name=joint.child)
         SubElement(entry, "mass").text = _MASS_KG
         SubElement(entry, "mass_center").text = "0 0 0"
         SubElement(entry, "inertia").text = _INERTIA
-        _add_cones(entry, body, bones, index)
+        if joint.child in segment_of:
+            _add_cones(entry, body, bones, segment_of[joint.child])
     joints = _set(model, "JointSet", "jointset")
-    coordinates = coordinate_names(body)
-    values = coordinate_values(body, pose[None])[0]
-    for segment in bones.segments:
-        _add_joint(joints, body, bones, segment, coordinates, values)
+    at_start = dict(zip(coordinates.names, coordinates.values(pose[None])[0].tolist(), strict=True))
+    for joint in coordinates.joints:
+        _add_joint(joints, joint, at_start)
+    _add_couplers(model, coordinates.names)
     markers = _set(model, "MarkerSet", "markerset")
     for name, node, offset in zip(
         names, body.marker_node.tolist(), body.marker_offset, strict=True
@@ -123,50 +125,31 @@ def _model(body: BodyModel, pose: FloatArray, names: tuple[str, ...], title: str
     return document
 
 
-def _add_joint(
-    joints: Element,
-    body: BodyModel,
-    bones: Skeleton,
-    segment: Segment,
-    names: tuple[str, ...],
-    values: FloatArray,
-) -> None:
-    joint = SubElement(joints, "CustomJoint", name=f"{segment.name}_joint")
-    parent, place = "/ground", _WORLD_IN_GROUND
-    if segment.parent >= 0:
-        parent = f"/bodyset/{bones.segments[segment.parent].name}"
-        place = _NO_ROTATION
-    place = np.column_stack(
-        [place[:, :3] @ segment.T_parent_joint[:, :3], place[:, :3] @ segment.T_parent_joint[:, 3]]
-    )
+def _add_joint(joints: Element, described: ModelJoint, values: Mapping[str, float]) -> None:
+    joint = SubElement(joints, "CustomJoint", name=f"{described.child}_joint")
+    above = described.parent
+    parent = "/ground" if above == "ground" else f"/bodyset/{above}"
     SubElement(joint, "socket_parent_frame").text = "parent_offset"
-    child = f"/bodyset/{segment.name}"
-    SubElement(joint, "socket_child_frame").text = "child_offset" if segment.ball else child
+    SubElement(joint, "socket_child_frame").text = "child_offset"
     coordinates = SubElement(joint, "coordinates")
-    for move in segment.moves:
-        entry = SubElement(coordinates, "Coordinate", name=names[move.parameter])
-        low, high = body.limits[:, move.parameter]
-        free = (-np.pi, np.pi) if move.rotates else (-100.0, 100.0)
-        own_limits = np.isfinite([low, high]).all() and not segment.ball
-        low, high = (low, high) if own_limits else free
-        SubElement(entry, "default_value").text = _number(values[move.parameter])
-        SubElement(entry, "range").text = _numbers(np.array([low, high]))
+    for coordinate in described.coordinates:
+        entry = SubElement(coordinates, "Coordinate", name=coordinate.name)
+        SubElement(entry, "default_value").text = _number(values[coordinate.name])
+        SubElement(entry, "range").text = _numbers(coordinate.limits)
         SubElement(entry, "clamped").text = "false"
     frames = SubElement(joint, "frames")
-    if segment.ball:
-        place = np.column_stack([segment.R_parent_anatomical, place[:, 3]])
-        own = np.column_stack([segment.R_segment_anatomical, np.zeros(3)])
-        _add_offset(frames, "child_offset", child, own)
-    _add_offset(frames, "parent_offset", parent, place)
+    own = np.column_stack([described.R_child_joint, np.zeros(3)])
+    _add_offset(frames, "child_offset", f"/bodyset/{described.child}", own)
+    _add_offset(frames, "parent_offset", parent, described.T_parent_joint)
     transform = SubElement(joint, "SpatialTransform")
     for kind in (True, False):
-        moves = [move for move in segment.moves if move.rotates == kind]
+        moves = [c for c in described.coordinates if c.rotates == kind]
         axes = _complete([move.axis for move in moves])
         for number in range(MOST_ROTATIONS):
             label = f"{'rotation' if kind else 'translation'}{number + 1}"
             axis = SubElement(transform, "TransformAxis", name=label)
             moving = number < len(moves)
-            SubElement(axis, "coordinates").text = names[moves[number].parameter] if moving else ""
+            SubElement(axis, "coordinates").text = moves[number].name if moving else ""
             SubElement(axis, "axis").text = _numbers(axes[number])
             if moving:
                 function = SubElement(axis, "LinearFunction", name="function")
@@ -174,6 +157,21 @@ def _add_joint(
             else:
                 function = SubElement(axis, "Constant", name="function")
                 SubElement(function, "value").text = "0"
+
+
+def _add_couplers(model: Element, names: tuple[str, ...]) -> None:
+    """Constraints that make every coordinate that undoes another one its reverse."""
+    constraints = _set(model, "ConstraintSet", "constraintset")
+    for name in names:
+        if not name.endswith(BACK):
+            continue
+        entry = SubElement(constraints, "CoordinateCouplerConstraint", name=f"{name}_coupler")
+        SubElement(entry, "isEnforced").text = "true"
+        function = SubElement(entry, "coupled_coordinates_function")
+        linear = SubElement(function, "LinearFunction")
+        SubElement(linear, "coefficients").text = "-1 0"
+        SubElement(entry, "independent_coordinate_names").text = name.removesuffix(BACK)
+        SubElement(entry, "dependent_coordinate_name").text = name
 
 
 def _complete(axes: list[FloatArray]) -> list[FloatArray]:
