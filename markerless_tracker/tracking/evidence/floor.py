@@ -39,6 +39,9 @@ class FloorView(NamedTuple):
 def floor_points(pixels: FloatArray, camera: CameraModel) -> FloatArray:
     """Points (n, 3) m where the rays of pixels (n, 2) meet the floor; NaN where they do not."""
     points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
+    if len(points) == 0:
+        # OpenCV returns None for no points.
+        return np.empty((0, 3))
     rays = cv2.undistortPoints(points, camera.matrix, camera.distortion).reshape(-1, 2)
     placed = camera.T_world_cam
     directions = np.column_stack([rays, np.ones(len(rays))]) @ placed[:3, :3].T
