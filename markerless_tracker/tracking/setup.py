@@ -107,12 +107,7 @@ def build_tracker(
     body = build_body(description, subject)
     pose: FloatArray | None = None
     if start is not None:
-        pose = pose_from_markers(
-            body,
-            start.markers_m,
-            limits=joint_limits(body, config),
-            likely=config.refinement == "contour",
-        )
+        pose = pose_from_markers(body, start.markers_m, limits=joint_limits(body, config))
     elif start_file is not None:
         pose = read_pose(start_file, body)
     tracker = Tracker(
