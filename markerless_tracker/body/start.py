@@ -17,15 +17,29 @@ from markerless_tracker.geometry import FloatArray
 _NEUTRAL_WEIGHT_M_PER_RAD = 0.004
 """Weight of the distance from neutral, for angles that the markers do not determine (the axial
 rotation of a straight limb): one radian costs as much as 4 mm at one marker."""
+_PRIOR_WEIGHT_M = 0.0024
+"""The same of one standard deviation of the prior of poses, which also decides how a stoop is
+shared by hips and trunk: markers do not show how far the pelvis tilts."""
 
 
 def pose_from_markers(
-    body: BodyModel, markers_m: Mapping[str, FloatArray], *, limits: FloatArray | None = None
+    body: BodyModel,
+    markers_m: Mapping[str, FloatArray],
+    *,
+    limits: FloatArray | None = None,
+    likely: bool = False,
 ) -> FloatArray:
     """The pose (p,) with the least squared distances from named markers (3,), world frame, m.
 
     Bounded least squares within the limits (2, p), by default the body's anatomical ones. Markers
     may be missing, except the hips and the neck, which give position and heading.
+
+    Args:
+        body: the body.
+        markers_m: positions (3,) by name.
+        limits: (2, p) instead of the body's own.
+        likely: what markers do not show is as the body's prior of poses has it, instead of as near
+            to neutral as can be, all joints alike.
 
     Raises:
         BodyModelError: LHip, RHip or Neck is missing, or the three lie on one line.
@@ -42,6 +56,9 @@ def pose_from_markers(
     target = np.array([known[name] for name in names])
     bounds = body.limits if limits is None else limits
     angles = body.joints
+    rest, weight = body.neutral, np.full(len(angles), _NEUTRAL_WEIGHT_M_PER_RAD)
+    if likely:
+        rest, weight = body.prior_mean, _PRIOR_WEIGHT_M / body.prior_sd[angles]
 
     start = np.clip(_upright(body, known), bounds[0], bounds[1])
     # The solver needs a start strictly inside the bounds.
@@ -49,8 +66,7 @@ def pose_from_markers(
 
     def residuals(pose: FloatArray) -> FloatArray:
         gap = (kinematics.markers(body, pose)[rows] - target).ravel()
-        neutral = _NEUTRAL_WEIGHT_M_PER_RAD * (pose - body.neutral)[angles]
-        return np.concatenate([gap, neutral])
+        return np.concatenate([gap, weight * (pose - rest)[angles]])
 
     # A second fit from the middle of the ranges avoids local minima at a limit.
     bent = start.copy()

@@ -40,7 +40,7 @@ def cone(name) -> int:
 
 
 def test_the_prior_mean_has_bent_elbows_and_is_neutral_elsewhere() -> None:
-    for name in ("person31", "person34", "person35"):
+    for name in ("person31", "person32", "person34", "person35"):
         body = load_body(name, 1.72)
         elbows = [body.index("l_elbow"), body.index("r_elbow")]
         bent = np.abs(body.prior_mean - body.neutral)

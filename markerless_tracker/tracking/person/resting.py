@@ -24,7 +24,10 @@ MOST_SD = 2.0
 NARROWER = 0.5
 """Factor of the prior's standard deviation, of trunk and shoulders about the person's own posture:
 they move less than people, and definitions of joint centres, differ."""
-_NARROWED = ("thorax_y", "thorax_z", "l_clavicle_x", "l_clavicle_y", "r_clavicle_x", "r_clavicle_y")
+_NARROWED = (
+    "thorax_x", "thorax_y", "thorax_z",
+    "l_clavicle_x", "l_clavicle_y", "r_clavicle_x", "r_clavicle_y",
+)  # fmt: skip
 
 
 def at_rest(body: BodyModel, start: FloatArray) -> BodyModel:

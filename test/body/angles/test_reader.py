@@ -13,7 +13,7 @@ from markerless_tracker.body.angles.reader import SPLIT_RAD_S
 from markerless_tracker.body.angles.segments import segment_axes, segment_nodes
 from markerless_tracker.body.angles.swing import set_rotation
 
-NAMES = ("person31", "person34", "person35", "balan31", "humaneva34")
+NAMES = ("person31", "person32", "person34", "person35", "balan31", "humaneva34")
 BODIES = {name: load_body(name, 1.75) for name in NAMES}
 BODY = BODIES["person31"]
 STEP_NS = 16_666_667
@@ -39,7 +39,8 @@ def test_zero_at_the_anatomical_posture(name) -> None:
 def test_a_body_reports_the_joints_that_it_has() -> None:
     counts = {name: len(AngleReader(body).names) for name, body in BODIES.items()}
     assert counts == {
-        "person31": 28, "person34": 31, "person35": 32, "balan31": 28, "humaneva34": 31,
+        "person31": 28, "person32": 29, "person34": 31, "person35": 32, "balan31": 28,
+        "humaneva34": 31,
     }  # fmt: skip
     assert "ankle_angle_r" not in AngleReader(BODY).names
     assert "ankle_angle_r" in AngleReader(BODIES["person35"]).names

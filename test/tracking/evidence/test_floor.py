@@ -50,6 +50,10 @@ def test_a_floor_point_is_found_again_from_its_pixel(rig) -> None:
         np.testing.assert_allclose(found, FLOOR, atol=1e-6)
 
 
+def test_no_pixels_have_no_points(rig) -> None:
+    assert floor_points(np.empty((0, 2)), next(iter(rig))).shape == (0, 3)
+
+
 def test_rays_that_do_not_meet_the_floor_have_no_point(rig) -> None:
     camera = rig.cameras[0]
     up = camera.T_world_cam[:3, 3] + [0.0, 0.0, 5.0] + 5.0 * camera.T_world_cam[:3, 2]
