@@ -77,7 +77,7 @@ class TrackerConfig(ImagingSettings):
         choices=tuple(PRESETS),
     )
     optimizer: str = setting("sppso", "search algorithm", choices=OPTIMIZERS)
-    body: str = setting("person31", "body: a shipped one's name, or a YAML file")
+    body: str = setting("person32", "body: a shipped one's name, or a YAML file")
     evaluations: int = setting(
         1000,
         "budget per frame, in evaluations of the fitness: exactly that many without refinement; "

@@ -189,7 +189,7 @@ def test_stature_scales_everything() -> None:
 
 
 def test_bodies_of_the_presets() -> None:
-    assert TrackerConfig.from_mapping({}).body == "person31"
+    assert TrackerConfig.from_mapping({}).body == "person32"
     assert TrackerConfig.from_mapping({}, preset="paper").body == "balan31"
 
 
