@@ -80,14 +80,14 @@ class Tracker:
         self.rig = rig
         self._cameras = {camera.name: camera for camera in rig}
         self.config = config
-        given = start_pose is not None
+        self._given = start_pose is not None
         start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
         if given and body.measured:
             body = at_rest(body, start)
         self._body = BodyEstimate(
             body, config, shape_known=shape_known, start_markers=start_markers, person=person
         )
-        check_pose(body, start, self._body.limits if given else None)
+        check_pose(body, start, self._body.limits if self._given else None)
         # Refuses a budget that cannot be spent before the first frame comes.
         frame_stages(body, config, start, body.sigma)
         threads = config.threads or os.cpu_count() or 1
@@ -100,9 +100,8 @@ class Tracker:
         self._views = ViewWatch(rig)
         self._motion = MotionModel(start, config)
         self._assessor = Assessor(rig, body, config)
-        self._given = given
         self._effort = Effort(needed_only=config.refine.swarms == "needed")
-        self._starter = None if given else self._new_starter()
+        self._starter = None if self._given else self._new_starter()
         self._lookahead = Lookahead(self._outlook(-1), self._outlook(0))
 
     @property
@@ -131,6 +130,13 @@ class Tracker:
         blank = self._evidence.warm_up()
         self._starter, self._assessor.track = None, Track(Phase.TRACKING)
         self.step(blank, 0)
+        pose = self._motion.pose
+        seen = decide(blank, self._cameras, self.body, pose)
+        search = self._searcher.frame(seen, 0, pose)
+        search.run(frame_stages(self.body, self.config, pose, self.body.sigma))
+        if self.config.refinement != "none":
+            self._assessor.limbs.recover(self._searcher, search.contours, seen, 0, pose)
+        self._assessor.found(Found(search, 0, seen), self.body, self._body.limits)
         self.reset()
         self._body.warm_up(self._searcher_for, blank, self._motion.pose)
         self.reset()

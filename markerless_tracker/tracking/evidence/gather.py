@@ -48,6 +48,7 @@ class EvidenceMaker:
         self._clear_px = edge_radius_px(config) + config.region.component_margin_px
         self._every = config.region.full_frame_every
         self._follows = config.background.follow_s > 0.0
+        self._three_classes = config.shadow.undecided
         self._pool = pool
         self.segmenters: dict[str, Segmenter] = {}
         self.take_backgrounds(backgrounds)
@@ -135,7 +136,10 @@ class EvidenceMaker:
         return self._follows and (number + shift) % self._every == 0
 
     def warm_up(self) -> dict[str, Observation]:
-        """Compile the imaging; returns made-up observations with a rectangle as silhouette."""
+        """Compile the imaging; returns made-up observations.
+
+        The silhouette is a rectangle, with undecided pixels around it and known ones above.
+        """
         made_up = {}
         for camera in self._rig:
             width, height = camera.size_px
@@ -147,7 +151,11 @@ class EvidenceMaker:
                 segmenter.reset()
             mask = np.zeros((height, width), dtype=np.uint8)
             mask[height // 4 : height // 2, width // 4 : width // 2] = 1
-            made_up[camera.name] = Observation.from_mask(camera.name, 0, mask, mask)
+            around = mask == 0
+            around[: height // 4] = False
+            made_up[camera.name] = Observation.from_mask(
+                camera.name, 0, mask, mask, undecided=around if self._three_classes else None
+            )
         return made_up
 
     def select(
