@@ -82,7 +82,7 @@ class Tracker:
         self.config = config
         self._given = start_pose is not None
         start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
-        if given and body.measured:
+        if self._given and body.measured:
             body = at_rest(body, start)
         self._body = BodyEstimate(
             body, config, shape_known=shape_known, start_markers=start_markers, person=person
