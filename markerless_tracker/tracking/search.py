@@ -198,7 +198,7 @@ class FrameSearch:
         search = SwarmSearch(
             centre=centre[active],
             sigma=plan.sigma[active],
-            bounds=np.ascontiguousarray(searcher.limits[:, active]),
+            bounds=np.ascontiguousarray(self._limits[:, active]),
             count=plan.particles,
             iterations=plan.iterations,
             rng=rng,
@@ -208,9 +208,11 @@ class FrameSearch:
         particles = SWARMS[plan.algorithm](search, **plan.options)
         self._note(stage, plan.evaluations, particles.best.std(axis=0))
         pose = centre.copy()
-        pose[active] = particles.found
+        # SPPSO keeps the body's limits, not those of what can be reached in the time.
+        pose[active] = np.clip(particles.found, *search.bounds)
         cost = float(particles.found_cost[0])
-        return pose, cost if np.isfinite(cost) else None
+        same = np.array_equal(pose[active], particles.found)
+        return pose, cost if same and np.isfinite(cost) else None
 
     def _filter(self, stage: Stage, rng: np.random.Generator) -> FloatArray:
         """The pose (p,) that an algorithm finds that is not compiled as a whole."""

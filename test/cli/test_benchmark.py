@@ -71,7 +71,7 @@ def test_both_presets_by_default(walk, capsys) -> None:
     assert main(["benchmark", *words]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
     assert [(row["preset"], row["body"], row["fps"]) for row in rows] == [
-        ("tuned", "person31", 60.0), ("tuned", "person31", 20.0),
+        ("tuned", "person32", 60.0), ("tuned", "person32", 20.0),
         ("paper", "balan31", 60.0), ("paper", "balan31", 20.0),
     ]  # fmt: skip
     assert rows[2]["evaluations"] == 1000

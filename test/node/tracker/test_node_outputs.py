@@ -136,7 +136,8 @@ def test_the_evidence_is_drawn_while_subscribed(live: Any) -> None:
     assert (labels[:, :, 0][person] == 255).mean() > 0.8
     difference = abs(image - background).max(axis=2)
     assert np.median(difference[person]) > 20 > np.median(difference[mask[:, :, 0] == 0])
-    assert edges.max() > 100
+    # At weight 0 no edge map is made.
+    assert edges.max() == 0
 
 
 def test_parameters_show_what_is_in_effect(live: Any) -> None:
@@ -171,7 +172,12 @@ def test_a_person_who_left_has_no_pose_and_is_tracked_again_later(live: Any, sce
         assert [len(got) for got in (live.joints, live.roots, live.poses)] == counts
     finally:
         live.camera.scene = here
-    index = live.track()
+
+    def back() -> bool:
+        # The first poses of a start may be poor.
+        index = live.track()
+        found = np.array([(p.position.x, p.position.y, p.position.z) for p in live.poses[-1].poses])
+        return bool(np.linalg.norm(found - here.markers(index), axis=1).mean() < 0.10)
+
+    live.until(back, "the person")
     assert live.value("state") == "TRACKING"
-    found = np.array([(p.position.x, p.position.y, p.position.z) for p in live.poses[-1].poses])
-    assert np.linalg.norm(found - here.markers(index), axis=1).mean() < 0.10

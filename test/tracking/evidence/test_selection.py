@@ -56,7 +56,7 @@ def test_undecided_pixels_stay_undecided_where_the_silhouette_is_left_out(
     blob = with_blob(person, 5) & ~person
     shadow = np.roll(blob, 30, axis=0)
     seen = observe(person | blob, undecided=shadow)
-    kept, left_out = explained_part(seen, camera, body, pose, 0)
+    kept, left_out = explained_part(seen, lines(camera, body, pose), 0)
     np.testing.assert_array_equal(kept.mask, person)
     np.testing.assert_array_equal(kept.undecided, shadow)
     assert left_out == 144

@@ -15,7 +15,7 @@ from markerless_tracker.tracking.partitions.frame import LIMB_SWARM, frame_stage
 
 BODIES = {
     name: load_body(name, 1.75)
-    for name in ("balan31", "person31", "person35", "humaneva34", "person34")
+    for name in ("balan31", "person31", "person32", "person35", "humaneva34", "person34")
 }
 SIX = ["root", "torso_head", "l_arm", "r_arm", "l_leg", "r_leg"]
 
