@@ -28,6 +28,10 @@ from markerless_tracker.tracking.start.recombination import Recombiner
 
 ROTATION_NS = 60_000_000
 """One limb that is not lost is searched elsewhere this often: every fourth frame at 60 frames/s."""
+WAIT_NS = 16_000_000
+"""Time before a limb near unexplained silhouette is searched again, after a search without gain."""
+_DOUBLINGS = 3
+"""That time doubles with each search without gain, so often."""
 _ALONG = np.linspace(0.1, 0.9, 5)
 
 
@@ -48,6 +52,7 @@ class LimbWatch:
         self._next = 0
         self._unexplained = 0
         self._rotated_ns: int | None = None
+        self._waits: dict[str, tuple[int, int]] = {}
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -97,6 +102,8 @@ class LimbWatch:
         """
         body, config = searcher.body, searcher.config
         unexplained = look_unexplained(body, pose, observations, self._rig)
+        if not unexplained.limbs:
+            self._waits.clear()
         due = self._due(body, stamp_ns, unexplained.limbs)
         if not due:
             return pose, ()
@@ -116,6 +123,10 @@ class LimbWatch:
             if other_cost < cost - config.min_improvement:
                 pose, cost = other, other_cost
                 found.append(name)
+                self._waits.pop(name, None)
+            else:
+                fruitless = min(self._waits.get(name, (0, 0))[0] + 1, 1 + _DOUBLINGS)
+                self._waits[name] = (fruitless, stamp_ns)
         return pose, tuple(found)
 
     def _due(self, body: BodyModel, stamp_ns: int, unexplained: tuple[str, ...]) -> list[str]:
@@ -124,7 +135,11 @@ class LimbWatch:
             return []
         lost = [
             *self.lost,
-            *(name for name in self._suspects(unexplained) if name not in self.lost),
+            *(
+                name
+                for name in self._suspects(unexplained)
+                if name not in self.lost and not self._waiting(name, stamp_ns)
+            ),
         ]
         if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < ROTATION_NS:
             return lost
@@ -132,6 +147,11 @@ class LimbWatch:
         name = body.limbs[self._next % len(body.limbs)]
         self._next += 1
         return lost if name in lost else [*lost, name]
+
+    def _waiting(self, name: str, stamp_ns: int) -> bool:
+        fruitless, searched_ns = self._waits.get(name, (0, 0))
+        since_ns = stamp_ns - searched_ns
+        return fruitless > 0 and 0 <= since_ns < WAIT_NS * 2**fruitless
 
     def _suspects(self, unexplained: tuple[str, ...]) -> list[str]:
         """The likeliest limb, and the others in rotation while silhouette stays unexplained."""

@@ -10,7 +10,12 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
-from markerless_tracker.tracking.limbs.watch import ROTATION_NS, LimbWatch, inside_fractions
+from markerless_tracker.tracking.limbs.watch import (
+    ROTATION_NS,
+    WAIT_NS,
+    LimbWatch,
+    inside_fractions,
+)
 from markerless_tracker.tracking.loss import LIMB_LOST_BELOW, LIMB_REGAINED_ABOVE
 from markerless_tracker.tracking.search import Searcher
 
@@ -165,6 +170,7 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
         ("other_limb", lambda _f, _r, at, limb, *_: searched.append(limb.tobytes()) or (at, 9.0)),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.watch.{name}", value)
+    monkeypatch.setattr("markerless_tracker.tracking.limbs.watch.WAIT_NS", 0)
     searcher, watch, searched = searcher_of(scene), LimbWatch(scene.rig), []
     contours = contours_of(searcher, seen, pose)
     watch.recover(searcher, contours, seen, 0, pose)
@@ -174,6 +180,24 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
     name_of = {scene.body.subspaces[name].tobytes(): name for name in limbs}
     names = [name_of[limb] for limb in searched]
     assert names[::2] == ["r_leg"] * 3 and set(names[1::2]) == {"l_leg", "r_arm", "l_arm"}
+
+
+def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monkeypatch) -> None:
+    scene, seen, pose, _ = balancing
+    searched: list[int] = []
+    for name, value in (
+        ("look_unexplained", lambda *_: Unexplained(("r_leg",), {})),
+        ("other_limb", lambda _f, _r, at, limb, *_: searched.append(now) or (at, 9.0)),
+        ("ROTATION_NS", 10**12),
+    ):
+        monkeypatch.setattr(f"markerless_tracker.tracking.limbs.watch.{name}", value)
+    searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
+    contours = contours_of(searcher, seen, pose)
+    for now in range(0, 40 * WAIT_NS, WAIT_NS):
+        watch.recover(searcher, contours, seen, now, pose)
+    # Once more at first: the next limb in rotation.
+    frames = sorted({at // WAIT_NS for at in searched})
+    assert frames == [0, 2, 6, 14, 30]
 
 
 def test_the_same_search_gives_the_same_bytes_with_any_number_of_threads(standing) -> None:
