@@ -1,5 +1,6 @@
 """Files for OpenSim, read by OpenSim's own wheel."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,17 @@ from markerless_tracker.body import markers
 from markerless_tracker.cli.main import main
 from markerless_tracker.results.read import read_result
 
+# The wheel takes over LD_LIBRARY_PATH, with which later processes no longer find ROS 2.
+_ENVIRONMENT = dict(os.environ)
 opensim = pytest.importorskip("opensim", reason="opensim is not installed")
+os.environ.clear()
+os.environ.update(_ENVIRONMENT)
 opensim.Logger.removeFileSink()
+
+
+def test_importing_the_wheel_leaves_the_environment_as_it_was() -> None:
+    for name in ("LD_LIBRARY_PATH", "PATH", "SIMBODY_HOME"):
+        assert os.environ.get(name) == _ENVIRONMENT.get(name)
 
 
 @pytest.fixture
