@@ -134,6 +134,7 @@ class FrameSearch:
         self._stamp_ns = stamp_ns
         self._views = searcher.fitness.lay_out(observations)
         self._contours: ContourFrame | None = None
+        self._terms: tuple[FloatArray, dict[str, ViewTerms]] | None = None
         self._whole: Comparison | None = None
         self._costs_of: Callable[[FloatArray], FloatArray] | None = None
 
@@ -186,7 +187,9 @@ class FrameSearch:
 
     def terms(self) -> dict[str, ViewTerms]:
         """How well the estimate explains each view."""
-        return self._searcher.fitness.terms(self._views, self.pose)
+        if self._terms is None or not np.array_equal(self._terms[0], self.pose):
+            self._terms = self.pose.copy(), self._searcher.fitness.terms(self._views, self.pose)
+        return self._terms[1]
 
     def _swarm(self, stage: Stage) -> tuple[FloatArray, float | None]:
         """The pose (p,) that a swarm finds, and its cost if that is known."""

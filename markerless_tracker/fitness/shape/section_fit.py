@@ -1,5 +1,7 @@
 """Sections and offsets of the cones, fitted to silhouettes at known poses."""
 
+from collections.abc import Generator
+
 import numpy as np
 
 from markerless_tracker.body import BodyModel
@@ -7,6 +9,7 @@ from markerless_tracker.fitness.contour import ContourFrame, normal_equations, o
 from markerless_tracker.fitness.shape.sections import Sections
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
+from markerless_tracker.optim.gauss_newton import truncations
 
 ITERATIONS = 12
 TRUNCATION_M = (0.10, 0.04)
@@ -33,28 +36,59 @@ def fit_shape(
         frames: contour evidence of some frames and the pose (p,) in each.
         tightness: factor of the prior's precision.
     """
-    sections = Sections(body)
-    scale = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * len(frames))
+    weighted = [(contours, pose, 1.0) for contours, pose in frames]
+    fitting = shape_fitting(
+        body, weighted, start=body, tightness=tightness, iterations=ITERATIONS,
+        truncation_m=TRUNCATION_M,
+    )  # fmt: skip
+    while True:
+        try:
+            next(fitting)
+        except StopIteration as end:
+            fitted: BodyModel = end.value
+            return fitted
 
-    def equations(shape: FloatArray, truncation_m: float) -> tuple[FloatArray, FloatArray]:
-        hessian, slope = np.zeros((sections.size, sections.size)), np.zeros(sections.size)
+
+def shape_fitting(
+    body: BodyModel,
+    frames: list[tuple[ContourFrame, FloatArray, float]],
+    *,
+    start: BodyModel,
+    iterations: int,
+    truncation_m: tuple[float, float],
+    tightness: float = 1.0,
+) -> Generator[None, None, BodyModel]:
+    """As `fit_shape`, in pieces: yields after each frame of each iteration.
+
+    Args:
+        body: the body with generic sections.
+        frames: contour evidence of some frames, the pose (p,) in each, and its weight.
+        start: the body with the sections to begin with.
+        iterations: Gauss-Newton steps.
+        truncation_m: residuals beyond it are outliers, in the first and in the last step.
+        tightness: factor of the prior's precision.
+
+    Returns:
+        The body with the fitted sections.
+    """
+    sections = Sections(body)
+    prior = Prior(sections.generic, tightness / sections.prior_sd**2)
+    scale = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * sum(weight for _, _, weight in frames))
+    shape = sections.of(start)
+    for reach_m in truncations(*truncation_m, iterations):
         shaped = sections.put(body, shape)
-        for frame, pose in frames:
-            frame.collect(pose, truncation_m, shaped)
+        hessian, slope = np.zeros((sections.size, sections.size)), np.zeros(sections.size)
+        for frame, pose, weight in frames:
+            frame.collect(pose, float(reach_m), shaped)
             rows = outline_rows(frame)
             slopes = sections.slopes(shaped, pose, rows)
             one = normal_equations(slopes, rows.weight, rows.value)
-            hessian += one[0]
-            slope += one[1]
-        return hessian * scale, slope * scale
-
-    prior = Prior(sections.generic, tightness / sections.prior_sd**2)
-    fitted = refine(
-        equations,
-        sections.generic,
-        priors=(prior,),
-        bounds=sections.bounds,
-        iterations=ITERATIONS,
-        truncation=TRUNCATION_M,
-    )
-    return sections.put(body, fitted)
+            hessian += weight * scale * one[0]
+            slope += weight * scale * one[1]
+            yield
+        sums = hessian, slope
+        shape = refine(
+            lambda _, __, sums=sums: sums, shape, priors=(prior,), bounds=sections.bounds,
+            iterations=1, truncation=(float(reach_m), float(reach_m)),
+        )  # fmt: skip
+    return sections.put(body, shape)

@@ -1,13 +1,13 @@
 """The body of the tracked person: what is known of it, and what remains to be fitted."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.shape.section_fit import fit_shape
+from markerless_tracker.fitness.shape.section_fit import TRUNCATION_M, fit_shape, shape_fitting
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
@@ -21,6 +21,11 @@ from markerless_tracker.tracking.search import FrameSearch, Searcher
 
 START_FRAMES = 30
 """Frames that may disagree with a given start pose before tracking goes on without a fit."""
+REVISION_STEPS = 4
+"""Gauss-Newton steps of a revision, which begins with the sections so far."""
+PIECES = 2
+"""A revision goes on in each tracked frame by so many pieces: none takes much longer than others.
+A piece is one step's sums over one of the frames that are fitted to."""
 
 SearcherFor = Callable[[BodyModel], Searcher]
 
@@ -71,6 +76,7 @@ class BodyEstimate:
         self.sized = None if self._person is None else self._person.sized
         self._disagreeing = 0
         self._varied: VariedFrames | None = None
+        self._revision: Generator[None, None, BodyModel] | None = None
         self._reported = False
         self._lengths: BodyFitting | None = None
         if self._person is not None and self._fits_sections and self._config.fit_lengths:
@@ -132,10 +138,13 @@ class BodyEstimate:
         Returns:
             If `body` has changed: how far (p,) its poses lie from those tracked so far.
         """
+        if self._revision is not None:
+            return self._go_on(self._revision)
         if not _agrees(search):
             return None
         if self.sections_fitted and self._lengths is None:
-            return self._revise_sections(search)
+            self._revise_sections(search)
+            return None
         if not self.sections_fitted:
             self.body = fit_shape(self.body, [(search.contours, search.pose)])
             self.sections_fitted = True
@@ -148,12 +157,25 @@ class BodyEstimate:
         self.body = fitted.body
         return fitted.moved
 
-    def _revise_sections(self, search: FrameSearch) -> FloatArray | None:
-        """Fit the sections to this frame as well, if its pose shows something new."""
+    def _revise_sections(self, search: FrameSearch) -> None:
+        """Begin to fit the sections to this frame as well, if its pose shows something new."""
         if self._varied is None or not self._varied.takes(search.pose, self.body):
-            return None
-        self.body = fit_shape(self._varied.prior, self._varied.add(search.contours, search.pose))
-        return np.zeros(self.body.size)
+            return
+        self._revision = shape_fitting(
+            self._varied.prior, self._varied.add(search.contours, search.pose), start=self.body,
+            iterations=REVISION_STEPS, truncation_m=(TRUNCATION_M[1], TRUNCATION_M[1]),
+        )  # fmt: skip
+
+    def _go_on(self, revision: Generator[None, None, BodyModel]) -> FloatArray | None:
+        """Go on with a fit of the sections; returns as `fit_tracked_frame` once it is complete."""
+        try:
+            for _ in range(PIECES):
+                next(revision)
+        except StopIteration as end:
+            self._revision = None
+            self.body = end.value
+            return np.zeros(self.body.size)
+        return None
 
     def warm_up(
         self,

@@ -10,7 +10,7 @@ MOST = 8
 """Frames that are kept."""
 VARIETY_RAD = 0.2
 """Root mean square difference of the joints' angles from which on a pose is another one."""
-FIRST_WEIGHT = 5
+FIRST_WEIGHT = 5.0
 """Weight of the first frame, relative to each later one."""
 
 
@@ -37,7 +37,8 @@ class VariedFrames:
 
     def add(
         self, contours: ContourFrame, pose: FloatArray
-    ) -> list[tuple[ContourFrame, FloatArray]]:
-        """Keep a frame; returns all for `fit_shape`."""
+    ) -> list[tuple[ContourFrame, FloatArray, float]]:
+        """Keep a frame; returns all, weighted, for `shape_fitting`."""
         self._frames.append((contours, pose))
-        return [self._frames[0]] * (FIRST_WEIGHT - 1) + self._frames
+        first, *others = self._frames
+        return [(*first, FIRST_WEIGHT), *((*other, 1.0) for other in others)]
