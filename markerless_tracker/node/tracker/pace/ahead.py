@@ -11,7 +11,8 @@ from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronize
 
 _RECENT = 0.2
 _SPARE_S = 0.002
-_STALE = 2
+STALE_S = 0.15
+"""Age from which on a set whose evidence is ready is left out, if a newer one is complete."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Ahead:
     """Takes the newest set and makes its evidence, in a thread beside the one that fits.
 
     The set is taken as late as its evidence will be ready when the fit ends, so that it is the
-    newest. One that waited while two newer ones became complete is left out.
+    newest. One that waited for longer than `STALE_S` is left out if a newer one is complete.
 
     Args:
         sets: source of the complete sets.
@@ -65,7 +66,7 @@ class Ahead:
         """The set to fit now; None if none came in time."""
         following, self._following = self._following, None
         taken = self._take(0.0) if following is None else following.result()
-        if taken is not None and self._sets.newer >= _STALE:
+        if taken is not None and self._sets.newer and self._age_s(taken) >= STALE_S:
             self._sets.note_skipped()
             taken = self._take(0.0)
         return taken
@@ -81,6 +82,9 @@ class Ahead:
         """The fit ended."""
         self._fit_s += _RECENT * (self._clock() - self._began_s - self._fit_s)
         self._fitted.set()
+
+    def _age_s(self, taken: Taken) -> float:
+        return self._clock() - taken.matched.arrived_s
 
     def close(self) -> None:
         """Take no more sets."""
