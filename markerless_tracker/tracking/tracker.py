@@ -18,12 +18,7 @@ from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.assess import Assessor, Found, Seen
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
-from markerless_tracker.tracking.evidence.prepared import (
-    Lookahead,
-    Outlook,
-    Prepared,
-    SeenView,
-)
+from markerless_tracker.tracking.evidence.prepared import Lookahead, Outlook, Prepared, SeenView
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
 from markerless_tracker.tracking.limits import check_pose, joint_speeds
@@ -91,12 +86,14 @@ class Tracker:
         # Refuses a budget that cannot be spent before the first frame comes.
         frame_stages(body, config, start, body.sigma)
         threads = config.threads or os.cpu_count() or 1
-        pool = ThreadPoolExecutor(max_workers=min(threads, len(rig)))
-        self._searcher_for = partial(
-            make_searcher, rig=rig, config=config, threads=threads, mapper=pool.map
-        )
+        # One thread is left to the evidence of the next set.
+        beside = max(1, threads - 1)
+        mapper = ThreadPoolExecutor(min(beside, len(rig))).map if beside > 1 else map
+        searcher_for = partial(make_searcher, rig=rig, config=config, mapper=mapper)
+        self._searcher_for = partial(searcher_for, threads=beside)
+        self._starter_for = partial(searcher_for, threads=threads)
         self._searcher = self._searcher_for(body)
-        self._evidence = EvidenceMaker(rig, config, backgrounds or {}, pool)
+        self._evidence = EvidenceMaker(rig, config, backgrounds or {}, mapper)
         self._views = ViewWatch(rig)
         self._motion = MotionModel(start, config)
         self._assessor = Assessor(rig, body, config)
@@ -288,7 +285,7 @@ class Tracker:
         start = starter.step(seen.believed, seen.stamp_ns)
         if start is None:
             return None
-        self._searcher = start.searcher
+        self._searcher = self._searcher_for(start.searcher.body)
         self._body.take_found(start.searcher.body, settled=start.settled)
         search = self._searcher.frame(start.observations, seen.stamp_ns, start.pose)
         if start.settled:
@@ -345,6 +342,6 @@ class Tracker:
 
     def _new_starter(self, last_pose: FloatArray | None = None) -> Starter:
         return Starter(
-            self.rig, self.body, self._searcher_for, self._evidence.select,
+            self.rig, self.body, self._starter_for, self._evidence.select,
             sized=self._body.sized, fit_shape=not self._body.sections_fitted, last_pose=last_pose,
         )  # fmt: skip

@@ -1,7 +1,7 @@
 """The views of one time to the evidence of the tracked body, cameras side by side."""
 
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class EvidenceMaker:
         rig: the cameras.
         config: settings of the imaging and the selection.
         backgrounds: the empty scene per camera; cameras without one take observations only.
-        pool: threads that the cameras share.
+        mapper: `map`, or a thread pool's: for the cameras.
 
     Raises:
         ImageError: a background does not fit its camera.
@@ -40,7 +40,7 @@ class EvidenceMaker:
         rig: CameraRig,
         config: TrackerConfig,
         backgrounds: Mapping[str, BackgroundModel],
-        pool: ThreadPoolExecutor,
+        mapper: Callable[..., Iterable[Any]],
     ) -> None:
         self._rig = rig
         self._config = config
@@ -49,7 +49,7 @@ class EvidenceMaker:
         self._every = config.region.full_frame_every
         self._follows = config.background.follow_s > 0.0
         self._three_classes = config.shadow.undecided
-        self._pool = pool
+        self._mapper = mapper
         self.segmenters: dict[str, Segmenter] = {}
         self.take_backgrounds(backgrounds)
 
@@ -104,12 +104,12 @@ class EvidenceMaker:
                 return SeenView(view, None, None, None)
             return self._segmented(name, view, stamp_ns, regions[name], outlook.number)
 
-        each: Callable[..., Iterable[SeenView]] = map if ahead else self._pool.map
+        each: Callable[..., Iterable[SeenView]] = map if ahead else self._mapper
         return dict(zip(views, each(one, views), strict=True))
 
     def whole(self, seen: Mapping[str, SeenView], stamp_ns: int) -> dict[str, Observation]:
         """Observations of the whole views, as they are."""
-        found = self._pool.map(lambda name: self._whole(name, seen[name], stamp_ns), seen)
+        found = self._mapper(lambda name: self._whole(name, seen[name], stamp_ns), seen)
         return dict(zip(seen, found, strict=True))
 
     def _segmented(
@@ -168,7 +168,7 @@ class EvidenceMaker:
             name, observation = item
             return explained_part(observation, body_lines(self._rig[name], cones), self._margin_px)
 
-        return _kept(dict(zip(observed, self._pool.map(part, observed.items()), strict=True)))
+        return _kept(dict(zip(observed, self._mapper(part, observed.items()), strict=True)))
 
     def gather(
         self,
@@ -198,7 +198,7 @@ class EvidenceMaker:
                     return found
             return explained_part(self._whole(name, view, stamp_ns), lines, self._margin_px)
 
-        return _kept(dict(zip(seen, self._pool.map(evidence, seen), strict=True)))
+        return _kept(dict(zip(seen, self._mapper(evidence, seen), strict=True)))
 
     def regions(self, outlook: Outlook, stamp_ns: int) -> dict[str, Region | None]:
         """Region of each camera in the step after the next one: body and margin; None = all."""
