@@ -15,6 +15,8 @@ AIMED, AIMED_OF = 60, 1000
 """Where silhouette is unexplained: further draws that reach there, the best of so many."""
 LAYERS = (0.4, 0.2)
 """Then the best are varied, twice, by these fractions of the prior's standard deviations."""
+HOPELESS = 0.03
+"""The refinement of a limb that is so much worse than what is of use is spared."""
 _PARENTS, _CHILDREN = 6, 10
 _REFINE = (3, (0.12, 0.035))
 """Iterations of the refinement of the best, and truncation (m) of the first and the last."""
@@ -27,6 +29,7 @@ def other_limb(
     limb: IntArray,
     rng: np.random.Generator,
     aim: Callable[[FloatArray, int], FloatArray] | None = None,
+    most_cost: float = np.inf,
 ) -> tuple[FloatArray, float]:
     """The best pose (p,) that is found with a limb elsewhere, and its cost 1 - f_s.
 
@@ -39,6 +42,7 @@ def other_limb(
         pose: (p,) where the rest of the body is.
         limb: the limb's parameters.
         rng: draws.
+        most_cost: only a lower one is of use.
         aim: keeps those poses, of many and at most so many, that reach where the limb may be; first
             draws are chosen by it, too.
     """
@@ -55,13 +59,19 @@ def other_limb(
             recombiner.with_limb(pose, limb, AIMED_OF // 2, rng),
         ]
         poses = np.concatenate([poses, aim(np.concatenate(many), AIMED)])
-    costs = frame.costs(poses)
-    for fraction in LAYERS:
+    costs_of = frame.limb_costs(pose, limb)
+    costs = costs_of(poses[:, limb])
+    for layer, fraction in enumerate(LAYERS, 1):
         best = np.argsort(costs, kind="stable")[:_PARENTS]
         near = recombiner.with_limb_near(
             np.repeat(poses[best], _CHILDREN, axis=0), limb, fraction, rng
         )
+        # Of the last layer only the best counts, of the others the parents.
+        cutoff = costs[best[0 if layer == len(LAYERS) else -1]]
         poses = np.concatenate([poses[best], near])
-        costs = np.concatenate([costs[best], frame.costs(near)])
+        more = costs_of(near[:, limb], np.full(len(near), cutoff))
+        costs = np.concatenate([costs[best], more])
+    if costs.min() > most_cost + HOPELESS:
+        return pose, float(costs.min())
     refined = frame.refined(poses[[int(costs.argmin())]], *_REFINE)
     return refined[0], float(frame.costs(refined)[0])

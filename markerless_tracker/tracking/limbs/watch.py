@@ -119,7 +119,7 @@ class LimbWatch:
                 aim = partial(
                     most_aimed, body, limb=limb, regions=unexplained.regions, rig=self._rig
                 )
-            other, other_cost = other_limb(frame, recombiner, pose, limb, rng, aim)
+            other, other_cost = other_limb(frame, recombiner, pose, limb, rng, aim, cost)
             if other_cost < cost - config.min_improvement:
                 pose, cost = other, other_cost
                 found.append(name)

@@ -1,13 +1,15 @@
 """Several poses that explain one frame, better and better: recombined, refined, selected."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.anatomy import heading, heading_difference
+from markerless_tracker.body.model import IntArray
+from markerless_tracker.fitness import Evaluator
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.fitness.threads import side_by_side, usable_threads
 from markerless_tracker.geometry import FloatArray
@@ -156,6 +158,14 @@ class FramePopulation:
         """1 - f_s (n,) of poses (n, p); infinite where there is none."""
         costs = self._costs(poses)
         return np.where(np.isfinite(costs), costs, np.inf)
+
+    def limb_costs(self, pose: FloatArray, limb: IntArray) -> Evaluator:
+        """Gives 1 - f_s (n,) of a limb's parameters (n, d) with the rest of a pose (p,).
+
+        The rest of the body is drawn once.
+        """
+        whole = Comparison.whole(pose, len(self._searcher.body.cone_names))
+        return self._searcher.fitness.prepare(self.contours.views, replace(whole, active=limb))
 
     def refined(
         self, poses: FloatArray, iterations: int, truncation: tuple[float, float]
