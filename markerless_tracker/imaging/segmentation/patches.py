@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.imaging.segmentation.kernels import WEAK
 
+STEPS = 16
+"""Differences are compared in this part of a grey level."""
+
 
 @inlined
 def _mirrored(v, count):  # type: ignore[no-untyped-def]
@@ -21,25 +24,27 @@ def _mirrored(v, count):  # type: ignore[no-untyped-def]
     return v
 
 
+# Loops over one row of integers each, which the compiler vectorises. Sums of integers are exact in
+# any order, so that a patch has the same mean whatever rows were summed before.
 @kernel
 def _take_plain(label, plain, old, total):  # type: ignore[no-untyped-def]
     """Row of background pixels, 1 or 0; the column sums ``total`` lose the row ``old`` for it."""
     for j in range(label.size):
         # Weak pixels were background before.
-        one = np.float32(1.0) if (label[j] == 0) | (label[j] == WEAK) else np.float32(0.0)
-        total[j] += np.float64(one - old[j])
+        one = np.int32((label[j] == 0) | (label[j] == WEAK))
+        total[j] += one - old[j]
         old[j] = one
         plain[j] = one
 
 
 @kernel
 def _take_differences(value, mean, gain, plain, old, total):  # type: ignore[no-untyped-def]
-    """As `_take_plain`, of a row's differences from the background."""
-    white = np.float32(255.0)
+    """As `_take_plain`, of a row's differences from the background, in steps of 1 / `STEPS`."""
+    white = np.float32(255.0 * STEPS)
     for j in range(plain.size):
-        new = (np.float32(value[j]) - min(gain * mean[j], white)) * plain[j]
-        # Sums of differences of float32 are exact in float64, in any order.
-        total[j] += np.float64(new) - np.float64(old[j])
+        base = np.int32(min(gain * mean[j], white) + np.float32(0.5))
+        new = (np.int32(STEPS) * np.int32(value[j]) - base) * plain[j]
+        total[j] += new - old[j]
         old[j] = new
 
 
@@ -69,25 +74,24 @@ def _mirror_ends(row, radius):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _limits(count, share, limit, least_share, out):  # type: ignore[no-untyped-def]
+def _limits(count, limit, least, out):  # type: ignore[no-untyped-def]
     for j in range(out.size):
-        out[j] = limit * max(np.float32(count[j] * share), least_share)
+        out[j] = max(limit * count[j], least)
 
 
 @kernel
-def _mark_beyond(patch, share, limit, label):  # type: ignore[no-untyped-def]
+def _mark_beyond(patch, limit, label):  # type: ignore[no-untyped-def]
     for j in range(label.size):
-        far = abs(np.float32(patch[j] * share)) > limit[j]
+        far = abs(patch[j]) > limit[j]
         label[j] = np.uint8(WEAK) if far & (label[j] == 0) else label[j]
 
 
 @kernel
-def _weak_rows(planes, mean, gain, radius, limit, least_share, left, top, rings, total, labels):  # type: ignore[no-untyped-def]
+def _weak_rows(planes, mean, gain, radius, limit, least, left, top, rings, total, labels):  # type: ignore[no-untyped-def]
     """See `mark_weak`; planes (c, a, b), rings (side + 1, c + 1, b), total (c + 2, b + 2 r)."""
     channels = planes.shape[0]
     rows, columns = labels.shape
     side = 2 * radius + 1
-    share = 1.0 / np.float64(side * side)
     plain, limits = rings[side, 0], rings[side, 1]
     patch = total[channels + 1, :columns]
     last = radius + columns
@@ -97,17 +101,18 @@ def _weak_rows(planes, mean, gain, radius, limit, least_share, left, top, rings,
         _take_plain(labels[v], plain, old[channels], total[channels, radius:last])
         for c in range(channels):
             base = mean[c, top + v, left : left + columns]
-            _take_differences(planes[c, v], base, gain[c], plain, old[c], total[c, radius:last])
+            steps = gain[c] * np.float32(STEPS)
+            _take_differences(planes[c, v], base, steps, plain, old[c], total[c, radius:last])
         i = s - radius
         if i < 0:
             continue
         _mirror_ends(total[channels], radius)
         _sum_patches(total[channels], side, patch)
-        _limits(patch, share, limit, least_share, limits)
+        _limits(patch, limit, least, limits)
         for c in range(channels):
             _mirror_ends(total[c], radius)
             _sum_patches(total[c], side, patch)
-            _mark_beyond(patch, share, limits, labels[i])
+            _mark_beyond(patch, limits, labels[i])
 
 
 def mark_weak(
@@ -137,9 +142,10 @@ def mark_weak(
     """
     channels, _, columns = planes.shape
     side = 2 * radius + 1
-    rings = np.zeros((side + 1, max(channels + 1, 2), columns), dtype=np.float32)
-    total = np.zeros((channels + 2, columns + 2 * radius), dtype=np.float64)
+    rings = np.zeros((side + 1, max(channels + 1, 2), columns), dtype=np.int32)
+    total = np.zeros((channels + 2, columns + 2 * radius), dtype=np.int32)
+    steps = np.int32(round(STEPS * limit))
     _weak_rows(
-        planes, mean, gain, radius, np.float32(limit), np.float32(least_share), corner[0],
+        planes, mean, gain, radius, steps, np.int32(least_share * side * side * steps), corner[0],
         corner[1], rings, total, labels,
     )  # fmt: skip

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.imaging.segmentation.kernels import WEAK
-from markerless_tracker.imaging.segmentation.patches import mark_weak
+from markerless_tracker.imaging.segmentation.patches import STEPS, mark_weak
 
 LEFT, TOP = 4, 3
 
@@ -15,13 +15,15 @@ def twin(image, mean, gain, labels, *, radius, limit):
     rows, columns = labels.shape
     side = (2 * radius + 1, 2 * radius + 1)
     plain = labels == 0
-    share = cv2.boxFilter(plain.astype(np.float32), cv2.CV_32F, side)
+    count = cv2.boxFilter(plain.astype(np.float64), cv2.CV_64F, side, normalize=False)
+    least = np.floor(0.5 * side[0] ** 2 * STEPS * limit)
     weak = np.zeros(labels.shape, bool)
     for c in range(image.shape[2]):
         base = mean[c, TOP : TOP + rows, LEFT : LEFT + columns]
-        plane = image[:, :, c].astype(np.float32) - np.minimum(gain[c] * base, np.float32(255.0))
-        smooth = cv2.boxFilter(plane * plain, cv2.CV_32F, side)
-        weak |= np.abs(smooth) > np.float32(limit) * np.maximum(share, np.float32(0.5))
+        base = np.minimum(gain[c] * np.float32(STEPS) * base, np.float32(255.0 * STEPS))
+        plane = STEPS * image[:, :, c].astype(np.float64) - np.floor(base + np.float32(0.5))
+        total = cv2.boxFilter(plane * plain, cv2.CV_64F, side, normalize=False)
+        weak |= np.abs(total) > np.maximum(STEPS * limit * count, least)
     return np.where(weak & plain, WEAK, labels).astype(np.uint8)
 
 
