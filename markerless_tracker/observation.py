@@ -27,10 +27,10 @@ def pack_mask(mask: NDArray[Any]) -> MaskWords:
     Column u is bit ``u % 64`` (least significant first) of word ``u // 64``; padding bits are 0.
     """
     height, width = mask.shape
-    packed = np.zeros((height, (width + 63) // 64 * 8), dtype=np.uint8)
-    bits = np.packbits(mask != 0, axis=1, bitorder="little")
-    packed[:, : bits.shape[1]] = bits
-    return packed.view("<u8").astype(np.uint64, copy=False)
+    padded = np.zeros((height, (width + 63) // 64 * 64), dtype=np.bool_)
+    np.not_equal(mask, 0, out=padded[:, :width])
+    packed = np.packbits(padded, bitorder="little").view("<u8")
+    return packed.astype(np.uint64, copy=False).reshape(height, -1)
 
 
 def unpack_mask(words: MaskWords, width: int) -> NDArray[np.bool_]:
@@ -131,12 +131,6 @@ class Observation:
         frame = np.zeros((height, width), dtype=part.dtype)
         frame[v : v + self.height, u : u + self.width] = part
         return frame
-
-    def words_in_full_frame(self, words: MaskWords) -> MaskWords:
-        """As `in_full_frame`, of a packed mask of the region."""
-        if self.edges.shape == self.size_px[::-1]:
-            return words
-        return pack_mask(self.in_full_frame(unpack_mask(words, self.width)))
 
     @classmethod
     def from_mask(

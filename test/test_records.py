@@ -97,7 +97,6 @@ def test_a_region_in_the_full_frame(
     seen = Observation.from_mask("cam01", 5, mask, edges, size_px=size, offset_px=(u, v))
     frame = seen.in_full_frame(seen.mask)
     np.testing.assert_array_equal(frame, np.pad(mask, ((v, below), (u, right))))
-    np.testing.assert_array_equal(seen.words_in_full_frame(seen.mask_words), pack_mask(frame))
     assert seen.in_full_frame(edges).sum() == 7 * mask.size
     if size == (width, height):
         assert seen.in_full_frame(edges) is edges

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +12,10 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import BodyModelError, ImageError
 from markerless_tracker.fitness.raster.bits import ALL, count_bits
+from markerless_tracker.fitness.raster.mask_words import paste_words
 from markerless_tracker.fitness.raster.outline_arrays import LANES
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation
+from markerless_tracker.records import MaskWords, Observation
 
 
 class BodyArrays(NamedTuple):
@@ -112,21 +114,52 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
                 f"{camera.name}: observation of a {_size(observation.size_px)} frame, "
                 f"its calibration says {_size(camera.size_px)}"
             )
-        masks.append(observation.words_in_full_frame(observation.mask_words))
-        edges.append(observation.in_full_frame(observation.edges))
+        masks.append(_in_full_frame(observation, observation.mask_words))
+        edges.append(_edges(observation))
         if observation.undecided_words is None:
             known.append(np.full(masks[-1].shape, ALL))
         else:
-            known.append(~observation.words_in_full_frame(observation.undecided_words))
+            known.append(~_in_full_frame(observation, observation.undecided_words))
     arrays = camera_arrays(seen)._replace(
         mask=np.concatenate([mask.T.ravel() for mask in masks]),
         mask_start=_starts(masks),
-        edges=np.concatenate([edge.ravel() for edge in edges]),
+        edges=_joined(edges),
         edge_start=_starts(edges),
         observed=np.array([count_bits(mask) for mask in masks], dtype=np.int64),
         known=np.concatenate([words.T.ravel() for words in known]),
     )
     return Views(tuple(camera.name for camera in seen), arrays)
+
+
+def _in_full_frame(observation: Observation, words: MaskWords) -> MaskWords:
+    """A packed mask of an observation's region as one of the full frame."""
+    (width, height), (left, top) = observation.size_px, observation.offset_px
+    if (observation.width, observation.height) == (width, height):
+        return words
+    frame = np.empty((height, (width + 63) // 64), dtype=np.uint64)
+    paste_words(words, -left, -top, width, frame)
+    return frame
+
+
+def _edges(observation: Observation) -> NDArray[np.uint8]:
+    """The edge map (h, w) of the full frame."""
+    if observation.edges.any():
+        return np.asarray(observation.in_full_frame(observation.edges))
+    return _no_edges(observation.size_px)
+
+
+@cache
+def _no_edges(size_px: tuple[int, int]) -> NDArray[np.uint8]:
+    """An edge map (h, w) without edges; not to be changed."""
+    return np.zeros(size_px[::-1], dtype=np.uint8)
+
+
+def _joined(edges: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """Edge maps of views, one after the other; none of them is copied if all are without edges."""
+    sizes = [edge.size for edge in edges]
+    if all(edge is _no_edges(edge.shape[::-1]) for edge in edges):
+        return _no_edges((sum(sizes), 1)).ravel()
+    return np.concatenate([edge.ravel() for edge in edges])
 
 
 def camera_arrays(cameras: Sequence[CameraModel]) -> ViewArrays:

@@ -7,7 +7,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel, Feasibility
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.fitness import Fitness, ViewTerms
-from markerless_tracker.fitness.contour import ContourFrame
+from markerless_tracker.fitness.contour import REACH_M, ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import (
     ALGORITHMS,
@@ -23,6 +23,11 @@ from markerless_tracker.tracking.refinement import pose_prior, refined_on_contou
 from markerless_tracker.tracking.swarms import SWARMS, SwarmSearch
 
 _NEAREST_M = 0.5
+LIMB_M = 0.12
+"""Truncation of the refinement of a limb that is searched elsewhere, in its first step, m."""
+TRACKED_REACH = 1.3
+"""Outlines of a tracked body are compared up to this multiple of the largest truncation: limbs may
+be nearer to a camera than the pelvis."""
 
 
 def make_fitness(
@@ -72,6 +77,7 @@ class Searcher:
         self.cameras: Mapping[str, CameraModel] = {camera.name: camera for camera in rig}
         self.feasible = Feasibility(body, limits, config.collision)
         self.fitness = make_fitness(body, rig, config, threads=threads)
+        self.tracked_reach_m = TRACKED_REACH * max(config.refine.truncation_m, LIMB_M)
         self.particle_sets: dict[str, ParticleSet] = {}
         """What each stage left in the last frame, where its algorithm goes on from that."""
 
@@ -82,12 +88,14 @@ class Searcher:
         predicted: FloatArray,
         *,
         limits: FloatArray | None = None,
+        reach_m: float = REACH_M,
     ) -> "FrameSearch":
         """The search of one frame, around a predicted pose (p,).
 
         Limits (2, p) may be narrower than those of the joints, as what can be reached in time.
+        Outlines farther than `reach_m` from the silhouettes are outliers in any case.
         """
-        return FrameSearch(self, observations, stamp_ns, predicted, limits)
+        return FrameSearch(self, observations, stamp_ns, predicted, limits, reach_m)
 
 
 def make_searcher(
@@ -121,7 +129,9 @@ class FrameSearch:
         stamp_ns: int,
         predicted: FloatArray,
         limits: FloatArray | None = None,
+        reach_m: float = REACH_M,
     ) -> None:
+        self._reach_m = reach_m
         self._limits = searcher.limits if limits is None else limits
         self.pose = predicted if limits is None else np.clip(predicted, *limits)
         self._predicted = predicted
@@ -150,6 +160,7 @@ class FrameSearch:
                 self._views,
                 pixels_per_m=self._pixels_per_m(),
                 step_px=searcher.config.edges.step_px,
+                reach_m=self._reach_m,
                 mapper=searcher.mapper,
             )
         return self._contours

@@ -311,7 +311,9 @@ class Tracker:
         limits = self._motion.reachable(
             stamp_ns, self._searcher.limits, joint_speeds(self._searcher.body, self._motion.pose)
         )
-        search = self._searcher.frame(believed, stamp_ns, predicted, limits=limits)
+        search = self._searcher.frame(
+            believed, stamp_ns, predicted, limits=limits, reach_m=self._searcher.tracked_reach_m
+        )
         sigma = self.body.sigma * self._motion.widening(stamp_ns)
         self._effort.search(search, self.body, self.config, predicted, sigma)
         names: tuple[str, ...] = ()

@@ -3,7 +3,7 @@
 `ContourFrame` compares one frame with poses; `outline_rows` gives the residuals one by one.
 """
 
-from markerless_tracker.fitness.contour.frame import ContourFrame, NormalEquations
+from markerless_tracker.fitness.contour.frame import REACH_M, ContourFrame, NormalEquations
 from markerless_tracker.fitness.contour.outline_rows import (
     OutlineRows,
     outline_rows,
@@ -13,6 +13,7 @@ from markerless_tracker.fitness.contour.outline_rows import (
 from markerless_tracker.fitness.contour.row_kernels import eliminated, normal_equations, solved
 
 __all__ = [
+    "REACH_M",
     "ContourFrame",
     "NormalEquations",
     "OutlineRows",

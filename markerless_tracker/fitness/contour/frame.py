@@ -25,6 +25,8 @@ from markerless_tracker.records import Observation
 
 SPACING_M = 0.02
 """Distance of neighbouring outline points along the outline, m."""
+REACH_M = 0.3
+"""Distance from a silhouette up to which outlines are compared, unless another is given, m."""
 _NO_BOUNDS = np.empty((2, 0))
 
 Mapper = Callable[..., "object"]
@@ -54,6 +56,8 @@ class ContourFrame:
         observations: the evidence of the views, by camera name.
         views: the same views as `lay_out_views` gives them.
         pixels_per_m: size of a metre at the body, px, by camera name.
+        reach_m: distance from a silhouette, at the body, beyond which outlines are outliers in any
+            case.
         step_px: distance outward of an outline point at which no cone may cover the pixel.
         mapper: `map`, or a thread pool's.
     """
@@ -67,6 +71,7 @@ class ContourFrame:
         *,
         pixels_per_m: Mapping[str, float],
         step_px: float = 2.0,
+        reach_m: float = REACH_M,
         mapper: Callable[..., object] = map,
     ) -> None:
         self.body = body
@@ -75,7 +80,8 @@ class ContourFrame:
         self._step_px = step_px
 
         def edge(name: str) -> SilhouetteContour:
-            return silhouette_contour(observations[name], SPACING_M * pixels_per_m[name])
+            scale = pixels_per_m[name]
+            return silhouette_contour(observations[name], SPACING_M * scale, reach_m * scale)
 
         self.contours = join_edges(list(mapper(edge, views.names)))  # type: ignore[call-overload]
         self._allocate()

@@ -1,5 +1,6 @@
 """The edges of silhouettes: signed distances around them, points and normals along them."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -70,10 +71,12 @@ class ContourViews(NamedTuple):
     point_start: NDArray[np.int64]
 
 
-def silhouette_contour(observation: Observation, spacing_px: float) -> SilhouetteContour:
+def silhouette_contour(
+    observation: Observation, spacing_px: float, margin_px: float = _LEAST_MARGIN_PX
+) -> SilhouetteContour:
     """Signed distances around a silhouette, and points along its edge.
 
-    The window is the silhouette's bounding box and a margin of a sixth of its height. The edge
+    The window is the silhouette's bounding box and that margin, at least 24 px. The edge
     runs midway between pixels inside and outside; where the silhouette leaves the frame, and
     around specks, there are no points. The border of person and undecided pixels is no edge: there
     are no points within `UNDECIDED_PX` of undecided pixels, and distances are very large where
@@ -86,7 +89,7 @@ def silhouette_contour(observation: Observation, spacing_px: float) -> Silhouett
         nothing = np.empty((0, 2))
         return SilhouetteContour(np.empty((0, 0), np.float32), 0, 0, nothing, nothing, np.empty(0))
     first, row = first + observation.offset_px[0], row + observation.offset_px[1]
-    margin = max(_LEAST_MARGIN_PX, (rows - 1) // 6)
+    margin = max(_LEAST_MARGIN_PX, math.ceil(margin_px))
     top, bottom = max(0, row - margin), min(height, row + rows + margin)
     left, right = max(0, first - margin), min(width, first + columns + margin)
     box = left, top, right, bottom

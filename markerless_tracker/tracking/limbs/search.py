@@ -6,6 +6,7 @@ import numpy as np
 
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.search import LIMB_M
 from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.recombination import Recombiner
 
@@ -18,7 +19,7 @@ LAYERS = (0.4, 0.2)
 HOPELESS = 0.03
 """The refinement of a limb that is so much worse than what is of use is spared."""
 _PARENTS, _CHILDREN = 6, 10
-_REFINE = (3, (0.12, 0.035))
+_REFINE = (3, (LIMB_M, 0.035))
 """Iterations of the refinement of the best, and truncation (m) of the first and the last."""
 
 
