@@ -30,7 +30,7 @@ ROTATION_NS = 60_000_000
 """One limb that is not lost is searched elsewhere this often: every fourth frame at 60 frames/s."""
 WAIT_NS = 16_000_000
 """Time before a limb near unexplained silhouette is searched again, after a search without gain."""
-_DOUBLINGS = 3
+_DOUBLINGS = 4
 """That time doubles with each search without gain, so often."""
 _ALONG = np.linspace(0.1, 0.9, 5)
 

@@ -1,5 +1,7 @@
 """How much is searched in a frame beside the refinement."""
 
+import numpy as np
+
 from markerless_tracker.body import BodyModel
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
@@ -13,6 +15,8 @@ from markerless_tracker.tracking.search import FrameSearch
 
 WORSE = 0.01
 """A frame is explained badly whose f lies this far below the track's usual one."""
+NEAR = 0.1
+"""A pose is refined once more if a parameter has moved by more than this, rad or m."""
 _MEMORY = 0.05
 
 
@@ -78,10 +82,14 @@ class Effort:
         if config.refinement == "none":
             search.run(frame_stages(body, config, centre, sigma))
             return
+        begin = search.pose
         search.run((contour_stage("align", body, config, centre, sigma),))
-        if self.wants_swarms(search.cost):
+        swarms = self.wants_swarms(search.cost)
+        if swarms:
             search.run(rescue_stages(body, config, centre, sigma))
-        search.run((contour_stage("polish", body, config, centre, sigma),))
+        # A refinement that begins near its end has arrived.
+        if swarms or float(np.abs(search.pose - begin).max()) > NEAR:
+            search.run((contour_stage("polish", body, config, centre, sigma),))
         self.end(search.cost)
 
     def wants_swarms(self, cost: float) -> bool:
