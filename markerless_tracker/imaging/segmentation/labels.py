@@ -126,7 +126,7 @@ class PixelLabeller:
         part = background.pixels(image, window)
         # Pixels that differ by themselves would smear over those beside them.
         mark_weak(
-            np.ascontiguousarray(part.transpose(2, 0, 1)), background.mean[0], self.gain, labels,
+            np.stack(cv2.split(part)), self._first[0][0], self.gain, labels,
             (window.left, window.top), radius=self._patch_radius_px, limit=limit,
             least_share=_LEAST_SHARE,
         )  # fmt: skip

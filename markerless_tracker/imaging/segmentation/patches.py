@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.compiled import inlined, kernel
-from markerless_tracker.imaging.segmentation.kernels import WEAK
+from markerless_tracker.imaging.segmentation.kernels import LEVELS, WEAK
 
 STEPS = 16
 """Differences are compared in this part of a grey level."""
@@ -42,7 +42,7 @@ def _take_differences(value, mean, gain, plain, old, total):  # type: ignore[no-
     """As `_take_plain`, of a row's differences from the background, in steps of 1 / `STEPS`."""
     white = np.float32(255.0 * STEPS)
     for j in range(plain.size):
-        base = np.int32(min(gain * mean[j], white) + np.float32(0.5))
+        base = np.int32(min(gain * np.float32(mean[j]), white) + np.float32(0.5))
         new = (np.int32(STEPS) * np.int32(value[j]) - base) * plain[j]
         total[j] += new - old[j]
         old[j] = new
@@ -101,7 +101,7 @@ def _weak_rows(planes, mean, gain, radius, limit, least, left, top, rings, total
         _take_plain(labels[v], plain, old[channels], total[channels, radius:last])
         for c in range(channels):
             base = mean[c, top + v, left : left + columns]
-            steps = gain[c] * np.float32(STEPS)
+            steps = gain[c] * np.float32(STEPS / LEVELS)
             _take_differences(planes[c, v], base, steps, plain, old[c], total[c, radius:last])
         i = s - radius
         if i < 0:
@@ -117,7 +117,7 @@ def _weak_rows(planes, mean, gain, radius, limit, least, left, top, rings, total
 
 def mark_weak(
     planes: NDArray[np.uint8],
-    mean: NDArray[np.float32],
+    mean: NDArray[np.uint16],
     gain: NDArray[np.float32],
     labels: NDArray[np.uint8],
     corner: tuple[int, int],
@@ -132,7 +132,7 @@ def mark_weak(
 
     Args:
         planes: (c, a, b), channels of a part of an image.
-        mean: (c, h, w) grey levels, the background of the whole image.
+        mean: (c, h, w) the background of the whole image, in steps of 1 / `LEVELS` grey level.
         gain: (c,) brightness of the image relative to the background's.
         labels: (a, b), changed: 0 becomes `WEAK`.
         corner: the part's first column and row in the image.

@@ -4,13 +4,13 @@ import cv2
 import numpy as np
 import pytest
 
-from markerless_tracker.imaging.segmentation.kernels import WEAK
+from markerless_tracker.imaging.segmentation.kernels import LEVELS, WEAK
 from markerless_tracker.imaging.segmentation.patches import STEPS, mark_weak
 
 LEFT, TOP = 4, 3
 
 
-def twin(image, mean, gain, labels, *, radius, limit):
+def twin(image, levels, gain, labels, *, radius, limit):
     """Labels by whole-image OpenCV and NumPy."""
     rows, columns = labels.shape
     side = (2 * radius + 1, 2 * radius + 1)
@@ -19,8 +19,9 @@ def twin(image, mean, gain, labels, *, radius, limit):
     least = np.floor(0.5 * side[0] ** 2 * STEPS * limit)
     weak = np.zeros(labels.shape, bool)
     for c in range(image.shape[2]):
-        base = mean[c, TOP : TOP + rows, LEFT : LEFT + columns]
-        base = np.minimum(gain[c] * np.float32(STEPS) * base, np.float32(255.0 * STEPS))
+        base = levels[c, TOP : TOP + rows, LEFT : LEFT + columns]
+        steps = gain[c] * np.float32(STEPS / LEVELS)
+        base = np.minimum(steps * base.astype(np.float32), np.float32(255.0 * STEPS))
         plane = STEPS * image[:, :, c].astype(np.float64) - np.floor(base + np.float32(0.5))
         total = cv2.boxFilter(plane * plain, cv2.CV_64F, side, normalize=False)
         weak |= np.abs(total) > np.maximum(STEPS * limit * count, least)
@@ -33,16 +34,17 @@ def twin(image, mean, gain, labels, *, radius, limit):
 def test_it_is_the_box_filter_of_differences(shape, radius, channels) -> None:
     rng = np.random.default_rng(radius)
     rows, columns = shape
-    mean = rng.uniform(0.0, 250.0, (channels, rows + 5, columns + 9)).astype(np.float32)
+    mean = rng.uniform(0.0, 250.0, (channels, rows + 5, columns + 9))
+    levels = np.rint(mean * LEVELS).astype(np.uint16)
     gain = rng.uniform(0.9, 1.1, channels).astype(np.float32)
     base = np.moveaxis(mean[:, TOP : TOP + rows, LEFT : LEFT + columns], 0, 2)
     light = cv2.blur(rng.normal(0.0, 20.0, shape), (9, 9)).reshape(rows, columns, 1)
     image = gain * base + light + rng.normal(0.0, 3.0, base.shape)
     image = np.clip(np.rint(image), 0, 255).astype(np.uint8)
     labels = rng.choice(np.array([0, 0, 0, 0, 127, 255], np.uint8), shape)
-    expected = twin(image, mean, gain, labels, radius=radius, limit=2.0)
+    expected = twin(image, levels, gain, labels, radius=radius, limit=2.0)
     planes = np.ascontiguousarray(np.moveaxis(image, 2, 0))
-    mark_weak(planes, mean, gain, labels, (LEFT, TOP), radius=radius, limit=2.0, least_share=0.5)
+    mark_weak(planes, levels, gain, labels, (LEFT, TOP), radius=radius, limit=2.0, least_share=0.5)
     np.testing.assert_array_equal(labels, expected)
     if rows > 50:
         assert 50 < (labels == WEAK).sum() < 0.7 * labels.size
