@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.camera.lens import project_points
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import FloatArray, inverse
 from markerless_tracker.records import locked
@@ -148,13 +149,7 @@ def project_camera(points_world: FloatArray, camera: CameraModel) -> FloatArray:
 
     Radial-tangential model as OpenCV and the Bouguet toolbox define it.
     """
-    local = points_world @ camera.T_cam_world[:3, :3].T + camera.T_cam_world[:3, 3]
-    depth = np.where(local[:, 2] > 1e-6, local[:, 2], np.nan)
-    a, b = local[:, 0] / depth, local[:, 1] / depth
-    k1, k2, p1, p2, k3 = camera.distortion
-    r2 = a * a + b * b
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    x = a * radial + 2.0 * p1 * a * b + p2 * (r2 + 2.0 * a * a)
-    y = b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * a * b
-    k = camera.matrix
-    return np.stack([k[0, 0] * x + k[0, 1] * y + k[0, 2], k[1, 1] * y + k[1, 2]], axis=1)
+    points = np.array(points_world, dtype=np.float64).reshape(-1, 3)
+    pixels = np.empty((len(points), 2))
+    project_points(points, camera.T_cam_world, camera.matrix, camera.distortion, pixels)
+    return pixels

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.camera.lens import distorts, lens
 from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.raster.bits import is_set
 from markerless_tracker.fitness.raster.fill import clear_used, fill_outline, wipe
-from markerless_tracker.fitness.raster.lens import distorts, lens
 from markerless_tracker.fitness.raster.outline import find_outlines
 from markerless_tracker.fitness.raster.outline_arrays import (
     HIDDEN,

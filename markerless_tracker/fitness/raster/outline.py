@@ -7,8 +7,8 @@ side by side (`outline_arrays`). Derivation: docs/outlines-of-cones.md.
 
 import numpy as np
 
+from markerless_tracker.camera.lens import distorts
 from markerless_tracker.compiled import kernel
-from markerless_tracker.fitness.raster.lens import distorts
 from markerless_tracker.fitness.raster.outline_arrays import (
     ARC_POINTS,
     LANES,

@@ -5,8 +5,8 @@ Derivation: docs/outlines-of-cones.md.
 
 import numpy as np
 
+from markerless_tracker.camera.lens import lens
 from markerless_tracker.compiled import inlined, kernel
-from markerless_tracker.fitness.raster.lens import lens
 from markerless_tracker.fitness.raster.outline_arrays import (
     LANES,
     MAX_POINTS,

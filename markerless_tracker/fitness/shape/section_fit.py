@@ -9,7 +9,7 @@ from markerless_tracker.fitness.contour import ContourFrame, normal_equations, o
 from markerless_tracker.fitness.shape.sections import Sections
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
-from markerless_tracker.optim.gauss_newton import truncations
+from markerless_tracker.optim.gauss_newton import Equations, truncations
 
 ITERATIONS = 12
 TRUNCATION_M = (0.10, 0.04)
@@ -86,9 +86,13 @@ def shape_fitting(
             hessian += weight * scale * one[0]
             slope += weight * scale * one[1]
             yield
-        sums = hessian, slope
         shape = refine(
-            lambda _, __, sums=sums: sums, shape, priors=(prior,), bounds=sections.bounds,
-            iterations=1, truncation=(float(reach_m), float(reach_m)),
+            _sums(hessian, slope), shape, priors=(prior,), bounds=sections.bounds, iterations=1,
+            truncation=(float(reach_m), float(reach_m)),
         )  # fmt: skip
     return sections.put(body, shape)
+
+
+def _sums(hessian: FloatArray, slope: FloatArray) -> Equations:
+    """Equations that are known at the one point where they are asked for."""
+    return lambda _, __: (hessian, slope)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.camera import CameraModel
+from markerless_tracker.camera.lens import pixel
 from markerless_tracker.compiled import kernel
-from markerless_tracker.fitness.raster.lens import pixel
 from markerless_tracker.fitness.raster.mask_words import has
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import MaskWords

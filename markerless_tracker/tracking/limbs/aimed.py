@@ -9,8 +9,8 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.body.kinematics import moving_nodes, node_transforms
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.camera.lens import pixel
 from markerless_tracker.compiled import kernel
-from markerless_tracker.fitness.raster.lens import pixel
 from markerless_tracker.geometry import FloatArray
 
 ALONG = np.array([0.3, 0.6, 0.9])

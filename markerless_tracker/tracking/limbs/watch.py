@@ -11,13 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
-from markerless_tracker.body.model import IntArray
 from markerless_tracker.body.parts import cones_of
-from markerless_tracker.camera import CameraRig, project_camera
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.camera.lens import projected
+from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contour import ContourFrame
+from markerless_tracker.fitness.raster.mask_words import has
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.observation import locked
 from markerless_tracker.optim import keyed_generator
-from markerless_tracker.records import LimbState, MaskWords, Observation, TrackState
+from markerless_tracker.records import LimbState, Observation, TrackState
 from markerless_tracker.tracking.limbs.aimed import most_aimed
 from markerless_tracker.tracking.limbs.search import other_limb
 from markerless_tracker.tracking.limbs.unexplained import look_unexplained
@@ -32,6 +35,7 @@ WAIT_NS = 16_000_000
 """Time before a limb near unexplained silhouette is searched again, after a search without gain."""
 _DOUBLINGS = 4
 """That time doubles with each search without gain, so often."""
+_NONE = locked(np.empty((0, 0), dtype=np.uint64), np.uint64)
 _ALONG = np.linspace(0.1, 0.9, 5)
 
 
@@ -195,21 +199,31 @@ def _look(
     points: FloatArray, observation: Observation, rig: CameraRig
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which of the points (n, 3) a view has in its frame, and which in its silhouette."""
-    pixels = project_camera(points, rig[observation.camera])
-    with np.errstate(invalid="ignore"):
-        last = np.array(observation.size_px) - 1
-        framed = np.asarray((pixels >= 0.0).all(axis=1) & (pixels <= last).all(axis=1))
-    inside = np.zeros(len(points), dtype=np.bool_)
-    u, v = (np.round(pixels[framed]) - observation.offset_px).astype(np.int64).T
-    there = (u >= 0) & (v >= 0) & (u < observation.width) & (v < observation.height)
-    seen = np.flatnonzero(framed)[there]
-    inside[seen] = _bits(observation.mask_words, u[there], v[there])
-    if observation.undecided_words is not None:
-        framed[seen] &= ~_bits(observation.undecided_words, u[there], v[there])
+    camera = rig[observation.camera]
+    undecided = observation.undecided_words
+    framed, inside = np.zeros((2, len(points)), dtype=np.bool_)
+    _find(
+        points, camera.T_cam_world, camera.matrix, camera.distortion, observation.size_px,
+        observation.offset_px, (observation.width, observation.height), observation.mask_words,
+        _NONE if undecided is None else undecided,
+        framed, inside,
+    )  # fmt: skip
     return framed, inside
 
 
-def _bits(words: MaskWords, u: IntArray, v: IntArray) -> NDArray[np.bool_]:
-    """A packed mask at pixels (n,)."""
-    shift = (u % 64).astype(np.uint64)
-    return np.asarray((words[v, u // 64] >> shift) & np.uint64(1), dtype=np.bool_)
+@kernel
+def _find(  # type: ignore[no-untyped-def]
+    points, to_camera, matrix, distortion, size, offset, region, mask, undecided, framed, inside
+):
+    for i in range(points.shape[0]):
+        u, v = projected(points[i, 0], points[i, 1], points[i, 2], to_camera, matrix, distortion)
+        # Not for NaN either.
+        if not (u >= 0.0 and v >= 0.0 and u <= size[0] - 1.0 and v <= size[1] - 1.0):
+            continue
+        framed[i] = True
+        column, row = np.int64(np.rint(u)) - offset[0], np.int64(np.rint(v)) - offset[1]
+        if column < 0 or row < 0 or column >= region[0] or row >= region[1]:
+            continue
+        inside[i] = has(mask, column, row)
+        if undecided.size > 0 and has(undecided, column, row):
+            framed[i] = False

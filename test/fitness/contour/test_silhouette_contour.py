@@ -90,11 +90,11 @@ def test_rectangle(left, top, wide, high) -> None:
 def test_window_is_the_bounding_box_with_a_margin() -> None:
     mask = np.zeros((400, 300), bool)
     mask[40:340, 100:160] = True
-    edge = silhouette_contour(observed(mask), 4.0)
-    # A sixth of the height, cut at the frame.
+    edge = silhouette_contour(observed(mask), 4.0, 48.3)
+    # Cut at the frame.
     assert (edge.left, edge.top) == (100 - 49, 0)
     assert edge.distance.shape == (340 + 49, 60 + 2 * 49)
-    small = silhouette_contour(observed(disc((120, 100), 10.0)), 4.0)
+    small = silhouette_contour(observed(disc((120, 100), 10.0)), 4.0, 3.0)
     assert (small.left, small.top) == (110 - 24, 90 - 24)
 
 

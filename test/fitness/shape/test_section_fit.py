@@ -12,7 +12,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contour import ContourFrame
-from markerless_tracker.fitness.shape.section_fit import fit_shape
+from markerless_tracker.fitness.shape.section_fit import fit_shape, shape_fitting
 from markerless_tracker.fitness.shape.sections import OFFSET_RANGE_M, RADIUS_RANGE
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
@@ -194,6 +194,24 @@ def test_frames_are_averaged() -> None:
     error = [np.abs(s - true.cone_shape)[:, :, :2].mean() for s in (GENERIC.cone_shape, both)]
     assert error[1] < 0.4 * error[0]
     assert np.abs(both - once).max() > 1e-3
+
+
+def test_a_fit_goes_on_in_pieces_from_where_it_was() -> None:
+    true = random_person(7)
+    first, second = (seen(true, open_pose(seed)) for seed in (7, 8))
+    frames = [(view.frame(), view.pose) for view in (first, second)]
+    # A weight counts as so many frames.
+    complete = fit_shape(GENERIC, [frames[0], *frames])
+    weighted = [(*frames[0], 2.0), (*frames[1], 1.0)]
+    fitting = shape_fitting(
+        GENERIC, weighted, start=complete, iterations=3, truncation_m=(0.04, 0.04)
+    )
+    for _ in range(6):
+        assert next(fitting) is None
+    with pytest.raises(StopIteration) as end:
+        next(fitting)
+    moved = np.abs(end.value.value.cone_shape - complete.cone_shape).max()
+    assert moved < 0.1 * np.abs(complete.cone_shape - GENERIC.cone_shape).max()
 
 
 def test_only_the_sections_change(case) -> None:

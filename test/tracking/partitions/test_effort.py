@@ -1,9 +1,12 @@
 """Tests for `markerless_tracker.tracking.partitions.effort`."""
 
+import numpy as np
 import pytest
 
+from markerless_tracker.body import load_body
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.tracking.partitions.effort import WORSE, Effort
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.partitions.effort import NEAR, WORSE, Effort
 
 
 def _settled() -> Effort:
@@ -65,3 +68,30 @@ def test_effort_is_the_fraction_of_frames_that_are_searched(fraction: float, gra
 def test_an_effort_that_is_no_fraction_is_refused(fraction: float) -> None:
     with pytest.raises(ConfigError, match="effort is .*expected 0 to 1"):
         Effort(needed_only=True).begin(fraction, doubt=False)
+
+
+class Recorder:
+    """Stands for a frame's search: notes the stages; a refinement moves the pose by a step."""
+
+    def __init__(self, step: float, cost: float) -> None:
+        self.pose, self.cost = np.zeros(31), cost
+        self.step = step
+        self.names: list[str] = []
+
+    def run(self, stages) -> None:
+        self.names += [stage.name for stage in stages]
+        self.pose = self.pose + self.step
+
+
+@pytest.mark.parametrize(
+    ("step", "cost", "polished"),
+    [(0.9 * NEAR, 0.05, False), (1.1 * NEAR, 0.05, True), (0.0, 0.05 + 2.0 * WORSE, True)],
+    ids=["near its end", "far", "with swarms"],
+)
+def test_a_pose_is_refined_again_if_it_moved_or_swarms_searched(step, cost, polished) -> None:
+    body = load_body("person31", 1.75)
+    search = Recorder(step, cost)
+    _settled().search(search, body, TrackerConfig(), body.neutral, body.sigma)  # type: ignore[arg-type]
+    assert search.names[0] == "align"
+    assert (search.names[-1] == "polish") is polished
+    assert (len(search.names) > 2) is (cost > 0.05 + WORSE)

@@ -51,6 +51,7 @@ def test_the_first_frame_counts_most_and_room_is_bounded(body: BodyModel) -> Non
         pose = moved(body, 2.0 * number * VARIETY_RAD)
         assert frames.takes(pose, body)
         kept = frames.add(CONTOURS, pose)
-    assert len(kept) == FIRST_WEIGHT - 1 + MOST
-    assert sum(pose is body.neutral for _, pose in kept) == FIRST_WEIGHT
+    assert len(kept) == MOST
+    assert [weight for _, _, weight in kept] == [FIRST_WEIGHT] + [1.0] * (MOST - 1)
+    assert kept[0][1] is body.neutral
     assert not frames.takes(moved(body, 99.0), body)

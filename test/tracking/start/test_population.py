@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from markerless_tracker.body import cone_transforms, markers
+from markerless_tracker.body import cone_transforms, load_body, markers
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
@@ -16,7 +16,8 @@ from markerless_tracker.tracking.start.postures import POSTURES, postures
 from markerless_tracker.tracking.start.starter import _improved
 
 
-def refined(threads: int) -> np.ndarray:
+def made_up(threads: int) -> tuple[FramePopulation, np.ndarray]:
+    """A frame of a made-up person, and the pose (p,) in it."""
     scene = SyntheticScene(body="person31", size_px=(256, 192), seed=2)
     pose = scene.motion.pose(0.0)
     views = {
@@ -28,13 +29,29 @@ def refined(threads: int) -> np.ndarray:
     searcher = make_searcher(
         scene.body, rig=scene.rig, config=TrackerConfig(threads=threads), threads=threads
     )
-    frame = FramePopulation(searcher, views, 0, pose)
+    return FramePopulation(searcher, views, 0, pose), pose
+
+
+def refined(threads: int) -> np.ndarray:
+    frame, pose = made_up(threads)
     rng = np.random.default_rng(1)
     return frame.refined(pose + 0.05 * rng.standard_normal((5, pose.size)), 3, (0.15, 0.05))
 
 
 def test_refined_poses_are_the_same_with_any_number_of_threads() -> None:
     np.testing.assert_array_equal(refined(1), refined(2))
+
+
+def test_a_limbs_costs_are_those_of_the_whole_body() -> None:
+    frame, pose = made_up(1)
+    limb = load_body("person31", 1.75).subspaces["l_arm"]
+    poses = np.tile(pose, (20, 1))
+    poses[:, limb] += 0.5 * np.random.default_rng(2).standard_normal((20, len(limb)))
+    costs = frame.costs(poses)
+    np.testing.assert_allclose(
+        frame.limb_costs(pose, limb)(poses[:, limb]), costs, rtol=0, atol=1e-12
+    )
+    assert costs.std() > 1e-3
 
 
 def test_many_poses_at_once_are_placed_as_one_by_one() -> None:

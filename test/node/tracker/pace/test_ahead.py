@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
+from markerless_tracker.node.tracker.pace.ahead import STALE_S, Ahead, Taken
 from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
 
 
@@ -17,7 +17,8 @@ class Bench:
         self.sets: Synchronizer[int] = Synchronizer(("a",))
         self.made: list[tuple[int, int]] = []
         self.making = threading.Event()
-        self.ahead = Ahead(self.sets, self._make, poll_s=60.0)
+        self.now_s = 0.0
+        self.ahead = Ahead(self.sets, self._make, poll_s=60.0, clock=lambda: self.now_s)
 
     def _make(self, matched: MatchedSet[Any]) -> str:
         self.made.append((matched.stamp_ns, threading.get_ident()))
@@ -56,7 +57,8 @@ def test_a_set_is_made_in_another_thread_while_one_is_fitted(bench) -> None:
     assert first == threading.get_ident() != second
 
 
-def test_a_set_is_left_out_for_the_second_newer_one(bench) -> None:
+def _fit_while_sets_come(bench: Bench, fit_s: float) -> None:
+    """One set is fitted for so long; the evidence of the next is made, and two more come."""
     bench.offer(1)
     bench.next()
     bench.ahead.fitting()
@@ -64,22 +66,21 @@ def test_a_set_is_left_out_for_the_second_newer_one(bench) -> None:
     bench.offer(2)
     assert bench.making.wait(60.0)
     bench.offer(3, 4)
+    bench.now_s += fit_s
     bench.ahead.fitted()
+
+
+def test_evidence_that_is_ready_is_used(bench) -> None:
+    _fit_while_sets_come(bench, 0.9 * STALE_S)
+    assert bench.next().matched.stamp_ns == 2
+    assert bench.next().matched.stamp_ns == 4
+    assert bench.sets.counts.skipped == 1
+
+
+def test_a_set_that_waited_for_long_is_left_out_for_a_newer_one(bench) -> None:
+    _fit_while_sets_come(bench, 1.1 * STALE_S)
     assert bench.next().matched.stamp_ns == 4
     assert bench.sets.counts.skipped == 2
-
-
-def test_a_set_is_kept_while_one_newer_is_complete(bench) -> None:
-    bench.offer(1)
-    bench.next()
-    bench.ahead.fitting()
-    bench.making.clear()
-    bench.offer(2)
-    assert bench.making.wait(60.0)
-    bench.offer(3)
-    bench.ahead.fitted()
-    assert bench.next().matched.stamp_ns == 2
-    assert bench.next().matched.stamp_ns == 3
 
 
 def test_an_error_comes_with_its_set(bench) -> None:

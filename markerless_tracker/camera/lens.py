@@ -22,8 +22,8 @@ def lens(a, b, distortion):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pixel(x, y, z, to_camera, matrix, distortion):  # type: ignore[no-untyped-def]
-    """The whole pixel (u, v) nearest to a point of the world, m; NaN behind the camera.
+def projected(x, y, z, to_camera, matrix, distortion):  # type: ignore[no-untyped-def]
+    """Pixel coordinates (u, v) of a point of the world, m; NaN behind the camera.
 
     Args:
         x, y, z: the point.
@@ -40,7 +40,23 @@ def pixel(x, y, z, to_camera, matrix, distortion):  # type: ignore[no-untyped-de
     b = (t[1, 0] * x + t[1, 1] * y + t[1, 2] * z + t[1, 3]) / depth
     a, b = lens(a, b, distortion)
     u = matrix[0, 0] * a + matrix[0, 1] * b + matrix[0, 2]
-    return np.rint(u), np.rint(matrix[1, 1] * b + matrix[1, 2])
+    return u, matrix[1, 1] * b + matrix[1, 2]
+
+
+@kernel
+def pixel(x, y, z, to_camera, matrix, distortion):  # type: ignore[no-untyped-def]
+    """The whole pixel nearest to what `projected` gives."""
+    u, v = projected(x, y, z, to_camera, matrix, distortion)
+    return np.rint(u), np.rint(v)
+
+
+@kernel
+def project_points(points, to_camera, matrix, distortion, out):  # type: ignore[no-untyped-def]
+    """Fill out (n, 2) with what `projected` gives for points (n, 3)."""
+    for i in range(points.shape[0]):
+        out[i, 0], out[i, 1] = projected(
+            points[i, 0], points[i, 1], points[i, 2], to_camera, matrix, distortion
+        )
 
 
 @kernel
