@@ -4,7 +4,6 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -51,8 +50,7 @@ def run(args: argparse.Namespace) -> int:
     """
     began_s = time.monotonic()
     given = {} if args.body is None else {"body": args.body}
-    config = read_config(args.config, given)
-    plans = [replace(config, optimizer=name) for name in args.optimizer]
+    plans = [read_config(args.config, {**given, "optimizer": name}) for name in args.optimizer]
     compiled = 0
     with progress_bars() as bars:
         task = bars.add_task("compiling", total=None)

@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+import markerless_tracker.cli.compile as compile_verb
 from markerless_tracker.cli.main import main
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.config import OPTIMIZERS
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
@@ -33,6 +36,18 @@ def test_what_is_stored_is_not_compiled_again(capsys: pytest.CaptureFixture[str]
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert done.stdout.strip() == "0", done.stderr
+
+
+def test_every_optimizer_is_compiled_with_its_own_budget(monkeypatch) -> None:
+    plans = []
+    monkeypatch.setattr(compile_verb, "warm_up", lambda config, channels: plans.append(config))
+    assert main(["compile"]) == 0
+    assert [plan.optimizer for plan in plans[::2]] == list(OPTIMIZERS)
+    for plan in plans:
+        assert (
+            plan.evaluations
+            == TrackerConfig.from_mapping({"optimizer": plan.optimizer}).evaluations
+        )
 
 
 def test_an_unknown_optimizer_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
