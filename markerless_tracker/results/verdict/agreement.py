@@ -5,7 +5,7 @@ exchanged, or one has another camera's background, the hull is small or nowhere.
 one camera, and with two exchanged, are tried: what makes them fit names the fault.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -21,6 +21,8 @@ FITS = 0.85
 """Fraction of the silhouettes that their hull fills, if cameras and silhouettes belong together."""
 GAIN = 0.10
 """Least gain in that fraction by which a fault is named."""
+CERTAIN = 0.97
+"""From this fraction on nothing else is tried."""
 MOST_CAMERAS = 8
 """Exchanges are tried among so many cameras."""
 _LEAST_LEFT = 3
@@ -43,6 +45,11 @@ class Fault:
     left_out: str
     before: float
     after: float
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """The cameras at fault."""
+        return self.exchanged or (self.left_out,)
 
     def describe(self) -> str:
         """The fault in one line."""
@@ -71,20 +78,43 @@ def find_fault(rig: CameraRig, frames: Sequence[Views]) -> Fault | None:
     if not frames or before >= FITS:
         return None
     names = [name for name in cameras if all(name in views for views in frames)][:MOST_CAMERAS]
-    faults = []
-    for a, b in combinations(names, 2):
-        swapped = {**cameras, a: replace(cameras[b], name=a), b: replace(cameras[a], name=b)}
-        if cameras[a].size_px == cameras[b].size_px:
-            faults.append(Fault((a, b), "", before, _mean_fit(swapped, frames)))
-    if len(names) > _LEAST_LEFT:
-        for name in names:
-            others = [{n: v for n, v in views.items() if n != name} for views in frames]
-            # Fewer silhouettes fit together more easily.
-            faults.append(Fault((), name, before, _mean_fit(cameras, others)))
-    best = max(faults, key=_worth, default=None)
-    if best is None or best.after < before + GAIN or best.after < 0.5 * (FITS + before):
+    best: Fault | None = None
+    for trial in _trials(cameras, names):
+        # One moment is enough to choose.
+        fault = trial.fault(frames[:1], before)
+        if best is None or _worth(fault) > _worth(best):
+            best, chosen = fault, trial
+        if fault.after >= CERTAIN:
+            break
+    if best is None:
+        return None
+    best = chosen.fault(frames, before)
+    if best.after < before + GAIN or best.after < 0.5 * (FITS + before):
         return None
     return best
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A rig to try, and the cameras that are not those of the given one."""
+
+    cameras: Mapping[str, CameraModel]
+    exchanged: tuple[str, ...]
+    left_out: str
+
+    def fault(self, frames: Sequence[Views], before: float) -> Fault:
+        used = [{n: v for n, v in views.items() if n in self.cameras} for views in frames]
+        return Fault(self.exchanged, self.left_out, before, _mean_fit(self.cameras, used))
+
+
+def _trials(cameras: Mapping[str, CameraModel], names: Sequence[str]) -> Iterator[_Trial]:
+    for a, b in combinations(names, 2):
+        if cameras[a].size_px == cameras[b].size_px:
+            swapped = {a: replace(cameras[b], name=a), b: replace(cameras[a], name=b)}
+            yield _Trial({**cameras, **swapped}, (a, b), "")
+    if len(names) > _LEAST_LEFT:
+        for name in names:
+            yield _Trial({n: c for n, c in cameras.items() if n != name}, (), name)
 
 
 def largest_hull(rig: CameraRig, views: Views) -> Hull | None:

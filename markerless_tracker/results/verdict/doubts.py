@@ -1,6 +1,6 @@
 """What is doubtful about a run, and why a run found nobody: a line each."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -36,43 +36,47 @@ def stature_is_plausible(stature: float) -> bool:
     return STATURES_M[0] <= stature <= STATURES_M[1]
 
 
-def doubts_about_fit(record: RunRecord, description: BodyDescription) -> list[str]:
+def doubts_about_fit(
+    record: RunRecord, description: BodyDescription, *, search_faults: bool = True
+) -> list[str]:
     """Doubts about a run in which a person was tracked.
 
     Args:
         record: of the run.
         description: of the tracked body.
+        search_faults: see `verdict_of`.
     """
     overlap = record.median_overlap
-    found = _contradicting(record, overlap)
-    low = bool(overlap) and float(np.mean(list(overlap.values()))) < LEAST_OVERLAP
-    if low:
-        found.append(
-            f"body and silhouettes overlap by {np.mean(list(overlap.values())):.2f}, expected "
-            f"{LEAST_OVERLAP:g} or more: the pose may be wrong although it is tracked; look at the "
-            "calibration, the backgrounds and the subject"
-        )
-    if low or found:
+    mean = float(np.mean(list(overlap.values()))) if overlap else 1.0
+    wrong = _contradicting(overlap)
+    found = []
+    if search_faults and (wrong or mean < LEAST_OVERLAP):
         fault = find_fault(record.rig, record.samples)
         if fault is not None:
-            found.insert(0, fault.describe())
+            found.append(fault.describe())
+            wrong = {n: text for n, text in wrong.items() if n not in fault.cameras}
+    found += wrong.values()
+    if mean < LEAST_OVERLAP:
+        found.append(
+            f"body and silhouettes overlap by {mean:.3f}, expected {LEAST_OVERLAP:g} or more: the "
+            "pose may be wrong although it is tracked; look at the calibration, the backgrounds "
+            "and the subject"
+        )
+    found += _unused(record)
     if record.body is not None:
-        found += _sizes(record.body, description, overlap)
-    found += _floor(record)
-    found += [
-        f"{name}: silhouette of {area:.2f} m2 beside the body never moves: furniture or a machine "
-        "that the empty scene does not show; limbs near it may be wrong"
-        for name, area in record.static.found_m2().items()
-    ]
-    return found
+        found += _sizes(record.body, description, mean)
+    return [*found, *_floor(record), *_static(record)]
 
 
-def causes_of_nobody(record: RunRecord, *, start_given: bool) -> list[str]:
+def causes_of_nobody(
+    record: RunRecord, *, start_given: bool, search_faults: bool = True
+) -> list[str]:
     """Why a run may have found nobody.
 
     Args:
         record: of the run.
         start_given: whether it was to begin with a start pose.
+        search_faults: see `verdict_of`.
     """
     found = []
     for name in record.rig.names:
@@ -93,70 +97,67 @@ def causes_of_nobody(record: RunRecord, *, start_given: bool) -> list[str]:
             "a person who stands still)"
         )
     if record.samples and not found:
-        found += _of_silhouettes(record)
-    if start_given and record.samples:
-        found.append(
-            "the start pose does not fit the silhouettes: is it of this recording and time, in "
-            "metres and in the calibration's world? (without --start the person is searched)"
-        )
+        fault = find_fault(record.rig, record.samples) if search_faults else None
+        found.append(fault.describe() if fault else _of_silhouettes(record, start_given))
     return found
 
 
-def _of_silhouettes(record: RunRecord) -> Sequence[str]:
-    fault = find_fault(record.rig, record.samples)
-    if fault is not None:
-        return [fault.describe()]
+def _of_silhouettes(record: RunRecord, start_given: bool) -> str:
+    if start_given:
+        return (
+            "the start pose does not fit the silhouettes: is it of this recording and time, in "
+            "metres and in the calibration's world? (without --start the person is searched)"
+        )
     hull = largest_hull(record.rig, record.samples[0])
     if hull is None:
-        return [
+        return (
             "the silhouettes meet nowhere in the room: units or axes of the calibration, or the "
             "order of the cameras"
-        ]
+        )
     x, y = hull.points_m[:, :2].mean(axis=0)
-    return [
+    return (
         f"what the silhouettes show at ({x:.2f}, {y:.2f}) m, from z = {hull.low_m:.2f} to "
         f"{hull.high_m:.2f} m, is no whole person: too little of one is in view, or it is none"
-    ]
+    )
 
 
-def _contradicting(record: RunRecord, overlap: Mapping[str, float]) -> list[str]:
-    found = []
+def _contradicting(overlap: Mapping[str, float]) -> dict[str, str]:
+    """Cameras whose overlap is far below the others', and a line for each."""
+    found = {}
     for name, value in overlap.items():
         others = [v for n, v in overlap.items() if n != name]
         if len(others) < 2 or value >= CAMERA_OVERLAP:
             continue
-        if value < CAMERA_RATIO * float(np.median(others)):
-            found.append(
-                f"{name} contradicts the other cameras: overlap {value:.2f}, theirs "
-                f"{np.median(others):.2f}; check its calibration, its background and its time"
-            )
-    for name in record.rig.names:
-        seen = record.silhouettes.get(name)
-        if seen is None or not seen.images:
-            continue
-        if 2 * seen.full > seen.images:
-            found.append(
-                f"{name}: silhouette over most of the image in {seen.full} of {seen.images} "
-                "frames: is the background this camera's, in the same light?"
-            )
-        elif 2 * seen.empty > seen.images:
-            found.append(
-                f"{name}: no silhouette in {seen.empty} of {seen.images} frames, others have one"
+        theirs = float(np.median(others))
+        if value < CAMERA_RATIO * theirs:
+            found[name] = (
+                f"{name} contradicts the other cameras: overlap {value:.2f}, theirs {theirs:.2f}; "
+                "check its calibration, its background and its time"
             )
     return found
 
 
-def _sizes(
-    body: BodyModel, description: BodyDescription, overlap: Mapping[str, float]
-) -> list[str]:
+def _unused(record: RunRecord) -> list[str]:
+    """Cameras that were left out of most poses."""
+    used = {n: record.overlap[n].count if n in record.overlap else 0 for n in record.rig.names}
+    poses = max(used.values())
+    return [
+        f"{name} was used in {count} of {poses} poses only: see its warnings, and check its images "
+        "and its background"
+        for name, count in used.items()
+        if 2 * count < poses
+    ]
+
+
+def _sizes(body: BodyModel, description: BodyDescription, overlap: float) -> list[str]:
     stature = stature_m(description, body)
-    mean = float(np.mean(list(overlap.values()))) if overlap else 1.0
-    low, high = STATURES_M if mean >= USUAL_OVERLAP else USUAL_STATURES_M
+    low, high = STATURES_M if overlap >= USUAL_OVERLAP else USUAL_STATURES_M
     found = []
     if not low <= stature <= high:
         found.append(
-            f"a stature of {stature:.2f} m was found, expected {low:.2f} to {high:.2f}: are the "
-            "units and the scale of the calibration right? (a child: --stature)"
+            f"the body has a stature of {stature:.2f} m, expected {low:.2f} to {high:.2f} of a "
+            "grown person: are the units and the scale of the calibration right, and is the "
+            "subject this person's?"
         )
     odd = []
     for name, entry in description.lengths.items():
@@ -167,9 +168,20 @@ def _sizes(
         listed = ", ".join(text for _, text in sorted(odd, reverse=True)[:3])
         found.append(
             f"lengths unlike those of a person of {stature:.2f} m: {listed}; are the axes and the "
-            "scale of the calibration right?"
+            "scale of the calibration right, and is the subject this person's?"
         )
     return found
+
+
+def _static(record: RunRecord) -> list[str]:
+    areas = record.static.found_m2()
+    if not areas:
+        return []
+    listed = ", ".join(f"{name} ({area:.2f} m2)" for name, area in areas.items())
+    return [
+        f"{listed}: silhouette beside the body that never moves: furniture or a machine that the "
+        "empty scene does not show; limbs near it may be wrong"
+    ]
 
 
 def _floor(record: RunRecord) -> list[str]:

@@ -16,7 +16,7 @@ from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.search import pixels_per_m
 
-EVERY_NS, LATER_EVERY_NS = 100_000_000, 2_000_000_000
+EVERY_NS, LATER_EVERY_NS = 60_000_000, 2_000_000_000
 """Time between the first `MANY` comparisons, and between those after them."""
 MANY = 12
 LEAST = 6

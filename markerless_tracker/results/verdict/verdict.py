@@ -104,22 +104,25 @@ def verdict_of(
     *,
     known: Sequence[str] = (),
     start_given: bool = False,
+    search_faults: bool = True,
 ) -> Verdict:
-    """The verdict of a run; takes up to some seconds where the run is doubtful.
+    """The verdict of a run.
 
     Args:
         record: its frames.
         description: of the body that was tracked.
         known: doubts that were found otherwise, such as those about the calibration.
         start_given: whether the run was to begin with a start pose.
+        search_faults: whether to find out, where the run is doubtful, which cameras may be
+            exchanged; takes some seconds.
     """
     somebody = record.tracked > 0
     stature = None if record.body is None else stature_m(description, record.body)
     doubts, causes = list(known), []
     if somebody:
-        doubts += doubts_about_fit(record, description)
+        doubts += doubts_about_fit(record, description, search_faults=search_faults)
     elif record.frames:
-        causes = causes_of_nobody(record, start_given=start_given)
+        causes = causes_of_nobody(record, start_given=start_given, search_faults=search_faults)
     limb, frames = max(record.lost_limbs.items(), key=lambda item: item[1], default=("", 0))
     return Verdict(
         frames=record.frames,
