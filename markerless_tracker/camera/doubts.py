@@ -5,6 +5,7 @@ said before any image is read.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.camera.model import CameraModel, CameraRig, project_camera
 from markerless_tracker.geometry import FloatArray
@@ -86,19 +87,21 @@ def _below_the_floor(rig: CameraRig) -> list[str]:
 
 
 def _nothing_in_common(rig: CameraRig) -> list[str]:
-    """Cameras that see nothing of what any other camera sees."""
-    if len(rig) < 2:
+    """Cameras that see nothing of what two others see."""
+    enough = min(2, len(rig) - 1)
+    if not enough:
         return []
-    alone = [
-        camera.name
-        for camera in rig
-        if not any(_sees(other, _looked_at(camera)) for other in rig if other is not camera)
-    ]
+    alone = []
+    for camera in rig:
+        points = _looked_at(camera)
+        others = np.sum([_sees(other, points) for other in rig if other is not camera], axis=0)
+        if others.max() < enough:
+            alone.append(camera.name)
     if not alone:
         return []
     return [
-        f"calibration: {', '.join(alone)}: sees nothing that another camera sees; are rotation and "
-        "translation from the world to the camera?"
+        f"calibration: {', '.join(alone)}: nothing in view that {enough} other camera(s) see; are "
+        "rotation and translation from the world to the camera?"
     ]
 
 
@@ -137,8 +140,9 @@ def _looked_at(camera: CameraModel) -> FloatArray:
     return np.asarray(points @ placed[:3, :3].T + placed[:3, 3])
 
 
-def _sees(camera: CameraModel, points: FloatArray) -> bool:
+def _sees(camera: CameraModel, points: FloatArray) -> NDArray[np.bool_]:
+    """Which points (n, 3) m are in a camera's image."""
     with np.errstate(invalid="ignore"):
         pixels = project_camera(points, camera)
         inside = (pixels >= 0.0).all(axis=1) & (pixels < camera.size_px).all(axis=1)
-    return bool(inside.any())
+    return np.asarray(inside)

@@ -17,7 +17,7 @@ from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.start.hull import FINE_M, Hull, find_hulls
 
-FITS = 0.85
+FITS = 0.90
 """Fraction of the silhouettes that their hull fills, if cameras and silhouettes belong together."""
 GAIN = 0.10
 """Least gain in that fraction by which a fault is named."""
