@@ -98,7 +98,14 @@ def causes_of_nobody(
         )
     if record.samples and not found:
         fault = find_fault(record.rig, record.samples) if search_faults else None
-        found.append(fault.describe() if fault else _of_silhouettes(record, start_given))
+        # Frames in the state LOST have a pose, too.
+        wrong = _contradicting(record.median_overlap)
+        if fault is not None:
+            found.append(fault.describe())
+        elif wrong:
+            found += wrong.values()
+        else:
+            found.append(_of_silhouettes(record, start_given))
     return found
 
 

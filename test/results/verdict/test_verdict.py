@@ -142,6 +142,15 @@ def test_nobody_at_the_start_pose(judge: Judge, result: Any) -> None:
     assert cause.startswith("the start pose does not fit the silhouettes")
 
 
+def test_a_camera_that_contradicts_in_lost_frames_is_named(judge: Judge, result: Any) -> None:
+    overlap = {"cam01": 0.9, "cam02": 0.2, "cam03": 0.9, "cam04": 0.85}
+    lost = [result(index, LOST, overlap=overlap) for index in range(3)]
+    found = judge(lost, start_given=True)
+    assert found.tracked == 0 and found.lost == 3
+    (cause,) = found.causes
+    assert cause.startswith("cam02 contradicts the other cameras: overlap 0.20")
+
+
 def test_nobody_where_the_silhouettes_meet_nowhere(judge: Judge, result: Any, masks: Any) -> None:
     corners = blank(masks, False)
     for number, mask in enumerate(corners.values()):
