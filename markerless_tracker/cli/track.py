@@ -4,8 +4,7 @@ import argparse
 import json
 import sys
 import time
-from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,18 +13,20 @@ import yaml
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from markerless_tracker.body import load_description
 from markerless_tracker.camera.calibration import write_calibration
-from markerless_tracker.cli.frame_warnings import FrameWarnings
+from markerless_tracker.camera.doubts import calibration_doubts
 from markerless_tracker.cli.track_arguments import add_arguments
 from markerless_tracker.compiled import compilation
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
 from markerless_tracker.datasets.silhouettes import SilhouetteRecording
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.records import TrackState
 from markerless_tracker.results.result import ResultWriter, check_target
 from markerless_tracker.results.run import recording_backgrounds, track_recording
 from markerless_tracker.results.smooth import Smoothing, smooth_result
+from markerless_tracker.results.verdict.record import RunRecord
+from markerless_tracker.results.verdict.verdict import Verdict, verdict_of
 from markerless_tracker.tracking import (
     TrackerConfig,
     TrackerSetup,
@@ -65,6 +66,9 @@ def run(args: argparse.Namespace) -> int:
         if args.debug_images is not None:
             raise ConfigError("--debug-images shows the segmentation, which --masks replaces")
         recording = SilhouetteRecording(recording, args.masks)
+    doubts = calibration_doubts(recording.rig)
+    for doubt in doubts:
+        _warn(console, doubt)
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
         console=console,
@@ -94,22 +98,24 @@ def run(args: argparse.Namespace) -> int:
             recording,
             setup,
             config,
+            doubts,
             warn=lambda text: _warn(console, text),
             progress=lambda done: bars.update(task, completed=done),
         )
     filled = None
-    if smoothing is not None and outcome.tracked:
+    verdict = outcome.verdict
+    if smoothing is not None and verdict.tracked:
         filled = smooth_result(args.name, smoothing)
     if args.refine_calibration is not None:
         full = open_recording(args.source).rig
         write_calibration(args.refine_calibration, corrected(full, outcome.shifts, args.scale))
     for warning in (*recording.warnings, *describe(outcome.shifts)):
         _warn(console, warning)
-    if outcome.warnings.frames:
+    if verdict.frames_with_warnings:
         _warn(
             console,
-            f"{outcome.warnings.frames} of {outcome.frames} frames have warnings, "
-            f"{len(outcome.warnings.kinds)} kinds of them",
+            f"{verdict.frames_with_warnings} of {verdict.frames} frames have warnings, "
+            f"{verdict.warnings} kinds of them",
         )
     if args.json:
         summary = _summary(args, recording, outcome)
@@ -119,18 +125,17 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write("\n")
     else:
         print(
-            f"{outcome.trc_path}: {outcome.frames} frames, {outcome.tracked} tracked, "
-            f"{outcome.states.get(TrackState.LOST.value, 0)} lost, {outcome.frames_per_s} frames/s"
+            f"{outcome.trc_path}: {verdict.counts}, {outcome.frames_per_s} frames/s"
             + (f"; {filled} frames filled" if filled else "")
         )
-    if outcome.tracked:
+        for line in verdict.lines():
+            print(line)
+    if verdict.tracked:
         return 0
-    console.print(
-        f"no person was found in {outcome.frames} of {outcome.frames} frames; no subject file was "
+    _tell(
+        console,
+        f"no person was found in {verdict.frames} of {verdict.frames} frames; no subject file was "
         "written",
-        markup=False,
-        highlight=False,
-        soft_wrap=True,
     )
     return NO_PERSON_FOUND
 
@@ -141,29 +146,22 @@ class _Outcome:
 
     Attributes:
         trc_path: the marker file.
-        frames: frames processed.
-        states: state -> number of frames.
         seconds: duration of tracking.
         shifts: camera -> offset of its silhouettes from the body.
-        warnings: of single frames.
+        record: what the frames add up to.
+        verdict: what that means.
     """
 
     trc_path: Path
-    frames: int
-    states: Mapping[str, int]
     seconds: float
     shifts: Mapping[str, Shift]
-    warnings: FrameWarnings
-
-    @property
-    def tracked(self) -> int:
-        """Frames in which the person was tracked."""
-        return self.states.get(TrackState.TRACKING.value, 0)
+    record: RunRecord
+    verdict: Verdict
 
     @property
     def frames_per_s(self) -> float | None:
         """Frames per second of tracking, None where the clock shows no duration."""
-        return round(self.frames / self.seconds, 2) if self.seconds > 0 else None
+        return round(self.record.frames / self.seconds, 2) if self.seconds > 0 else None
 
 
 def _track(
@@ -171,6 +169,7 @@ def _track(
     recording: Recording,
     setup: TrackerSetup,
     config: TrackerConfig,
+    doubts: Sequence[str],
     *,
     warn: Callable[[str], None],
     progress: Callable[[int], Any],
@@ -179,15 +178,13 @@ def _track(
     tracker = setup.tracker
     debug = DebugImages(args.debug_images) if args.debug_images else None
     check = CameraCheck(tracker.rig, config)
-    states: Counter[str] = Counter()
-    warnings = FrameWarnings()
+    record = RunRecord(tracker.rig)
     started = time.perf_counter()
-    rate = args.fps or recording.fps
     with ResultWriter(
         args.name,
         tracker.body,
         config,
-        fps=rate,
+        fps=args.fps or recording.fps,
         source=recording.name,
         overwrite=args.force,
         keep_lost=args.keep_lost,
@@ -197,35 +194,45 @@ def _track(
             writer.add(result)
             writer.body = body
             check.add(result, body)
-            states[result.state.value] += 1
-            for kind in warnings.add(tracked.images.index, result.warnings):
+            for kind in record.add(result, body, tracked.images.index):
                 warn(f"frame {kind.first_frame}: {kind.text}")
             if debug:
                 debug.write(tracked.images, result, tracker.rig, body, tracker.segmenter)
-            progress(states.total())
+            progress(record.frames)
+        seconds = time.perf_counter() - started
         shifts = check.shifts()
-        writer.note({"cameras": _cameras(shifts)})
-    seconds = time.perf_counter() - started
-    return _Outcome(writer.trc_path, states.total(), states, seconds, shifts, warnings)
+        verdict = verdict_of(
+            record,
+            load_description(config.body),
+            known=(*doubts, *describe(shifts)),
+            start_given=args.start is not None,
+        )
+        writer.note({"cameras": _cameras(shifts), "verdict": verdict.as_mapping()})
+    return _Outcome(writer.trc_path, seconds, shifts, record, verdict)
 
 
 def _summary(args: argparse.Namespace, recording: Recording, outcome: _Outcome) -> dict[str, Any]:
     return {
         "source": str(args.source),
         "result": str(outcome.trc_path),
-        "frames": outcome.frames,
-        "tracked": outcome.tracked,
-        "states": dict(outcome.states),
+        "frames": outcome.record.frames,
+        "tracked": outcome.record.tracked,
+        "states": dict(outcome.record.states),
         "seconds": round(outcome.seconds, 3),
         "frames_per_s": outcome.frames_per_s,
+        "verdict": outcome.verdict.as_mapping(),
         "warnings": [*recording.warnings, *describe(outcome.shifts)],
-        "frame_warnings": outcome.warnings.as_list(),
+        "frame_warnings": outcome.record.warnings.as_list(),
         "cameras": _cameras(outcome.shifts),
     }
 
 
 def _warn(console: Console, text: str) -> None:
-    console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
+    _tell(console, f"warning: {text}")
+
+
+def _tell(console: Console, text: str) -> None:
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:

@@ -1,14 +1,24 @@
 """Level and message of the diagnostics of a running tracker."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from types import MappingProxyType
 
 from markerless_tracker.records import TrackState
 
 QUIET_S = 2.0
 """Time without images, sets or results after which that is reported."""
-
+PROCESSING = "processing images"
+"""Activity of a tracker that deals with images as they come."""
+NEWS: Mapping[TrackState, str] = MappingProxyType(
+    {
+        TrackState.TRACKING: "person found",
+        TrackState.LOST: "person lost",
+        TrackState.SEARCHING: "searching for a person",
+    }
+)
+"""What a state means, in the diagnostics and in the log."""
 
 _NOTHING = "no image from any camera"
 
@@ -62,11 +72,19 @@ class Facts:
 
 @dataclass(frozen=True)
 class Health:
-    """Level and message, one line; `trouble` is the reason for missing results, empty otherwise."""
+    """Level and message of the diagnostics.
+
+    Attributes:
+        level: the level.
+        message: one line.
+        trouble: the reason for missing results; empty if there are results.
+        without: the cameras that results come without, and why; empty if there is none.
+    """
 
     level: Level
     message: str
     trouble: str = ""
+    without: str = ""
 
 
 def assess(facts: Facts) -> Health:
@@ -79,7 +97,7 @@ def assess(facts: Facts) -> Health:
         return health
     clock = "use_sim_time is set and no /clock is received"
     level = Level.WARN if health.level is Level.OK else health.level
-    return Health(level, f"{health.message}; {clock}", health.trouble)
+    return replace(health, level=level, message=f"{health.message}; {clock}")
 
 
 def _assess(facts: Facts) -> Health:
@@ -98,12 +116,15 @@ def _assess(facts: Facts) -> Health:
 
 def _working(facts: Facts) -> Health:
     problems = [facts.refusals.get(name, f"no image of {name}") for name in facts.left_out]
-    without = f"tracking without {', '.join(facts.left_out)}: {'; '.join(problems)}"
-    if facts.state is not TrackState.TRACKING:
-        message = f"{facts.state.value}: {facts.activity}"
-        return Health(Level.WARN, f"{message}; {without}" if problems else message)
+    without = ""
     if problems:
-        return Health(Level.WARN, f"{facts.state.value}: {without}")
+        without = f"tracking without {', '.join(facts.left_out)}: {'; '.join(problems)}"
+    if facts.state is not TrackState.TRACKING:
+        doing = NEWS[facts.state] if facts.activity == PROCESSING else facts.activity
+        message = f"{facts.state.value}: {doing}"
+        return Health(Level.WARN, f"{message}; {without}" if without else message, "", without)
+    if without:
+        return Health(Level.WARN, f"{facts.state.value}: {without}", "", without)
     return Health(Level.OK, facts.state.value)
 
 

@@ -64,6 +64,19 @@ def test_json_has_the_warnings_of_frames(run: Run, warned, walk) -> None:
     ]
 
 
+def test_the_verdict_follows_the_counts(run: Run, warned, walk, tmp_path) -> None:
+    _, out, _ = run(walk, "--start", walk / "ground_truth.trc")
+    lines = out.splitlines()
+    assert lines[0].startswith(f"{tmp_path / 'out.trc'}: 6 frames, 6 tracked, 0 lost, 0 searching")
+    assert lines[1].startswith("overlap of body and silhouettes: cam01 0.")
+    assert lines[2].startswith("stature 1.7") and lines[-1].startswith("next: ")
+    assert "warnings: 2 kinds in 4 frames" in lines
+    _, out, _ = run(walk, "--start", walk / "ground_truth.trc", "--json", "--force")
+    verdict = json.loads(out)["verdict"]
+    assert verdict == json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["verdict"]
+    assert verdict["tracked"] == 6 and verdict["frames_with_warnings"] == 4
+
+
 @pytest.fixture
 def empty_room(tmp_path: Path) -> Path:
     """Five frames of the synthetic room without a person."""
@@ -88,6 +101,9 @@ def test_nobody_found_is_no_success(run: Run, empty_room, tmp_path, json_flag) -
         assert json.loads(out)["tracked"] == 0
     else:
         assert "out.trc: 5 frames, 0 tracked, 0 lost" in out
+        assert "likely cause: no silhouette in any camera: nobody is there" in out
+    verdict = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["verdict"]
+    assert (verdict["tracked"], verdict["searching"]) == (0, 5) and len(verdict["causes"]) == 1
     assert not (tmp_path / "out.subject.yaml").exists()
     assert not read_trc(tmp_path / "out.trc").tracked.any()
 

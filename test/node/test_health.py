@@ -29,7 +29,12 @@ def facts(**changes: Any) -> Facts:
     ("changes", "level", "message"),
     [
         ({}, Level.OK, "TRACKING"),
-        ({"state": TrackState.LOST}, Level.WARN, "LOST: processing images"),
+        ({"state": TrackState.LOST}, Level.WARN, "LOST: person lost"),
+        (
+            {"state": TrackState.SEARCHING, "activity": "waiting for learn_background"},
+            Level.WARN,
+            "SEARCHING: waiting for learn_background",
+        ),
         (
             {"ready": False, "activity": "compiling", "state": TrackState.SEARCHING},
             Level.WARN,

@@ -1,45 +1,60 @@
-"""Log lines of a running tracker: changes of state, warnings, missing results."""
+"""Log lines of a running tracker: one per event, in the words of `state` and the diagnostics."""
 
-from collections.abc import Callable
-
-from markerless_tracker.node.health import Health
+from markerless_tracker.node.health import NEWS, Health
 from markerless_tracker.node.ros.notices import Notices, kind_of
 from markerless_tracker.records import TrackResult, TrackState
 
-_NEWS = {
-    TrackState.TRACKING: "person found",
-    TrackState.LOST: "person lost",
-    TrackState.SEARCHING: "searching for a person",
-}
-
 
 class Announcer:
-    """Logs changes.
+    """Logs changes: the person found, lost and found again, cameras gone and back, warnings.
+
+    A line about the person begins as the message of `state` does. Repetitions are counted.
 
     Args:
-        inform: logs a line as information.
-        notices: logs warnings, repetitions counted.
+        news: logs lines as information.
+        notices: logs lines as warnings.
     """
 
-    def __init__(self, inform: Callable[[str], None], notices: Notices) -> None:
-        self._inform = inform
+    def __init__(self, news: Notices, notices: Notices) -> None:
+        self._news = news
         self._notices = notices
         self._state = TrackState.SEARCHING
-        self._trouble = ""
+        self._found = False
+        self._trouble = self._without = ""
 
     def result(self, result: TrackResult) -> None:
         """Log a change of state, and the warnings of a result."""
         if result.state is not self._state:
-            self._inform(f"stamp {result.stamp_ns}: {_NEWS[result.state]}")
+            words = NEWS[result.state]
+            if result.state is TrackState.TRACKING:
+                words, self._found = f"{words}{' again' * self._found}", True
+            self._news.say(f"{result.state.value}: {words} (stamp {result.stamp_ns})")
             self._state = result.state
         for warning in result.warnings:
             self._notices.say(f"stamp {result.stamp_ns}: {warning}")
 
     def health(self, health: Health) -> None:
-        """Log the reason for missing results when it changes, and its end."""
+        """Log cameras that are gone or back, the reason for missing results, and its end."""
+        if kind_of(health.without) != kind_of(self._without):
+            if health.without:
+                self._notices.say(f"{self._state.value}: {health.without}")
+            else:
+                self._news.say(f"{self._state.value}: every camera is used again")
+            self._without = health.without
         if kind_of(health.trouble) != kind_of(self._trouble):
             if health.trouble:
                 self._notices.say(health.trouble)
             else:
-                self._inform("images are tracked")
+                self._news.say("images are tracked")
             self._trouble = health.trouble
+
+
+def ready_line(activity: str, kernels: int, seconds: float) -> str:
+    """The line for the log when the tracker is ready.
+
+    Args:
+        activity: what it does from now on.
+        kernels: how many were compiled; the others were stored by an earlier start.
+        seconds: how long that took, loading included.
+    """
+    return f"ready, {activity}; {kernels} kernels compiled, {seconds:.1f} s"

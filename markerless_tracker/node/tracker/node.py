@@ -28,6 +28,7 @@ from markerless_tracker.node.tracker.inputs import CameraInput
 from markerless_tracker.node.tracker.learning import Learning
 from markerless_tracker.node.tracker.outputs import Pictures, ResultFile
 from markerless_tracker.node.tracker.publishers import ResultPublishers
+from markerless_tracker.node.tracker.report import RunReport
 from markerless_tracker.node.tracker.setup import RigSource, build
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
@@ -82,7 +83,8 @@ class TrackerNode(GivenNode):
         )
         self._seconds: Callable[[], float] = time.monotonic
         self._notices = Notices(self._log_warning, self._seconds)
-        self._announcer = Announcer(self._inform, self._notices)
+        self._news = Notices(self._inform, self._seconds)
+        self._announcer = Announcer(self._news, self._notices)
         self._source = RigSource(self._settings)
         self._status = TrackerStatus()
         self._sets: Synchronizer[ImageMessage] = Synchronizer(
@@ -98,6 +100,7 @@ class TrackerNode(GivenNode):
         self._result_file = ResultFile(
             self._settings.result_file, overwrite=self._settings.overwrite, report=self._warn
         )
+        self._report = RunReport(start_given=self._settings.start_file is not None)
         self._results = ResultPublishers(self)
         self._states = self.create_publisher(DiagnosticArray, "state", latched_qos())
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -133,8 +136,16 @@ class TrackerNode(GivenNode):
         """
         ended = self._worker.stop(timeout_s)
         self._notices.flush()
+        self._news.flush()
         counts = self._status.values(self._sets.counts, (), ())
-        written = self._result_file.close({"node": {key: counts[key] for key in _NOTED}})
+        notes: dict[str, Any] = {"node": {key: counts[key] for key in _NOTED}}
+        verdict = self._report.verdict()
+        if verdict is not None:
+            self._inform(verdict.counts)
+            for line in verdict.lines():
+                self._inform(line)
+            notes["verdict"] = verdict.as_mapping()
+        written = self._result_file.close(notes)
         if written is not None:
             self._inform(written)
         return ended
@@ -217,6 +228,8 @@ class TrackerNode(GivenNode):
         self._results.describe(setup.tracker.body)
         self._tracker = setup.tracker
         self._result_file.begin(setup.tracker)
+        for doubt in self._report.begin(setup.tracker, rig):
+            self._warn(doubt)
         return TrackerHandle(
             setup.tracker,
             setup.start_stamp_ns,
@@ -229,6 +242,7 @@ class TrackerNode(GivenNode):
     def _publish(self, tracked: TrackedSet) -> None:
         assert self._tracker is not None
         self._result_file.add(tracked.result)
+        self._report.add(tracked.result)
         self._announcer.result(tracked.result)
         if not self.context.ok():  # a signal was received while this set was tracked
             return
@@ -304,6 +318,7 @@ class TrackerNode(GivenNode):
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
         self._notices.flush()
+        self._news.flush()
 
     def _warn(self, text: str) -> None:
         self._notices.say(text)

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from markerless_tracker.compiled import compilation
 from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.imaging import BackgroundModel
+from markerless_tracker.node.health import PROCESSING
+from markerless_tracker.node.tracker.announcer import ready_line
 from markerless_tracker.node.tracker.learning import Learning, OpenRequest
 from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
 from markerless_tracker.node.tracker.pace.effort import EffortRule, Lateness
@@ -184,8 +186,8 @@ class TrackWorker:
                 return
             self._status.doing("compiling")
             self._inform("compiling what is not stored from an earlier start")
-            self._reported_s = self._clock()
-            with compilation(self._compiling):
+            begun_s = self._reported_s = self._clock()
+            with compilation(self._compiling) as kernels:
                 handle.tracker.warm_up()
         except Exception as error:
             self.fatal = one_line(error)
@@ -196,7 +198,7 @@ class TrackWorker:
         self._waits = handle.waits
         activity = "waiting for learn_background" if handle.waits else "waiting for images"
         self._status.became_ready(activity, now_s=self._clock())
-        self._inform(f"ready, {activity}")
+        self._inform(ready_line(activity, kernels.done, self._clock() - begun_s))
         gate = StartGate(handle.start_ns)
         ahead = Ahead(
             self._sets, partial(self._evidence, handle), poll_s=_POLL_S, clock=self._clock
@@ -275,7 +277,7 @@ class TrackWorker:
                     self._learn(handle, learning, matched.stamp_ns)
                     return
             else:
-                self._status.doing("processing images")
+                self._status.doing(PROCESSING)
             age_s = max(0.0, self._clock() - matched.arrived_s)
             lateness = Lateness(matched.replaced, waited_s, age_s, matched.period_s)
             result = handle.tracker.step(views, matched.stamp_ns, self._effort.take(lateness))

@@ -1,6 +1,6 @@
 """Kinds of warning in the frames of a run."""
 
-from markerless_tracker.cli.frame_warnings import FrameWarnings
+from markerless_tracker.results.verdict.frame_warnings import FrameWarnings
 
 
 def test_each_kind_is_reported_once_and_counted_in_every_frame() -> None:

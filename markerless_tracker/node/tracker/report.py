@@ -1,0 +1,53 @@
+"""The verdict of a live run: what its frames add up to."""
+
+from threading import Lock
+
+from markerless_tracker.body import load_description
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.camera.doubts import calibration_doubts
+from markerless_tracker.records import TrackResult
+from markerless_tracker.results.verdict.record import RunRecord
+from markerless_tracker.results.verdict.verdict import Verdict, verdict_of
+from markerless_tracker.tracking import Tracker
+
+
+class RunReport:
+    """Takes the results of a tracker. Safe to use from several threads.
+
+    Args:
+        start_given: whether the run begins with a start pose.
+    """
+
+    def __init__(self, *, start_given: bool) -> None:
+        self._start_given = start_given
+        self._lock = Lock()
+        self._tracker: Tracker | None = None
+        self._record: RunRecord | None = None
+        self._doubts: tuple[str, ...] = ()
+
+    def begin(self, tracker: Tracker, rig: CameraRig) -> tuple[str, ...]:
+        """Set the tracker; returns what is doubtful about the cameras, one line each."""
+        with self._lock:
+            self._tracker, self._record = tracker, RunRecord(tracker.rig)
+            self._doubts = calibration_doubts(rig)
+            return self._doubts
+
+    def add(self, result: TrackResult) -> None:
+        """Take a result."""
+        with self._lock:
+            if self._record is not None and self._tracker is not None:
+                self._record.add(result, self._tracker.body)
+
+    def verdict(self) -> Verdict | None:
+        """The verdict so far; None before the first result."""
+        with self._lock:
+            if self._record is None or self._tracker is None or not self._record.frames:
+                return None
+            # No search for exchanged cameras: a node that is told to end must end soon.
+            return verdict_of(
+                self._record,
+                load_description(self._tracker.config.body),
+                known=self._doubts,
+                start_given=self._start_given,
+                search_faults=False,
+            )

@@ -1,0 +1,107 @@
+"""Silhouette that never moves with any limb: furniture or a machine that the background lacks.
+
+Now and then the silhouettes are compared with the tracked body. Pixels that are person throughout,
+and lie beside the body in most of the comparisons, are no person's.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.fitness.raster.silhouette import body_masks
+from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.tracking.search import pixels_per_m
+
+EVERY_NS, LATER_EVERY_NS = 60_000_000, 2_000_000_000
+"""Time between the first `MANY` comparisons, and between those after them."""
+MANY = 12
+LEAST = 6
+"""Comparisons without which nothing is said."""
+ALWAYS = 0.9
+"""Fraction of the comparisons in which such a pixel is person."""
+BESIDE = 0.5
+"""Fraction in which it lies beside the body, so."""
+BESIDE_M = 0.05
+"""Pixels nearer to the body than this may be its clothes."""
+THICK_M = 0.06
+"""Thinner parts are the outline's error."""
+LEAST_M2 = 0.02
+"""Area at the person's distance from which on it is reported."""
+
+
+@dataclass(eq=False)
+class _View:
+    person: NDArray[np.uint32]
+    beside: NDArray[np.uint32]
+    comparisons: int = 0
+    px_per_m: float = 0.0
+
+
+class StaticSilhouette:
+    """Compares silhouettes with the body over a run; memory is that of two images per camera.
+
+    Args:
+        rig: the cameras, as the tracker has them.
+    """
+
+    def __init__(self, rig: CameraRig) -> None:
+        self._cameras = {camera.name: camera for camera in rig}
+        self._views: dict[str, _View] = {}
+        self._last_ns: int | None = None
+        self._comparisons = 0
+
+    def add(self, result: TrackResult, body: BodyModel) -> None:
+        """Take a frame; most are passed over."""
+        if result.state is not TrackState.TRACKING or result.pose is None:
+            return
+        every_ns = EVERY_NS if self._comparisons < MANY else LATER_EVERY_NS
+        # Stamps may be set back.
+        if self._last_ns is not None and abs(result.stamp_ns - self._last_ns) < every_ns:
+            return
+        self._last_ns = result.stamp_ns
+        self._comparisons += 1
+        seen = [self._cameras[name] for name in result.observations]
+        covered = body_masks(body, result.pose, seen)
+        at = result.pose[[body.index(f"pelvis_t{axis}") for axis in "xyz"]]
+        for camera in seen:
+            self._compare(camera, result.observations[camera.name], covered[camera.name])
+            view = self._views[camera.name]
+            view.px_per_m += (pixels_per_m(camera, at) - view.px_per_m) / view.comparisons
+
+    def found_m2(self) -> dict[str, float]:
+        """Area of such silhouette by camera, where there is any, m2 at the person's distance."""
+        found = {}
+        for name, view in self._views.items():
+            if view.comparisons < LEAST or not view.px_per_m > 0.0:
+                continue
+            still = view.person >= ALWAYS * view.comparisons
+            still &= view.beside >= BESIDE * view.comparisons
+            thick = _disc(0.5 * THICK_M * view.px_per_m)
+            opened = cv2.morphologyEx(still.view(np.uint8), cv2.MORPH_OPEN, thick)
+            area = float(np.count_nonzero(opened)) / view.px_per_m**2
+            if area >= LEAST_M2:
+                found[name] = area
+        return found
+
+    def _compare(
+        self, camera: CameraModel, observation: Observation, covered: NDArray[np.bool_]
+    ) -> None:
+        view = self._views.get(camera.name)
+        if view is None:
+            empty = np.zeros(covered.shape, dtype=np.uint32)
+            view = self._views[camera.name] = _View(empty, empty.copy())
+        view.comparisons += 1
+        person = observation.in_full_frame(observation.mask)
+        view.person += person
+        # The distance of the first comparison will do for the margin.
+        margin = _disc(BESIDE_M * view.px_per_m) if view.px_per_m else _disc(1.0)
+        view.beside += person & (cv2.dilate(covered.view(np.uint8), margin) == 0)
+
+
+def _disc(radius_px: float) -> NDArray[np.uint8]:
+    side = 2 * max(1, round(min(radius_px, 100.0))) + 1
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)), dtype=np.uint8)

@@ -1,0 +1,162 @@
+"""The verdict of a run, in words and as a mapping."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from markerless_tracker.body.description import BodyDescription
+from markerless_tracker.records import TrackState
+from markerless_tracker.results.verdict.doubts import (
+    causes_of_nobody,
+    doubts_about_fit,
+    stature_is_plausible,
+    stature_m,
+)
+from markerless_tracker.results.verdict.record import RunRecord
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What happened in a run.
+
+    Attributes:
+        frames: frames processed.
+        tracked, searching, lost: of them in that state.
+        overlap: camera -> median overlap (IoU) of its silhouette and the body.
+        stature_m: of the body; None without one.
+        stature_plausible: whether that is a grown person's; None without a body.
+        worst_limb: the limb lost in most tracked frames; empty if none was lost.
+        worst_limb_lost: the number of those frames.
+        frames_with_warnings: frames with any warning.
+        warnings: kinds of them.
+        doubts: what is doubtful, one line each.
+        causes: why nobody may have been found, one line each; empty if somebody was.
+        look: where to look next.
+    """
+
+    frames: int
+    tracked: int
+    searching: int
+    lost: int
+    overlap: Mapping[str, float]
+    stature_m: float | None
+    stature_plausible: bool | None
+    worst_limb: str
+    worst_limb_lost: int
+    frames_with_warnings: int
+    warnings: int
+    doubts: tuple[str, ...]
+    causes: tuple[str, ...]
+    look: str
+
+    @property
+    def counts(self) -> str:
+        """Frames by state, in words."""
+        return (
+            f"{self.frames} frames, {self.tracked} tracked, {self.lost} lost, "
+            f"{self.searching} searching"
+        )
+
+    def lines(self) -> list[str]:
+        """Everything but the counts, one line each."""
+        found = []
+        if self.overlap:
+            listed = ", ".join(f"{name} {value:.2f}" for name, value in self.overlap.items())
+            found.append(f"overlap of body and silhouettes: {listed}")
+        if self.stature_m is not None:
+            unusual = "" if self.stature_plausible else ", not a grown person's"
+            found.append(f"stature {self.stature_m:.2f} m{unusual}")
+        if self.worst_limb:
+            found.append(
+                f"worst limb: {self.worst_limb}, lost in {self.worst_limb_lost} of {self.tracked} "
+                "tracked frames"
+            )
+        if self.frames_with_warnings:
+            found.append(f"warnings: {self.warnings} kinds in {self.frames_with_warnings} frames")
+        found += [f"doubt: {text}" for text in self.doubts]
+        found += [f"likely cause: {text}" for text in self.causes]
+        return [*found, f"next: {self.look}"]
+
+    def as_mapping(self) -> dict[str, Any]:
+        """The verdict for JSON."""
+        return {
+            "frames": self.frames,
+            "tracked": self.tracked,
+            "searching": self.searching,
+            "lost": self.lost,
+            "overlap": {name: round(value, 3) for name, value in self.overlap.items()},
+            "stature_m": None if self.stature_m is None else round(self.stature_m, 3),
+            "stature_plausible": self.stature_plausible,
+            "worst_limb": self.worst_limb or None,
+            "worst_limb_lost": self.worst_limb_lost,
+            "frames_with_warnings": self.frames_with_warnings,
+            "warnings": self.warnings,
+            "doubts": list(self.doubts),
+            "causes": list(self.causes),
+            "look": self.look,
+        }
+
+
+def verdict_of(
+    record: RunRecord,
+    description: BodyDescription,
+    *,
+    known: Sequence[str] = (),
+    start_given: bool = False,
+    search_faults: bool = True,
+) -> Verdict:
+    """The verdict of a run.
+
+    Args:
+        record: its frames.
+        description: of the body that was tracked.
+        known: doubts that were found otherwise, such as those about the calibration.
+        start_given: whether the run was to begin with a start pose.
+        search_faults: whether to find out, where the run is doubtful, which cameras may be
+            exchanged; takes some seconds.
+    """
+    somebody = record.tracked > 0
+    stature = None if record.body is None else stature_m(description, record.body)
+    doubts, causes = list(known), []
+    if somebody:
+        doubts += doubts_about_fit(record, description, search_faults=search_faults)
+    elif record.frames:
+        causes = causes_of_nobody(record, start_given=start_given, search_faults=search_faults)
+    limb, frames = max(record.lost_limbs.items(), key=lambda item: item[1], default=("", 0))
+    return Verdict(
+        frames=record.frames,
+        tracked=record.tracked,
+        searching=record.states[TrackState.SEARCHING.value],
+        lost=record.states[TrackState.LOST.value],
+        overlap={n: v for n, v in record.median_overlap.items() if math.isfinite(v)},
+        stature_m=stature,
+        stature_plausible=None if stature is None else stature_is_plausible(stature),
+        worst_limb=limb if frames else "",
+        worst_limb_lost=frames,
+        frames_with_warnings=record.warnings.frames,
+        warnings=len(record.warnings.kinds),
+        doubts=tuple(dict.fromkeys(doubts)),
+        causes=tuple(dict.fromkeys(causes)),
+        look=_where_to_look(record, bool(doubts)),
+    )
+
+
+def _where_to_look(record: RunRecord, doubtful: bool) -> str:
+    if not record.frames:
+        return "there was no frame"
+    pictures = "`track --debug-images DIR` shows silhouettes and body of every frame"
+    if not record.tracked:
+        return pictures
+    if record.stretch.frames:
+        begin, end = record.stretch.from_ns / 1e9, record.stretch.to_ns / 1e9
+        return (
+            f"nobody was tracked from {begin:.2f} to {end:.2f} s ({record.stretch.frames} frames); "
+            f"{pictures}"
+        )
+    if doubtful:
+        return pictures
+    worst = min(record.median_overlap.items(), key=lambda item: item[1], default=None)
+    if worst is None:
+        return pictures
+    return f"{worst[0]} fits worst; {pictures}"

@@ -1,0 +1,67 @@
+"""Log lines of a running tracker, without the middleware."""
+
+import math
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+from markerless_tracker.node.health import Health, Level
+from markerless_tracker.node.ros.notices import Notices
+from markerless_tracker.node.tracker.announcer import Announcer, ready_line
+from markerless_tracker.records import TrackResult, TrackState
+
+TRACKING, LOST, SEARCHING = TrackState.TRACKING, TrackState.LOST, TrackState.SEARCHING
+
+
+class Log:
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.warnings: list[str] = []
+        self.now_s = 0.0
+        self.news = Notices(self.lines.append, lambda: self.now_s)
+        self.announcer = Announcer(self.news, Notices(self.warnings.append, lambda: self.now_s))
+
+    def results(self, *states: TrackState, seconds: float = 20.0) -> None:
+        """Results that follow each other at that distance."""
+        for state in states:
+            self.now_s += seconds
+            self.announcer.result(TrackResult(int(self.now_s), state, None, None, math.nan, {}, 0))
+
+
+def test_found_lost_and_found_again_once_each() -> None:
+    log = Log()
+    log.results(SEARCHING, SEARCHING, TRACKING, TRACKING, LOST, LOST, SEARCHING, TRACKING, TRACKING)
+    assert log.lines == [
+        "TRACKING: person found (stamp 60)",
+        "LOST: person lost (stamp 100)",
+        "SEARCHING: searching for a person (stamp 140)",
+        "TRACKING: person found again (stamp 160)",
+    ]
+    assert log.warnings == []
+
+
+def test_a_state_that_changes_all_the_time_does_not_fill_the_log() -> None:
+    log = Log()
+    log.results(*([TRACKING, LOST] * 50), seconds=0.01)
+    assert len(log.lines) == 3
+    log.now_s += 20.0
+    log.news.flush()
+    assert [line for line in log.lines[3:] if "times in 10 s" in line] == log.lines[3:] != []
+
+
+def test_a_camera_that_is_gone_and_back_is_said_once_each() -> None:
+    log = Log()
+    log.results(TRACKING)
+    whole = Health(Level.OK, "TRACKING")
+    words = "tracking without cam02: no image of cam02"
+    gone = Health(Level.WARN, f"TRACKING: {words}", without=words)
+    for health in (whole, gone, gone, gone, whole, whole):
+        log.announcer.health(health)
+    assert log.warnings == [gone.message]
+    assert log.lines[1:] == ["TRACKING: every camera is used again"]
+
+
+def test_the_duration_of_the_compilation() -> None:
+    line = ready_line("waiting for images", 12, 34.56)
+    assert line == "ready, waiting for images; 12 kernels compiled, 34.6 s"

@@ -1,0 +1,74 @@
+"""What the node says in its log, over the real middleware: each event once, and the verdict."""
+
+import json
+import re
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+
+def test_a_run_from_ready_to_the_result(tmp_path: Path, begin: Any, scenes: Any) -> None:
+    live = begin(result_file=tmp_path / "walk")
+    log = live.process.output
+    assert re.search(r"ready, waiting for images; \d+ kernels compiled, \d+\.\d s", log), log
+    live.track()
+    live.until(lambda: "TRACKING: person found (stamp" in live.process.output, "found")
+    live.send_until(
+        lambda: "tracking without cam03" in live.message, "tracking without cam03", cam03=None
+    )
+    said = live.message
+    live.until(lambda: f"]: {said}" in live.process.output, said)
+    live.send_until(lambda: "every camera is used again" in live.process.output, "cam03 again")
+    here = live.camera.scene
+    live.camera.scene = scenes.EmptyRoom(here)
+    messages: set[str] = set()
+
+    def searching() -> bool:
+        messages.add(live.message)
+        return "SEARCHING: searching for a person (stamp" in live.process.output
+
+    live.send_until(searching, "SEARCHING")
+    live.camera.scene = here
+    live.send_until(lambda: "person found again" in live.process.output, "found again")
+    live.process.signal(signal.SIGINT)
+    assert live.process.wait() == 0, live.process.output
+    log = live.process.output
+    # The diagnostics have the same words.
+    assert "SEARCHING: searching for a person" in messages
+    for line in (
+        "compiling", "TRACKING: person found (", "LOST: person lost (",
+        "SEARCHING: searching for a person (", "TRACKING: person found again (",
+        "TRACKING: tracking without cam03", "TRACKING: every camera is used again",
+        "frames written", "overlap of body and silhouettes: cam01 0.", "next: ",
+    ):  # fmt: skip
+        assert log.count(line) == 1, (line, log)
+    verdict = json.loads((tmp_path / "walk.json").read_text(encoding="utf-8"))["verdict"]
+    assert verdict["tracked"] > 0 and verdict["lost"] > 0 and verdict["searching"] > 0
+    assert f"{verdict['frames']} frames, {verdict['tracked']} tracked" in log
+
+
+def test_a_doubtful_calibration_is_said_before_the_run(
+    tmp_path: Path, begin: Any, world: Any
+) -> None:
+    text = (world.folder / "calibration.toml").read_text(encoding="utf-8")
+    path = tmp_path / "calibration.toml"
+    path.write_text(
+        re.sub(
+            r"translation = \[(.*)\]",
+            lambda found: (
+                "translation = ["
+                + ", ".join(str(1000.0 * float(value)) for value in found[1].split(","))
+                + "]"
+            ),
+            text,
+        ),
+        encoding="utf-8",
+    )
+    live = begin(calibration_file=path)
+    log = live.process.output
+    assert log.count("are the translations in millimetres instead of metres?") == 1
+    assert log.index("millimetres") < log.index("ready, ")
