@@ -38,6 +38,8 @@ LEAST_PERSON = 0.25
 """Fraction of a lump's points that two cameras must see as person."""
 HIGH_M = 0.35
 """Shadows on the floor hardly make hulls higher than this: the trunk is looked for above it."""
+FOOT_M, SHIN_M = 0.22, 0.16
+"""Points lower than `SHIN_M` are feet only so near, across the floor, to higher ones of a leg."""
 ASIDE_M = 0.45
 """So far aside of the trunk, points lower than `HIGH_M` that no two cameras show as person, and
 those on the floor, are shadows."""
@@ -56,7 +58,8 @@ class Hull:
         depth_m: (n,) how deep each lies in the lump.
         views: how many cameras see it.
         trunk_m: (m, 3) the thick part: points that lie at least half as deep as the deepest.
-        sure_m: (k, 3) points that are no shadow: high enough, or person in two views.
+        sure_m: (k, 3) points that are no shadow: high enough, or person in two views and not at the
+            floor.
     """
 
     points_m: FloatArray
@@ -99,8 +102,8 @@ class Hull:
         trunk = points_m[thick]
         aside = np.linalg.norm((points_m - trunk.mean(axis=0))[:, :2], axis=1) > ASIDE_M
         low = (points_m[:, 2] < FLOOR_M) | ((points_m[:, 2] < HIGH_M) & ~person)
-        kept = ~(aside & low) | thick
-        sure = kept & (person | (points_m[:, 2] > HIGH_M))
+        kept = (~(aside & low) | thick) & ~_floor_alone(points_m, ~(aside & low))
+        sure = kept & (person | (points_m[:, 2] > HIGH_M)) & (points_m[:, 2] > SHIN_M)
         return cls(points_m[kept], depth_m[kept], views, trunk, points_m[sure])
 
 
@@ -126,58 +129,13 @@ def find_hulls(
     low = middle - (_RADIUS_M, _RADIUS_M, _UP_M)
     size = np.ceil(2.0 * np.array([_RADIUS_M, _RADIUS_M, _UP_M]) / COARSE_M).astype(np.int64)
     inside, looking, _ = _occupied(low, size, COARSE_M, views)
-    labels, count = ndimage.label(inside, structure=np.ones((3, 3, 3)))
+    labels, count = ndimage.label(inside, structure=np.ones((3, 3, 3), dtype=np.bool_))
     support = np.bincount(labels[inside], weights=looking[inside], minlength=count + 1)
     boxes = ndimage.find_objects(labels)
     for number in np.argsort(-support[1:], kind="stable") + 1:
         hull = _fine(labels, int(number), boxes[number - 1], low, views)
         if hull is not None:
             yield hull
-
-
-def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
-    """The silhouette's components that a hull's points fall on, the very same if that is all.
-
-    Undecided pixels that the hull covers are person: what all views allow is no shadow.
-    """
-    observation = decided_by_hull(observation, camera, hull)
-    mask = observation.not_background.view(np.uint8)
-    count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
-    if count <= 2:
-        return observation
-    pixels = project_camera(hull.points_m, camera) - observation.offset_px
-    with np.errstate(invalid="ignore"):
-        u, v = np.round(pixels).T
-        framed = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
-    kept = np.zeros(count, dtype=np.bool_)
-    kept[np.unique(labels[v[framed].astype(np.int64), u[framed].astype(np.int64)])] = True
-    kept[0] = False
-    if not kept.any() or kept[1:].all():
-        return observation
-    selected, undecided = kept[labels], observation.undecided
-    return observation.with_masks(
-        observation.mask & selected, None if undecided is None else undecided & selected
-    )
-
-
-def decided_by_hull(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
-    """The observation with undecided pixels as person where sure points of the hull fall."""
-    undecided = observation.undecided
-    if undecided is None:
-        return observation
-    pixels = project_camera(hull.sure_m, camera) - observation.offset_px
-    with np.errstate(invalid="ignore"):
-        u, v = np.round(pixels).T
-        framed = (u >= 0) & (v >= 0) & (u < observation.width) & (v < observation.height)
-    covered = np.zeros(undecided.shape, dtype=np.uint8)
-    covered[v[framed].astype(np.int64), u[framed].astype(np.int64)] = 1
-    middle = hull.points_m.mean(axis=0)
-    depth = float(camera.T_cam_world[2, :3] @ middle + camera.T_cam_world[2, 3])
-    side = 2 * int(0.75 * FINE_M * float(camera.matrix[0, 0]) / max(depth, 1.0)) + 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    covered = np.asarray(cv2.morphologyEx(covered, cv2.MORPH_CLOSE, kernel), dtype=np.uint8)
-    person = undecided & (covered > 0)
-    return observation.with_masks(observation.mask | person, undecided & ~person)
 
 
 def _fine(
@@ -194,7 +152,10 @@ def _fine(
     first = low + COARSE_M * (np.array([part.start for part in box]) - 1.0)
     extent = COARSE_M * (np.array([part.stop - part.start for part in box]) + 2.0)
     size = np.ceil(extent / FINE_M).astype(np.int64)
-    inside, looking, person = _occupied(first, size, FINE_M, views)
+    near = ndimage.binary_dilation(
+        np.pad(labels[box] == number, 1), structure=np.ones((3, 3, 3), dtype=np.bool_)
+    )
+    inside, looking, person = _occupied(first, size, FINE_M, views, near)
     parts, count = ndimage.label(inside)
     if count == 0:
         return None
@@ -203,7 +164,9 @@ def _fine(
     volume = FINE_M**3 * float(sizes.max())
     if not LEAST_VOLUME_M3 <= volume <= MOST_VOLUME_M3:
         return None
-    depth = ndimage.distance_transform_edt(np.pad(largest, 1))[1:-1, 1:-1, 1:-1]
+    lump = ndimage.find_objects(largest.view(np.uint8))[0]
+    depth = np.zeros(largest.shape)
+    depth[lump] = ndimage.distance_transform_edt(np.pad(largest[lump], 1))[1:-1, 1:-1, 1:-1]
     points = first + FINE_M * (np.argwhere(largest) + 0.5)
     if float(np.ptp(points, axis=0).max()) < LEAST_HEIGHT_M:
         return None
@@ -247,14 +210,30 @@ def _occupied(
     size: NDArray[np.int64],
     spacing: float,
     views: Sequence[_View],
+    cells: NDArray[np.bool_] | None = None,
 ) -> tuple[NDArray[np.bool_], NDArray[np.int8], NDArray[np.bool_]]:
     """Points of a grid that no view shows as background, and how many views look at each.
 
     Also the points that at least two views show as person.
+
+    Args:
+        low: (3,) corner of the grid, m.
+        size: (3,) its points.
+        spacing: m.
+        views: the silhouettes.
+        cells: cells of the coarse grid from the same corner on; points elsewhere are left out.
     """
     axes = [low[i] + spacing * (np.arange(size[i]) + 0.5) for i in range(3)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    index = np.arange(len(points))
+    if cells is None:
+        index = np.arange(int(size.prod()))
+    else:
+        within = [np.minimum(((a - b) / COARSE_M).astype(np.int64), n - 1)
+                  for a, b, n in zip(axes, low, cells.shape, strict=True)]  # fmt: skip
+        index = np.flatnonzero(cells[np.ix_(*within)])
+    at = np.unravel_index(index, tuple(size))
+    # Only those that are left are ever projected.
+    points = np.empty((int(size.prod()), 3))
+    points[index] = np.column_stack([axis[i] for axis, i in zip(axes, at, strict=True)])
     looking = np.zeros(len(points), dtype=np.int8)
     seen = np.zeros(len(points), dtype=np.int8)
     for view in views:
@@ -276,6 +255,22 @@ def _occupied(
     inside &= person | (points[:, 2] > FLOOR_M)
     shape = tuple(int(n) for n in size)
     return inside.reshape(shape), looking.reshape(shape), person.reshape(shape)
+
+
+def _floor_alone(points_m: FloatArray, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which points (n, 3) lie at the floor, and near no kept point of what may be a leg above."""
+    low = points_m[:, 2] < SHIN_M
+    leg = kept & ~low & (points_m[:, 2] < HIGH_M)
+    if not (low.any() and leg.any()):
+        return np.zeros(len(points_m), dtype=np.bool_)
+    cells = np.round((points_m[:, :2] - points_m[:, :2].min(axis=0)) / FINE_M).astype(np.int64)
+    feet = np.zeros(cells.max(axis=0) + 1, dtype=np.uint8)
+    feet[tuple(cells[leg].T)] = 1
+    side = 2 * round(FOOT_M / FINE_M) + 1
+    feet = np.asarray(
+        cv2.dilate(feet, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))), np.uint8
+    )
+    return np.asarray(low & (feet[tuple(cells.T)] == 0))
 
 
 def _middle(cameras: Sequence[CameraModel]) -> FloatArray:

@@ -7,16 +7,22 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.anatomy import posture
+from markerless_tracker.body.model import MARKER_NAMES
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.start.hull import Hull
-from markerless_tracker.tracking.start.many_poses import transforms_of_many
+from markerless_tracker.tracking.start.many_poses import markers_of_many, transforms_of_many
 
 HEADINGS = 16
 VARIATIONS = 48
 """Random variations of the postures, per heading."""
+ANKLE_M = 0.08
+"""Height of the lower ankle of a person that stands, squats, bends or sits."""
+OFF_FLOOR_M = 0.15
+"""A hull that begins higher above the floor, z = 0, may lack the feet."""
 VARIATION_FRACTION = 0.6
 """Their standard deviation, as a fraction of the prior's."""
 _TILT_RAD = (0.35, 0.40)
+_ANKLES = [MARKER_NAMES.index("LAnkle"), MARKER_NAMES.index("RAnkle")]
 _LIKE_TRUNK = ("pelvis", "belly", "chest", "torso")
 
 _LEFT_STEP = {
@@ -89,18 +95,36 @@ def first_guesses(
     known = postures(body)
     sd = VARIATION_FRACTION * joint_sd(body)
     sd[[body.index("pelvis_rx"), body.index("pelvis_ry")]] = _TILT_RAD
-    middle = hull.trunk_m.mean(axis=0)
-    out = np.empty((HEADINGS, len(known) + VARIATIONS, body.size))
+    heights = ankle_heights_m(hull)
+    places = 1 + len(heights)
+    count = places * len(known) + VARIATIONS
+    out = np.empty((HEADINGS, count, body.size))
     for k in range(HEADINGS):
         varied = known[rng.integers(len(known), size=VARIATIONS)]
-        out[k] = np.concatenate([known, varied + sd * rng.standard_normal((VARIATIONS, body.size))])
+        varied = varied + sd * rng.standard_normal((VARIATIONS, body.size))
+        out[k] = np.concatenate([*[known] * places, varied])
         out[k, :, body.index("pelvis_rz")] += 2.0 * np.pi * k / HEADINGS
     np.clip(out, limits[0], limits[1], out=out)
     at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
-    out[..., at] += middle - _trunk_middles(body, out.reshape(-1, body.size)).reshape(
-        HEADINGS, -1, 3
+    flat = out.reshape(-1, body.size)
+    middles = _trunk_middles(body, flat).reshape(HEADINGS, -1, 3)
+    ankles = markers_of_many(body, flat)[:, _ANKLES, 2].min(axis=1).reshape(HEADINGS, -1)
+    out[..., at] += hull.trunk_m.mean(axis=0) - middles
+    # What the hull's trunk is differs with clothes and arms by 0.3 m in height; feet are sure.
+    shift = hull.trunk_m[:, 2].mean() - middles[..., 2]
+    place = np.concatenate(
+        [np.repeat(np.arange(places), len(known)), np.arange(VARIATIONS) % places]
     )
+    for number, height in enumerate(heights):
+        rows = place == 1 + number
+        out[:, rows, at[2]] += height - ankles[:, rows] - shift[:, rows]
     return out
+
+
+def ankle_heights_m(hull: Hull) -> tuple[float, ...]:
+    """Heights of a person's lower ankle, m: above the hull's lowest point, or above the floor."""
+    low = max(hull.low_m, 0.0)
+    return (low + ANKLE_M,) if low <= OFF_FLOOR_M else (low + ANKLE_M, ANKLE_M)
 
 
 def put_at(body: BodyModel, hull: Hull, pose: FloatArray) -> FloatArray:

@@ -15,10 +15,11 @@ from markerless_tracker.records import Observation
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.hull import Hull, decided_by_hull, find_hulls, hulls_part
+from markerless_tracker.tracking.start.hull import Hull, find_hulls
 from markerless_tracker.tracking.start.population import FramePopulation, Population
 from markerless_tracker.tracking.start.postures import put_at
 from markerless_tracker.tracking.start.rejections import Rejections
+from markerless_tracker.tracking.start.silhouettes import hulls_silhouettes
 from markerless_tracker.tracking.start.sizing import (
     Sized,
     SizeSearch,
@@ -173,10 +174,7 @@ class Starter:
             stands = put_at(self._body, hull, self._body.neutral)
             if not self._start_gate.enough(self._body, stands, looking, stamp_ns):
                 continue
-            observations = {
-                name: hulls_part(observation, self._cameras[name], hull)
-                for name, observation in observed.items()
-            }
+            observations = hulls_silhouettes(observed, self._cameras, hull)
             found = self._search(hull, observations, stamp_ns)
             if found is None:
                 self._rejections.note(hull)
@@ -201,10 +199,7 @@ class Starter:
         assert self._searcher is not None
         hull = next(find_hulls(self._cameras, observations), None)
         if hull is not None:
-            observations = {
-                name: decided_by_hull(seen, self._cameras[name], hull)
-                for name, seen in observations.items()
-            }
+            observations = hulls_silhouettes(observations, self._cameras, hull)
         return decide(observations, self._cameras, self._searcher.body, pose)
 
     def _second_look(

@@ -1,13 +1,11 @@
 """The visual hull: the position of a person."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.start.hull import find_hulls, hulls_part
+from markerless_tracker.tracking.start.hull import find_hulls
 
 
 @pytest.fixture(scope="module")
@@ -74,17 +72,3 @@ def test_a_view_that_shows_nothing_does_not_hide_the_person(person) -> None:
     name = next(iter(seen))
     seen[name] = observed({name: np.zeros_like(masks[name])})[name]
     assert len(list(find_hulls(cameras(scene), seen))) == 1
-
-
-def test_other_components_are_left_out(person) -> None:
-    scene, masks, _ = person
-    name = next(iter(masks))
-    hull = next(find_hulls(cameras(scene), observed(masks)))
-    mask = masks[name].copy()
-    mask[:8, :8] = 1
-    seen = observed({name: mask})[name]
-    kept = hulls_part(seen, scene.rig[name], hull)
-    assert not kept.mask[:8, :8].any()
-    assert kept.mask.sum() == (masks[name] > 0).sum()
-    alone = replace(seen, mask_words=kept.mask_words)
-    assert hulls_part(alone, scene.rig[name], hull) is alone

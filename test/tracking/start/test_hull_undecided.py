@@ -6,7 +6,7 @@ import pytest
 from markerless_tracker.camera import project_camera
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.start.hull import FLOOR_M, decided_by_hull, find_hulls, hulls_part
+from markerless_tracker.tracking.start.hull import FINE_M, FLOOR_M, FOOT_M, SHIN_M, find_hulls
 
 
 @pytest.fixture(scope="module")
@@ -91,22 +91,6 @@ def test_a_shadow_without_a_person_is_no_hull(person) -> None:
     assert not list(find_hulls(cameras(scene), seen))
 
 
-def test_undecided_pixels_under_the_hull_are_person(person) -> None:
-    scene, masks = person
-    name = next(iter(masks))
-    nothing = np.zeros_like(masks[name])
-    hull = next(find_hulls(cameras(scene), {n: observe(n, m, nothing) for n, m in masks.items()}))
-    legs = lower_half(masks[name]) & masks[name]
-    shadow = floor_disc(scene, name, masks[name]) & ~masks[name]
-    seen = decided_by_hull(observe(name, masks[name], legs | shadow), scene.rig[name], hull)
-    assert seen.mask[legs].mean() > 0.95
-    assert seen.mask[shadow].mean() < 0.25
-    np.testing.assert_array_equal(seen.not_background, masks[name] | shadow)
-    plain = observe(name, masks[name], nothing)
-    assert decided_by_hull(plain, scene.rig[name], hull) is plain
-    assert hulls_part(plain, scene.rig[name], hull) is plain
-
-
 def test_a_shadow_beside_the_person_is_left_out(person) -> None:
     """A patch that all views show as undecided, 0.7 m aside of the person and up to the shins."""
     scene, masks = person
@@ -124,4 +108,24 @@ def test_a_shadow_beside_the_person_is_left_out(person) -> None:
     aside = hull.points_m[:, 0] - hull.trunk_m[:, 0].mean() > 0.6
     assert not aside.any()
     assert np.linalg.norm(hull.trunk_m.mean(axis=0)[:2] - pelvis[:2]) < 0.2
-    assert hull.sure_m[:, 2].min() < 0.2 and len(hull.sure_m) < len(hull.points_m)
+    assert SHIN_M < hull.sure_m[:, 2].min() < 0.2 and len(hull.sure_m) < len(hull.points_m)
+
+
+def test_the_floor_far_from_the_legs_is_no_foot(person) -> None:
+    """A dark shadow, person in all views, lies at the floor: beside the feet it is no hull."""
+    scene, masks = person
+    nothing = {name: np.zeros_like(mask) for name, mask in masks.items()}
+    discs = {n: floor_disc(scene, n, m) for n, m in masks.items()}
+    hull = next(
+        find_hulls(cameras(scene), {n: observe(n, masks[n] | discs[n], nothing[n]) for n in masks})
+    )
+    plain = next(
+        find_hulls(cameras(scene), {n: observe(n, m, nothing[n]) for n, m in masks.items()})
+    )
+    middle = scene.markers(0)[0] + (0.22, 0.0, 0.0)
+    far = np.linalg.norm(hull.points_m[:, :2] - middle[:2], axis=1) < 0.3
+    legs = plain.points_m[(plain.points_m[:, 2] > SHIN_M) & (plain.points_m[:, 2] < 0.3)]
+    gaps = np.linalg.norm(hull.points_m[far][:, None, :2] - legs[None, :, :2], axis=2).min(axis=1)
+    assert gaps[hull.points_m[far, 2] < SHIN_M].max() < FOOT_M + 2 * FINE_M
+    # The feet stay.
+    assert hull.low_m < plain.low_m + 0.04

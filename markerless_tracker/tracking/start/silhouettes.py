@@ -1,0 +1,153 @@
+"""Silhouettes of a person that a hull has located: shadows and unsure pixels are decided by it.
+
+Where no body is known yet, the views decide for each other. A pixel may be the person where the
+hull lies on its ray. A shadow lies on the floor: a pixel whose floor point another view sees lit is
+none (`evidence.floor`).
+"""
+
+from collections.abc import Mapping
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.camera import CameraModel, project_camera
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.observation import locked
+from markerless_tracker.records import Observation, pack_mask
+from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, lit_elsewhere
+from markerless_tracker.tracking.start.hull import FINE_M, Hull
+
+FLOOR_RADIUS_M = 3.0
+"""Distance from the hull of floor points that are tested: farther ones may lie behind a wall."""
+_BLOCK_PX = 2
+"""One pixel of so many in a row and a column is tested on the floor."""
+
+
+def hulls_silhouettes(
+    observations: Mapping[str, Observation], cameras: Mapping[str, CameraModel], hull: Hull
+) -> dict[str, Observation]:
+    """The silhouettes of the person that a hull holds, as `decided_by_hull` and `hulls_part` do.
+
+    Args:
+        observations: the views.
+        cameras: the cameras by name.
+        hull: where the person is.
+    """
+    decided = decided_by_hull(observations, cameras, hull)
+    return {name: hulls_part(seen, cameras[name], hull) for name, seen in decided.items()}
+
+
+def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
+    """The silhouette's components that a hull's points fall on, the very same if that is all."""
+    mask = observation.not_background.view(np.uint8)
+    count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
+    if count <= 2:
+        return observation
+    u, v = _pixels(hull.points_m, observation, camera)
+    kept = np.zeros(count, dtype=np.bool_)
+    kept[np.unique(labels[v, u])] = True
+    kept[0] = False
+    if not kept.any() or kept[1:].all():
+        return observation
+    selected, undecided = kept[labels], observation.undecided
+    return observation.with_masks(
+        observation.mask & selected, None if undecided is None else undecided & selected
+    )
+
+
+def decided_by_hull(
+    observations: Mapping[str, Observation], cameras: Mapping[str, CameraModel], hull: Hull
+) -> dict[str, Observation]:
+    """Observations with undecided pixels decided where the hull and the floor allow it.
+
+    Of the undecided pixels
+    - those beside the hull's image are background: other views show nobody on their rays;
+    - those in the image of its sure points are person if the floor there is lit in another view,
+      and darkened in none, or if they show no floor; the others stay undecided.
+
+    Person pixels beside the hull's image, whose floor is lit in no other view, become undecided:
+    they may be a dark shadow.
+    """
+    if all(seen.undecided_words is None for seen in observations.values()):
+        return dict(observations)
+    covered = {
+        name: _covered(hull.points_m, seen, cameras[name], grown=True)
+        for name, seen in observations.items()
+    }
+    views = {
+        name: _floor_view(seen, cameras[name], covered[name]) for name, seen in observations.items()
+    }
+    middle = hull.trunk_m.mean(axis=0)
+    decided = {}
+    for name, seen in observations.items():
+        undecided = seen.undecided
+        if undecided is None:
+            undecided = np.zeros((seen.height, seen.width), dtype=np.bool_)
+        sure = _covered(hull.sure_m, seen, cameras[name])
+        others = [view for other, view in views.items() if other != name]
+        beside = ~covered[name]
+        asked = (undecided & sure) | (seen.mask & beside)
+        shadow = _maybe_shadows(asked, views[name], others, middle)
+        person = (seen.mask & ~shadow) | (undecided & sure & ~shadow)
+        unsure = (undecided & ~person & ~beside) | (seen.mask & shadow)
+        decided[name] = seen.with_masks(person, unsure)
+    return decided
+
+
+def _maybe_shadows(
+    asked: NDArray[np.bool_], view: FloorView, others: list[FloorView], middle: FloatArray
+) -> NDArray[np.bool_]:
+    """Which pixels (h, w) of those asked for show floor unless it is lit elsewhere."""
+    rows, columns = np.nonzero(asked)
+    if not rows.size:
+        return asked
+    blocks = np.unique(
+        np.column_stack([columns // _BLOCK_PX, rows // _BLOCK_PX]), axis=0, return_inverse=True
+    )
+    pixels = np.asarray(blocks[0] * _BLOCK_PX + 0.5 * (_BLOCK_PX - 1), dtype=np.float64)
+    points = floor_points(pixels + view.offset_px, view.camera)
+    points[np.linalg.norm((points - middle)[:, :2], axis=1) > FLOOR_RADIUS_M] = np.nan
+    maybe = np.isfinite(points).all(axis=1) & ~lit_elsewhere(points, others)
+    out = np.zeros_like(asked)
+    out[rows, columns] = maybe[blocks[1].reshape(-1)]
+    return out
+
+
+def _floor_view(seen: Observation, camera: CameraModel, covered: NDArray[np.bool_]) -> FloorView:
+    undecided = seen.undecided_words
+    if undecided is None:
+        undecided = locked(np.zeros_like(seen.mask_words), np.uint64)
+    return FloorView(
+        camera, seen.offset_px, seen.width, seen.mask_words, undecided, pack_mask(covered)
+    )
+
+
+def _covered(
+    points_m: FloatArray, seen: Observation, camera: CameraModel, *, grown: bool = False
+) -> NDArray[np.bool_]:
+    """Pixels (h, w) that the image of a hull's points covers, gaps of the grid closed.
+
+    Grown by about the grid's spacing, it covers all that the points stand for.
+    """
+    u, v = _pixels(points_m, seen, camera)
+    out = np.zeros((seen.height, seen.width), dtype=np.uint8)
+    if not u.size:
+        return out > 0
+    out[v, u] = 1
+    depth = float(camera.T_cam_world[2, :3] @ points_m.mean(axis=0) + camera.T_cam_world[2, 3])
+    side = 2 * int(0.75 * FINE_M * float(camera.matrix[0, 0]) / max(depth, 1.0)) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    change = cv2.MORPH_DILATE if grown else cv2.MORPH_CLOSE
+    return np.asarray(cv2.morphologyEx(out, change, kernel) > 0)
+
+
+def _pixels(
+    points_m: FloatArray, seen: Observation, camera: CameraModel
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Columns and rows in the region of the points (n, 3) that it shows."""
+    pixels = project_camera(points_m, camera) - seen.offset_px
+    with np.errstate(invalid="ignore"):
+        u, v = np.round(pixels).T
+        framed = (u >= 0) & (v >= 0) & (u < seen.width) & (v < seen.height)
+    return u[framed].astype(np.int64), v[framed].astype(np.int64)
