@@ -18,8 +18,6 @@ RADIUS_SD_RATIO = 0.20
 """Standard deviation of radii among people, relative to the generic ones (prior)."""
 OFFSET_SD_M = 0.015
 """Standard deviation of offsets among people (prior)."""
-HAND_SD_M = 0.03
-"""The same of the offsets of a hand's end that a bent wrist causes."""
 RADIUS_RANGE = (0.6, 1.6)
 """Radii stay within this multiple of the generic ones (bounds)."""
 OFFSET_RANGE_M = 0.06
@@ -47,8 +45,6 @@ class Sections:
         radius = np.zeros(self._size, dtype=np.bool_)
         radius[self._index[:, :, :2].ravel()] = True
         self.prior_sd = np.where(radius, RADIUS_SD_RATIO * self.generic, OFFSET_SD_M)
-        hands = [c for c, name in enumerate(generic.cone_names) if _is_rigid_hand(generic, name)]
-        self.prior_sd[self._index[hands, 1, 2:]] = HAND_SD_M
         self.bounds = np.where(
             radius,
             np.outer(RADIUS_RANGE, self.generic),
