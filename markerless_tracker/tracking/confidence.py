@@ -9,6 +9,9 @@ A limb at a wrong optimum has a well-determined pose, so its covariance does not
 residuals do: they stay larger than those of a limb that fits. By how much decides what is added to
 the limb's markers; the trunk's excess is added to all. Undecided pixels give no residuals, hence no
 information.
+
+The outline of a straight limb moves less than the model's error when the limb turns about itself:
+of that rotation only the part counts that a bent knee or elbow shows.
 """
 
 from collections.abc import Mapping
@@ -17,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, markers, transforms
+from markerless_tracker.body.angles.swing import straightness, twists
 from markerless_tracker.body.kinematics import carried, move_axes
 from markerless_tracker.body.model import is_translation
 from markerless_tracker.body.parts import cones_of
@@ -68,7 +72,9 @@ def confidence_of(
     if not (total > 0.0 and np.isfinite(value).all() and np.isfinite(sums.hessian).all()):
         return None
     variance = max(float((weight * value**2).sum()) / total, _LEAST_SIGMA_M**2)
-    precision = sums.hessian / (CORRELATED * CORRELATION_M * variance)
+    seen = np.ones(body.size)
+    seen[twists(body)] = np.sqrt(1.0 - straightness(body, pose))
+    precision = np.outer(seen, seen) * sums.hessian / (CORRELATED * CORRELATION_M * variance)
     precision[np.diag_indices_from(precision)] += 1.0 / body.prior_sd**2 + 1e-9
     try:
         covariance = np.linalg.inv(precision)

@@ -1,7 +1,9 @@
 """Contour refinement of a pose: Gauss-Newton on the outlines, with priors and joint limits."""
 
+import numpy as np
+
 from markerless_tracker.body import BodyModel
-from markerless_tracker.body.angles.swing import straightness, twists
+from markerless_tracker.body.angles.swing import straightness, swing_joints, twists
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
@@ -16,12 +18,20 @@ def data_precision(config: TrackerConfig) -> float:
 
 STRAIGHT_TWIST_SD_RAD = 0.05
 """Standard deviation, in the refinement, of a straight limb's rotation about itself: near the usual
-value, whatever the outline's noise and the sections' error suggest."""
-
-
+value, whatever the outline's noise and the sections' error suggest. An arm bent by more than
+`HANGING_RAD` keeps near the predicted value instead, as long as it counts as straight: a forearm
+held in the wrong plane would straighten the elbow."""
+HANGING_RAD = float(np.deg2rad(12.0))
+"""Least flexion of an elbow that shows, in part, the arm's rotation: usual with hanging arms."""
 HEAD_TURN_SD_RAD = 0.04
 """The same of the head's turn: the outline of a head is that of an egg, nearly round."""
+ELBOW_PRECISION = 9.0
+"""Factor of the precision of an elbow's prior: before and behind the trunk the outline shows little
+of a forearm, and the error of generic sections along a whole limb would decide."""
 _HEAD_TURN = "head_z"
+_ELBOWS = ("l_elbow", "r_elbow")
+_HIP = "hip"
+_LEAST = 1e-12
 
 
 def pose_prior(body: BodyModel, weight: float = 1.0, at: FloatArray | None = None) -> Prior:
@@ -30,18 +40,25 @@ def pose_prior(body: BodyModel, weight: float = 1.0, at: FloatArray | None = Non
     Args:
         body: the body.
         weight: the factor.
-        at: (p,) a pose near the one sought: limbs that are straight there, and the head, keep
-            the usual rotation about themselves. That is a convention, not knowledge: no deviation
-            follows from it.
+        at: (p,) a pose near the one sought: limbs that are straight there, and the head, keep the
+            usual rotation about themselves, nearly straight arms the one they have there. That is
+            a convention, not knowledge: no deviation follows from it.
     """
-    precision = weight / body.prior_sd**2
-    if at is not None:
-        straight = straightness(body, at)
-        precision[twists(body)] += weight * straight / STRAIGHT_TWIST_SD_RAD**2
-        if straight.size and _HEAD_TURN in body.parameter_names:
-            turn = body.index(_HEAD_TURN)
-            precision[turn] += weight / HEAD_TURN_SD_RAD**2
-    return Prior(body.prior_mean, precision)
+    mean, precision = body.prior_mean, weight / body.prior_sd**2
+    joints = swing_joints(body)
+    if at is not None and joints:
+        precision[[body.index(n) for n in _ELBOWS if n in body.parameter_names]] *= ELBOW_PRECISION
+        # Two Gaussians multiplied: about the usual value, and about that of the pose.
+        own, held = twists(body), np.zeros(body.size)
+        held[own] = weight * straightness(body, at) / STRAIGHT_TWIST_SD_RAD**2
+        if _HEAD_TURN in body.parameter_names:
+            held[body.index(_HEAD_TURN)] = weight / HEAD_TURN_SD_RAD**2
+        arms = np.array([not joint.endswith(_HIP) for joint in joints])
+        there = np.zeros(body.size)
+        there[own] = held[own] * arms * (1.0 - straightness(body, at, HANGING_RAD))
+        precision += held
+        mean = mean + there / np.maximum(precision, there + _LEAST) * (at - mean)
+    return Prior(mean, precision)
 
 
 def refined_on_contours(

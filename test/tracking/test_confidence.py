@@ -195,3 +195,14 @@ def test_the_covariance_has_the_deviations_on_its_diagonal(scene) -> None:
     assert sure.covariance[elbow, twist] != 0.0
     plain = replace(sure, pose_covariance=None)
     np.testing.assert_allclose(plain.covariance, np.diag(sure.pose_sd**2))
+
+
+def test_a_straight_limbs_rotation_has_the_deviation_of_its_prior(scene) -> None:
+    """And a bent one's a smaller one, by what the silhouettes show."""
+    body = scene.body
+    bent, contours = frame_of(scene, scene.rig.names)
+    bent[[body.index("l_knee"), body.index("r_knee")]] = -0.8, 0.0
+    sd = confidence_of(body, bent, contours, measured=True).pose_sd
+    left, right = body.index("l_hip_z"), body.index("r_hip_z")
+    assert sd[right] >= body.prior_sd[right]
+    assert sd[left] < 0.8 * sd[right]

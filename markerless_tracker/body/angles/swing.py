@@ -33,11 +33,11 @@ def twists(body: BodyModel) -> IntArray:
     return np.asarray(body.node_parameter[nodes], dtype=np.int64)
 
 
-def straightness(body: BodyModel, pose: FloatArray) -> FloatArray:
+def straightness(body: BodyModel, pose: FloatArray, bent_rad: float = BENT_RAD) -> FloatArray:
     """How straight the limbs of `twists` (k,) are at a pose (p,): 1 with a straight knee or elbow.
 
-    0 from `BENT_RAD` on, and for a limb without such a joint. Images of a straight limb do not show
-    its rotation about itself; a bent one shows it by the sine of the flexion.
+    0 from a flexion of `bent_rad` on, and for a limb without such a joint. Images of a straight
+    limb do not show its rotation about itself; a bent one shows it by the sine of the flexion.
     """
     found = []
     for joint in swing_joints(body):
@@ -46,8 +46,8 @@ def straightness(body: BodyModel, pose: FloatArray) -> FloatArray:
         if hinge not in body.parameter_names:
             found.append(0.0)
             continue
-        flexion = min(abs(float(pose[body.index(hinge)])), BENT_RAD)
-        found.append(1.0 - float(np.sin(flexion) / np.sin(BENT_RAD)) ** 2)
+        flexion = min(abs(float(pose[body.index(hinge)])), bent_rad)
+        found.append(1.0 - float(np.sin(flexion) / np.sin(bent_rad)) ** 2)
     return np.array(found)
 
 

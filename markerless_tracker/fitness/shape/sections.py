@@ -1,4 +1,9 @@
-"""Free numbers of a body's sections: radii and offsets, equal on the left and on the right."""
+"""Free numbers of a body's sections: radii and offsets, equal on the left and on the right.
+
+A hand whose wrist is bent lies beside the line of its forearm, each hand its own way: that is
+posture, so the offsets of hands without a joint of their own are not equal. Otherwise the forearm
+would follow the hand, and the elbow be bent wrongly.
+"""
 
 from dataclasses import replace
 
@@ -22,7 +27,8 @@ OFFSET_RANGE_M = 0.06
 class Sections:
     """The k free numbers of a body's sections.
 
-    Limbs of both sides share theirs, offsets to the side mirrored; trunk and head are symmetric.
+    Limbs of both sides share theirs, offsets to the side mirrored, but for the offsets of hands
+    without a joint of their own; trunk and head are symmetric.
 
     Args:
         generic: the body with the sections of the prior.
@@ -89,6 +95,7 @@ def _tie(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray, int]:
     known: dict[tuple[str, int, int], int] = {}
     for c, name in enumerate(body.cone_names):
         paired = name[:2] in ("l_", "r_")
+        hand = _is_rigid_hand(body, name)
         for end in range(2):
             for entry in range(4):
                 if entry == 3:
@@ -96,6 +103,13 @@ def _tie(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray, int]:
                     if not paired:
                         continue
                     sign[c, end, entry] = 1.0 if name[0] == "l" else -1.0
-                key = (name[2:] if paired else name, end, entry)
+                alike = paired and not (hand and entry >= 2)
+                key = (name[2:] if alike else name, end, entry)
                 index[c, end, entry] = known.setdefault(key, len(known))
     return index, sign, len(known)
+
+
+def _is_rigid_hand(body: BodyModel, cone: str) -> bool:
+    """Whether a cone is that of a hand that is fixed to its forearm."""
+    side, _, part = cone.partition("_")
+    return part == "hand" and f"{side}_wrist" not in body.frames
