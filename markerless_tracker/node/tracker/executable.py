@@ -20,7 +20,7 @@ _EXAMPLE = (
 )
 _CLOSE_S = 3.0
 # Longest time until a signal is noticed.
-_SWITCH_S = 0.0003
+_SWITCH_S = 0.001
 """Time after which a thread that runs Python gives way to another one."""
 _NOTICE_S = 0.1
 
