@@ -5,6 +5,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 
 from markerless_tracker.errors import ConfigError
@@ -15,7 +16,10 @@ ROS_OWN = ("use_sim_time", "start_type_description_service")
 
 
 class GivenNode(Node):
-    """A node that declares all parameters that are given.
+    """A node that declares all parameters that are given, and does not wait for QoS events.
+
+    All that an executor waits for costs time at every message, and each publisher and subscription
+    would add two events that only report other QoS. The node at the other end reports that as well.
 
     Args:
         name: the node's name.
@@ -39,6 +43,16 @@ class GivenNode(Node):
                 f"{', '.join(empty)}: an empty list, expected at least one value, or the "
                 "parameter left out"
             ) from error
+
+    def create_publisher(self, *arguments: Any, **named: Any) -> Any:
+        """As `rclpy.node.Node.create_publisher`, without events unless they are asked for."""
+        named.setdefault("event_callbacks", PublisherEventCallbacks(use_default_callbacks=False))
+        return super().create_publisher(*arguments, **named)
+
+    def create_subscription(self, *arguments: Any, **named: Any) -> Any:
+        """As `rclpy.node.Node.create_subscription`, without events unless they are asked for."""
+        named.setdefault("event_callbacks", SubscriptionEventCallbacks(use_default_callbacks=False))
+        return super().create_subscription(*arguments, **named)
 
 
 def given_parameters(node: Node) -> dict[str, Any]:

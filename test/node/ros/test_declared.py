@@ -66,3 +66,23 @@ def test_settings_in_groups_are_parameters_with_ranges_and_choices(node: Any) ->
         ranges = (len(descriptor.integer_range), len(descriptor.floating_point_range))
         assert ranges == (entry.type is int, entry.type is float), entry.name
         assert bool(descriptor.additional_constraints) == bool(entry.choices), entry.name
+
+
+def test_nothing_but_messages_wakes_the_executor(tmp_path: Path) -> None:
+    rclpy = pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    from std_msgs.msg import String
+
+    from markerless_tracker.node.ros.declared import GivenNode
+
+    context = rclpy.Context()
+    rclpy.init(context=context, args=[])
+    node = GivenNode("quiet", context=context)
+    try:
+        node.create_publisher(String, "out", 1)
+        node.create_subscription(String, "in", lambda _: None, 1)
+        assert len(list(node.publishers)) >= 2
+        assert all(not publisher.event_handlers for publisher in node.publishers)
+        assert all(not subscription.event_handlers for subscription in node.subscriptions)
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
