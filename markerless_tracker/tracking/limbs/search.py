@@ -12,7 +12,7 @@ from markerless_tracker.tracking.start.recombination import Recombiner
 
 DRAWS = 120
 """First draws of a limb: half from the pose prior, half uniform."""
-AIMED, AIMED_OF = 60, 500
+AIMED, AIMED_OF = 60, 1000
 """Where silhouette is unexplained: further draws that reach there, the best of so many."""
 LAYERS = (0.4, 0.2)
 """Then the best are varied, twice, by these fractions of the prior's standard deviations."""
