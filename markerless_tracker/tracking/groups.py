@@ -35,7 +35,10 @@ class RefineSettings(SettingsGroup):
     NAME = "refine"
 
     iterations: int = setting(
-        4, "iterations of each of the two contour refinements", least=1, most=1000
+        4,
+        "iterations of a contour refinement; a frame has one, or two if the pose moved far",
+        least=1,
+        most=1000,
     )
     truncation_m: float = setting(
         0.10,

@@ -30,7 +30,7 @@ from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.recombination import Recombiner
 
 ROTATION_NS = 100_000_000
-"""One limb that is not lost is searched elsewhere this often: every fourth frame at 60 frames/s."""
+"""One limb that is not lost is searched elsewhere this often: every sixth frame at 60 frames/s."""
 WAIT_NS = 16_000_000
 """Time before a limb near unexplained silhouette is searched again, after a search without gain."""
 _DOUBLINGS = 4
