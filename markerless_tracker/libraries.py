@@ -1,4 +1,4 @@
-"""Threads of the numerical libraries: none beside the package's own.
+"""Cores, and threads of the numerical libraries: none beside the package's own.
 
 A pose has some thirty parameters. For matrices of that size a library's threads only wait for each
 other, and take the cores from the threads that work.
@@ -17,3 +17,10 @@ def single_threaded() -> None:
     """
     for name in VARIABLES:
         os.environ.setdefault(name, "1")
+
+
+def usable_cores() -> int:
+    """Cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

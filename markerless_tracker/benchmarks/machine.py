@@ -5,6 +5,8 @@ import platform
 from pathlib import Path
 from typing import Any
 
+from markerless_tracker.libraries import usable_cores
+
 CPUINFO = Path("/proc/cpuinfo")
 
 
@@ -33,13 +35,6 @@ def processor(cpuinfo: Path = CPUINFO) -> str:
     except OSError:
         pass
     return platform.processor() or platform.machine()
-
-
-def usable_cores() -> int:
-    """Cores that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _memory_gib() -> float | None:

@@ -87,6 +87,7 @@ def run(args: argparse.Namespace) -> int:
             subject_from=args.subject_from,
             stature=args.stature,
         )
+        setup.tracker.evidence.start_process()
         bars.update(task, description="compiling")
         with compilation(lambda _, done, most: bars.update(task, completed=done, total=most)):
             setup.tracker.warm_up()
@@ -102,6 +103,7 @@ def run(args: argparse.Namespace) -> int:
             warn=lambda text: _warn(console, text),
             progress=lambda done: bars.update(task, completed=done),
         )
+        setup.tracker.evidence.close()
     filled = None
     verdict = outcome.verdict
     if smoothing is not None and verdict.tracked:

@@ -1,6 +1,5 @@
 """Runs a tracker over a recording, through the same `Tracker.step` as the live node."""
 
-import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from pathlib import Path
 from markerless_tracker.datasets import FrameSet, Recording, every_for_fps
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.imaging import BackgroundModel, ImagingSettings, learn_background
+from markerless_tracker.libraries import usable_cores
 from markerless_tracker.records import TrackResult
 from markerless_tracker.tracking import Prepared, TrackerSetup
 
@@ -61,7 +61,7 @@ def track_recording(
     start = 0 if setup.start_stamp_ns is None else recording.start_index(setup.start_stamp_ns)
     frames = recording.frames(start=start, every=every)
     tracker = setup.tracker
-    if (tracker.config.threads or os.cpu_count() or 1) == 1:
+    if (tracker.config.threads or usable_cores()) == 1:
         for images in frames:
             yield TrackedFrame(images, tracker.step(images.images, images.stamp_ns))
         return

@@ -1,7 +1,6 @@
 """`Tracker.step`: from the views of one time to a pose."""
 
 import copy
-import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -14,6 +13,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import TrackerError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
+from markerless_tracker.libraries import usable_cores
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.assess import Assessor, Found, Seen
 from markerless_tracker.tracking.config import TrackerConfig
@@ -85,7 +85,7 @@ class Tracker:
         check_pose(body, start, self._body.limits if self._given else None)
         # Refuses a budget that cannot be spent before the first frame comes.
         frame_stages(body, config, start, body.sigma)
-        threads = config.threads or os.cpu_count() or 1
+        threads = config.threads or usable_cores()
         # One thread is left to the evidence of the next set.
         beside = max(1, threads - 1)
         mapper = ThreadPoolExecutor(min(beside, len(rig))).map if beside > 1 else map
@@ -93,7 +93,7 @@ class Tracker:
         self._searcher_for = partial(searcher_for, threads=beside)
         self._starter_for = partial(searcher_for, threads=threads)
         self._searcher = self._searcher_for(body)
-        self._evidence = EvidenceMaker(rig, config, backgrounds or {}, mapper)
+        self.evidence = EvidenceMaker(rig, config, backgrounds or {}, mapper)
         self._views = ViewWatch(rig)
         self._motion = MotionModel(start, config)
         self._assessor = Assessor(rig, body, config)
@@ -124,7 +124,7 @@ class Tracker:
 
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
-        blank = self._evidence.warm_up()
+        blank = self.evidence.warm_up()
         self._starter, self._assessor.track = None, Track(Phase.TRACKING)
         self.step(blank, 0)
         pose = self._motion.pose
@@ -137,6 +137,7 @@ class Tracker:
         self.reset()
         self._body.warm_up(self._searcher_for, blank, self._motion.pose)
         self.reset()
+        self.evidence.wait()
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
         """Use other backgrounds from now on; then `warm_up`, which resets.
@@ -147,7 +148,7 @@ class Tracker:
         Raises:
             ImageError: a background does not fit its camera; all stays as it was.
         """
-        self._evidence.take_backgrounds(backgrounds)
+        self.evidence.take_backgrounds(backgrounds)
         self.warm_up()
 
     def regions(self, stamp_ns: int) -> dict[str, Region | None]:
@@ -156,11 +157,11 @@ class Tracker:
         It follows from the pose of the set before the last one, so that it is known while the last
         one is fitted. The whole image is used besides where the region cuts the person off.
         """
-        return self._evidence.regions(self._lookahead.current, stamp_ns)
+        return self.evidence.regions(self._lookahead.current, stamp_ns)
 
     def segmenter(self, camera: str) -> Segmenter | None:
         """The segmenter of a camera; None without a background."""
-        return self._evidence.segmenters.get(camera)
+        return self.evidence.segmenters.get(camera)
 
     def prepare(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> Prepared:
         """Make the evidence of the set after the one that `step` deals with now.
@@ -181,7 +182,7 @@ class Tracker:
         if outlook is None:
             return Prepared(views, stamp_ns, None, {})
         try:
-            seen = self._evidence.segment(views, stamp_ns, outlook, ahead=True)
+            seen = self.evidence.segment(views, stamp_ns, outlook, ahead=True)
         except TrackerError:
             self._lookahead.drop()
             raise
@@ -254,17 +255,17 @@ class Tracker:
             if views.outlook is outlook and views.stamp_ns == stamp_ns:
                 return views.seen
             views = views.views
-        return self._evidence.segment(views, stamp_ns, outlook)
+        return self.evidence.segment(views, stamp_ns, outlook)
 
     def _observe(
         self, evidence: Mapping[str, SeenView], stamp_ns: int, predicted: FloatArray
     ) -> Seen:
         """The evidence near the predicted pose (p,); of the whole views without a track."""
         if self._starter is not None:
-            observed = self._evidence.whole(evidence, stamp_ns)
+            observed = self.evidence.whole(evidence, stamp_ns)
             believed, notes = self._views.sort(observed, self.body, None)
             return Seen(stamp_ns, observed, believed, notes)
-        observed, left_out = self._evidence.gather(evidence, stamp_ns, self.body, predicted)
+        observed, left_out = self.evidence.gather(evidence, stamp_ns, self.body, predicted)
         expected = predicted if self.state is TrackState.TRACKING else None
         believed, notes = self._views.sort(observed, self.body, expected)
         if self.state is not TrackState.LOST:
@@ -344,6 +345,6 @@ class Tracker:
 
     def _new_starter(self, last_pose: FloatArray | None = None) -> Starter:
         return Starter(
-            self.rig, self.body, self._starter_for, self._evidence.select,
+            self.rig, self.body, self._starter_for, self.evidence.select,
             sized=self._body.sized, fit_shape=not self._body.sections_fitted, last_pose=last_pose,
         )  # fmt: skip

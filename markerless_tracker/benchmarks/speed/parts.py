@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from markerless_tracker.benchmarks.machine import machine, usable_cores
+from markerless_tracker.benchmarks.machine import machine
 from markerless_tracker.benchmarks.speed.reference import ReferenceFitness
 from markerless_tracker.benchmarks.speed.scene import SpeedScene
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Segmenter, edge_map, learn_background
+from markerless_tracker.libraries import usable_cores
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.results.result import versions

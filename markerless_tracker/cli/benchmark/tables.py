@@ -10,7 +10,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.benchmarks.machine import machine, usable_cores
+from markerless_tracker.benchmarks.machine import machine
 from markerless_tracker.benchmarks.tables import accuracy
 from markerless_tracker.benchmarks.tables.papers import PaperRow, choose, read_papers
 from markerless_tracker.benchmarks.tables.plots import write_plot
@@ -25,6 +25,7 @@ from markerless_tracker.cli.benchmark.arguments import (
 from markerless_tracker.cli.benchmark.choices import Group, every_config, groups, varied
 from markerless_tracker.cli.benchmark.layout import LEGEND, full_table, legend_of, paper_table
 from markerless_tracker.errors import ConfigError
+from markerless_tracker.libraries import usable_cores
 from markerless_tracker.results.result import versions
 from markerless_tracker.tracking import TrackerConfig
 

@@ -91,7 +91,7 @@ class Segmenter:
         Raises:
             ImageError: as `mask`.
         """
-        self._check(image)
+        self.check(image)
         region = region or self._whole
         mask, undecided, zone = self._silhouette(image, region, 0)
         inside = region.within(zone).slices
@@ -103,7 +103,7 @@ class Segmenter:
         Raises:
             ImageError: not an image of the background's size and channels; names the camera.
         """
-        self._check(image)
+        self.check(image)
         with self.lock:
             self._labeller.measure_exposure(image)
             return self._labeller.label(image, self._whole, self._whole).copy()
@@ -124,7 +124,7 @@ class Segmenter:
         Raises:
             ImageError: another size or other channels, or a region outside; names the camera.
         """
-        self._check(image)
+        self.check(image)
         region = region or self._whole
         if region.width <= 0 or region.height <= 0 or region.grown(0, self._size_px) != region:
             raise ImageError(
@@ -154,7 +154,12 @@ class Segmenter:
             offset_px=(region.left, region.top),
         )
 
-    def _check(self, image: Image) -> None:
+    def check(self, image: Image) -> None:
+        """Make sure that an image is of the background's size and channels.
+
+        Raises:
+            ImageError: it is not; names the camera.
+        """
         check_image(image, self.camera, size_px=self._size_px)
         channels = 1 if image.ndim == 2 else 3
         if channels != self.background.channels:

@@ -135,6 +135,8 @@ class TrackerNode(GivenNode):
             DatasetError: the result files cannot be completed.
         """
         ended = self._worker.stop(timeout_s)
+        if self._tracker is not None:
+            self._tracker.evidence.close()
         self._notices.flush()
         self._news.flush()
         counts = self._status.values(self._sets.counts, (), ())
@@ -223,10 +225,12 @@ class TrackerNode(GivenNode):
         self._status.doing("reading the backgrounds and the start")
         scaled = rig.scaled(self._settings.scale)
         setup = build(self._settings, rig, scaled)
+        setup.tracker.evidence.start_process()
         sizes_px = {camera.name: camera.size_px for camera in scaled}
         self._pictures = Pictures(self, scaled)
         self._results.describe(setup.tracker.body)
         self._tracker = setup.tracker
+        self._status.add_cpu_of(lambda: setup.tracker.evidence.process_cpu_s)
         self._result_file.begin(setup.tracker)
         for doubt in self._report.begin(setup.tracker, rig):
             self._warn(doubt)

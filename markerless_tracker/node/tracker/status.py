@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
 
 import numpy as np
@@ -37,6 +37,7 @@ class TrackerStatus:
         self._first_arrived_s: float | None = None
         self._first_pose_s: float | None = None
         self._ready_cpu_s = 0.0
+        self._helper_cpu_s: Callable[[], float] = lambda: 0.0
 
     @property
     def ready(self) -> bool:
@@ -67,11 +68,16 @@ class TrackerStatus:
         with self._lock:
             self._activity = activity
 
+    def add_cpu_of(self, helper_cpu_s: Callable[[], float]) -> None:
+        """Count the CPU time of another process, which works for this one, as well."""
+        with self._lock:
+            self._helper_cpu_s = helper_cpu_s
+
     def became_ready(self, activity: str, *, now_s: float) -> None:
         """Images are tracked as they arrive from now on."""
         with self._lock:
             self._activity, self._ready, self._ready_s = activity, True, now_s
-            self._ready_cpu_s = time.process_time()
+            self._ready_cpu_s = self._cpu_s()
 
     def tracked(self, result: TrackResult, *, arrived_s: float, finished_s: float) -> None:
         """Record a result and its times of one monotonic clock."""
@@ -148,7 +154,7 @@ class TrackerStatus:
         """Everything as text, by key, in a fixed order.
 
         `first_pose_s`: from the arrival of the first set that was tracked to the first pose;
-        `cpu_s`: CPU time of this process since it became ready; `dealt_with_ns`: stamp of the last
+        `cpu_s`: CPU time since it became ready; `dealt_with_ns`: stamp of the last
         complete set that was tracked or dropped.
 
         Args:
@@ -182,9 +188,7 @@ class TrackerStatus:
                 ),
                 "fps": _number(self._rate(now_s), 2),
                 "first_pose_s": _number(self._first_pose_s, 3),
-                "cpu_s": _number(
-                    time.process_time() - self._ready_cpu_s if self._ready else None, 3
-                ),
+                "cpu_s": _number(self._cpu_s() - self._ready_cpu_s if self._ready else None, 3),
                 "stamp_ns": "" if result is None else str(result.stamp_ns),
                 "dealt_with_ns": "" if self._dealt_ns is None else str(self._dealt_ns),
                 "fitness": _number(None if result is None else result.fitness, 4),
@@ -208,6 +212,9 @@ class TrackerStatus:
             values["warnings"] = "" if result is None else "; ".join(result.warnings)
             values["last_error"] = self._last_error
             return values
+
+    def _cpu_s(self) -> float:
+        return time.process_time() + self._helper_cpu_s()
 
     def _rate(self, now_s: float | None) -> float | None:
         if not self._finished_s:

@@ -10,9 +10,11 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import ImageError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter, edge_radius_px
+from markerless_tracker.libraries import usable_cores
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.prepared import Outlook, SeenView
+from markerless_tracker.tracking.evidence.process.parent import SegmentingProcess
 from markerless_tracker.tracking.evidence.selection import (
     body_lines,
     body_region,
@@ -50,6 +52,7 @@ class EvidenceMaker:
         self._follows = config.background.follow_s > 0.0
         self._three_classes = config.shadow.undecided
         self._mapper = mapper
+        self._process: SegmentingProcess | None = None
         self.segmenters: dict[str, Segmenter] = {}
         self.take_backgrounds(backgrounds)
 
@@ -74,6 +77,7 @@ class EvidenceMaker:
                 camera.name, background, self._config, edges=self._config.edge_weight > 0.0
             )
         self.segmenters = segmenters
+        self._backgrounds = dict(backgrounds)
 
     def segment(
         self,
@@ -97,15 +101,62 @@ class EvidenceMaker:
         """
         self._check(views)
         regions = self.regions(outlook, stamp_ns)
+        made: dict[str, SeenView] = {}
+        if ahead and self._process is not None:
+            images = {n: v for n, v in views.items() if not isinstance(v, Observation)}
+            for name, image in images.items():
+                self._segmenter(name).check(image)
+            made = self._process.segment(images, stamp_ns, regions) or {}
 
         def one(name: str) -> SeenView:
             view = views[name]
             if isinstance(view, Observation):
                 return SeenView(view, None, None, None)
+            if name in made:
+                return made[name]
             return self._segmented(name, view, stamp_ns, regions[name], outlook.number)
 
         each: Callable[..., Iterable[SeenView]] = map if ahead else self._mapper
         return dict(zip(views, each(one, views), strict=True))
+
+    def segment_regions(
+        self,
+        images: Mapping[str, Image],
+        stamp_ns: int,
+        regions: Mapping[str, Region | None],
+    ) -> dict[str, SeenView]:
+        """Images segmented in given regions, None = all, one after the other.
+
+        Raises:
+            ImageError: an image without a background or one that does not fit; names the camera.
+        """
+        return {n: self._segmented(n, v, stamp_ns, regions[n], 0) for n, v in images.items()}
+
+    def start_process(self) -> None:
+        """Let a process of its own segment what is made ahead; `warm_up` hands it its backgrounds.
+
+        Without effect with one thread, and if the backgrounds follow the images: the steps decide
+        on the order then.
+        """
+        several = (self._config.threads or usable_cores()) > 1
+        if several and self.segmenters and not self._follows and self._process is None:
+            self._process = SegmentingProcess(self._rig)
+
+    @property
+    def process_cpu_s(self) -> float:
+        """CPU time of that process, 0 without one."""
+        return 0.0 if self._process is None else self._process.cpu_s
+
+    def wait(self) -> None:
+        """Wait until that process, if there is one, is ready."""
+        if self._process is not None:
+            self._process.wait()
+
+    def close(self) -> None:
+        """End the process, if there is one."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.close()
 
     def whole(self, seen: Mapping[str, SeenView], stamp_ns: int) -> dict[str, Observation]:
         """Observations of the whole views, as they are."""
@@ -156,6 +207,9 @@ class EvidenceMaker:
             made_up[camera.name] = Observation.from_mask(
                 camera.name, 0, mask, mask, undecided=around if self._three_classes else None
             )
+        if self._process is not None:
+            # Now, when what it would compile is stored.
+            self._process.use(self._config, self._backgrounds)
         return made_up
 
     def select(

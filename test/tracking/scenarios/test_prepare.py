@@ -112,3 +112,18 @@ def test_a_background_that_follows_gets_the_images_in_order(
         ahead = other.prepare(frames[i + 1].images, frames[i + 1].stamp_ns)
         a, b = one.step(frame.images, frame.stamp_ns), other.step(prepared, frame.stamp_ns)
         assert said(a) == said(b)
+
+
+def test_a_process_of_its_own_prepares_the_sets(
+    make_tracker, frames, swarm_settings, alone
+) -> None:
+    tracker = make_tracker(swarm_settings, **SMALL, threads=2)
+    tracker.evidence.start_process()
+    tracker.warm_up()
+    assert tracker.evidence.process_cpu_s > 0.0
+    for i, frame in enumerate(frames):
+        used_s = tracker.evidence.process_cpu_s
+        prepared = tracker.prepare(frame.images, frame.stamp_ns)
+        assert tracker.evidence.process_cpu_s > used_s, "the process did nothing"
+        assert said(tracker.step(prepared, frame.stamp_ns)) == alone[i]
+    tracker.evidence.close()

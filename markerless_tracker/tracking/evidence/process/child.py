@@ -1,0 +1,74 @@
+"""Main program of the segmenting process: images in, observations out, until its input ends.
+
+Started as ``python -m markerless_tracker.tracking.evidence.process.child FD``, where FD is the
+shared memory. Its input is the parent's requests; its output belongs to the answers alone.
+"""
+
+import mmap
+import os
+import sys
+import time
+from typing import Any, BinaryIO
+
+from markerless_tracker.libraries import single_threaded
+
+
+def main(memory_fd: int) -> int:
+    """Serve until the parent ends; returns the exit status."""
+    single_threaded()
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    # Whatever prints must not end up among the answers.
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    memory = mmap.mmap(memory_fd, 0, prot=mmap.PROT_READ)
+    try:
+        serve(sys.stdin.buffer, answers, memory)
+    except (EOFError, BrokenPipeError):
+        pass  # The parent has ended.
+    return 0
+
+
+def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
+    """Answer requests; a message that is none brings another rig, configuration and backgrounds.
+
+    Each answer is what `EvidenceMaker.segment_regions` gave, by camera, without the images; an
+    exception if it raised one; True when other backgrounds are in use. The CPU time of this process
+    so far comes with it.
+
+    Raises:
+        EOFError, BrokenPipeError: the parent has ended.
+    """
+    # Read while the parent prepares itself.
+    import numpy as np
+
+    from markerless_tracker.tracking.evidence.gather import EvidenceMaker
+    from markerless_tracker.tracking.evidence.process.wire import Request, receive, send
+
+    maker: EvidenceMaker | None = None
+    while True:
+        message = receive(requests)
+        answer: Any
+        try:
+            if not isinstance(message, Request):
+                rig, config, backgrounds = message
+                maker = EvidenceMaker(rig, config, backgrounds, map)
+                maker.warm_up()
+                answer = True
+            elif maker is None:
+                raise RuntimeError("images came before the backgrounds")
+            else:
+                images = {
+                    name: np.frombuffer(
+                        memory, np.uint8, int(np.prod(place.shape)), place.offset
+                    ).reshape(place.shape)
+                    for name, place in message.images.items()
+                }
+                regions = {name: place.region for name, place in message.images.items()}
+                seen = maker.segment_regions(images, message.stamp_ns, regions)
+                answer = {name: view._replace(image=None) for name, view in seen.items()}
+        except Exception as error:
+            answer = error
+        send(answers, (answer, time.process_time()))
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1])))

@@ -1,0 +1,59 @@
+"""What the two processes send each other: pickled objects, each after its length."""
+
+import pickle
+import struct
+from typing import Any, BinaryIO, NamedTuple
+
+from markerless_tracker.imaging import Region
+
+_LENGTH = struct.Struct("<Q")
+
+
+class Place(NamedTuple):
+    """Where an image lies in the shared memory, and which part of it is to be segmented.
+
+    Attributes:
+        offset: of its first byte.
+        shape: (h, w) or (h, w, 3), uint8.
+        region: None = the whole image.
+    """
+
+    offset: int
+    shape: tuple[int, ...]
+    region: Region | None
+
+
+class Request(NamedTuple):
+    """Images of one time to segment, by camera."""
+
+    stamp_ns: int
+    images: dict[str, Place]
+
+
+def send(stream: BinaryIO, message: Any) -> None:
+    """Write an object.
+
+    Raises:
+        OSError: the other side has ended.
+    """
+    data = pickle.dumps(message, protocol=5)
+    stream.write(_LENGTH.pack(len(data)))
+    stream.write(data)
+    stream.flush()
+
+
+def receive(stream: BinaryIO) -> Any:
+    """Read an object.
+
+    Raises:
+        EOFError: the other side has ended.
+    """
+    (length,) = _LENGTH.unpack(_exactly(stream, _LENGTH.size))
+    return pickle.loads(_exactly(stream, length))
+
+
+def _exactly(stream: BinaryIO, count: int) -> bytes:
+    data = stream.read(count)
+    if len(data) < count:
+        raise EOFError("the other process has ended")
+    return data
