@@ -1,9 +1,10 @@
-"""Cores, and threads of the numerical libraries: none beside the package's own.
+"""Cores, threads of the numerical libraries (none beside the package's own), and collections.
 
 A pose has some thirty parameters. For matrices of that size a library's threads only wait for each
 other, and take the cores from the threads that work.
 """
 
+import gc
 import os
 
 VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -24,3 +25,13 @@ def usable_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def collect_for_good() -> None:
+    """Collect garbage now, and look at no object that is left again.
+
+    For programs, after their preparations: the libraries' objects are some hundred thousand, and a
+    collection that looks at all of them holds every thread up for a tenth of a second.
+    """
+    gc.collect()
+    gc.freeze()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from markerless_tracker.compiled import compilation
 from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.imaging import BackgroundModel
+from markerless_tracker.libraries import collect_for_good
 from markerless_tracker.node.health import PROCESSING
 from markerless_tracker.node.tracker.announcer import ready_line
 from markerless_tracker.node.tracker.learning import Learning, OpenRequest
@@ -189,6 +190,7 @@ class TrackWorker:
             begun_s = self._reported_s = self._clock()
             with compilation(self._compiling) as kernels:
                 handle.tracker.warm_up()
+            collect_for_good()
         except Exception as error:
             self.fatal = one_line(error)
             self._status.failed(self.fatal)

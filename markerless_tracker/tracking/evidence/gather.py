@@ -1,6 +1,6 @@
 """The views of one time to the evidence of the tracked body, cameras side by side."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,12 +16,16 @@ from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.prepared import Outlook, SeenView
 from markerless_tracker.tracking.evidence.process.parent import SegmentingProcess
 from markerless_tracker.tracking.evidence.selection import (
+    BodyLines,
     body_lines,
     body_region,
     explained_in_region,
     explained_part,
     place_cones,
 )
+
+WIDE_MARGIN_M = 0.5
+"""Margin around the predicted body that is segmented where the first region cuts the person off."""
 
 
 class EvidenceMaker:
@@ -233,7 +237,8 @@ class EvidenceMaker:
     ) -> tuple[dict[str, Observation], tuple[str, ...]]:
         """As `whole` and then `select`, in less time while the body is tracked.
 
-        Whole frames are segmented only where the regions would change what stays.
+        Where a region cuts the person off, a wider one is segmented, and the whole frame where that
+        does, too.
 
         Args:
             seen: of `segment`.
@@ -245,14 +250,27 @@ class EvidenceMaker:
 
         def evidence(name: str) -> tuple[Observation, int]:
             lines, view = body_lines(self._rig[name], cones), seen[name]
-            if view.region is not None:
-                part = view.observation.cut(view.region)
+            for part in self._parts(name, view, stamp_ns, lines):
                 found = explained_in_region(part, lines, self._margin_px, self._clear_px)
                 if found is not None:
                     return found
             return explained_part(self._whole(name, view, stamp_ns), lines, self._margin_px)
 
         return _kept(dict(zip(seen, self._mapper(evidence, seen), strict=True)))
+
+    def _parts(
+        self, name: str, view: SeenView, stamp_ns: int, lines: BodyLines
+    ) -> Iterator[Observation]:
+        """The view in its region, then in a wider one, segmented when it is asked for."""
+        if view.region is None:
+            return
+        yield view.observation.cut(view.region)
+        wide = body_region(lines, WIDE_MARGIN_M, self._clear_px)
+        if view.image is None or wide is None:
+            return
+        segmenter = self._segmenter(name)
+        with segmenter.lock:
+            yield segmenter.observe(view.image, stamp_ns, wide)
 
     def regions(self, outlook: Outlook, stamp_ns: int) -> dict[str, Region | None]:
         """Region of each camera in the step after the next one: body and margin; None = all."""

@@ -10,7 +10,7 @@ import sys
 import time
 from typing import Any, BinaryIO
 
-from markerless_tracker.libraries import single_threaded
+from markerless_tracker.libraries import collect_for_good, single_threaded
 
 
 def main(memory_fd: int) -> int:
@@ -52,6 +52,7 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
                 rig, config, backgrounds = message
                 maker = EvidenceMaker(rig, config, backgrounds, map)
                 maker.warm_up()
+                collect_for_good()
                 answer = True
             elif maker is None:
                 raise RuntimeError("images came before the backgrounds")
