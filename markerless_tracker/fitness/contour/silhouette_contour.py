@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation
 
 UNDECIDED_PX = 2.0
@@ -98,7 +99,7 @@ def silhouette_contour(
     known, free = distance, None
     if undecided is not None:
         known, free = _without_undecided(
-            distance, window, _window(observation, undecided.view(np.uint8), box)
+            distance, window, _window(observation, undecided.view(np.uint8), box), margin
         )
     contours, _ = cv2.findContours(window, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     chains: list[NDArray[Any]] = [np.empty((0, 2), dtype=np.int32)]
@@ -166,7 +167,10 @@ def _signed_distance(mask: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def _without_undecided(
-    distance: NDArray[np.float32], person: NDArray[np.uint8], undecided: NDArray[np.uint8]
+    distance: NDArray[np.float32],
+    person: NDArray[np.uint8],
+    undecided: NDArray[np.uint8],
+    reach_px: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Distances (h, w), very large where the nearest edge borders on undecided pixels.
 
@@ -176,12 +180,24 @@ def _without_undecided(
     Args:
         distance: (h, w) to the edge of the person alone.
         person, undecided: (h, w), 0 or 1.
+        reach_px: larger distances may be those to the edge of the person alone.
     """
-    wider = _signed_distance(person | undecided)
-    same = np.abs(wider - distance) < _SAME_PX
-    free = cv2.dilate(undecided, _NEAR_UNDECIDED) == 0
-    same &= free
-    return np.where(same, distance, _FAR_PX), free
+    free = np.ones(person.shape, dtype=np.bool_)
+    left, top, width, height = cv2.boundingRect(undecided)
+    if width == 0:
+        return distance, free
+    # Distances up to `reach_px` differ so near to undecided pixels only, and follow from pixels
+    # that are as near again.
+    columns, rows = person.shape[1], person.shape[0]
+    patch = Region(left, top, left + width, top + height).grown(reach_px, (columns, rows))
+    around = patch.grown(reach_px, (columns, rows))
+    wider = _signed_distance((person | undecided)[around.slices])[patch.within(around).slices]
+    same = np.abs(wider - distance[patch.slices]) < _SAME_PX
+    free[patch.slices] = cv2.dilate(undecided[patch.slices], _NEAR_UNDECIDED) == 0
+    same &= free[patch.slices]
+    known = distance.copy()
+    known[patch.slices][~same] = _FAR_PX
+    return known, free
 
 
 @kernel

@@ -99,7 +99,7 @@ def _beyond(distance, limit, row, marks):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def label_colour(image, first, unit, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
+def label_colour(image, first, unit, mean, scale, gain, rule, left, top, planes, labels):  # type: ignore[no-untyped-def]
     """Label a part of a colour image: 0 background, 127 shadow, 255 foreground.
 
     Args:
@@ -110,6 +110,7 @@ def label_colour(image, first, unit, mean, scale, gain, rule, left, top, labels)
         gain: (3,) float32, brightness of the image relative to the background's.
         rule: of `shadow.shadow_rule`.
         left, top: the part's first column and row in the image.
+        planes: (3, a, b) uint8, the part's channels, written.
         labels: (a, b) uint8, written.
     """
     one = np.float32(1.0)
@@ -122,9 +123,9 @@ def label_colour(image, first, unit, mean, scale, gain, rule, left, top, labels)
     # Groups of eight background pixels are skipped at once.
     marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
     words = marks.view(np.uint64)
-    split = np.empty((3, columns), dtype=np.uint8)
     for i in range(rows):
         v = top + i
+        split = planes[:, i]
         # First whole rows without branches: most pixels are background of the first Gaussian.
         _split_row(image[i].ravel(), split[0], split[1], split[2])
         distance[:] = 0.0

@@ -82,6 +82,7 @@ class PixelLabeller:
         scale = min(1.0, math.sqrt(width * height / FULL_FRAME_PX))
         self._patch_radius_px = max(1, round(WEAK_RADIUS_PX * scale))
         self._memory = np.empty(height * width, dtype=np.uint8)
+        self._planes = np.empty(0 if gaussians.is_grey else 3 * height * width, dtype=np.uint8)
 
     def reset(self) -> None:
         """Return to the initial background."""
@@ -108,27 +109,30 @@ class PixelLabeller:
         count = window.width * window.height
         labels = self._memory[:count].reshape(window.height, window.width)
         is_grey = self.background.is_grey
-        label = kernels.label_grey if is_grey else kernels.label_colour
-        label(
-            part[:, :, 0] if is_grey else part, *self._first, self.background.mean,
-            self.background.scale, self.gain, self._rule, window.left, window.top, labels,
+        known = (
+            *self._first, self.background.mean, self.background.scale, self.gain, self._rule,
+            window.left, window.top,
         )  # fmt: skip
+        if is_grey:
+            planes = part.transpose(2, 0, 1)
+            kernels.label_grey(planes[0], *known, labels)
+        else:
+            planes = self._planes[: 3 * count].reshape(3, window.height, window.width)
+            kernels.label_colour(part, *known, planes, labels)
         if self._uses_texture:
             self._correct_by_texture(image, labels, window, corrected)
         if self._uses_patches:
-            self._mark_weak(image, labels, window)
+            self._mark_weak(planes, labels, window)
         return labels
 
-    def _mark_weak(self, image: Image, labels: Mask, window: Region) -> None:
+    def _mark_weak(self, planes: NDArray[np.uint8], labels: Mask, window: Region) -> None:
         """Label background as weak where a patch differs from it, though no single pixel does."""
-        background, options = self.background, self._settings.shadow
-        limit = max(options.weak_least, options.weak_sigmas * background.sigma)
-        part = background.pixels(image, window)
+        options = self._settings.shadow
+        limit = max(options.weak_least, options.weak_sigmas * self.background.sigma)
         # Pixels that differ by themselves would smear over those beside them.
         mark_weak(
-            np.stack(cv2.split(part)), self._first[0][0], self.gain, labels,
-            (window.left, window.top), radius=self._patch_radius_px, limit=limit,
-            least_share=_LEAST_SHARE,
+            planes, self._first[0][0], self.gain, labels, (window.left, window.top),
+            radius=self._patch_radius_px, limit=limit, least_share=_LEAST_SHARE,
         )  # fmt: skip
 
     def _correct_by_texture(

@@ -113,8 +113,10 @@ def _refine(
     settings: ImagingSettings,
 ) -> None:
     """Move the mask's contour to the local contrast, in place; outside the zone it stays."""
+    if settings.level_set.iterations == 0:
+        return
     body = occupied(mask, zone)
-    if settings.level_set.iterations == 0 or body.width <= 0:
+    if body.width <= 0:
         return
     margin = settings.level_set.iterations + settings.level_set.radius_px
     box = body.grown(margin, (mask.shape[1], mask.shape[0]))

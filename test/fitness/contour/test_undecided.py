@@ -4,7 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
-from markerless_tracker.fitness.contour.silhouette_contour import silhouette_contour
+from markerless_tracker.fitness.contour.silhouette_contour import (
+    _NEAR_UNDECIDED,
+    _signed_distance,
+    _without_undecided,
+    silhouette_contour,
+)
 from markerless_tracker.records import Observation
 
 SPACING_PX = 2.0
@@ -121,3 +126,22 @@ def test_a_few_undecided_pixels_leave_distances_far_from_them(lower) -> None:
     plain = silhouette_contour(observe(person & ~few), SPACING_PX)
     changed = np.flatnonzero((edge.distance != plain.distance).any(axis=1))
     assert changed.size and changed[0] + edge.top > 90
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_near_the_edge_distances_are_those_of_the_whole_window(seed) -> None:
+    rng = np.random.default_rng(seed)
+    person, undecided = np.zeros((2, 120, 90), np.uint8)
+    person[20:100, 30:60] = 1
+    for _ in range(4):
+        top, left = rng.integers(0, (110, 80))
+        undecided[top : top + 10, left : left + 8] = 1
+    undecided[person == 1] = 0
+    reach_px = 24
+    distance = _signed_distance(person)
+    wider = _signed_distance(person | undecided)
+    same = (np.abs(wider - distance) < 0.5) & (cv2.dilate(undecided, _NEAR_UNDECIDED) == 0)
+    known, free = _without_undecided(distance, person, undecided, reach_px)
+    near = np.abs(distance) <= reach_px
+    np.testing.assert_array_equal(known[near], np.where(same, distance, 1e4)[near])
+    np.testing.assert_array_equal(free, cv2.dilate(undecided, _NEAR_UNDECIDED) == 0)
