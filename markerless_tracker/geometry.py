@@ -67,6 +67,19 @@ def rotation_from_quaternion(quaternion: Any) -> FloatArray:
     )
 
 
+def roll_pitch_yaw(rotation: Any) -> FloatArray:
+    """Angles (3,) rad about the fixed axes x, y, z of a rotation matrix (3, 3), as URDF has them.
+
+    R = Rz(yaw) Ry(pitch) Rx(roll); at a pitch of 90 degrees the yaw is 0.
+    """
+    R = np.asarray(rotation, dtype=np.float64)
+    level = float(np.hypot(R[0, 0], R[1, 0]))
+    pitch = np.arctan2(-R[2, 0], level)
+    if level < 1e-9:
+        return np.array([np.arctan2(-R[1, 2], R[1, 1]), pitch, 0.0])
+    return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
+
+
 def transform(rotation: Any, translation: Any) -> FloatArray:
     """Homogeneous matrix (4, 4) of a rotation (3, 3) and a translation (3,)."""
     t = np.eye(4)

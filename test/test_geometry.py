@@ -1,16 +1,20 @@
 """Rotations and rigid transforms."""
 
+import math
+
 import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from markerless_tracker.geometry import (
     apply,
     inverse,
     quaternion_from_rotation,
     rodrigues_from_rotation,
+    roll_pitch_yaw,
     rotation_from_quaternion,
     rotation_from_rodrigues,
     skew,
@@ -94,3 +98,14 @@ def test_apply_keeps_the_shape_of_its_points() -> None:
     T = transform(np.eye(3), [1, 2, 3])
     assert apply(T, np.zeros((2, 5, 3))).shape == (2, 5, 3)
     np.testing.assert_array_equal(apply(T, np.zeros(3)), [1, 2, 3])
+
+
+@given(st.tuples(*[st.floats(-3.1, 3.1)] * 3), st.booleans())
+def test_roll_pitch_yaw_give_the_rotation_back(angles, upright) -> None:
+    roll, pitch, yaw = angles
+    pitch = math.copysign(math.pi / 2, pitch) if upright else pitch
+    rotation = Rotation.from_euler("xyz", [roll, pitch, yaw]).as_matrix()
+    found = roll_pitch_yaw(rotation)
+    np.testing.assert_allclose(
+        Rotation.from_euler("xyz", found).as_matrix(), rotation, rtol=0, atol=1e-7
+    )

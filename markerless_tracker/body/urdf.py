@@ -1,11 +1,9 @@
 """Bodies as URDF whose joints are the reported angles, for viewers and other ROS programs."""
 
-import warnings
 import xml.etree.ElementTree as ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body.angles import AngleReader
 from markerless_tracker.body.angles.definitions import GROUND, Joint
@@ -24,7 +22,7 @@ from markerless_tracker.body.model import (
     is_translation,
 )
 from markerless_tracker.errors import BodyModelError
-from markerless_tracker.geometry import FloatArray
+from markerless_tracker.geometry import FloatArray, roll_pitch_yaw
 
 _AXES = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 # Required by URDF; the body has no limits of effort or speed.
@@ -61,7 +59,8 @@ class _Writer:
             for joint, between in reported_joints(body).items()
             if joint.reference != GROUND
         }
-        self._shown = set(AngleReader(body).names)
+        self._reader = AngleReader(body)
+        self._shown = set(self._reader.names)
         self._seen: set[int] = set()
         self._links: list[str] = []
         self._elements: dict[int, Element] = {}
@@ -166,12 +165,12 @@ class _Writer:
         if len(moving) != 1 or len(names) != 1 or not np.isfinite(limits).all():
             return None
         parameter = int(body.node_parameter[moving[0]])
-        reader = AngleReader(body)
+        reader = self._reader
         pose, found = body.neutral.copy(), []
         for value in limits:
             pose[parameter] = value
-            found.append(reader.read(pose).values_rad[reader.names.index(names[0])])
             reader.reset()
+            found.append(reader.read(pose).values_rad[reader.names.index(names[0])])
         return float(min(found)), float(max(found))
 
     def _parameters(self, link: str, chain: list[int]) -> None:
@@ -240,11 +239,7 @@ def _visual(link: Element, body: BodyModel, cone: int) -> None:
 
 
 def _origin(parent: Element, fixed: FloatArray) -> None:
-    # Roll, pitch, yaw of URDF: Rz(yaw) Ry(pitch) Rx(roll), rotations about fixed axes.
-    with warnings.catch_warnings():
-        # At a pitch of 90 degrees SciPy sets one of roll and yaw to 0, which is correct here.
-        warnings.filterwarnings("ignore", "Gimbal lock detected")
-        rpy = Rotation.from_matrix(fixed[:, :3]).as_euler("xyz")
+    rpy = roll_pitch_yaw(fixed[:, :3])
     SubElement(parent, "origin", xyz=_numbers(fixed[:, 3]), rpy=_numbers(rpy))
 
 
