@@ -87,7 +87,10 @@ def warm_up(config: TrackerConfig, channels: int) -> None:
         )
         for name in rig.names
     }
-    build_tracker(rig, config, backgrounds=backgrounds).tracker.warm_up()
+    tracker = build_tracker(rig, config, backgrounds=backgrounds).tracker
+    tracker.evidence.start_process()
+    tracker.warm_up()
+    tracker.evidence.close()
 
 
 def _optimizer(text: str) -> str:

@@ -71,6 +71,14 @@ class Segmenter:
         """Brightness of the last image relative to the background's, by channel."""
         return tuple(float(value) for value in self._labeller.gain)
 
+    def warm_up(self) -> None:
+        """Compile what segments an image; then `reset`."""
+        width, height = self._size_px
+        channels = self.background.channels
+        shape = (height, width) if channels == 1 else (height, width, channels)
+        self.observe(np.zeros(shape, dtype=np.uint8), 0)
+        self.reset()
+
     def reset(self) -> None:
         """Return to the initial background."""
         self._labeller.reset()

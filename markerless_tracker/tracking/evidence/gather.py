@@ -152,9 +152,11 @@ class EvidenceMaker:
         return 0.0 if self._process is None else self._process.cpu_s
 
     def wait(self) -> None:
-        """Wait until that process, if there is one, is ready."""
+        """Compile the imaging, or wait until that process has done it and is ready."""
         if self._process is not None:
             self._process.wait()
+        for segmenter in self.segmenters.values():
+            segmenter.warm_up()
 
     def close(self) -> None:
         """End the process, if there is one."""
@@ -191,19 +193,16 @@ class EvidenceMaker:
         return self._follows and (number + shift) % self._every == 0
 
     def warm_up(self) -> dict[str, Observation]:
-        """Compile the imaging; returns made-up observations.
+        """Begin to compile the imaging (`wait` ends it); returns made-up observations.
 
         The silhouette is a rectangle, with undecided pixels around it and known ones above.
         """
+        if self._process is not None:
+            # It compiles while this process compiles what comes after the imaging.
+            self._process.use(self._config, self._backgrounds)
         made_up = {}
         for camera in self._rig:
             width, height = camera.size_px
-            segmenter = self.segmenters.get(camera.name)
-            if segmenter is not None:
-                channels = segmenter.background.channels
-                shape = (height, width) if channels == 1 else (height, width, channels)
-                segmenter.observe(np.zeros(shape, dtype=np.uint8), 0)
-                segmenter.reset()
             mask = np.zeros((height, width), dtype=np.uint8)
             mask[height // 4 : height // 2, width // 4 : width // 2] = 1
             around = mask == 0
@@ -211,9 +210,6 @@ class EvidenceMaker:
             made_up[camera.name] = Observation.from_mask(
                 camera.name, 0, mask, mask, undecided=around if self._three_classes else None
             )
-        if self._process is not None:
-            # Now, when what it would compile is stored.
-            self._process.use(self._config, self._backgrounds)
         return made_up
 
     def select(

@@ -51,7 +51,7 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
             if not isinstance(message, Request):
                 rig, config, backgrounds = message
                 maker = EvidenceMaker(rig, config, backgrounds, map)
-                maker.warm_up()
+                maker.wait()
                 collect_for_good()
                 answer = True
             elif maker is None:

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any, BinaryIO, cast
 
 import numpy as np
@@ -36,7 +36,7 @@ class SegmentingProcess:
     def __init__(self, rig: CameraRig) -> None:
         self._rig = rig
         self._lock = Lock()
-        self._ready = self._busy = False
+        self._ready = False
         self._cpu_s = 0.0
         size = sum(_aligned(3 * width * height) for width, height in (c.size_px for c in rig))
         fd = _memory_fd(size)
@@ -67,16 +67,16 @@ class SegmentingProcess:
         return self._cpu_s
 
     def use(self, config: TrackerConfig, backgrounds: Mapping[str, BackgroundModel]) -> None:
-        """Use these backgrounds from now on; does not wait until the process is ready for that."""
-        with self._lock:
-            self._settle()
-            self._ready = False
-            self._send((self._rig, config, dict(backgrounds)))
+        """Use these backgrounds from now on; returns before the process is ready for that."""
+        message = self._rig, config, dict(backgrounds)
+        self._lock.acquire()
+        # Released when the process is ready: until then everybody else waits.
+        Thread(target=self._begin, args=(message,), name="segmenting", daemon=True).start()
 
     def wait(self) -> None:
         """Wait until it uses the backgrounds, or has ended."""
         with self._lock:
-            self._settle()
+            pass
 
     def segment(
         self,
@@ -92,7 +92,6 @@ class SegmentingProcess:
             TrackerError: what the segmentation raised.
         """
         with self._lock:
-            self._settle()
             if not self._ready:
                 return None
             offset, places = 0, {}
@@ -103,8 +102,7 @@ class SegmentingProcess:
                 np.copyto(shared.reshape(image.shape), image)
                 places[name] = Place(offset, image.shape, regions[name])
                 offset += _aligned(image.size)
-            self._send(Request(stamp_ns, places))
-            answer = self._settle()
+            answer = self._ask(Request(stamp_ns, places))
         if isinstance(answer, Exception):
             raise answer
         if answer is None:
@@ -125,28 +123,20 @@ class SegmentingProcess:
             self._process.kill()
             self._process.wait()
 
-    def _send(self, message: Any) -> None:
-        assert self._process.stdin is not None
+    def _begin(self, message: Any) -> None:
+        try:
+            self._ready = self._ask(message) is True
+        finally:
+            self._lock.release()
+
+    def _ask(self, message: Any) -> Any:
+        """Send a message; returns the answer, None if the process has ended."""
         try:
             send(cast(BinaryIO, self._process.stdin), message)
-        except (OSError, ValueError):
-            self._ready = False
-            return
-        self._busy = True
-
-    def _settle(self) -> Any:
-        """Wait for the answer that is due, if any; returns it, None if the process has ended."""
-        if not self._busy:
-            return None
-        self._busy = False
-        assert self._process.stdout is not None
-        try:
             answer, self._cpu_s = receive(cast(BinaryIO, self._process.stdout))
-        except (EOFError, OSError):
+        except (EOFError, OSError, ValueError):
             self._ready = False
             return None
-        if answer is True:
-            self._ready = True
         return answer
 
 

@@ -55,7 +55,7 @@ def images() -> dict[str, np.ndarray]:
 @pytest.fixture(scope="module")
 def here(backgrounds) -> EvidenceMaker:
     maker = EvidenceMaker(RIG, CONFIG, backgrounds, map)
-    maker.warm_up()
+    maker.wait()
     return maker
 
 
