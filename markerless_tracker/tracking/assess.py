@@ -10,7 +10,7 @@ from markerless_tracker.body.model import IntArray
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
-from markerless_tracker.tracking.confidence import confidence_of
+from markerless_tracker.tracking.confidence import confidence_of, slopes
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.loss import event_of, shared_overlap
@@ -105,6 +105,12 @@ class Assessor:
             fitness=float("nan"), evaluations=0, observations=seen.observed, warnings=seen.notes,
             iou=dict.fromkeys(seen.observed, 0.0) if lost else {},
         )  # fmt: skip
+
+    def warm_up(self, found: Found, body: BodyModel, limits: FloatArray) -> None:
+        """Compile what `found` needs; arguments as there."""
+        self.found(found, body, limits)
+        # A pose that has nothing to do with the evidence has no confidence.
+        slopes(body, found.search.pose)
 
     def found(self, found: Found, body: BodyModel, limits: FloatArray) -> TrackResult:
         """The result of a frame with a pose.

@@ -86,7 +86,7 @@ def confidence_of(
     by_limb, of_trunk = excesses_m(body, rows)
     between = DISAGREEMENT * disagreement_m(contours, rows)
     floor = float(np.linalg.norm([unseen, between, TRUNK_ERROR * of_trunk]))
-    by_marker, by_root = _slopes(body, pose)
+    by_marker, by_root = slopes(body, pose)
     of_markers = np.einsum("ij,jk,ik->i", by_marker, covariance, by_marker)
     limbs_m = {name: min(LIMB_ERROR * value, MOST_LIMB_M) for name, value in by_limb.items()}
     of_limbs, of_pose = _spread(body, by_marker, limbs_m)
@@ -179,8 +179,8 @@ def _spread(
     return of_markers, of_pose
 
 
-def _slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives by the parameters: of the markers (45, p), of the root's pose (6, p).
+def slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Derivatives by the parameters at a pose (p,): of the markers (45, p), the root's pose (6, p).
 
     The root's rotation is a small one about the world's axes.
     """

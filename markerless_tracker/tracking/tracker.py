@@ -133,7 +133,7 @@ class Tracker:
         search.run(frame_stages(self.body, self.config, pose, self.body.sigma))
         if self.config.refinement != "none":
             self._assessor.limbs.recover(self._searcher, search.contours, seen, 0, pose)
-        self._assessor.found(Found(search, 0, seen), self.body, self._body.limits)
+        self._assessor.warm_up(Found(search, 0, seen), self.body, self._body.limits)
         self.reset()
         self._body.warm_up(self._searcher_for, blank, self._motion.pose)
         self.reset()

@@ -15,9 +15,9 @@ from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.confidence import (
     MEASURED_M,
     UNMEASURED_M,
-    _slopes,
     confidence_of,
     disagreement_m,
+    slopes,
 )
 from markerless_tracker.tracking.search import Searcher
 
@@ -163,7 +163,7 @@ def test_no_silhouette_no_confidence(scene) -> None:
 
 def test_slopes_against_finite_differences(scene) -> None:
     body, pose = scene.body, scene.pose(0)
-    by_marker, by_root = _slopes(body, pose)
+    by_marker, by_root = slopes(body, pose)
     rng = np.random.default_rng(0)
     change = 1e-3 * rng.standard_normal(body.size)
     after, before = markers(body, pose + change), markers(body, pose - change)

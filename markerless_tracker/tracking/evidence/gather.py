@@ -195,21 +195,24 @@ class EvidenceMaker:
     def warm_up(self) -> dict[str, Observation]:
         """Begin to compile the imaging (`wait` ends it); returns made-up observations.
 
-        The silhouette is a rectangle, with undecided pixels around it and known ones above.
+        All but the first are of regions, as when the body is tracked. The silhouette is a
+        rectangle, with undecided pixels around it and known ones above.
         """
         if self._process is not None:
             # It compiles while this process compiles what comes after the imaging.
             self._process.use(self._config, self._backgrounds)
-        made_up = {}
+        made_up: dict[str, Observation] = {}
         for camera in self._rig:
             width, height = camera.size_px
             mask = np.zeros((height, width), dtype=np.uint8)
             mask[height // 4 : height // 2, width // 4 : width // 2] = 1
             around = mask == 0
             around[: height // 4] = False
-            made_up[camera.name] = Observation.from_mask(
+            left, right = width // 8, width - width // 8
+            whole = Observation.from_mask(
                 camera.name, 0, mask, mask, undecided=around if self._three_classes else None
             )
+            made_up[camera.name] = whole.cut((left, 0, right, height)) if made_up else whole
         return made_up
 
     def select(
