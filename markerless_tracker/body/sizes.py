@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from markerless_tracker.body.build import build_body
 from markerless_tracker.body.description import BodyDescription
 from markerless_tracker.body.model import BodyModel
-from markerless_tracker.body.subject import Subject, subject_from_stature
+from markerless_tracker.body.subject import Subject, fitted_lengths, subject_from_stature
 from markerless_tracker.geometry import FloatArray
 
 MEAN_STATURE_M = 1.70
@@ -19,6 +20,9 @@ GIVEN_STATURE_SD = 0.01
 """Relative standard deviation of a stature given by the user (shoes, rounding)."""
 PROPORTION_SD = 0.04
 """Relative standard deviation of a segment length among persons of one stature."""
+
+_LINEAR = ("node_fixed", "marker_offset", "cone_fixed", "cone_length")
+_STEP_M = 0.125
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +86,42 @@ class Sizes:
         Raises:
             BodyModelError: a length is not between 0 and 3 m.
         """
-        by_name = dict(zip(self.names, map(float, lengths_m), strict=True))
-        named: Mapping[str, float] = {
-            name: by_name[_side_free(name)] for name in self._description.lengths
-        }
-        sized = build_body(self._description, Subject("fitted", named, measured=False))
+        subject = self._subject(lengths_m)
         if like is None:
-            return sized
-        return replace(sized, cone_shape=like.cone_shape, measured=like.measured)
+            return build_body(self._description, subject)
+        base = self._base
+        longer = np.asarray(lengths_m, dtype=np.float64) - self._fractions * MEAN_STATURE_M
+        arrays = {
+            name: getattr(base, name) + np.tensordot(longer, slopes, axes=1)
+            for name, slopes in self._slopes.items()
+        }
+        return replace(
+            base, **arrays, lengths_m=fitted_lengths(self._description, subject),
+            cone_shape=like.cone_shape, measured=like.measured,
+        )  # fmt: skip
+
+    def _subject(self, lengths_m: FloatArray) -> Subject:
+        by_name = dict(zip(self.names, map(float, lengths_m), strict=True))
+        named = {name: by_name[_side_free(name)] for name in self._description.lengths}
+        return Subject("fitted", named, measured=False)
+
+    @cached_property
+    def _base(self) -> BodyModel:
+        """A body of the mean stature."""
+        return build_body(self._description, self._subject(self._fractions * MEAN_STATURE_M))
+
+    @cached_property
+    def _slopes(self) -> Mapping[str, FloatArray]:
+        """Derivatives (k, ...) of the arrays that depend on the free lengths, all linearly."""
+        longer = [
+            build_body(self._description, self._subject(self._fractions * MEAN_STATURE_M + step))
+            for step in _STEP_M * np.eye(len(self.names))
+        ]
+        return {
+            name: np.array([getattr(other, name) - getattr(self._base, name) for other in longer])
+            / _STEP_M
+            for name in _LINEAR
+        }
 
 
 def _side_free(name: str) -> str:
