@@ -195,11 +195,15 @@ class Starter:
     def _decide(
         self, observations: Mapping[str, Observation], pose: FloatArray
     ) -> dict[str, Observation]:
-        """Observations whose undecided pixels the hull, or the body at a pose (p,), decides."""
+        """Observations whose undecided pixels the body at a pose (p,) decides.
+
+        In the second frame, which is searched independently, the hull decides first.
+        """
         assert self._searcher is not None
-        hull = next(find_hulls(self._cameras, observations), None)
-        if hull is not None:
-            observations = hulls_silhouettes(observations, self._cameras, hull)
+        if len(self._seen[0]) == 1:
+            hull = next(find_hulls(self._cameras, observations), None)
+            if hull is not None:
+                observations = hulls_silhouettes(observations, self._cameras, hull)
         return decide(observations, self._cameras, self._searcher.body, pose)
 
     def _second_look(
