@@ -156,7 +156,7 @@ def test_who_is_turned_round_is_said_once() -> None:
 
     scene = SyntheticScene(body="person31", motion="stand", size_px=(64, 48), seed=2)
     tracker = tracker_of(scene, stature=1.72)
-    starter = Starter(scene.rig, scene.body, tracker._searcher_for, tracker._evidence.select)
+    starter = Starter(scene.rig, scene.body, tracker._searcher_for, tracker.evidence.select)
     starter._searcher = tracker._searcher_for(scene.body)
     pose = scene.pose(0)
     starter._from_m = starter._trunk(pose)
