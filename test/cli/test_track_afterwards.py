@@ -98,3 +98,4 @@ def test_smoothing_and_offsets(track, tmp_path: Path) -> None:
     assert status == 1 and "no camera cam09" in err
     status, _, err = track("--time-offsets", "cam02=-0.0333", "--force")
     assert status == 0 and len(read_trc(tmp_path / "out.trc")) == 5
+    assert read_result(tmp_path / "out").summary["time_offsets_s"] == {"cam02": -0.0333}
