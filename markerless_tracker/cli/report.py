@@ -128,7 +128,7 @@ def _film(
 ) -> tuple[Film | None, str]:
     """The film, or why there is none; images that were asked for must be there."""
     try:
-        images = ResultImages(result, source, width_px=IMAGE_PX)
+        images = ResultImages(result, source, width_px=IMAGE_PX, whole=False)
         with Progress(
             TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
             TimeRemainingColumn(), console=console, disable=not console.is_terminal,

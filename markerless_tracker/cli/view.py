@@ -72,6 +72,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=1280,
         help="width of film and picture (default 1280)",
     )
+    parser.add_argument(
+        "--whole",
+        action="store_true",
+        help="show whole images in film and picture, not only the part in which the person moves",
+    )
     parser.add_argument("--force", action="store_true", help="replace existing files")
     parser.add_argument("--json", action="store_true", help="print the written files as JSON")
 
@@ -92,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
         )
     name = args.name.with_suffix("") if args.name.suffix.lower() == ".trc" else args.name
     result = read_result(name)
-    images = ResultImages(result, args.source, width_px=args.width // 2)
+    images = ResultImages(result, args.source, width_px=args.width // 2, whole=args.whole)
     overlays = Overlays(result, images)
     for path in targets:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
 """The images that a result was tracked in, matched by time."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from markerless_tracker.datasets import FrameSet, Recording, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.stored_result import StoredResult
+from markerless_tracker.viewing.windows import Window, windows
 
 
 class ResultImages:
@@ -18,10 +19,12 @@ class ResultImages:
     Args:
         result: the result.
         source: the recording; None: the one that the result names.
-        width_px: largest width of an image.
+        width_px: largest width of a picture.
+        whole: whether pictures show whole images; else the window in which the person moves.
 
     Attributes:
         rig: the cameras of the scaled images.
+        windows: camera -> the part of its images that pictures show.
         fps: rate of the source, 1/s.
 
     Raises:
@@ -30,7 +33,12 @@ class ResultImages:
     """
 
     def __init__(
-        self, result: StoredResult, source: Path | None = None, *, width_px: int = 640
+        self,
+        result: StoredResult,
+        source: Path | None = None,
+        *,
+        width_px: int = 640,
+        whole: bool = True,
     ) -> None:
         path = source or Path(result.source)
         if not path.exists():
@@ -38,7 +46,11 @@ class ResultImages:
                 f"{result.source or 'unknown source'}: the images of the result are not there, "
                 "expected the recording's folder with --source"
             )
-        widest = max(camera.size_px[0] for camera in open_recording(path).rig)
+        rig = open_recording(path).rig
+        self.windows: Mapping[str, Window] = (
+            dict.fromkeys(rig.names, Window()) if whole else windows(result, rig)
+        )
+        widest = max(self.windows[camera.name].size * camera.size_px[0] for camera in rig)
         recording: Recording = open_recording(path, scale=min(1.0, width_px / widest))
         offsets = result.summary.get("time_offsets_s")
         if offsets:

@@ -43,14 +43,17 @@ class Overlays:
         self._surfaces = cone_surfaces(self._body, end_points=_END_POINTS, sections=1)
 
     def pictures(self, rows: list[int]) -> Iterator[tuple[int, Mapping[str, Image]]]:
-        """Rows with their pictures (h, w, 3) BGR by camera."""
+        """Rows with their whole pictures (h, w, 3) BGR by camera."""
         for row, images in self._images.frames(rows):
             yield row, self._drawn(row, images)
 
     def sheets(self, rows: list[int], *, width_px: int = 960) -> Iterator[tuple[int, Image]]:
         """Rows with one picture (h, w, 3) BGR of all cameras, with time and state."""
         for row, pictures in self.pictures(rows):
-            named = {f"{name}  {self.caption(row)}": image for name, image in pictures.items()}
+            named = {
+                f"{name}  {self.caption(row)}": self._images.windows[name].of(image)
+                for name, image in pictures.items()
+            }
             yield row, overlay_sheet(named, max_width_px=width_px)
 
     def contact_sheet(self, rows: list[int], *, width_px: int = 1920) -> Image:
@@ -60,7 +63,7 @@ class Overlays:
         for row, pictures in self.pictures(rows):
             cameras = max(cameras, len(pictures))
             for name, image in pictures.items():
-                tiles[f"{name}  {self.caption(row)}"] = image
+                tiles[f"{name}  {self.caption(row)}"] = self._images.windows[name].of(image)
         return overlay_sheet(tiles, columns=cameras, max_width_px=width_px)
 
     def caption(self, row: int) -> str:

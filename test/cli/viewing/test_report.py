@@ -10,18 +10,6 @@ from markerless_tracker.cli.report import _levels
 from markerless_tracker.viewing.page.charts import Level
 
 
-@pytest.fixture(scope="module")
-def tracked(walk: Path, search, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """NAME of a tracked result of the recording `walk`."""
-    folder = tmp_path_factory.mktemp("tracked")
-    config = folder / "settings.yaml"
-    quick = {**search, "evaluations": 200, "refinement": "none", "fit_shape": False}
-    config.write_text(json.dumps(quick), encoding="utf-8")
-    words = ["track", walk, "-o", folder / "out", "--config", config]
-    assert main([str(w) for w in [*words, "--start", walk / "ground_truth.trc"]]) == 0
-    return folder / "out"
-
-
 def test_a_page_from_the_results_own_source(tracked, walk: Path, tmp_path, capsys) -> None:
     pytest.importorskip("av", reason="PyAV is not installed: pip install av")
     page = tmp_path / "new" / "page.html"
