@@ -7,6 +7,7 @@ import numpy as np
 
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import FrameSet, Recording, open_recording
+from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.in_step import InStepRecording
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.stored_result import StoredResult
@@ -52,6 +53,8 @@ class ResultImages:
         )
         widest = max(self.windows[camera.name].size * camera.size_px[0] for camera in rig)
         recording: Recording = open_recording(path, scale=min(1.0, width_px / widest))
+        # Sets of a bag may be missing: every k-th one is not one in k periods.
+        self._regular = isinstance(recording, VideoRecording)
         offsets = result.summary.get("time_offsets_s")
         if offsets:
             recording = InStepRecording(recording, offsets)
@@ -92,7 +95,9 @@ class ResultImages:
         return images.stamp_ns - stamp_ns > self._tolerance_ns
 
     def _every(self, wanted: Sequence[tuple[int, int]]) -> int:
-        """Greatest step over the source that meets all the stamps, as long as they are regular."""
+        """Greatest step over the source that meets all the stamps; 1 where it is not regular."""
+        if not self._regular:
+            return 1
         steps = np.diff([stamp_ns for _, stamp_ns in wanted]) * self.fps / 1e9
         whole = np.rint(steps).astype(np.int64)
         if not whole.size or np.abs(steps - whole).max() > 0.25 or whole.min() < 1:

@@ -30,7 +30,8 @@ class Overlays:
     """Draws the body over images: left limbs cyan, right limbs yellow, ellipses of 2 sd.
 
     Args:
-        result: the result; frames without a pose show the images alone.
+        result: the result; frames without a pose show the images alone, cameras without an image
+            are black.
         images: its images.
 
     Raises:
@@ -77,8 +78,9 @@ class Overlays:
         for camera in self._images.rig:
             image = images.images.get(camera.name)
             if image is None:
-                continue
-            if np.isfinite(pose).all():
+                width, height = camera.size_px
+                found[camera.name] = np.zeros((height, width, 3), dtype=np.uint8)
+            elif np.isfinite(pose).all():
                 deviations = self._result.positions_sd_m[row]
                 found[camera.name] = draw_overlay(
                     image,

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from markerless_tracker.bags import write_bag
+from markerless_tracker.datasets import open_recording
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.read import read_result
 from markerless_tracker.viewing.images import ResultImages
@@ -42,3 +44,15 @@ def test_cameras_are_brought_into_step_as_the_run_did(make_result, walk: Path) -
     plain = dict(ResultImages(read_result(make_result("plain", source=walk))).frames([0, 1, 2]))
     assert (late[2].images["cam02"] == plain[1].images["cam02"]).all()
     assert (late[2].images["cam01"] == plain[2].images["cam01"]).all()
+
+
+def test_a_bag_with_a_missing_set(make_result, walk: Path, tmp_path: Path) -> None:
+    recording = open_recording(walk)
+    sets = [images for images in recording.frames() if images.index != 1]
+    recording.frames = lambda **_: iter(sets)  # type: ignore[method-assign]
+    write_bag(recording, tmp_path / "bag")
+    result = read_result(make_result(source=tmp_path / "bag"))
+    shown = dict(ResultImages(result).frames([0, 2, 4]))
+    assert {row: images.stamp_ns for row, images in shown.items()} == {
+        row: int(result.stamps_ns[row]) for row in (0, 2, 4)
+    }

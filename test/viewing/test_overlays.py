@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from markerless_tracker.datasets import FrameSet
 from markerless_tracker.drawing import draw_overlay
 from markerless_tracker.results.read import read_result
 from markerless_tracker.viewing.images import ResultImages
@@ -36,6 +37,13 @@ def test_sheets_name_time_and_state(overlays: Overlays) -> None:
     assert row == 2 and sheet.shape == other.shape and sheet.shape[1] <= 300
     whole = overlays.contact_sheet([0, 2, 5], width_px=640)
     assert whole.shape[1] <= 640 and whole.shape[0] > sheet.shape[0]
+
+
+def test_a_camera_without_an_image_is_black(overlays: Overlays, seen) -> None:
+    images = {name: image for name, image in seen.frame(2)[0].items() if name != "cam02"}
+    drawn = overlays._drawn(2, FrameSet(2, seen.stamp_ns(2), images))
+    assert sorted(drawn) == ["cam01", "cam02", "cam03", "cam04"]
+    assert not drawn["cam02"].any() and drawn["cam01"].any()
 
 
 def test_rows_to_show(make_result) -> None:

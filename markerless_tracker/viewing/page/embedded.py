@@ -55,7 +55,7 @@ def embedded_film(
 
     def pictures() -> Iterator[Image]:
         for number, (row, sheet) in enumerate(overlays.sheets(rows, width_px=WIDTH_PX)):
-            if row in stills:
+            if row in stills or not kept:
                 kept.append(sheet)
             progress(number + 1, len(rows))
             yield sheet

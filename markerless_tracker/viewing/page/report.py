@@ -94,7 +94,7 @@ class Report:
         for state in (TrackState.LOST, TrackState.SEARCHING):
             count = int((result.states == state.value).sum())
             if count:
-                words.append(f"{count} frames {state.value.lower()}")
+                words.append(f"{count} {'frame' if count == 1 else 'frames'} {state.value.lower()}")
         if self.overlap:
             worst, value = min(self.overlap.items(), key=lambda item: item[1])
             words.append(f"{worst} fits worst (overlap {value:.2f})")

@@ -62,7 +62,8 @@ summary { cursor: pointer; font-weight: 600; margin: .8rem 0 .4rem; }
 @media print { :root { color-scheme: light; --ink: #000; --dim: #444; --paper: #fff; --card: #fff;
   --rule: #bbb; --left: #0089a3; --right: #a87900; --s0: #2563c9; --s1: #c2410c; --s2: #15803d;
   --s3: #9333ea; --s4: #be185d; --s5: #57534e; --s6: #0e7490; --s7: #854d0e; --doubt: #a12b0e; }
-  body { font-size: 10pt; } video { display: none; } .still { display: block; }
+  body { font-size: 10pt; } video { display: none; }
+  .still { display: block; width: auto; max-width: 100%; max-height: 14cm; }
   h2, h3 { break-after: avoid; } tr, .chart { break-inside: avoid; } .wide { overflow: visible; }
   .plot { height: 8rem; } }
 """

@@ -66,7 +66,7 @@ def test_everything_is_in_the_page(make_result, walk: Path) -> None:
     assert {"video", "svg", "table", "details"} <= set(reader.tags)
     assert reader.texts.count("walk <1>") >= 2, "title and heading"
     words = " ".join(reader.texts)
-    assert "tracked in 5 of 6 frames (0.2 s at 30/s), 1 frames lost, cam02 fits worst" in words
+    assert "tracked in 5 of 6 frames (0.2 s at 30/s), 1 frame lost, cam02 fits worst" in words
     assert "paper" in words and "mean error, mm 0.0" in words.replace("  ", " ")
     for name in ("LKnee", "balan31", "numpy, version", "refine.truncation_m", "overlap, cam02"):
         assert name in reader.texts
