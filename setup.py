@@ -65,12 +65,14 @@ setup(
             "hypothesis",
             "mypy",
             'opensim>=4.5; python_version < "3.14"',
+            "pandas>=2",
             "pytest>=7",
             "pytest-xdist",
             "ruff",
             "scipy-stubs",
             "types-PyYAML",
         ],
+        "view": ["av>=14", "rerun-sdk>=0.24"],
     },
     entry_points={
         "console_scripts": [

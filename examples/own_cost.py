@@ -1,10 +1,12 @@
 """Search with a cost of one's own: that of the images and a term for the pose.
 
-    python examples/own_cost.py --frames 4
+    python examples/own_cost.py --frames 12
 
 The images' cost of a pose is 2 - f, f being the overlap of body and silhouettes and of edges.
 `NearPrediction` adds a term that grows with the distance from the predicted pose. It takes the
-place of the algorithm `sppso`. A made-up person stands for the images.
+place of the algorithm `sppso`. `refine.swarms: always` searches with it in each frame after the
+start (here the first eight); by default frames that the contour refinement explains are not
+searched. A made-up person stands for the images.
 """
 
 import argparse
@@ -38,11 +40,11 @@ ALGORITHMS["sppso"] = NearPrediction
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--frames", type=int, default=10)
+    parser.add_argument("--frames", type=int, default=12)
     args = parser.parse_args()
 
     scene = SyntheticScene(body="person31", size_px=(328, 245))
-    config = TrackerConfig()
+    config = TrackerConfig.from_mapping({"refine.swarms": "always"})
     backgrounds = {
         name: learn_background(images, config, camera=name)
         for name, images in scene.backgrounds(5).items()

@@ -34,6 +34,8 @@ VERBS: Mapping[str, str] = MappingProxyType(
         "track": "track the person in a recording or bag",
         "export": "write a result in the formats of OpenSim, C3D, BVH, CSV, NumPy and ROS",
         "evaluate": "compare a result with reference markers, in mm",
+        "report": "write one HTML page about a result: film, verdict, errors, angles, gait",
+        "view": "show a result over its images: film, picture, Rerun viewer",
         "synthesize": "render a synthetic person as a recording with exact reference markers",
         "benchmark": "measure speed and accuracy",
         "compile": "compile everything for this machine, so that no first start waits for it",

@@ -187,7 +187,7 @@ def _track(
         tracker.body,
         config,
         fps=args.fps or recording.fps,
-        source=recording.name,
+        source=str(args.source.resolve()),
         overwrite=args.force,
         keep_lost=args.keep_lost,
     ) as writer:
@@ -210,6 +210,9 @@ def _track(
             start_given=args.start is not None,
         )
         writer.note({"cameras": _cameras(shifts), "verdict": verdict.as_mapping()})
+        writer.note({"scale": args.scale})
+        if args.time_offsets is not None:
+            writer.note({"time_offsets_s": read_time_offsets(args.time_offsets)})
     return _Outcome(writer.trc_path, seconds, shifts, record, verdict)
 
 

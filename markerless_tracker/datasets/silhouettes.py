@@ -21,14 +21,16 @@ class SilhouetteRecording(Recording):
 
     A folder per camera has an image per frame: person from 128 on, background below. Files are
     named by the number of their frame in the recording, such as 000050.png; images of another size
-    than the recording's are scaled. A camera without a file for a frame is missing in its set.
+    than the recording's are scaled. A camera without a file for a frame is missing in its set;
+    frames of which no camera has a file are left out, with a warning.
 
     Args:
         recording: the recording, for its stamps.
         folder: holds a folder for every camera.
 
     Raises:
-        DatasetError: a camera has no folder, or a file's name is no number.
+        DatasetError: a camera has no folder, a file's name is no number, or (from `frames`) none of
+            the frames read has a file.
     """
 
     def __init__(self, recording: Recording, folder: Path) -> None:
@@ -37,6 +39,7 @@ class SilhouetteRecording(Recording):
         self.scale, self.fps = recording.scale, recording.fps
         self.frame_count = recording.frame_count
         self._warnings = {}
+        self._folder = folder
         missing = [name for name in rig.names if not (folder / name).is_dir()]
         if missing:
             raise DatasetError(
@@ -55,16 +58,31 @@ class SilhouetteRecording(Recording):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Problems found, one line each."""
-        return self._inner.warnings
+        return (*self._inner.warnings, *self._warnings.values())
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
         return self._inner._nearest(stamp_ns)
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
+        left_out = read = 0
         for frame in self._inner.frames(start=start, every=every):
             views = self._views(frame.index, frame.stamp_ns)
-            # The type of a set knows images only; the tracker takes both.
-            yield FrameSet(frame.index, frame.stamp_ns, cast("dict[str, Image]", views))
+            read += 1
+            if views:
+                # The type of a set knows images only; the tracker takes both.
+                yield FrameSet(frame.index, frame.stamp_ns, cast("dict[str, Image]", views))
+            else:
+                left_out += 1
+        if read and left_out == read:
+            raise DatasetError(
+                f"{self._folder}: no silhouette of any of the {read} frames read, expected files "
+                f"such as {self.rig.names[0]}/{start:06d}.png"
+            )
+        if left_out:
+            self.warn(
+                f"{self.name}: {left_out} of {read} frames left out, no camera has a silhouette",
+                replaces="left out",
+            )
 
     def _views(self, index: int, stamp_ns: int) -> dict[str, Observation]:
         """Observations of the cameras that have a silhouette of a frame, without edges."""

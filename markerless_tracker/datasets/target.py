@@ -32,7 +32,10 @@ def new_folder(path: str | Path, *, replace: bool = False) -> Iterator[Path]:
     if path.is_symlink() or (path.exists() and not path.is_dir()):
         raise DatasetError(f"{path}: exists and is not a folder, expected a new or an empty folder")
     if path.is_dir() and any(path.iterdir()) and not earlier:
-        raise DatasetError(f"{path}: exists and is not empty, expected a new or an empty folder")
+        hint = " (--force replaces a bag)" if (path / BAG_FILE).is_file() else ""
+        raise DatasetError(
+            f"{path}: exists and is not empty, expected a new or an empty folder{hint}"
+        )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         holder = Path(tempfile.mkdtemp(prefix=f".{path.name}.partial-", dir=path.parent))

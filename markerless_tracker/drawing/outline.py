@@ -17,17 +17,42 @@ _SHIFT = 8
 """Fractional bits of OpenCV's fixed-point coordinates."""
 
 
-def outlines(body: BodyModel, pose: FloatArray, camera: CameraModel) -> list[FloatArray]:
+def cone_surfaces(
+    body: BodyModel, *, end_points: int = END_POINTS, sections: int = SIDE_SECTIONS
+) -> FloatArray:
+    """(c, k, 3) points on each cone in its base frame, m.
+
+    Args:
+        body: the body.
+        end_points: points on the ellipse of an end.
+        sections: sections between the ends.
+    """
+    return np.array(
+        [
+            _surface(float(length), shape, end_points, sections)
+            for length, shape in zip(body.cone_length, body.cone_shape, strict=True)
+        ]
+    )
+
+
+def outlines(
+    body: BodyModel,
+    pose: FloatArray,
+    camera: CameraModel,
+    *,
+    surfaces: FloatArray | None = None,
+) -> list[FloatArray]:
     """Outline (n, 2) in px of each cone at a pose (p,), through the lens.
 
     The convex hull of the projected cone; empty (0, 2) if a part of it is behind the camera.
+    Given `cone_surfaces` of the body are not computed again.
     """
+    local = cone_surfaces(body) if surfaces is None else surfaces
+    T = cone_transforms(body, pose)
+    points = local @ T[:, :, :3].transpose(0, 2, 1) + T[:, None, :, 3]
+    projected = project_camera(points.reshape(-1, 3), camera).reshape(*points.shape[:2], 2)
     result = []
-    for T, length, shape in zip(
-        cone_transforms(body, pose), body.cone_length, body.cone_shape, strict=True
-    ):
-        surface = _surface(float(length), shape) @ T[:, :3].T + T[:, 3]
-        pixels = project_camera(surface, camera)
+    for pixels in projected:
         if not np.isfinite(pixels).all():
             result.append(np.empty((0, 2)))
             continue
@@ -82,13 +107,13 @@ def fixed_point(points_px: FloatArray) -> tuple[NDArray[np.int32], int]:
     return np.rint(limited * (1 << _SHIFT)).astype(np.int32), _SHIFT
 
 
-def _surface(length: float, shape: FloatArray) -> FloatArray:
+def _surface(length: float, shape: FloatArray, end_points: int, sections: int) -> FloatArray:
     """Points (n, 3) on a cone in its base frame.
 
     The point of an end's ellipse with normal n is r² n / |r n|. Points of both ends with the same
     normal are joined by a line of the side.
     """
-    angle = 2.0 * np.pi * np.arange(END_POINTS) / END_POINTS
+    angle = 2.0 * np.pi * np.arange(end_points) / end_points
     # Normals at evenly spaced points of the mean section: equal angles undersample flat sides.
     normal = np.column_stack([np.cos(angle), np.sin(angle)]) / shape[:, :2].mean(axis=0)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -98,8 +123,8 @@ def _surface(length: float, shape: FloatArray) -> FloatArray:
     )
     return np.concatenate(
         [
-            np.column_stack([(1.0 - t) * start + t * end, np.full(END_POINTS, t * length)])
-            for t in np.linspace(0.0, 1.0, SIDE_SECTIONS + 2)
+            np.column_stack([(1.0 - t) * start + t * end, np.full(end_points, t * length)])
+            for t in np.linspace(0.0, 1.0, sections + 2)
         ]
     )
 

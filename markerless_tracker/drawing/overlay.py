@@ -1,5 +1,7 @@
 """Body drawn over an image: outlines coloured by side, markers as dots."""
 
+from collections.abc import Iterator
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +14,11 @@ from markerless_tracker.geometry import FloatArray
 
 Image = NDArray[np.uint8]
 
-LEFT_BGR, RIGHT_BGR, CENTRE_BGR = (60, 200, 60), (50, 80, 255), (255, 190, 40)
-"""Colours of the left side (green), the right side (red) and the rest (blue), BGR."""
+LEFT_BGR, RIGHT_BGR, CENTRE_BGR = (255, 255, 0), (0, 255, 255), (255, 255, 255)
+"""Colours of the left side (cyan) and the right side (yellow), as in Fleischmann et al. (2012), and
+of the rest (white), BGR."""
+ELLIPSE_SD = 2.0
+"""Radius of the ellipses of uncertainty in standard deviations."""
 _MASK_BGR = (255, 0, 255)
 _PLANES: tuple[tuple[int, ...], ...] = ((), (1,), (3,))
 
@@ -55,11 +60,15 @@ def draw_overlay(
     pose: FloatArray,
     *,
     mask: NDArray[np.bool_] | None = None,
+    markers_sd_m: FloatArray | None = None,
+    surfaces: FloatArray | None = None,
 ) -> Image:
     """A copy (h, w, 3) BGR of an image with the body at a pose (p,) drawn over it.
 
-    Cones are outlined, the 15 markers are dots, a given mask (h, w) is tinted. Parts behind the
-    camera are left out.
+    Cones are outlined, the 15 markers are dots, a given mask (h, w) is tinted. Given standard
+    deviations (15, 3) of the markers along x, y, z in m (NaN = unknown) are ellipses of
+    `ELLIPSE_SD`. Given `cone_surfaces` of the body are not computed again. Parts behind the camera
+    are left out.
 
     Raises:
         ImageError: the image or mask does not fit the camera.
@@ -73,16 +82,40 @@ def draw_overlay(
         tint = 0.75 * picture[mask != 0] + 0.25 * np.array(_MASK_BGR)
         picture[mask != 0] = np.rint(tint).astype(np.uint8)
     thickness = 1 if max(camera.size_px) < 1000 else 2
-    for name, polygon in zip(body.cone_names, outlines(body, pose, camera), strict=True):
+    polygons = outlines(body, pose, camera, surfaces=surfaces)
+    for name, polygon in zip(body.cone_names, polygons, strict=True):
         if len(polygon) >= 3:
             points, shift = fixed_point(polygon)
             cv2.polylines(
                 picture, [points[:, None]], True, side_colour(name), thickness, cv2.LINE_AA, shift
             )
-    for name, pixel in zip(MARKER_NAMES, project_camera(markers(body, pose), camera), strict=True):
+    positions = markers(body, pose)
+    if markers_sd_m is not None:
+        for name, box in _ellipses(positions, markers_sd_m, camera):
+            cv2.ellipse(picture, box, side_colour(name), 1, cv2.LINE_AA)
+    for name, pixel in zip(MARKER_NAMES, project_camera(positions, camera), strict=True):
         if np.isfinite(pixel).all():
             (centre,), shift = fixed_point(pixel[None])
             at, one = (int(centre[0]), int(centre[1])), 1 << shift
             cv2.circle(picture, at, 2 * thickness * one, side_colour(name), -1, cv2.LINE_AA, shift)
             cv2.circle(picture, at, 2 * thickness * one, (255, 255, 255), 1, cv2.LINE_AA, shift)
     return picture
+
+
+def _ellipses(
+    positions_m: FloatArray, sd_m: FloatArray, camera: CameraModel
+) -> Iterator[tuple[str, tuple[tuple[float, float], tuple[float, float], float]]]:
+    """Marker and (centre in px, diameters in px, angle in degrees) of each ellipse."""
+    ends = positions_m[:, None] + sd_m[:, :, None] * np.eye(3)
+    centres = project_camera(positions_m, camera)
+    moved = project_camera(ends.reshape(-1, 3), camera).reshape(-1, 3, 2) - centres[:, None]
+    # NaN, behind the camera or of unknown deviation, is not below any limit.
+    limit = 4.0 * max(camera.size_px)
+    known = np.asarray((np.abs(centres) < limit).all(1) & (np.abs(moved) < limit).all((1, 2)))
+    variances, directions = np.linalg.eigh(moved[known].transpose(0, 2, 1) @ moved[known])
+    diameters = 2.0 * ELLIPSE_SD * np.sqrt(np.maximum(variances[:, ::-1], 0.0))
+    angles = np.degrees(np.arctan2(directions[:, 1, 1], directions[:, 0, 1]))
+    names = (name for name, here in zip(MARKER_NAMES, known, strict=True) if here)
+    rows = zip(centres[known].tolist(), diameters.tolist(), angles.tolist(), strict=True)
+    for name, (centre, (long, short), angle) in zip(names, rows, strict=True):
+        yield name, ((centre[0], centre[1]), (long, short), angle)

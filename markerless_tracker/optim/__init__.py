@@ -8,7 +8,7 @@ from markerless_tracker.optim.mcpso import MASTER_TERMS, Mcpso, swarm_sizes
 from markerless_tracker.optim.pf import Pf
 from markerless_tracker.optim.problem import Feasible, ParticleSet, Problem, everything_feasible
 from markerless_tracker.optim.pso import Pso
-from markerless_tracker.optim.registry import ALGORITHMS
+from markerless_tracker.optim.registry import ALGORITHMS, is_replaced
 from markerless_tracker.optim.sppso import UPDATES, Sppso
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "Pso",
     "Sppso",
     "everything_feasible",
+    "is_replaced",
     "keyed_generator",
     "refine",
     "swarm_sizes",

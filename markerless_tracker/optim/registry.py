@@ -21,3 +21,9 @@ ALGORITHMS: dict[str, Callable[..., Optimizer]] = {
 A program may replace an entry by an `Optimizer` of its own (examples/own_optimizer.py).
 HPSO, H-MCPSO and GLPSO are stages of these: see `tracking.partitions`.
 """
+_SHIPPED = dict(ALGORITHMS)
+
+
+def is_replaced(name: str) -> bool:
+    """Whether an entry of `ALGORITHMS` is not the package's; its compiled twin is not its equal."""
+    return ALGORITHMS[name] is not _SHIPPED.get(name)

@@ -42,7 +42,7 @@ class ResultReader:
     Attributes:
         name: path without suffix.
         summary: every entry of the JSON file but the frames.
-        marker_names, parameter_names, angle_names: names of the columns.
+        marker_names, parameter_names, angle_names, camera_names: names of the columns.
         fps: rate of the results, 1/s.
 
     Raises:
@@ -68,7 +68,13 @@ class ResultReader:
         self.parameter_names = tuple(str(parameter) for parameter in names)
         # All frames with a pose have the same angles, or none.
         posed = (frame for frame in frames if frame.get("parameters") is not None)
-        self.angle_names = tuple(next(posed, {}).get("angles") or ())
+        first = next(posed, {})
+        self.angle_names = tuple(first.get("angles") or ())
+        # A camera may be missing in that frame; the verdict at the end of a run has all of them.
+        verdict = self.summary.get("verdict")
+        overlap = verdict.get("overlap") if isinstance(verdict, dict) else None
+        cameras = (*(overlap or ()), *(first.get("iou") or ()))
+        self.camera_names = tuple(sorted(map(str, dict.fromkeys(cameras))))
 
     def chunks(self, size: int = CHUNK_FRAMES) -> Iterator[StoredResult]:
         """Parts of at most `size` frames, in order; one without frames if there is none.
@@ -108,6 +114,7 @@ class ResultReader:
         positions = np.array([row for _, row in part], dtype=np.float64).reshape(n, m, 3)
         sd = np.full((n, m, 3), np.nan)
         angles = np.full((n, len(self.angle_names)), np.nan)
+        overlap = np.full((n, len(self.camera_names)), np.nan)
         parameters, parameters_sd = np.full((2, n, len(self.parameter_names)), np.nan)
         try:
             for row, frame in enumerate(frames):
@@ -118,6 +125,8 @@ class ResultReader:
                 found = frame.get("angles") or {}
                 if found:
                     angles[row] = [_number(found.get(name)) for name in self.angle_names]
+                agreement = frame.get("iou") or {}
+                overlap[row] = [_number(agreement.get(name)) for name in self.camera_names]
                 if frame.get("parameters") is not None:
                     parameters[row] = frame["parameters"]
                 if frame.get("parameters_sd") is not None:
@@ -127,7 +136,7 @@ class ResultReader:
             raise DatasetError(
                 f"{self._summary_name}.json: a frame is malformed: {error}"
             ) from error
-        for values in (positions, sd, angles, parameters, parameters_sd):
+        for values in (positions, sd, angles, overlap, parameters, parameters_sd):
             values[blank] = np.nan
         return StoredResult(
             source=str(self.summary.get("source", "")),
@@ -136,6 +145,7 @@ class ResultReader:
             marker_names=self.marker_names,
             parameter_names=self.parameter_names,
             angle_names=self.angle_names,
+            camera_names=self.camera_names,
             stamps_ns=np.array([frame["stamp_ns"] for frame in frames], dtype=np.int64),
             states=states,
             filled=filled,
@@ -145,6 +155,7 @@ class ResultReader:
             parameters=parameters,
             parameters_sd=parameters_sd,
             angles_deg=angles,
+            overlap=overlap,
         )
 
 

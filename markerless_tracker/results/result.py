@@ -51,7 +51,7 @@ class ResultWriter:
         body: the tracked body; also an attribute, for a tracker that fits it during the run.
         config: the tracker's settings.
         fps: rate of the results, 1/s; None = as the stamps show.
-        source: what was tracked, for the reader of the JSON file.
+        source: what was tracked: the path of a recording, or `live`.
         overwrite: whether an earlier result of that name may be replaced.
         keep_lost: whether frames in the states LOST and SEARCHING that have an estimate keep it in
             NAME.trc; their rows are blank otherwise. NAME.json has it in any case.
@@ -214,7 +214,10 @@ class ResultWriter:
             return
         shapes = zip(self.body.cone_names, self.body.cone_shape, strict=True)
         subject = Subject(
-            self._source or "tracked", dict(self.body.lengths_m), dict(shapes), self.body.measured
+            Path(self._source).name or "tracked",
+            dict(self.body.lengths_m),
+            dict(shapes),
+            self.body.measured,
         )
         try:
             write_subject(self.subject_path, subject)

@@ -17,7 +17,7 @@ from markerless_tracker.records import TrackState, locked
 
 _PER_FRAME = (
     "stamps_ns", "states", "filled", "fitness", "positions_m", "positions_sd_m", "parameters",
-    "parameters_sd", "angles_deg",
+    "parameters_sd", "angles_deg", "overlap",
 )  # fmt: skip
 
 
@@ -26,12 +26,13 @@ class StoredResult:
     """What a run found, n frames; world frame (Z up), NaN = unknown.
 
     Attributes:
-        source: what was tracked.
+        source: what was tracked: the path of a recording, or `live`.
         fps: rate of the results, 1/s.
         summary: every entry of the JSON file but the frames: settings, versions, body, cameras.
         marker_names: (15,) names of the markers.
         parameter_names: (p,) names of the body's parameters.
         angle_names: (k,) names of the joint angles; none if the result has no angles.
+        camera_names: (c,) names of the cameras that the body was compared with.
         stamps_ns: (n,) int64 stamps.
         states: (n,) SEARCHING, TRACKING or LOST.
         filled: (n,) whether the frame is interpolated (`track --fill-gaps`).
@@ -41,6 +42,7 @@ class StoredResult:
         parameters: (n, p) the body's parameters in m and rad.
         parameters_sd: (n, p) their standard deviations.
         angles_deg: (n, k) joint angles in degrees.
+        overlap: (n, c) overlap (IoU) of each camera's silhouette and the body, 0 to 1.
     """
 
     source: str
@@ -49,6 +51,7 @@ class StoredResult:
     marker_names: tuple[str, ...]
     parameter_names: tuple[str, ...]
     angle_names: tuple[str, ...]
+    camera_names: tuple[str, ...]
     stamps_ns: NDArray[np.int64]
     states: NDArray[np.str_]
     filled: NDArray[np.bool_]
@@ -58,6 +61,7 @@ class StoredResult:
     parameters: FloatArray
     parameters_sd: FloatArray
     angles_deg: FloatArray
+    overlap: FloatArray
 
     def __post_init__(self) -> None:
         for name in _PER_FRAME:

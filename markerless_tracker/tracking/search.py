@@ -14,6 +14,7 @@ from markerless_tracker.optim import (
     ParticleSet,
     Prior,
     Problem,
+    is_replaced,
     keyed_generator,
 )
 from markerless_tracker.records import CONTOUR, Comparison, Observation, SearchPlan, Stage
@@ -206,7 +207,7 @@ class FrameSearch:
         """The pose (p,) that a swarm finds, and its cost if that is known."""
         searcher, plan = self._searcher, stage.plan
         rng = keyed_generator(searcher.config.seed, self._stamp_ns, stage.name)
-        if plan.algorithm not in SWARMS:
+        if plan.algorithm not in SWARMS or is_replaced(plan.algorithm):
             return self._filter(stage, rng), None
         active, centre = stage.comparison.active, stage.comparison.centre
         search = SwarmSearch(

@@ -111,7 +111,7 @@ def test_an_earlier_bag_is_replaced_with_force_only(make_recording, tmp_path: Pa
     assert main(["convert", str(make_recording(frames=3)), str(bag)]) == 0
     longer = str(make_recording("longer", frames=5))
     assert main(["convert", longer, str(bag)]) == 1
-    assert "exists and is not empty" in capsys.readouterr().err
+    assert "expected a new or an empty folder (--force replaces a bag)" in capsys.readouterr().err
     assert open_recording(bag).frame_count == 3
     assert main(["convert", longer, str(bag), "--force"]) == 0
     assert open_recording(bag).frame_count == 5

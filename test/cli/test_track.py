@@ -82,7 +82,7 @@ def test_a_recording_becomes_markers_and_a_summary(track, walk, tmp_path):
     data = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
     used = TrackerConfig.from_mapping(data["settings"])
     assert used == TrackerConfig.from_mapping(SEARCH)
-    assert data["source"] == "walk"
+    assert data["source"] == str(walk.resolve()) and data["scale"] == 1.0
     assert [frame["evaluations"] for frame in data["frames"]] == [200] * FRAMES
 
 

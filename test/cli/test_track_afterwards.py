@@ -67,6 +67,18 @@ def test_silhouettes_made_elsewhere(track, masks, walk, tmp_path: Path) -> None:
     assert worse.mean_mm != found.mean_mm, "the silhouettes decide, not the images"
 
 
+def test_frames_without_any_silhouette_are_left_out(track, masks, tmp_path: Path) -> None:
+    for file in (*masks.glob("*/000003.png"), *masks.glob("cam01/000004.png")):
+        file.unlink()
+    status, out, err = track("--masks", masks)
+    assert status == 0 and out.partition(": ")[2].startswith("5 frames, 5 tracked")
+    assert "1 of 6 frames left out, no camera has a silhouette" in err
+    for file in masks.glob("*/*.png"):
+        file.rename(file.with_stem(f"1{file.stem}"))
+    status, _, err = track("--masks", masks, "--force")
+    assert status == 1 and "no silhouette of any of the 6 frames read" in err
+
+
 def test_impossible_silhouettes_fail_in_one_line(track, masks, tmp_path: Path) -> None:
     status, _, err = track("--masks", masks, "--debug-images", tmp_path / "debug")
     assert status == 1 and "which --masks replaces" in err
@@ -86,3 +98,4 @@ def test_smoothing_and_offsets(track, tmp_path: Path) -> None:
     assert status == 1 and "no camera cam09" in err
     status, _, err = track("--time-offsets", "cam02=-0.0333", "--force")
     assert status == 0 and len(read_trc(tmp_path / "out.trc")) == 5
+    assert read_result(tmp_path / "out").summary["time_offsets_s"] == {"cam02": -0.0333}

@@ -6,6 +6,7 @@ import pytest
 from markerless_tracker.body import MARKER_NAMES, load_body, markers
 from markerless_tracker.camera import project_camera
 from markerless_tracker.drawing import draw_overlay, silhouette
+from markerless_tracker.drawing.outline import cone_surfaces
 from markerless_tracker.drawing.overlay import CENTRE_BGR, LEFT_BGR, RIGHT_BGR, side_colour
 from markerless_tracker.errors import ImageError
 from markerless_tracker.synthesis import ring_rig
@@ -92,3 +93,30 @@ def test_images_of_another_size_or_type_are_errors(image, words) -> None:
 def test_a_mask_of_another_size_is_an_error() -> None:
     with pytest.raises(ImageError, match=r"cam01: mask of shape \(3, 3\), expected \(246, 328\)"):
         draw_overlay(blank(), CAMERA, BODY, POSE, mask=np.ones((3, 3), dtype=np.bool_))
+
+
+def test_ellipses_show_the_deviations() -> None:
+    def shown(sd: np.ndarray) -> np.ndarray:
+        plain = draw_overlay(blank(), CAMERA, BODY, POSE)
+        return (draw_overlay(blank(), CAMERA, BODY, POSE, markers_sd_m=sd) != plain).any(axis=2)
+
+    sd = np.full((15, 3), np.nan)
+    assert not shown(sd).any(), "unknown deviations draw nothing"
+    head = MARKER_NAMES.index("Head")
+    sd[head] = (0.01, 0.01, 0.10)
+    v, u = np.nonzero(shown(sd))
+    centre = project_camera(markers(BODY, POSE), CAMERA)[head]
+    ends = markers(BODY, POSE)[head] + np.array([[0.0, 0.0, -0.2], [0.0, 0.0, 0.2]])
+    height = np.ptp(project_camera(ends, CAMERA)[:, 1])
+    assert np.ptp(v) == pytest.approx(height, abs=3.0), "two deviations up and down"
+    assert abs(u.mean() - centre[0]) < 2.0 and np.ptp(u) < 0.3 * height
+
+
+def test_coarser_surfaces_draw_nearly_the_same() -> None:
+    surfaces = cone_surfaces(BODY, end_points=32, sections=1)
+    coarse = draw_overlay(blank(), CAMERA, BODY, POSE, surfaces=surfaces).astype(int)
+    assert (np.abs(coarse - draw_overlay(blank(), CAMERA, BODY, POSE)) > 60).mean() < 0.002
+    np.testing.assert_array_equal(
+        draw_overlay(blank(), CAMERA, BODY, POSE, surfaces=cone_surfaces(BODY)),
+        draw_overlay(blank(), CAMERA, BODY, POSE),
+    )

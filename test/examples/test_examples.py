@@ -12,12 +12,22 @@ from markerless_tracker import read_trc, score
 
 
 @pytest.fixture
-def run_example(project_root: Path, tmp_path: Path):
+def run_example(run_program, project_root: Path):
     """Runs an example in an empty folder; returns the lines that it prints."""
 
     def run(name: str, *arguments: str) -> list[str]:
+        return run_program(str(project_root / "examples" / f"{name}.py"), *arguments)
+
+    return run
+
+
+@pytest.fixture
+def run_program(project_root: Path, tmp_path: Path):
+    """Runs Python with arguments in an empty folder; returns the lines that it prints."""
+
+    def run(*arguments: str) -> list[str]:
         done = subprocess.run(
-            [sys.executable, str(project_root / "examples" / f"{name}.py"), *arguments],
+            [sys.executable, *arguments],
             capture_output=True,
             text=True,
             cwd=tmp_path,
@@ -47,12 +57,39 @@ def test_images_in_memory(run_example) -> None:
     assert "right wrist" in lines[3]
 
 
-@pytest.mark.parametrize("name", ["own_optimizer", "own_cost", "own_segmenter"])
-def test_parts_of_ones_own(run_example, name: str) -> None:
-    lines = run_example(name, "--frames", "3")
-    assert len(lines) == 3 and lines[0].startswith("0: ")
-    assert "TRACKING" in lines[2], "the person is found and tracked"
-    assert float(lines[2].rpartition(" ")[2]) > 0.85
+OWN = {
+    "own_optimizer": "RandomSearch._ask",
+    "own_cost": "NearPrediction.run",
+    "own_segmenter": "segment",
+}
+"""Example -> its function of one's own."""
+COUNTED = """
+import runpy, sys
+
+calls = 0
+
+def profile(frame, event, _):
+    global calls
+    code = frame.f_code
+    calls += event == "call" and code.co_qualname == {own!r} and code.co_filename == {path!r}
+
+sys.argv = [{path!r}, "--frames", "12"]
+sys.setprofile(profile)
+runpy.run_path({path!r}, run_name="__main__")
+sys.setprofile(None)
+print(calls)
+"""
+"""Runs an example and prints how often its own function was called."""
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_parts_of_ones_own(run_program, project_root: Path, name: str) -> None:
+    path = str(project_root / "examples" / f"{name}.py")
+    *lines, calls = run_program("-c", COUNTED.format(path=path, own=OWN[name]))
+    assert int(calls) >= 4, "what is registered is used"
+    assert len(lines) == 12 and lines[0].startswith("0: ")
+    assert "TRACKING" in lines[11], "the person is found and tracked"
+    assert float(lines[11].rpartition(" ")[2]) > 0.85
 
 
 def test_every_example_is_tested(project_root: Path) -> None:

@@ -55,6 +55,8 @@ def test_everything_comes_back(tmp_path: Path) -> None:
     np.testing.assert_allclose(result.positions_m[held], truth[held], atol=1e-6)
     np.testing.assert_allclose(result.position("LKnee")[0], truth[0, 10], atol=1e-6)
     np.testing.assert_allclose(result.sd("LKnee")[held], 0.02)
+    assert result.camera_names == ("cam01",)
+    np.testing.assert_array_equal(result.overlap[:, 0], np.where(held, 0.75, np.nan))
     np.testing.assert_array_equal(result.parameter("l_knee"), result.parameters[:, 9])
     for values in (result.positions_m, result.positions_sd_m, result.parameters):
         assert np.isnan(values[3]).all()

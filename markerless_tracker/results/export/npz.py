@@ -28,6 +28,7 @@ _ARRAYS: dict[str, Callable[[StoredResult], NDArray[Any]]] = {
     "parameters": lambda part: part.parameters,
     "parameters_sd": lambda part: part.parameters_sd,
     "angles_deg": lambda part: part.angles_deg,
+    "overlap": lambda part: part.overlap,
 }
 
 
@@ -76,6 +77,7 @@ def write_npz(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
             ("marker_names", np.array(names)),
             ("parameter_names", np.array(reader.parameter_names, dtype=np.str_)),
             ("angle_names", np.array(reader.angle_names, dtype=np.str_)),
+            ("camera_names", np.array(reader.camera_names, dtype=np.str_)),
             ("axes", np.array(DESCRIPTION)),
             ("fps", np.array(reader.fps)),
         ):

@@ -68,6 +68,16 @@ def doubts_about_fit(
     return [*found, *_floor(record), *_static(record)]
 
 
+def doubts_about_start(record: RunRecord) -> list[str]:
+    """Doubts about a start pose that was given, in a run in which a person was tracked."""
+    if not record.before.frames:
+        return []
+    return [
+        f"nobody was tracked in the first {record.before.frames} frames although a start pose was "
+        "given: is it of this recording and time, in metres and in the calibration's world?"
+    ]
+
+
 def causes_of_nobody(
     record: RunRecord, *, start_given: bool, search_faults: bool = True
 ) -> list[str]:

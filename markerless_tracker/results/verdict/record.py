@@ -47,7 +47,7 @@ class Silhouettes:
 
 @dataclass
 class Stretch:
-    """The longest time without a tracked person, from the first tracked frame on.
+    """A time without a tracked person.
 
     Attributes:
         from_ns, to_ns: stamps of its first and last frame.
@@ -72,7 +72,8 @@ class RunRecord:
         lowest_m: height of the lowest marker, in tracked frames.
         silhouettes: camera -> its silhouettes.
         samples: silhouettes of some moments, by camera.
-        stretch: the longest time without a tracked person.
+        stretch: the longest time without a tracked person, from the first tracked frame on.
+        before: the time before the first tracked frame.
         warnings: of the frames.
         body: the body of the last tracked frame; None before the first.
         static: silhouette that never moves.
@@ -87,6 +88,7 @@ class RunRecord:
     silhouettes: dict[str, Silhouettes] = field(default_factory=dict)
     samples: list[Mapping[str, Observation]] = field(default_factory=list)
     stretch: Stretch = field(default_factory=Stretch)
+    before: Stretch = field(default_factory=Stretch)
     warnings: FrameWarnings = field(default_factory=FrameWarnings)
     body: BodyModel | None = None
 
@@ -145,10 +147,12 @@ class RunRecord:
             self._sampled_ns = result.stamp_ns
 
     def _follow(self, result: TrackResult) -> None:
-        if result.state is TrackState.TRACKING or not self.tracked:
+        if result.state is TrackState.TRACKING:
             self._current = Stretch()
             return
         begun = self._current.from_ns if self._current.frames else result.stamp_ns
         self._current = Stretch(begun, result.stamp_ns, self._current.frames + 1)
-        if self._current.frames > self.stretch.frames:
+        if not self.tracked:
+            self.before = self._current
+        elif self._current.frames > self.stretch.frames:
             self.stretch = self._current

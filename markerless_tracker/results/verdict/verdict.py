@@ -10,6 +10,7 @@ from markerless_tracker.records import TrackState
 from markerless_tracker.results.verdict.doubts import (
     causes_of_nobody,
     doubts_about_fit,
+    doubts_about_start,
     stature_is_plausible,
     stature_m,
 )
@@ -120,6 +121,7 @@ def verdict_of(
     stature = None if record.body is None else stature_m(description, record.body)
     doubts, causes = list(known), []
     if somebody:
+        doubts += doubts_about_start(record) if start_given else []
         doubts += doubts_about_fit(record, description, search_faults=search_faults)
     elif record.frames:
         causes = causes_of_nobody(record, start_given=start_given, search_faults=search_faults)
@@ -148,10 +150,11 @@ def _where_to_look(record: RunRecord, doubtful: bool) -> str:
     pictures = "`track --debug-images DIR` shows silhouettes and body of every frame"
     if not record.tracked:
         return pictures
-    if record.stretch.frames:
-        begin, end = record.stretch.from_ns / 1e9, record.stretch.to_ns / 1e9
+    longest = max(record.stretch, record.before, key=lambda stretch: stretch.frames)
+    if longest.frames:
+        begin, end = longest.from_ns / 1e9, longest.to_ns / 1e9
         return (
-            f"nobody was tracked from {begin:.2f} to {end:.2f} s ({record.stretch.frames} frames); "
+            f"nobody was tracked from {begin:.2f} to {end:.2f} s ({longest.frames} frames); "
             f"{pictures}"
         )
     if doubtful:

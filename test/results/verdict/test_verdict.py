@@ -60,6 +60,15 @@ def test_states_limbs_warnings_and_where_to_look(judge: Judge, result: Any) -> N
     assert found.look.startswith("nobody was tracked from 0.50 to 0.70 s (3 frames)")
 
 
+def test_a_start_pose_that_fits_late_is_doubted(judge: Judge, result: Any) -> None:
+    results = [result(index, SEARCHING if index < 4 else TRACKING) for index in range(6)]
+    found = judge(results, start_given=True)
+    assert found.doubts[0].startswith("nobody was tracked in the first 4 frames although a start")
+    assert found.look.startswith("nobody was tracked from 0.00 to 0.30 s (4 frames)")
+    assert judge(results).doubts == ()
+    assert judge(results[4:], start_given=True).doubts == ()
+
+
 def test_what_was_known_before_stays_first(judge: Judge, result: Any) -> None:
     found = judge([result(0, raised_m=0.9)], known=("said before",))
     assert found.doubts[0] == "said before" and len(found.doubts) == 2

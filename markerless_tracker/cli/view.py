@@ -1,0 +1,160 @@
+"""Verb `view`: pictures of a result, and the Rerun viewer."""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import cv2
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from markerless_tracker.errors import ConfigError, DatasetError
+from markerless_tracker.results.read import read_result
+from markerless_tracker.results.stored_result import StoredResult
+from markerless_tracker.viewing.film import FORMATS, require_av, write_film
+from markerless_tracker.viewing.images import ResultImages
+from markerless_tracker.viewing.overlays import Overlays, chosen_rows, spread_rows
+from markerless_tracker.viewing.rerun_file import require_rerun, write_rrd
+
+HELP = (
+    "Show a result: the body over the images (left limbs cyan, right limbs yellow, ellipses of two "
+    "standard deviations), as a film, as a picture of some frames, or in the Rerun viewer, which "
+    "has the body in 3D with cameras and floor, and angles, deviations and overlap over time. The "
+    "images are those of the result's source, or of --source. Without an output the Rerun viewer "
+    "opens. Films and the viewer need markerless_tracker[view]."
+)
+EXAMPLE = "markerless_tracker view out/walk --film walk.webm --sheet walk.png --rrd walk.rrd"
+
+MOST_RRD_PICTURES = 300
+"""Frames whose pictures go into the file for the Rerun viewer."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("name", metavar="NAME", type=Path, help="NAME of NAME.trc and NAME.json")
+    parser.add_argument(
+        "--source",
+        metavar="DIR",
+        type=Path,
+        help="recording with the images (default: the one that the result names)",
+    )
+    parser.add_argument(
+        "--film", metavar="FILE", type=_file(FORMATS), help="film, .webm (VP9) or .mp4 (H.264)"
+    )
+    parser.add_argument(
+        "--sheet",
+        metavar="FILE.png",
+        type=_file(("png", "jpg")),
+        help="picture of some frames, a line for each",
+    )
+    parser.add_argument(
+        "--rrd",
+        metavar="FILE.rrd",
+        type=_file(("rrd",)),
+        help="file for the Rerun viewer: rerun FILE.rrd",
+    )
+    parser.add_argument(
+        "--frames",
+        metavar="N",
+        type=_count,
+        default=4,
+        help="frames of the picture, from the first to the last (default 4)",
+    )
+    parser.add_argument(
+        "--width",
+        metavar="PX",
+        type=_count,
+        default=1280,
+        help="width of film and picture (default 1280)",
+    )
+    parser.add_argument(
+        "--whole",
+        action="store_true",
+        help="show whole images in film and picture, not only the part in which the person moves",
+    )
+    parser.add_argument("--force", action="store_true", help="replace existing files")
+    parser.add_argument("--json", action="store_true", help="print the written files as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show the result; returns the exit status."""
+    targets = [path for path in (args.film, args.sheet, args.rrd) if path is not None]
+    for path in targets:
+        if path.exists() and not args.force:
+            raise DatasetError(f"{path}: exists already, expected a new name or --force")
+    if args.film is not None:
+        require_av()
+    if args.rrd is not None or not targets:
+        require_rerun()
+    if not targets and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise ConfigError(
+            "there is no display for the Rerun viewer, expected --film, --sheet or --rrd"
+        )
+    name = args.name.with_suffix("") if args.name.suffix.lower() == ".trc" else args.name
+    result = read_result(name)
+    images = ResultImages(result, args.source, width_px=args.width // 2, whole=args.whole)
+    overlays = Overlays(result, images)
+    for path in targets:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    if args.film is not None:
+        _write_film(args.film, result, overlays, args.width)
+    if args.sheet is not None:
+        sheet = overlays.contact_sheet(spread_rows(result, args.frames), width_px=args.width)
+        if not cv2.imwrite(str(args.sheet), sheet):
+            raise DatasetError(f"{args.sheet}: cannot be written")
+    rows = chosen_rows(result, MOST_RRD_PICTURES)
+    if args.rrd is not None:
+        write_rrd(args.rrd, result, rig=images.rig, overlays=overlays, rows=rows)
+    if not targets:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"{name.name}.rrd"
+            write_rrd(path, result, rig=images.rig, overlays=overlays, rows=rows)
+            return subprocess.run([sys.executable, "-m", "rerun", str(path)]).returncode
+    if args.json:
+        json.dump({"files": [str(path) for path in targets]}, sys.stdout, indent=2)
+        sys.stdout.write("\n")
+    else:
+        for path in targets:
+            print(path)
+    return 0
+
+
+def _write_film(path: Path, result: StoredResult, overlays: Overlays, width: int) -> None:
+    """The film, with a progress bar in a terminal."""
+    console = Console(stderr=True)
+    rows = list(range(len(result)))
+    with Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
+        console=console, disable=not console.is_terminal,
+    ) as bars:  # fmt: skip
+        shown = bars.track(
+            (sheet for _, sheet in overlays.sheets(rows, width_px=width)),
+            total=len(rows),
+            description="film",
+        )
+        write_film(path, shown, fps=result.fps, container=path.suffix[1:].lower())
+
+
+def _file(endings: Sequence[str]) -> Callable[[str], Path]:
+    """The type of an argument: a file with one of some endings."""
+
+    def parse(text: str) -> Path:
+        path = Path(text)
+        if path.suffix[1:].lower() not in endings:
+            raise argparse.ArgumentTypeError(
+                f"{text!r}, expected a file that ends in .{' or .'.join(endings)}"
+            )
+        return path
+
+    return parse
+
+
+def _count(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and int(text)):
+        raise argparse.ArgumentTypeError(f"{text!r}, expected a whole number above 0")
+    return int(text)

@@ -1,0 +1,88 @@
+"""Films that browsers play: VP9 in WebM, H.264 in MP4, written with PyAV."""
+
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from markerless_tracker.drawing.overlay import Image
+from markerless_tracker.errors import ConfigError, DatasetError
+
+FORMATS = ("webm", "mp4")
+"""Containers: WebM holds VP9, MP4 holds H.264."""
+
+# Fast settings: an overlay is looked at, not measured.
+_CODECS: dict[str, tuple[str, dict[str, str], dict[str, str]]] = {
+    "webm": (
+        "libvpx-vp9",
+        {"deadline": "realtime", "cpu-used": "8", "row-mt": "1", "crf": "32", "b": "0"},
+        {},
+    ),
+    "mp4": ("libx264", {"preset": "veryfast", "crf": "25"}, {"movflags": "faststart"}),
+}
+
+
+def require_av() -> Any:
+    """PyAV.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
+    try:
+        import av
+    except ImportError as error:
+        raise ConfigError("films need PyAV: pip install av, or markerless_tracker[view]") from error
+    return av
+
+
+def write_film(
+    target: Path | IO[bytes],
+    pictures: Iterable[Image],
+    *,
+    fps: float,
+    container: str = "webm",
+    bit_rate: int | None = None,
+) -> int:
+    """Write pictures as a film; returns their number.
+
+    Args:
+        target: a file, or an open one for bytes.
+        pictures: (h, w, 3) BGR, all of one size; an odd last row or column is left out.
+        fps: pictures per second.
+        container: one of `FORMATS`.
+        bit_rate: largest rate in bit/s; None = by quality alone.
+
+    Raises:
+        ConfigError: PyAV is not installed, or there is no such container.
+        DatasetError: the film cannot be written, or there is no picture.
+    """
+    av = require_av()
+    if container not in _CODECS:
+        raise ConfigError(f"film {container!r}, expected one of {', '.join(FORMATS)}")
+    codec, options, muxer = _CODECS[container]
+    count = 0
+    try:
+        sink = str(target) if isinstance(target, Path) else target
+        with av.open(sink, "w", format=container, options=muxer) as film:
+            stream = film.add_stream(
+                codec, rate=Fraction(fps).limit_denominator(1000), options=options
+            )
+            stream.pix_fmt = "yuv420p"
+            if bit_rate is not None:
+                stream.bit_rate = bit_rate
+            for picture in pictures:
+                height, width = (side // 2 * 2 for side in picture.shape[:2])
+                if not count:
+                    stream.width, stream.height = width, height
+                even = np.ascontiguousarray(picture[:height, :width])
+                film.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="bgr24")))
+                count += 1
+            if count:
+                film.mux(stream.encode())
+    except (OSError, av.FFmpegError) as error:
+        raise DatasetError(f"{target}: the film cannot be written: {error}") from error
+    if not count:
+        raise DatasetError(f"{target}: no image of the result, expected some of its source")
+    return count

@@ -1,0 +1,248 @@
+"""The page: composed of its sections."""
+
+from base64 import b64encode
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from markerless_tracker import __version__
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.results.gait import METHOD
+from markerless_tracker.viewing.page.charts import Curve, Level, Mark, line_chart
+from markerless_tracker.viewing.page.report import Report
+from markerless_tracker.viewing.page.style import STYLE
+from markerless_tracker.viewing.page.tables import (
+    dotted,
+    figures_table,
+    gait_table,
+    joints_table,
+    mapping_table,
+)
+
+FIRST_ANGLES = ("hip_flexion", "knee_angle", "ankle_angle", "arm_flex", "elbow_flex", "lumbar")
+"""Beginnings of the angles that are shown first; the others are folded."""
+
+_SIDES = (("_l", "left"), ("_r", "right"))
+_STYLES = 8
+
+
+def write_page(path: Path, reports: Sequence[Report], *, levels: Sequence[Level] = ()) -> None:
+    """Write the page.
+
+    Args:
+        path: the file; its folder is made.
+        reports: the results, in order.
+        levels: errors of others, for the error curves.
+
+    Raises:
+        DatasetError: it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(page(reports, levels=levels), encoding="utf-8")
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def page(reports: Sequence[Report], *, levels: Sequence[Level] = ()) -> str:
+    """The page as HTML; see `write_page`."""
+    title = ", ".join(report.name for report in reports)
+    several = len(reports) > 1
+    if several:
+        articles = "".join(_article(report) for report in reports)
+    else:
+        articles = _single(reports[0], levels)
+    return (
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        # Browsers ask for an icon otherwise.
+        f'<link rel="icon" href="data:,"><title>{escape(title)}</title>'
+        f"<style>{STYLE}</style></head><body>"
+        f"<header><h1>{escape(title)}</h1></header><main>"
+        f"{_errors(reports, levels) if several else ''}"
+        f"{'<h2>Figures</h2>' + figures_table(reports) if several else ''}"
+        f'<div class="results">{articles}</div>'
+        f"</main><footer><p>markerless_tracker {escape(__version__)}. Angles: "
+        "docs/joint-angles.md; measures: docs/results.md.</p></footer></body></html>\n"
+    )
+
+
+def _single(report: Report, levels: Sequence[Level]) -> str:
+    """The article of the only result: film and figures beside each other, then the rest."""
+    return (
+        f"<article>{_verdict(report)}"
+        f'<div class="top"><div>{_film(report)}</div><div>{figures_table([report])}</div></div>'
+        f"{_errors([report], levels)}{_parts(report)}</article>"
+    )
+
+
+def _article(report: Report) -> str:
+    """The article of one of several results."""
+    return (
+        f"<article><h2>{escape(report.name)}</h2>{_verdict(report)}{_film(report)}"
+        f"{_parts(report)}</article>"
+    )
+
+
+def _verdict(report: Report) -> str:
+    found = f'<p class="verdict">{escape(report.sentence())}</p>'
+    notes = [*report.verdict.get("doubts", ()), *report.verdict.get("causes", ())]
+    items = "".join(f"<li>{escape(str(text))}</li>" for text in notes)
+    return f'{found}<ul class="doubts">{items}</ul>' if notes else found
+
+
+def _parts(report: Report) -> str:
+    """Tables and charts of a result."""
+    return "".join(
+        [
+            f"<h3>Joints</h3>{joints_table(report)}",
+            _angles(report),
+            _gait(report),
+            _overlap(report),
+            _run(report),
+        ]
+    )
+
+
+def _film(report: Report) -> str:
+    film = report.film
+    if film is None:
+        return f'<p class="dim">No film: {escape(report.why_no_film)}.</p>'
+    return (
+        '<video controls muted loop playsinline preload="auto" '
+        f'src="{_data("video/webm", film.data)}"></video>'
+        f'<img class="still" alt="frames of the film" src="{_data("image/jpeg", film.still)}">'
+        '<p class="dim">The tracked body over the images: left limbs cyan, right limbs yellow, '
+        "dots are joints, ellipses two standard deviations.</p>"
+    )
+
+
+def _errors(reports: Sequence[Report], levels: Sequence[Level]) -> str:
+    curves = [
+        Curve(
+            f"{report.name}: {report.score.mean_mm:.1f} mm" if report.score else "",
+            f"s{number % _STYLES}",
+            report.score.stamps_ns / 1e9,
+            report.score.frame_mm,
+        )
+        for number, report in enumerate(reports)
+        if report.score is not None
+    ]
+    if not curves:
+        return ""
+    told = (
+        "Dashed: errors that the papers print, on their own recordings with other cameras."
+        if levels
+        else ""
+    )
+    return (
+        "<h2>Error</h2>"
+        + line_chart("Mean error over the joints", "mm", curves, levels=levels, low=0.0)
+        + f'<p class="dim">Distance to the reference, mean over the joints of a frame. {told}</p>'
+    )
+
+
+def _angles(report: Report) -> str:
+    """A chart per angle, left and right together."""
+    result = report.result
+    groups: dict[str, list[Curve]] = {}
+    for name, values in zip(result.angle_names, result.angles_deg.T, strict=True):
+        base, label, style = name, "", "s0"
+        for ending, side in _SIDES:
+            if name.endswith(ending):
+                base, label, style = name.removesuffix(ending), side, side
+        groups.setdefault(base, []).append(Curve(label, style, result.times_s, _cut(values)))
+    if not groups:
+        return ""
+    marks = _strikes(report)
+    charts = {
+        base: line_chart(
+            base.replace("_", " "),
+            "degrees",
+            sorted(curves, key=lambda curve: curve.label),
+            marks=marks,
+        )
+        for base, curves in groups.items()
+    }
+    order = [base for start in FIRST_ANGLES for base in charts if base.startswith(start)]
+    first = [charts[base] for base in order]
+    rest = [chart for base, chart in charts.items() if base not in order]
+    folded = (
+        f"<details><summary>{len(rest)} more angles</summary>"
+        f'<div class="charts">{"".join(rest)}</div></details>'
+    )
+    told = '<p class="dim">Dotted: foot strikes, left and right.</p>' if marks else ""
+    return (
+        f'<h3>Joint angles</h3>{told}<div class="charts">{"".join(first)}</div>'
+        f"{folded if rest else ''}"
+    )
+
+
+def _cut(values: np.ndarray) -> np.ndarray:
+    """Angles with a gap where they jump from 180 to -180 degrees."""
+    jumps = np.abs(np.diff(values, prepend=values[:1])) > 300.0
+    return np.where(jumps, np.nan, values)
+
+
+def _strikes(report: Report) -> list[Mark]:
+    if report.gait is None:
+        return []
+    return [Mark("", event.side, event.time_s) for event in report.gait.events if event.strike]
+
+
+def _gait(report: Report) -> str:
+    if report.gait is None:
+        return ""
+    events = report.gait.events
+    listed = "; ".join(
+        f"{side} foot {'strike' if strike else 'off'}: "
+        + ", ".join(f"{e.time_s:.2f}" for e in events if e.side == side and e.strike == strike)
+        for side in ("left", "right")
+        for strike in (True, False)
+        if any(e.side == side and e.strike == strike for e in events)
+    )
+    return (
+        f"<h3>Gait</h3>{gait_table(report.gait.parameters())}"
+        f'<p class="dim">Events, s: {escape(listed)}.</p><p class="dim">{escape(METHOD)}. Stride '
+        "length: distance of an ankle between two of its strikes, on the floor. Speed: way of the "
+        "pelvis on the floor by the time of the stride.</p>"
+    )
+
+
+def _overlap(report: Report) -> str:
+    result = report.result
+    if not report.overlap:
+        return ""
+    curves = [
+        Curve(
+            f"{name}: {report.overlap[name]:.2f}",
+            f"s{number % _STYLES}",
+            result.times_s,
+            result.overlap[:, result.camera_names.index(name)],
+        )
+        for number, name in enumerate(report.overlap)
+    ]
+    return "<h3>Silhouettes</h3>" + line_chart(
+        "Overlap (IoU) of each camera's silhouette and the body", "median in the legend", curves
+    )
+
+
+def _run(report: Report) -> str:
+    summary = report.result.summary
+    settings = dotted(summary.get("settings") or {})
+    run = {
+        "source": summary.get("source", ""),
+        "seed": summary.get("seed", ""),
+        **{f"{name}, version": value for name, value in (summary.get("versions") or {}).items()},
+    }
+    folded = (
+        f"<details><summary>{len(settings)} settings</summary>"
+        f"{mapping_table(('setting', 'value'), settings)}</details>"
+    )
+    return f"<h3>Run</h3>{mapping_table(('', ''), run)}{folded if settings else ''}"
+
+
+def _data(kind: str, content: bytes) -> str:
+    return f"data:{kind};base64,{b64encode(content).decode('ascii')}"

@@ -1,0 +1,187 @@
+"""A result for the Rerun viewer: pictures, body, cameras and floor in 3D, angles over time."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.drawing.overlay import ELLIPSE_SD, Image, side_colour
+from markerless_tracker.errors import ConfigError, DatasetError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.results.stored_result import StoredResult
+from markerless_tracker.viewing.overlays import Overlays
+
+APPLICATION = "markerless_tracker"
+TIMELINE = "time"
+BONES = (
+    ("Pelvis", "Neck"), ("Neck", "Head"),
+    ("Neck", "LShoulder"), ("LShoulder", "LElbow"), ("LElbow", "LWrist"),
+    ("Neck", "RShoulder"), ("RShoulder", "RElbow"), ("RElbow", "RWrist"),
+    ("Pelvis", "LHip"), ("LHip", "LKnee"), ("LKnee", "LAnkle"),
+    ("Pelvis", "RHip"), ("RHip", "RKnee"), ("RKnee", "RAnkle"),
+)  # fmt: skip
+"""Pairs of markers that a line joins."""
+
+_JPEG_QUALITY = 80
+_FLOOR_M = 4.0
+
+
+def require_rerun() -> Any:
+    """The Rerun SDK.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
+    try:
+        import rerun
+    except ImportError as error:
+        raise ConfigError(
+            "the Rerun viewer needs rerun-sdk: pip install rerun-sdk, or markerless_tracker[view]"
+        ) from error
+    return rerun
+
+
+def write_rrd(
+    path: Path,
+    result: StoredResult,
+    *,
+    rig: CameraRig | None = None,
+    overlays: Overlays | None = None,
+    rows: list[int] | None = None,
+) -> None:
+    """Write a result as a recording of the Rerun viewer.
+
+    Args:
+        path: the file, *.rrd.
+        result: the result; world frame, Z up.
+        rig: its cameras.
+        overlays: their pictures, with the body drawn.
+        rows: frames whose pictures are written; None = all.
+
+    Raises:
+        ConfigError: rerun-sdk is not installed.
+        DatasetError: the file cannot be written, or the images cannot be read.
+    """
+    rr = require_rerun()
+    stream = rr.RecordingStream(APPLICATION)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        stream.save(path, default_blueprint=_blueprint(result, rig))
+    except (OSError, RuntimeError, ValueError) as error:
+        raise DatasetError(f"{path}: cannot be written: {error}") from error
+    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    stream.log("world/floor", _floor(rr), static=True)
+    for camera in rig or ():
+        _camera(rr, stream, camera)
+    for row in range(len(result)):
+        stream.set_time(TIMELINE, duration=float(result.times_s[row]))
+        _body(rr, stream, result, row)
+        _curves(rr, stream, result, row)
+    if overlays is not None:
+        for row, pictures in overlays.pictures(list(range(len(result))) if rows is None else rows):
+            stream.set_time(TIMELINE, duration=float(result.times_s[row]))
+            _pictures(rr, stream, pictures)
+    stream.flush()
+    stream.disconnect()
+
+
+def _floor(rr: Any) -> Any:
+    """A grid of 1 m on z = 0."""
+    ticks = np.arange(-_FLOOR_M, _FLOOR_M + 0.5)
+    lines = [[(x, -_FLOOR_M, 0.0), (x, _FLOOR_M, 0.0)] for x in ticks]
+    lines += [[(-_FLOOR_M, y, 0.0), (_FLOOR_M, y, 0.0)] for y in ticks]
+    return rr.LineStrips3D(lines, colors=[(110, 110, 110)], radii=0.003)
+
+
+def _camera(rr: Any, stream: Any, camera: CameraModel) -> None:
+    T = camera.T_world_cam
+    at = f"world/cameras/{camera.name}"
+    stream.log(at, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]), static=True)
+    stream.log(
+        at,
+        rr.Pinhole(
+            image_from_camera=camera.matrix,
+            resolution=camera.size_px,
+            camera_xyz=rr.ViewCoordinates.RDF,
+            image_plane_distance=0.4,
+        ),
+        static=True,
+    )
+
+
+def _body(rr: Any, stream: Any, result: StoredResult, row: int) -> None:
+    positions = result.positions_m[row]
+    if not np.isfinite(positions).any():
+        stream.log("world/body", rr.Clear(recursive=True))
+        return
+    at = dict(zip(result.marker_names, positions, strict=True))
+    known = np.isfinite(positions).all(axis=1)
+    names = [name for name, here in zip(result.marker_names, known, strict=True) if here]
+    colours = [_rgb(name) for name in names]
+    stream.log(
+        "world/body/joints",
+        rr.Points3D(positions[known], colors=colours, radii=0.02, labels=names, show_labels=False),
+    )
+    bones = [(a, b) for a, b in BONES if a in names and b in names]
+    stream.log(
+        "world/body/bones",
+        rr.LineStrips3D(
+            [np.array([at[a], at[b]]) for a, b in bones],
+            colors=[_rgb(b) for _, b in bones],
+            radii=0.012,
+        ),
+    )
+    radii = ELLIPSE_SD * result.positions_sd_m[row][known]
+    if np.isfinite(radii).all():
+        stream.log(
+            "world/body/sd",
+            rr.Ellipsoids3D(centers=positions[known], half_sizes=radii, colors=colours),
+        )
+
+
+def _curves(rr: Any, stream: Any, result: StoredResult, row: int) -> None:
+    for folder, names, values in (
+        ("angles", result.angle_names, result.angles_deg[row]),
+        ("overlap", result.camera_names, result.overlap[row]),
+        ("sd_mm", result.marker_names, 1000.0 * _length(result.positions_sd_m[row])),
+    ):
+        for name, value in zip(names, values.tolist(), strict=True):
+            if np.isfinite(value):
+                stream.log(f"{folder}/{name}", rr.Scalars(value))
+
+
+def _length(deviations: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt((deviations**2).sum(axis=-1)))
+
+
+def _pictures(rr: Any, stream: Any, pictures: Mapping[str, Image]) -> None:
+    for name, picture in pictures.items():
+        done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+        if done:
+            image = rr.EncodedImage(contents=data.tobytes(), media_type="image/jpeg")
+            stream.log(f"world/cameras/{name}", image)
+
+
+def _blueprint(result: StoredResult, rig: CameraRig | None) -> Any:
+    """3D on the left, the pictures on the right, curves below."""
+    import rerun.blueprint as rrb
+
+    cameras = [
+        rrb.Spatial2DView(origin=f"world/cameras/{name}", name=name)
+        for name in (rig.names if rig is not None else ())
+    ]
+    curves = [("angles", "joint angles, degrees"), ("sd_mm", "sd, mm"), ("overlap", "overlap")]
+    views = [rrb.TimeSeriesView(origin=folder, name=name) for folder, name in curves]
+    space = rrb.Spatial3DView(origin="world", name="world")
+    above = rrb.Horizontal(space, rrb.Grid(*cameras)) if cameras else space
+    return rrb.Blueprint(
+        rrb.Vertical(above, rrb.Tabs(*views), row_shares=[3, 1]), collapse_panels=True
+    )
+
+
+def _rgb(name: str) -> tuple[int, int, int]:
+    blue, green, red = side_colour(name)
+    return red, green, blue

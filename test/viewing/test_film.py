@@ -1,0 +1,50 @@
+"""Films, read back."""
+
+import io
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from markerless_tracker.errors import ConfigError, DatasetError
+from markerless_tracker.viewing.film import write_film
+
+av = pytest.importorskip("av", reason="PyAV is not installed: pip install av")
+
+
+def pictures(count: int, size: tuple[int, int] = (65, 97)) -> list[np.ndarray]:
+    return [np.full((*size, 3), (200, 20 * index, 40), np.uint8) for index in range(count)]
+
+
+@pytest.mark.parametrize(("container", "codec"), [("webm", "vp9"), ("mp4", "h264")])
+def test_a_film_is_read_back(tmp_path: Path, container: str, codec: str) -> None:
+    path = tmp_path / f"a.{container}"
+    assert write_film(path, pictures(6), fps=12.5, container=container) == 6
+    with av.open(str(path)) as film:
+        (stream,) = film.streams.video
+        assert stream.codec_context.name.startswith((codec, f"lib{codec}"))
+        assert (stream.width, stream.height) == (96, 64)
+        frames = [frame.to_ndarray(format="bgr24") for frame in film.decode(stream)]
+        assert float(stream.average_rate) == pytest.approx(12.5)
+    assert len(frames) == 6
+    for index, frame in enumerate(frames):
+        assert np.abs(frame[32, 48].astype(int) - (200, 20 * index, 40)).max() < 12
+
+
+def test_a_film_in_memory() -> None:
+    buffer = io.BytesIO()
+    assert write_film(buffer, pictures(2), fps=10.0, bit_rate=100_000) == 2
+    assert buffer.getvalue()[:4] == b"\x1aE\xdf\xa3", "the beginning of WebM"
+
+
+def test_what_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(DatasetError, match="no image of the result"):
+        write_film(io.BytesIO(), [], fps=10.0)
+    with pytest.raises(ConfigError, match="film 'avi', expected one of webm, mp4"):
+        write_film(io.BytesIO(), pictures(1), fps=10.0, container="avi")
+    with pytest.raises(DatasetError, match="cannot be written"):
+        write_film(tmp_path / "none" / "a.webm", pictures(1), fps=10.0)
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(ConfigError, match="pip install av"):
+        write_film(io.BytesIO(), pictures(1), fps=10.0)

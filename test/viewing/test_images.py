@@ -1,0 +1,58 @@
+"""The images of a result, found by time."""
+
+from pathlib import Path
+
+import pytest
+
+from markerless_tracker.bags import write_bag
+from markerless_tracker.datasets import open_recording
+from markerless_tracker.errors import DatasetError
+from markerless_tracker.results.read import read_result
+from markerless_tracker.viewing.images import ResultImages
+
+
+def indices(images: ResultImages, rows: list[int]) -> list[tuple[int, int]]:
+    return [(row, frame.index) for row, frame in images.frames(rows)]
+
+
+def test_rows_come_with_the_images_of_their_time(make_result, walk: Path) -> None:
+    result = read_result(make_result(source=walk))
+    images = ResultImages(result, width_px=96)
+    assert images.rig["cam01"].size_px == (96, 72)
+    assert indices(images, [0, 1, 2, 3, 4, 5]) == [(i, i) for i in range(6)]
+    assert indices(images, [1, 3, 5]) == [(1, 1), (3, 3), (5, 5)]
+    assert indices(images, [0, 1, 4]) == [(0, 0), (1, 1), (4, 4)]
+    assert indices(images, [5]) == [(5, 5)] and indices(images, []) == []
+
+
+def test_the_source_may_be_elsewhere(make_result, walk: Path) -> None:
+    result = read_result(make_result(source="/nowhere/walk"))
+    with pytest.raises(DatasetError, match="/nowhere/walk: the images .* --source"):
+        ResultImages(result)
+    assert len(indices(ResultImages(result, walk), [0, 5])) == 2
+
+
+def test_rows_beyond_the_recording_are_left_out(make_result, walk: Path) -> None:
+    result = read_result(make_result(frames=8, source=walk))
+    assert indices(ResultImages(result), [4, 5, 6, 7]) == [(4, 4), (5, 5)]
+
+
+def test_cameras_are_brought_into_step_as_the_run_did(make_result, walk: Path) -> None:
+    offsets = {"time_offsets_s": {"cam02": 1 / 30}}
+    result = read_result(make_result(source=walk, notes=offsets))
+    late = dict(ResultImages(result).frames([1, 2]))
+    plain = dict(ResultImages(read_result(make_result("plain", source=walk))).frames([0, 1, 2]))
+    assert (late[2].images["cam02"] == plain[1].images["cam02"]).all()
+    assert (late[2].images["cam01"] == plain[2].images["cam01"]).all()
+
+
+def test_a_bag_with_a_missing_set(make_result, walk: Path, tmp_path: Path) -> None:
+    recording = open_recording(walk)
+    sets = [images for images in recording.frames() if images.index != 1]
+    recording.frames = lambda **_: iter(sets)  # type: ignore[method-assign]
+    write_bag(recording, tmp_path / "bag")
+    result = read_result(make_result(source=tmp_path / "bag"))
+    shown = dict(ResultImages(result).frames([0, 2, 4]))
+    assert {row: images.stamp_ns for row, images in shown.items()} == {
+        row: int(result.stamps_ns[row]) for row in (0, 2, 4)
+    }
