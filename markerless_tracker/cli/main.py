@@ -32,6 +32,7 @@ VERBS: Mapping[str, str] = MappingProxyType(
     {
         "convert": "write a recording, dataset or videos as an MCAP bag",
         "track": "track the person in a recording or bag",
+        "batch": "track many recordings: results and one summary table",
         "export": "write a result in the formats of OpenSim, C3D, BVH, CSV, NumPy and ROS",
         "evaluate": "compare a result with reference markers, in mm",
         "synthesize": "render a synthetic person as a recording with exact reference markers",
@@ -57,7 +58,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit status: 0 done, 1 failed with one line on standard error, 2 wrong arguments,
-        3 no person found (`track`), 130 interrupted, 141 standard output was closed by its reader.
+        3 no person found (`track`, `batch`), 130 interrupted, 141 standard output was closed by its
+        reader.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if not words:

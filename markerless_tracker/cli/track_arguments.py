@@ -24,6 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--force", action="store_true", help="replace the files of an earlier result of that NAME"
     )
+    add_options(parser)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Declare all options but those of the result's place and of the output, in groups."""
     _person(parser.add_argument_group("the person (all optional)"))
     _images(parser.add_argument_group("images"))
     _search(parser.add_argument_group("search"))
