@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from markerless_tracker.bags import COMPRESSIONS, BagSummary, write_bag
 from markerless_tracker.datasets import FORMATS, Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
+from markerless_tracker.datasets.part import PartRecording
 
 HELP = (
     "Write a recording folder, a Pose2Sim project or another bag as an MCAP bag folder: images, "
@@ -34,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fps",
         type=float,
         metavar="N",
-        help="keep every k-th set, from the first, to get this rate (default: all)",
+        help="keep every k-th set, from the first kept, to get this rate (default: all)",
     )
     parser.add_argument(
         "--scale",
@@ -47,7 +48,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--compress",
         choices=COMPRESSIONS,
         default="none",
-        help="none (default), zstd (lossless, smaller, slower) or jpeg (lossy, much smaller)",
+        help="none (default); zstd or png (lossless, smaller, slower); jpeg (lossy, much smaller)",
+    )
+    parser.add_argument(
+        "--cameras", metavar="A,B,...", help="names of the cameras to keep (default: all)"
+    )
+    parser.add_argument(
+        "--start",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="leave out the first S seconds (default 0)",
+    )
+    parser.add_argument(
+        "--end",
+        type=float,
+        metavar="S",
+        help="leave out what is later than S seconds after the first set (default: nothing)",
     )
     parser.add_argument("--force", action="store_true", help="replace an earlier bag at BAG")
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
@@ -60,6 +77,11 @@ def run(args: argparse.Namespace) -> int:
     recording = open_recording(
         args.source, scale=args.scale, format=args.format, input_fps=args.input_fps
     )
+    start = 0
+    if args.cameras is not None or args.start != 0.0 or args.end is not None:
+        names = None if args.cameras is None else [n for n in args.cameras.split(",") if n]
+        part = PartRecording(recording, cameras=names, from_s=args.start, until_s=args.end)
+        recording, start = part, part.first
     every = every_for_fps(recording.fps, args.fps)
     with Progress(
         TextColumn("{task.description}"),
@@ -74,6 +96,7 @@ def run(args: argparse.Namespace) -> int:
         summary = write_bag(
             recording,
             args.bag,
+            start=start,
             every=every,
             compress=args.compress,
             backgrounds=backgrounds,
