@@ -32,12 +32,17 @@ FIRST = Place(0, 0)
 
 
 class RawMessage(NamedTuple):
-    """One message as stored; `place` is its own record or the chunk that holds it."""
+    """One message as stored.
+
+    `place` is its own record or the chunk that holds it; `log_ns` the time at which it was
+    recorded, 0 in `McapFiles.heads`.
+    """
 
     topic: str
     type: str
     data: bytes
     place: Place
+    log_ns: int = 0
 
 
 class IndexDamaged(Exception):
@@ -172,7 +177,7 @@ class McapFiles:
             self._define(number, record)
             if isinstance(record, Message) and record.channel_id in self._channels[number]:
                 topic = self._channels[number][record.channel_id].topic
-                yield RawMessage(topic, self.types[topic], record.data, place)
+                yield RawMessage(topic, self.types[topic], record.data, place, record.log_time)
 
     def _define(self, number: int, record: McapRecord | None) -> None:
         if isinstance(record, Schema):
