@@ -34,6 +34,7 @@ VERBS: Mapping[str, str] = MappingProxyType(
         "track": "track the person in a recording or bag",
         "batch": "track many recordings: results and one summary table",
         "export": "write a result in the formats of OpenSim, C3D, BVH, CSV, NumPy and ROS",
+        "record": "record the topics of a running graph to an MCAP bag",
         "evaluate": "compare a result with reference markers, in mm",
         "synthesize": "render a synthetic person as a recording with exact reference markers",
         "benchmark": "measure speed and accuracy",
