@@ -20,7 +20,7 @@ from markerless_tracker.bags.messages import (
 from markerless_tracker.body import MARKER_NAMES
 from markerless_tracker.camera import CameraRig, write_calibration
 from markerless_tracker.datasets.markers.track import MarkerTrack
-from markerless_tracker.datasets.markers.trc import read_trc
+from markerless_tracker.datasets.markers.trc import write_trc
 from markerless_tracker.datasets.recording import BACKGROUND, FrameSet, Recording
 from markerless_tracker.datasets.target import new_folder
 from markerless_tracker.datasets.truth import TRUTH, truth_path
@@ -99,8 +99,7 @@ def write_bag(
             )
     count = recording.frame_count
     total = None if count is None else -(-(count - start) // every)
-    truth_file = truth_path(recording.path)
-    truth = read_trc(truth_file) if truth_file.is_file() else None
+    truth = recording.ground_truth()
     with new_folder(out, replace=replace) as folder:
         stamps: list[int] = []
         with (
@@ -123,7 +122,7 @@ def write_bag(
         for name, model in recording.background_models().items():
             write_background_model(folder / BACKGROUND / f"{name}{MODEL_SUFFIX}", model)
         if truth is not None:
-            shutil.copy(truth_file, folder / TRUTH)
+            _write_truth(folder / TRUTH, truth, recording)
         size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     return BagSummary(Path(out), len(stamps), stamps[0], stamps[-1], size)
 
@@ -201,6 +200,15 @@ class _Topics:
             message = marker_poses_message(self._truth.positions_m[self._row], own)
             self._writer.write(self._truth_topic, own, message)
             self._row += 1
+
+
+def _write_truth(path: Path, truth: MarkerTrack, recording: Recording) -> None:
+    """Put the reference markers beside a bag: their file, or what another format gave."""
+    file = truth_path(recording.path)
+    if file.is_file():
+        shutil.copy(file, path)
+    else:
+        write_trc(path, truth, recording.fps)
 
 
 def _in_order(track: MarkerTrack) -> MarkerTrack:

@@ -11,14 +11,16 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from markerless_tracker.bags import COMPRESSIONS, BagSummary, write_bag
+from markerless_tracker.cli.track_arguments import add_world
 from markerless_tracker.datasets import FORMATS, Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.datasets.part import PartRecording
 
 HELP = (
-    "Write a recording folder, a Pose2Sim project or another bag as an MCAP bag folder: images, "
-    "camera infos and static transforms as topics, calibration.toml and background/ in the folder. "
-    "For a camera without an empty-scene image, one is learned from the recording."
+    "Write a recording folder, a data set, a project of another tool or another bag as an MCAP bag "
+    "folder: images, camera infos, static transforms and reference markers as topics, "
+    "calibration.toml and background/ in the folder. For a camera without an empty-scene image, "
+    "one is learned from the recording."
 )
 EXAMPLE = "markerless_tracker convert recordings/walk walk_bag --scale 0.5"
 
@@ -26,11 +28,15 @@ EXAMPLE = "markerless_tracker convert recordings/walk walk_bag --scale 0.5"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "source", metavar="SOURCE", type=Path, help="recording folder, Pose2Sim project or bag"
+        "source",
+        metavar="SOURCE",
+        type=Path,
+        help=f"recording: {', '.join(FORMATS)} (see bags/README.md)",
     )
     parser.add_argument("bag", metavar="BAG", type=Path, help="folder to write (new or empty)")
     parser.add_argument("--format", choices=FORMATS, help="format of SOURCE (default: detected)")
     parser.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images, 1/s")
+    add_world(parser)
     parser.add_argument(
         "--fps",
         type=float,
@@ -75,7 +81,12 @@ def run(args: argparse.Namespace) -> int:
     started = time.monotonic()
     console = Console(stderr=True)
     recording = open_recording(
-        args.source, scale=args.scale, format=args.format, input_fps=args.input_fps
+        args.source,
+        scale=args.scale,
+        format=args.format,
+        input_fps=args.input_fps,
+        up=args.up,
+        units=args.units,
     )
     start = 0
     if args.cameras is not None or args.start != 0.0 or args.end is not None:

@@ -158,7 +158,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     smoothing = None
     if args.smooth is not None or args.fill_gaps is not None:
         smoothing = Smoothing(args.smooth, args.fill_gaps or 0.0)
-    recording = open_recording(args.source, scale=args.scale)
+    recording = open_recording(args.source, scale=args.scale, up=args.up, units=args.units)
     if args.time_offsets is not None:
         recording = InStepRecording(recording, read_time_offsets(args.time_offsets))
     if args.masks is not None:
@@ -192,7 +192,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     if smoothing is not None and verdict.tracked:
         filled = smooth_result(args.name, smoothing)
     if args.refine_calibration is not None:
-        full = open_recording(args.source).rig
+        full = open_recording(args.source, up=args.up, units=args.units).rig
         write_calibration(args.refine_calibration, corrected(full, outcome.shifts, args.scale))
     late = [*recording.warnings, *describe(outcome.shifts)]
     if verdict.frames_with_warnings:

@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from markerless_tracker.datasets.upright import AXES, UNITS
 from markerless_tracker.results.smooth import CUTOFF_HZ
 from markerless_tracker.tracking import OPTIMIZERS, PRESETS
 
@@ -10,7 +11,10 @@ from markerless_tracker.tracking import OPTIMIZERS, PRESETS
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments, in groups."""
     parser.add_argument(
-        "source", metavar="SOURCE", type=Path, help="recording folder, Pose2Sim project or bag"
+        "source",
+        metavar="SOURCE",
+        type=Path,
+        help="recording folder, bag or other recording",
     )
     parser.add_argument(
         "-o",
@@ -91,6 +95,25 @@ def _images(group: argparse._ArgumentGroup) -> None:
         type=Path,
         metavar="DIR",
         help="empty-scene images or learned backgrounds (.npz), one per camera",
+    )
+    add_world(group)
+
+
+def add_world(group: "argparse._ActionsContainer") -> None:
+    """Declare what turns the world of a calibration upright."""
+    group.add_argument(
+        "--up",
+        choices=AXES,
+        default="z",
+        metavar="AXIS",
+        help="axis of the calibration's world that is up: x, y, z, or -x, -y, -z as --up=-y "
+        "(default z)",
+    )
+    group.add_argument(
+        "--units",
+        choices=tuple(UNITS),
+        default="m",
+        help="of the lengths in the calibration (default m)",
     )
 
 

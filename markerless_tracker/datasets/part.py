@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.imaging import BackgroundModel, Image
@@ -92,6 +93,10 @@ class PartRecording(Recording):
     def room_stills(self) -> dict[str, list[Image]]:
         """As of the whole, of the part's cameras."""
         return self._own(self._inner.room_stills())
+
+    def ground_truth(self) -> MarkerTrack | None:
+        """As of the whole."""
+        return self._inner.ground_truth()
 
     def _own(self, found: dict[str, T]) -> dict[str, T]:
         return {name: value for name, value in found.items() if name in self.rig.names}

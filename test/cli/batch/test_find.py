@@ -68,3 +68,10 @@ def test_what_holds_no_recording(tmp_path: Path, content, message) -> None:
         find_recordings(path)
     with pytest.raises(DatasetError, match="no recording, expected some"):
         find_recordings(tmp_path)
+
+
+def test_trials_of_a_session_share_its_calibration(tmp_path: Path) -> None:
+    session = tmp_path / "session"
+    for name in ("calibration", "Trial_1/videos", "Trial_2/videos"):
+        (session / name).mkdir(parents=True)
+    assert find_recordings(session) == {name: session / name for name in ("Trial_1", "Trial_2")}
