@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from markerless_tracker.bags import COMPRESSIONS, BagSummary, write_bag
-from markerless_tracker.cli.track_arguments import add_world
+from markerless_tracker.cli.track_arguments import add_format, add_world
 from markerless_tracker.datasets import FORMATS, Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.datasets.part import PartRecording
@@ -34,8 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"recording: {', '.join(FORMATS)} (see bags/README.md)",
     )
     parser.add_argument("bag", metavar="BAG", type=Path, help="folder to write (new or empty)")
-    parser.add_argument("--format", choices=FORMATS, help="format of SOURCE (default: detected)")
-    parser.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images, 1/s")
+    add_format(parser)
     add_world(parser)
     parser.add_argument(
         "--fps",

@@ -11,12 +11,12 @@ from typing import Any
 
 import yaml
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from markerless_tracker.body import load_description
 from markerless_tracker.camera.calibration import write_calibration
 from markerless_tracker.camera.doubts import calibration_doubts
 from markerless_tracker.cli.track_arguments import add_arguments
+from markerless_tracker.cli.track_notices import COMPILING, Bars, Notices, tell, warn
 from markerless_tracker.compiled import compilation
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
@@ -48,19 +48,16 @@ __all__ = ["EXAMPLE", "HELP", "add_arguments", "read_config", "run"]
 NO_PERSON_FOUND = 3
 """Exit status when the person was tracked in no frame."""
 
-COMPILING = "compiling"
-"""Name of the part of a run in which kernels are compiled or loaded."""
-
 _KEYS = ("optimizer", "body", "evaluations", "seed", "threads")
 
 
 def run(args: argparse.Namespace) -> int:
     """Track; returns 0, or 3 if no person was found."""
     console = Console(stderr=True)
-    with _Bars(console) as bars:
+    with Bars(console) as bars:
         finished = track_source(args, bars)
     for warning in finished.late_warnings:
-        _warn(console, warning)
+        warn(console, warning)
     verdict = finished.outcome.verdict
     if args.json:
         json.dump(finished.summary, sys.stdout, indent=2)
@@ -75,55 +72,12 @@ def run(args: argparse.Namespace) -> int:
             print(line)
     if verdict.tracked:
         return 0
-    _tell(
+    tell(
         console,
         f"no person was found in {verdict.frames} of {verdict.frames} frames; no subject file was "
         "written",
     )
     return NO_PERSON_FOUND
-
-
-class Notices:
-    """Receives what happens during `track_source`; the base class ignores it."""
-
-    def begin(self, part: str, total: int | None = None) -> None:
-        """Receives the name of the next part and the number of its steps (None = unknown)."""
-
-    def step(self, done: int, total: int | None = None) -> None:
-        """Receives the number of the part's completed steps, and their total if it changed."""
-
-    def warn(self, text: str) -> None:
-        """Receives a warning, one line."""
-
-
-class _Bars(Notices):
-    """A progress bar from the first part on, and warnings above it."""
-
-    def __init__(self, console: Console) -> None:
-        self._bars = Progress(
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-            TimeRemainingColumn(), console=console,
-        )  # fmt: skip
-        self._task = self._bars.add_task("", total=None)
-
-    def __enter__(self) -> "_Bars":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        if self._bars.live.is_started:
-            self._bars.stop()
-
-    def begin(self, part: str, total: int | None = None) -> None:
-        self._bars.start()
-        self._bars.reset(self._task, description=part, total=total)
-
-    def step(self, done: int, total: int | None = None) -> None:
-        if total is not None:
-            self._bars.update(self._task, total=total)
-        self._bars.update(self._task, completed=done)
-
-    def warn(self, text: str) -> None:
-        _warn(self._bars.console, text)
 
 
 @dataclass(frozen=True)
@@ -158,7 +112,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     smoothing = None
     if args.smooth is not None or args.fill_gaps is not None:
         smoothing = Smoothing(args.smooth, args.fill_gaps or 0.0)
-    recording = open_recording(args.source, scale=args.scale, up=args.up, units=args.units)
+    recording = _opened(args, args.scale)
     if args.time_offsets is not None:
         recording = InStepRecording(recording, read_time_offsets(args.time_offsets))
     if args.masks is not None:
@@ -192,7 +146,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     if smoothing is not None and verdict.tracked:
         filled = smooth_result(args.name, smoothing)
     if args.refine_calibration is not None:
-        full = open_recording(args.source, up=args.up, units=args.units).rig
+        full = _opened(args, 1.0).rig
         write_calibration(args.refine_calibration, corrected(full, outcome.shifts, args.scale))
     late = [*recording.warnings, *describe(outcome.shifts)]
     if verdict.frames_with_warnings:
@@ -228,6 +182,17 @@ class Outcome:
     def frames_per_s(self) -> float | None:
         """Frames per second of tracking, None where the clock shows no duration."""
         return round(self.record.frames / self.seconds, 2) if self.seconds > 0 else None
+
+
+def _opened(args: argparse.Namespace, scale: float) -> Recording:
+    return open_recording(
+        args.source,
+        scale=scale,
+        format=args.format,
+        input_fps=args.input_fps,
+        up=args.up,
+        units=args.units,
+    )
 
 
 def _track(
@@ -289,14 +254,6 @@ def _summary(args: argparse.Namespace, recording: Recording, outcome: Outcome) -
         "frame_warnings": outcome.record.warnings.as_list(),
         "cameras": _cameras(outcome.shifts),
     }
-
-
-def _warn(console: Console, text: str) -> None:
-    _tell(console, f"warning: {text}")
-
-
-def _tell(console: Console, text: str) -> None:
-    console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:

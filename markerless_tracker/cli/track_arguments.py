@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from markerless_tracker.datasets import FORMATS
 from markerless_tracker.datasets.upright import AXES, UNITS
 from markerless_tracker.results.smooth import CUTOFF_HZ
 from markerless_tracker.tracking import OPTIMIZERS, PRESETS
@@ -97,6 +98,15 @@ def _images(group: argparse._ArgumentGroup) -> None:
         help="empty-scene images or learned backgrounds (.npz), one per camera",
     )
     add_world(group)
+    add_format(group)
+
+
+def add_format(group: "argparse._ActionsContainer") -> None:
+    """Declare what says how a recording is to be read."""
+    group.add_argument(
+        "--format", choices=FORMATS, help="format of the recording (default: detected)"
+    )
+    group.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images, 1/s")
 
 
 def add_world(group: "argparse._ActionsContainer") -> None:
