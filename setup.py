@@ -63,6 +63,7 @@ setup(
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
             "hypothesis",
+            "mcap-ros2-support>=0.5",
             "mypy",
             'opensim>=4.5; python_version < "3.14"',
             "pandas>=2",

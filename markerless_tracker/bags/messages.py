@@ -11,10 +11,16 @@ from scipy.spatial.transform import Rotation
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.camera.ros_fields import camera_info_fields
 from markerless_tracker.errors import DatasetError
+from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image
 
 WORLD_FRAME = "map"
 JPEG_QUALITY = 90
+# Quick PNG: higher levels take several times as long for a few percent.
+_FORMS = {
+    "jpeg": (".jpg", [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]),
+    "png": (".png", [cv2.IMWRITE_PNG_COMPRESSION, 1]),
+}
 
 
 @cache
@@ -59,18 +65,33 @@ def image_message(image: Image, stamp_ns: int, camera: CameraModel) -> Any:
     )
 
 
-def jpeg_message(image: Image, stamp_ns: int, camera: CameraModel) -> Any:
-    """sensor_msgs/CompressedImage, JPEG of quality `JPEG_QUALITY`.
+def encoded_message(image: Image, stamp_ns: int, camera: CameraModel, form: str) -> Any:
+    """sensor_msgs/CompressedImage: `jpeg` of quality `JPEG_QUALITY`, or lossless `png`.
 
     Raises:
         DatasetError: the image cannot be encoded.
     """
-    done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    suffix, options = _FORMS[form]
+    done, data = cv2.imencode(suffix, image, options)
     if not done:
-        raise DatasetError(f"{camera.name}: an image {image.shape} cannot be encoded as JPEG")
-    kind = "mono8; jpeg compressed" if image.ndim == 2 else "bgr8; jpeg compressed bgr8"
+        raise DatasetError(f"{camera.name}: an image {image.shape} cannot be encoded as {form}")
+    kind = "mono8" if image.ndim == 2 else "bgr8"
+    # As compressed_image_transport writes it.
+    words = f"{kind}; {form} compressed {'' if image.ndim == 2 else kind}".rstrip()
     return message_type("sensor_msgs/msg/CompressedImage")(
-        header=header(stamp_ns, optical_frame(camera.name)), format=kind, data=data.reshape(-1)
+        header=header(stamp_ns, optical_frame(camera.name)), format=words, data=data.reshape(-1)
+    )
+
+
+def marker_poses_message(positions_m: FloatArray, stamp_ns: int) -> Any:
+    """geometry_msgs/PoseArray of markers (m, 3) in m, world frame; NaN where one is unknown."""
+    pose, point = message_type("geometry_msgs/msg/Pose"), message_type("geometry_msgs/msg/Point")
+    upright = message_type("geometry_msgs/msg/Quaternion")(x=0.0, y=0.0, z=0.0, w=1.0)
+    poses = [
+        pose(position=point(x=x, y=y, z=z), orientation=upright) for x, y, z in positions_m.tolist()
+    ]
+    return message_type("geometry_msgs/msg/PoseArray")(
+        header=header(stamp_ns, WORLD_FRAME), poses=poses
     )
 
 

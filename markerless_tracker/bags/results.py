@@ -4,11 +4,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.rosbag2 import StoragePlugin, Writer
 from scipy.spatial.transform import Rotation
 
-from markerless_tracker.bags.messages import WORLD_FRAME, header, message_type, typestore
-from markerless_tracker.bags.write import LAST_SECOND, offered_qos
+from markerless_tracker.bags.mcap_bag import LAST_SECOND, BagWriter
+from markerless_tracker.bags.messages import (
+    WORLD_FRAME,
+    header,
+    marker_poses_message,
+    message_type,
+)
 from markerless_tracker.body import BodyModel, root_transform
 from markerless_tracker.body.urdf import urdf
 from markerless_tracker.datasets.target import new_folder
@@ -41,9 +45,7 @@ def write_result_bag(out: Path, reader: ResultReader, *, replace: bool = False) 
     """
     body = stored_body(reader.summary)
     with new_folder(out, replace=replace) as folder:
-        # The writer creates the folder and refuses an existing one.
-        folder.rmdir()
-        with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        with BagWriter(folder) as writer:
             topics = _Topics(writer, body, reader.angle_names)
             for part in reader.chunks():
                 for row, stamp in enumerate(part.stamps_ns.tolist()):
@@ -55,22 +57,21 @@ def write_result_bag(out: Path, reader: ResultReader, *, replace: bool = False) 
                     topics.pose(stamp, part.parameters[row], part.parameters_sd[row])
                     topics.angles(stamp, part.parameters[row], part.angles_deg[row])
                     topics.markers(stamp, part.positions_m[row])
-            if not topics.messages:
+            if not writer.messages:
                 raise DatasetError(f"{reader.name}: has no frame, expected at least one")
-        return topics.messages
+        return writer.messages
 
 
 class _Topics:
     """The topics of a bag being written."""
 
-    def __init__(self, writer: Writer, body: BodyModel, angles: tuple[str, ...]) -> None:
+    def __init__(self, writer: BagWriter, body: BodyModel, angles: tuple[str, ...]) -> None:
         self._writer, self._body = writer, body
-        self.messages = 0
         # The joints of the URDF: the reported angles but the root's, if there are any.
         root = body.root_frame
         self._columns = [k for k, name in enumerate(angles) if not name.startswith(f"{root}_")]
         self._angles = [angles[column] for column in self._columns]
-        self._kinds = {
+        kinds = {
             "/robot_description": "std_msgs/msg/String",
             "/state": "diagnostic_msgs/msg/DiagnosticArray",
             "/marker_poses": "geometry_msgs/msg/PoseArray",
@@ -79,19 +80,14 @@ class _Topics:
             "/root_pose": "geometry_msgs/msg/PoseWithCovarianceStamped",
             "/tf": "tf2_msgs/msg/TFMessage",
         }
-        self._connections = {
-            topic: writer.add_connection(
-                topic,
-                kind,
-                typestore=typestore(),
-                offered_qos_profiles=[offered_qos(latched=topic == "/robot_description")],
-            )
-            for topic, kind in self._kinds.items()
+        self._topics = {
+            name: writer.topic(name, kind, latched=name == "/robot_description")
+            for name, kind in kinds.items()
         }
 
     def state(self, stamp: int, state: str, fitness: float) -> None:
         """Write the state of a frame; before the first, the body's description."""
-        if not self.messages:
+        if not self._writer.messages:
             text = message_type("std_msgs/msg/String")(data=urdf(self._body))
             self._put("/robot_description", stamp, text)
         pair = message_type("diagnostic_msgs/msg/KeyValue")
@@ -144,17 +140,7 @@ class _Topics:
         """Write the markers (15, 3), if they are known."""
         if not np.isfinite(positions_m).all():
             return
-        pose, point = (
-            message_type("geometry_msgs/msg/Pose"),
-            message_type("geometry_msgs/msg/Point"),
-        )
-        upright = message_type("geometry_msgs/msg/Quaternion")(x=0.0, y=0.0, z=0.0, w=1.0)
-        poses = [
-            pose(position=point(x=x, y=y, z=z), orientation=upright)
-            for x, y, z in positions_m.tolist()
-        ]
-        array = message_type("geometry_msgs/msg/PoseArray")
-        self._put("/marker_poses", stamp, array(header=header(stamp, WORLD_FRAME), poses=poses))
+        self._put("/marker_poses", stamp, marker_poses_message(positions_m, stamp))
 
     def angles(self, stamp: int, parameters: FloatArray, angles_deg: FloatArray) -> None:
         """Write the joints: the result's angles (k,), without them the parameters (p,)."""
@@ -174,6 +160,4 @@ class _Topics:
         )
 
     def _put(self, topic: str, stamp_ns: int, message: Any) -> None:
-        data = typestore().serialize_cdr(message, self._kinds[topic])
-        self._writer.write(self._connections[topic], stamp_ns, data)
-        self.messages += 1
+        self._writer.write(self._topics[topic], stamp_ns, message)

@@ -1,40 +1,39 @@
 """Writing a recording as a bag folder: MCAP rosbag2 version 9 (Jazzy), calibration, background."""
 
 import re
+import shutil
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+import numpy as np
 
+from markerless_tracker.bags.mcap_bag import LAST_SECOND, BagWriter
 from markerless_tracker.bags.messages import (
     camera_info_message,
+    encoded_message,
     image_message,
-    jpeg_message,
+    marker_poses_message,
     static_transforms_message,
-    typestore,
 )
+from markerless_tracker.body import MARKER_NAMES
 from markerless_tracker.camera import CameraRig, write_calibration
+from markerless_tracker.datasets.markers.track import MarkerTrack
+from markerless_tracker.datasets.markers.trc import write_trc
 from markerless_tracker.datasets.recording import BACKGROUND, FrameSet, Recording
 from markerless_tracker.datasets.target import new_folder
+from markerless_tracker.datasets.truth import TRUTH, truth_path
 from markerless_tracker.datasets.writer import write_background
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.imaging import Image, write_background_model
 from markerless_tracker.imaging.background import MODEL_SUFFIX
 
-COMPRESSIONS = ("none", "zstd", "jpeg")
-# Stamps of ROS have int32 seconds; later ones cannot be written.
-LAST_SECOND = 2**31 - 1
-_FOREVER = QosTime(2147483647, 4294967295)
+COMPRESSIONS = ("none", "zstd", "png", "jpeg")
+TRUTH_TOPIC = "/ground_truth/marker_poses"
+_ENCODED = ("png", "jpeg")
+_SLACK_NS = 500_000
+"""Largest difference of the stamps of a set and of its row of reference markers."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +58,7 @@ def write_bag(
     recording: Recording,
     out: str | Path,
     *,
+    start: int = 0,
     every: int = 1,
     compress: str = "none",
     backgrounds: Mapping[str, Sequence[Image]] | None = None,
@@ -67,17 +67,20 @@ def write_bag(
 ) -> BagSummary:
     """Write a recording, at its scale, as a bag folder.
 
-    Topics per camera: `/NAME/image_raw` (or `/NAME/image_raw/compressed` for jpeg) and
-    `/NAME/camera_info`; once `/tf_static` with `map` -> NAME_optical_frame. The folder also holds
-    `calibration.toml` and `background/` (images and learned models), scaled like the images and
-    lossless for every `compress`.
-    The folder appears when it is complete; a failure leaves nothing.
+    Topics per camera: `/NAME/image_raw` (or `/NAME/image_raw/compressed` for png and jpeg) and
+    `/NAME/camera_info`; once `/tf_static` with `map` -> NAME_optical_frame; with a
+    `ground_truth.trc` in the recording `TRUTH_TOPIC`, geometry_msgs/PoseArray of the 15 markers in
+    order, NaN where one is missing. The folder also holds `calibration.toml`, `background/` (images
+    and learned models), scaled like the images and lossless for every `compress`, and the
+    `ground_truth.trc`. The folder appears when it is complete; a failure leaves nothing. Memory
+    does not depend on the length.
 
     Args:
         recording: the sets to write; their stamps are kept.
         out: the new folder.
+        start: index of the first set.
         every: keep every k-th set, from the first.
-        compress: `none`, `zstd` (lossless chunks) or `jpeg` (lossy images).
+        compress: `none`, `zstd` (lossless chunks), `png` (lossless images) or `jpeg` (lossy ones).
         backgrounds: camera -> empty-scene images in the rig's size, instead of the recording's own.
         progress: called with the sets written and their number (None if unknown).
         replace: whether an earlier bag at `out` is replaced, once the new one is complete.
@@ -94,18 +97,19 @@ def write_bag(
                 f"{name}: this camera name cannot be part of a ROS topic, expected a letter, then "
                 "letters, digits and _"
             )
-    total = None if recording.frame_count is None else -(-recording.frame_count // every)
+    count = recording.frame_count
+    total = None if count is None else -(-(count - start) // every)
+    truth = recording.ground_truth()
     with new_folder(out, replace=replace) as folder:
-        # The writer creates the folder and refuses an existing one.
-        folder.rmdir()
-        writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
-        if compress == "zstd":
-            writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         stamps: list[int] = []
-        with writer:
-            topics = _Topics(writer, recording.rig, jpeg=compress == "jpeg")
-            for frame in recording.frames(every=every):
-                topics.write(frame, first=not stamps)
+        with (
+            BagWriter(folder, zstd=compress == "zstd") as writer,
+            ThreadPoolExecutor(len(recording.rig), thread_name_prefix="encode") as pool,
+        ):
+            encode = compress if compress in _ENCODED else None
+            topics = _Topics(writer, recording.rig, encode, truth, pool)
+            for frame in recording.frames(start=start, every=every):
+                topics.write(frame)
                 stamps.append(frame.stamp_ns)
                 if progress is not None:
                     progress(len(stamps), total)
@@ -117,62 +121,101 @@ def write_bag(
             write_background(folder / BACKGROUND, recording.rig[name], images)
         for name, model in recording.background_models().items():
             write_background_model(folder / BACKGROUND / f"{name}{MODEL_SUFFIX}", model)
+        if truth is not None:
+            _write_truth(folder / TRUTH, truth, recording)
         size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
     return BagSummary(Path(out), len(stamps), stamps[0], stamps[-1], size)
 
 
-def offered_qos(*, latched: bool) -> Qos:
-    """Reliable; a latched topic keeps its last message for late subscribers."""
-    durability = QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE
-    return Qos(
-        history=QosHistory.KEEP_LAST,
-        depth=1 if latched else 10,
-        reliability=QosReliability.RELIABLE,
-        durability=durability,
-        deadline=_FOREVER,
-        lifespan=_FOREVER,
-        liveliness=QosLiveliness.AUTOMATIC,
-        liveliness_lease_duration=_FOREVER,
-        avoid_ros_namespace_conventions=False,
-    )
-
-
 class _Topics:
-    """The connections of a bag being written."""
+    """The topics of a bag being written.
 
-    def __init__(self, writer: Writer, rig: CameraRig, *, jpeg: bool) -> None:
-        self._writer, self._rig, self._jpeg = writer, rig, jpeg
-        kind, suffix = ("CompressedImage", "/compressed") if jpeg else ("Image", "")
-        self._static = self._connect("/tf_static", "tf2_msgs/msg/TFMessage", latched=True)
+    Args:
+        writer: of the bag.
+        rig: the cameras.
+        encode: `png`, `jpeg` or None for raw images.
+        truth: reference markers.
+        pool: encodes the images of a set.
+    """
+
+    def __init__(
+        self,
+        writer: BagWriter,
+        rig: CameraRig,
+        encode: str | None,
+        truth: MarkerTrack | None,
+        pool: ThreadPoolExecutor,
+    ) -> None:
+        self._writer, self._rig, self._encode, self._pool = writer, rig, encode, pool
+        kind, suffix = ("CompressedImage", "/compressed") if encode else ("Image", "")
+        self._static = writer.topic("/tf_static", "tf2_msgs/msg/TFMessage", latched=True)
         self._images = {
-            name: self._connect(f"/{name}/image_raw{suffix}", f"sensor_msgs/msg/{kind}")
+            name: writer.topic(f"/{name}/image_raw{suffix}", f"sensor_msgs/msg/{kind}")
             for name in rig.names
         }
         self._infos = {
-            name: self._connect(f"/{name}/camera_info", "sensor_msgs/msg/CameraInfo")
+            name: writer.topic(f"/{name}/camera_info", "sensor_msgs/msg/CameraInfo")
             for name in rig.names
         }
+        self._truth = None if truth is None else _in_order(truth)
+        self._row: int | None = None
+        if truth is not None:
+            self._truth_topic = writer.topic(TRUTH_TOPIC, "geometry_msgs/msg/PoseArray")
 
-    def write(self, frame: FrameSet, *, first: bool) -> None:
-        """Write one set; the static transforms are written before the first."""
+    def write(self, frame: FrameSet) -> None:
+        """Write one set, before it the reference markers since the last one."""
         stamp = frame.stamp_ns
         if not 0 <= stamp < LAST_SECOND * 10**9:
             raise DatasetError(
                 f"frame {frame.index}: its stamp {stamp} ns cannot be written to a ROS message"
             )
-        if first:
-            self._put(self._static, stamp, static_transforms_message(self._rig, stamp))
-        for camera in self._rig:
-            make = jpeg_message if self._jpeg else image_message
-            self._put(self._infos[camera.name], stamp, camera_info_message(camera, stamp))
-            image = make(frame.images[camera.name], stamp, camera)
-            self._put(self._images[camera.name], stamp, image)
+        if not self._writer.messages:
+            transforms = static_transforms_message(self._rig, stamp)
+            self._writer.write(self._static, stamp, transforms)
+        self._write_truth(stamp)
+        if self._encode is None:
+            messages = [image_message(frame.images[c.name], stamp, c) for c in self._rig]
+        else:
+            work = (
+                self._pool.submit(encoded_message, frame.images[c.name], stamp, c, self._encode)
+                for c in self._rig
+            )
+            messages = [one.result() for one in list(work)]
+        for camera, image in zip(self._rig, messages, strict=True):
+            info = camera_info_message(camera, stamp)
+            self._writer.write(self._infos[camera.name], stamp, info)
+            self._writer.write(self._images[camera.name], stamp, image)
 
-    def _connect(self, topic: str, kind: str, *, latched: bool = False) -> Any:
-        return self._writer.add_connection(
-            topic, kind, typestore=typestore(), offered_qos_profiles=[offered_qos(latched=latched)]
-        )
+    def _write_truth(self, stamp: int) -> None:
+        if self._truth is None:
+            return
+        stamps = self._truth.stamps_ns
+        if self._row is None:
+            # Rows are rounded to their file's digits: the first one may be just before the set.
+            self._row = int((stamps < stamp - _SLACK_NS).sum())
+        while self._row < len(stamps) and stamps[self._row] <= stamp + _SLACK_NS:
+            own = int(stamps[self._row])
+            # A row of this set has its stamp.
+            own = stamp if abs(own - stamp) <= _SLACK_NS else own
+            message = marker_poses_message(self._truth.positions_m[self._row], own)
+            self._writer.write(self._truth_topic, own, message)
+            self._row += 1
 
-    def _put(self, connection: Any, stamp_ns: int, message: Any) -> None:
-        data = typestore().serialize_cdr(message, connection.msgtype)
-        self._writer.write(connection, stamp_ns, data)
+
+def _write_truth(path: Path, truth: MarkerTrack, recording: Recording) -> None:
+    """Put the reference markers beside a bag: their file, or what another format gave."""
+    file = truth_path(recording.path)
+    if file.is_file():
+        shutil.copy(file, path)
+    else:
+        write_trc(path, truth, recording.fps)
+
+
+def _in_order(track: MarkerTrack) -> MarkerTrack:
+    """The 15 markers in order, by name; NaN where the track lacks one."""
+    track = track.with_pelvis()
+    positions = np.full((len(track), len(MARKER_NAMES), 3), np.nan)
+    for column, name in enumerate(MARKER_NAMES):
+        if name in track.names:
+            positions[:, column] = track.positions_m[:, track.names.index(name)]
+    return MarkerTrack(MARKER_NAMES, track.stamps_ns, positions)

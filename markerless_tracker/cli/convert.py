@@ -11,13 +11,16 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from markerless_tracker.bags import COMPRESSIONS, BagSummary, write_bag
+from markerless_tracker.cli.track_arguments import add_format, add_world
 from markerless_tracker.datasets import FORMATS, Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
+from markerless_tracker.datasets.part import PartRecording
 
 HELP = (
-    "Write a recording folder, a Pose2Sim project or another bag as an MCAP bag folder: images, "
-    "camera infos and static transforms as topics, calibration.toml and background/ in the folder. "
-    "For a camera without an empty-scene image, one is learned from the recording."
+    "Write a recording folder, a data set, a project of another tool or another bag as an MCAP bag "
+    "folder: images, camera infos, static transforms and reference markers as topics, "
+    "calibration.toml and background/ in the folder. For a camera without an empty-scene image, "
+    "one is learned from the recording."
 )
 EXAMPLE = "markerless_tracker convert recordings/walk walk_bag --scale 0.5"
 
@@ -25,16 +28,19 @@ EXAMPLE = "markerless_tracker convert recordings/walk walk_bag --scale 0.5"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "source", metavar="SOURCE", type=Path, help="recording folder, Pose2Sim project or bag"
+        "source",
+        metavar="SOURCE",
+        type=Path,
+        help=f"recording: {', '.join(FORMATS)} (see bags/README.md)",
     )
     parser.add_argument("bag", metavar="BAG", type=Path, help="folder to write (new or empty)")
-    parser.add_argument("--format", choices=FORMATS, help="format of SOURCE (default: detected)")
-    parser.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images, 1/s")
+    add_format(parser)
+    add_world(parser)
     parser.add_argument(
         "--fps",
         type=float,
         metavar="N",
-        help="keep every k-th set, from the first, to get this rate (default: all)",
+        help="keep every k-th set, from the first kept, to get this rate (default: all)",
     )
     parser.add_argument(
         "--scale",
@@ -47,7 +53,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--compress",
         choices=COMPRESSIONS,
         default="none",
-        help="none (default), zstd (lossless, smaller, slower) or jpeg (lossy, much smaller)",
+        help="none (default); zstd or png (lossless, smaller, slower); jpeg (lossy, much smaller)",
+    )
+    parser.add_argument(
+        "--cameras", metavar="A,B,...", help="names of the cameras to keep (default: all)"
+    )
+    parser.add_argument(
+        "--start",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="leave out the first S seconds (default 0)",
+    )
+    parser.add_argument(
+        "--end",
+        type=float,
+        metavar="S",
+        help="leave out what is later than S seconds after the first set (default: nothing)",
     )
     parser.add_argument("--force", action="store_true", help="replace an earlier bag at BAG")
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
@@ -58,8 +80,18 @@ def run(args: argparse.Namespace) -> int:
     started = time.monotonic()
     console = Console(stderr=True)
     recording = open_recording(
-        args.source, scale=args.scale, format=args.format, input_fps=args.input_fps
+        args.source,
+        scale=args.scale,
+        format=args.format,
+        input_fps=args.input_fps,
+        up=args.up,
+        units=args.units,
     )
+    start = 0
+    if args.cameras is not None or args.start != 0.0 or args.end is not None:
+        names = None if args.cameras is None else [n for n in args.cameras.split(",") if n]
+        part = PartRecording(recording, cameras=names, from_s=args.start, until_s=args.end)
+        recording, start = part, part.first
     every = every_for_fps(recording.fps, args.fps)
     with Progress(
         TextColumn("{task.description}"),
@@ -74,6 +106,7 @@ def run(args: argparse.Namespace) -> int:
         summary = write_bag(
             recording,
             args.bag,
+            start=start,
             every=every,
             compress=args.compress,
             backgrounds=backgrounds,

@@ -17,9 +17,9 @@ HELP = (
     "Write a result (NAME.trc, NAME.json) as NAME.FORMAT: mot (OpenSim motion, degrees), osim "
     "(OpenSim model of the person with these markers, and NAME.ik.xml, the setup of inverse "
     "kinematics), c3d (mm), bvh (cm), csv (one row per frame and joint), npz (NumPy arrays), trc "
-    "(with --names) or bag (folder NAME_bag with the node's topics). Axes and origin as in "
-    "NAME.trc, Y up; a bag is in the world frame. Frames without a pose are empty; in BVH they "
-    "repeat the last pose."
+    "(with --names), humaneva.xml (for HumanEva's web evaluation, mm, Z up) or bag (folder "
+    "NAME_bag with the node's topics). Axes and origin as in NAME.trc, Y up; a bag is in the world "
+    "frame. Frames without a pose are empty; in BVH they repeat the last pose."
 )
 EXAMPLE = "markerless_tracker export out/walk --to mot,osim,c3d"
 

@@ -32,7 +32,9 @@ VERBS: Mapping[str, str] = MappingProxyType(
     {
         "convert": "write a recording, dataset or videos as an MCAP bag",
         "track": "track the person in a recording or bag",
+        "batch": "track many recordings: results and one summary table",
         "export": "write a result in the formats of OpenSim, C3D, BVH, CSV, NumPy and ROS",
+        "record": "record the topics of a running graph to an MCAP bag",
         "evaluate": "compare a result with reference markers, in mm",
         "report": "write one HTML page about a result: film, verdict, errors, angles, gait",
         "view": "show a result over its images: film, picture, Rerun viewer",
@@ -59,7 +61,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit status: 0 done, 1 failed with one line on standard error, 2 wrong arguments,
-        3 no person found (`track`), 130 interrupted, 141 standard output was closed by its reader.
+        3 no person found (`track`, `batch`), 130 interrupted, 141 standard output was closed by its
+        reader.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if not words:

@@ -4,19 +4,20 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from markerless_tracker.body import load_description
 from markerless_tracker.camera.calibration import write_calibration
 from markerless_tracker.camera.doubts import calibration_doubts
 from markerless_tracker.cli.track_arguments import add_arguments
+from markerless_tracker.cli.track_notices import COMPILING, Bars, Notices, tell, warn
 from markerless_tracker.compiled import compilation
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
@@ -54,87 +55,25 @@ _KEYS = ("optimizer", "body", "evaluations", "seed", "threads")
 def run(args: argparse.Namespace) -> int:
     """Track; returns 0, or 3 if no person was found."""
     console = Console(stderr=True)
-    config = read_config(args.config, _flags(args))
-    check_target(args.name, overwrite=args.force, allow="--force")
-    smoothing = None
-    if args.smooth is not None or args.fill_gaps is not None:
-        smoothing = Smoothing(args.smooth, args.fill_gaps or 0.0)
-    recording = open_recording(args.source, scale=args.scale)
-    if args.time_offsets is not None:
-        recording = InStepRecording(recording, read_time_offsets(args.time_offsets))
-    if args.masks is not None:
-        if args.debug_images is not None:
-            raise ConfigError("--debug-images shows the segmentation, which --masks replaces")
-        recording = SilhouetteRecording(recording, args.masks)
-    doubts = calibration_doubts(recording.rig)
-    for doubt in doubts:
-        _warn(console, doubt)
-    with Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
-        console=console,
-    ) as bars:  # fmt: skip
-        task = bars.add_task("background", total=None)
-        setup = build_tracker(
-            recording.rig,
-            config,
-            backgrounds=(
-                recording_backgrounds(recording, config, args.background)
-                if args.masks is None
-                else None
-            ),
-            start_file=args.start,
-            subject_file=args.subject,
-            subject_from=args.subject_from,
-            stature=args.stature,
-        )
-        setup.tracker.evidence.start_process()
-        bars.update(task, description="compiling")
-        with compilation(lambda _, done, most: bars.update(task, completed=done, total=most)):
-            setup.tracker.warm_up()
-        bars.reset(
-            task, description=f"tracking {recording.name}", total=_total(recording, setup, args.fps)
-        )
-        outcome = _track(
-            args,
-            recording,
-            setup,
-            config,
-            doubts,
-            warn=lambda text: _warn(console, text),
-            progress=lambda done: bars.update(task, completed=done),
-        )
-        setup.tracker.evidence.close()
-    filled = None
-    verdict = outcome.verdict
-    if smoothing is not None and verdict.tracked:
-        filled = smooth_result(args.name, smoothing)
-    if args.refine_calibration is not None:
-        full = open_recording(args.source).rig
-        write_calibration(args.refine_calibration, corrected(full, outcome.shifts, args.scale))
-    for warning in (*recording.warnings, *describe(outcome.shifts)):
-        _warn(console, warning)
-    if verdict.frames_with_warnings:
-        _warn(
-            console,
-            f"{verdict.frames_with_warnings} of {verdict.frames} frames have warnings, "
-            f"{verdict.warnings} kinds of them",
-        )
+    with Bars(console) as bars:
+        finished = track_source(args, bars)
+    for warning in finished.late_warnings:
+        warn(console, warning)
+    verdict = finished.outcome.verdict
     if args.json:
-        summary = _summary(args, recording, outcome)
-        if filled is not None:
-            summary["filled"] = filled
-        json.dump(summary, sys.stdout, indent=2)
+        json.dump(finished.summary, sys.stdout, indent=2)
         sys.stdout.write("\n")
     else:
         print(
-            f"{outcome.trc_path}: {verdict.counts}, {outcome.frames_per_s} frames/s"
-            + (f"; {filled} frames filled" if filled else "")
+            f"{finished.outcome.trc_path}: {verdict.counts}, "
+            f"{finished.outcome.frames_per_s} frames/s"
+            + (f"; {finished.filled} frames filled" if finished.filled else "")
         )
         for line in verdict.lines():
             print(line)
     if verdict.tracked:
         return 0
-    _tell(
+    tell(
         console,
         f"no person was found in {verdict.frames} of {verdict.frames} frames; no subject file was "
         "written",
@@ -143,7 +82,89 @@ def run(args: argparse.Namespace) -> int:
 
 
 @dataclass(frozen=True)
-class _Outcome:
+class Finished:
+    """A finished run of `track_source`.
+
+    Attributes:
+        outcome: what the frames gave.
+        filled: interpolated frames, None without smoothing.
+        late_warnings: warnings known at the end only, one line each.
+        summary: all of it, for JSON.
+    """
+
+    outcome: "Outcome"
+    filled: int | None
+    late_warnings: tuple[str, ...]
+    summary: Mapping[str, Any]
+
+
+def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
+    """Do what the arguments of `track` ask for, and write the result's files.
+
+    Args:
+        args: parsed arguments (`add_arguments`).
+        notices: receives the progress and the warnings.
+
+    Raises:
+        TrackerError: an argument is impossible, or a file cannot be read or written.
+    """
+    config = read_config(args.config, given_settings(args))
+    check_target(args.name, overwrite=args.force, allow="--force")
+    smoothing = None
+    if args.smooth is not None or args.fill_gaps is not None:
+        smoothing = Smoothing(args.smooth, args.fill_gaps or 0.0)
+    recording = _opened(args, args.scale)
+    if args.time_offsets is not None:
+        recording = InStepRecording(recording, read_time_offsets(args.time_offsets))
+    if args.masks is not None:
+        if args.debug_images is not None:
+            raise ConfigError("--debug-images shows the segmentation, which --masks replaces")
+        recording = SilhouetteRecording(recording, args.masks)
+    doubts = calibration_doubts(recording.rig)
+    for doubt in doubts:
+        notices.warn(doubt)
+    notices.begin("background")
+    setup = build_tracker(
+        recording.rig,
+        config,
+        backgrounds=(
+            recording_backgrounds(recording, config, args.background)
+            if args.masks is None
+            else None
+        ),
+        start_file=args.start,
+        subject_file=args.subject,
+        subject_from=args.subject_from,
+        stature=args.stature,
+    )
+    with closing(setup.tracker.evidence) as evidence:
+        evidence.start_process()
+        notices.begin(COMPILING)
+        with compilation(lambda _, done, most: notices.step(done, most)):
+            setup.tracker.warm_up()
+        notices.begin(f"tracking {recording.name}", _total(recording, setup, args.fps))
+        outcome = _track(args, recording, setup, config, doubts, notices)
+    filled = None
+    verdict = outcome.verdict
+    if smoothing is not None and verdict.tracked:
+        filled = smooth_result(args.name, smoothing)
+    if args.refine_calibration is not None:
+        full = _opened(args, 1.0).rig
+        write_calibration(args.refine_calibration, corrected(full, outcome.shifts, args.scale))
+    late = [*recording.warnings, *describe(outcome.shifts)]
+    if verdict.frames_with_warnings:
+        late.append(
+            f"{verdict.frames_with_warnings} of {verdict.frames} frames have warnings, "
+            f"{verdict.warnings} kinds of them"
+        )
+    summary = _summary(args, recording, outcome)
+    if filled is not None:
+        summary["filled"] = filled
+    return Finished(outcome, filled, tuple(late), summary)
+
+
+@dataclass(frozen=True)
+class Outcome:
     """What a run gave.
 
     Attributes:
@@ -166,16 +187,25 @@ class _Outcome:
         return round(self.record.frames / self.seconds, 2) if self.seconds > 0 else None
 
 
+def _opened(args: argparse.Namespace, scale: float) -> Recording:
+    return open_recording(
+        args.source,
+        scale=scale,
+        format=args.format,
+        input_fps=args.input_fps,
+        up=args.up,
+        units=args.units,
+    )
+
+
 def _track(
     args: argparse.Namespace,
     recording: Recording,
     setup: TrackerSetup,
     config: TrackerConfig,
     doubts: Sequence[str],
-    *,
-    warn: Callable[[str], None],
-    progress: Callable[[int], Any],
-) -> _Outcome:
+    notices: Notices,
+) -> Outcome:
     """Track all frames and write the result and the debug images."""
     tracker = setup.tracker
     debug = DebugImages(args.debug_images) if args.debug_images else None
@@ -197,10 +227,10 @@ def _track(
             writer.body = body
             check.add(result, body)
             for kind in record.add(result, body, tracked.images.index):
-                warn(f"frame {kind.first_frame}: {kind.text}")
+                notices.warn(f"frame {kind.first_frame}: {kind.text}")
             if debug:
                 debug.write(tracked.images, result, tracker.rig, body, tracker.segmenter)
-            progress(record.frames)
+            notices.step(record.frames)
         seconds = time.perf_counter() - started
         shifts = check.shifts()
         verdict = verdict_of(
@@ -213,10 +243,10 @@ def _track(
         writer.note({"scale": args.scale})
         if args.time_offsets is not None:
             writer.note({"time_offsets_s": read_time_offsets(args.time_offsets)})
-    return _Outcome(writer.trc_path, seconds, shifts, record, verdict)
+    return Outcome(writer.trc_path, seconds, shifts, record, verdict)
 
 
-def _summary(args: argparse.Namespace, recording: Recording, outcome: _Outcome) -> dict[str, Any]:
+def _summary(args: argparse.Namespace, recording: Recording, outcome: Outcome) -> dict[str, Any]:
     return {
         "source": str(args.source),
         "result": str(outcome.trc_path),
@@ -230,14 +260,6 @@ def _summary(args: argparse.Namespace, recording: Recording, outcome: _Outcome) 
         "frame_warnings": outcome.record.warnings.as_list(),
         "cameras": _cameras(outcome.shifts),
     }
-
-
-def _warn(console: Console, text: str) -> None:
-    _tell(console, f"warning: {text}")
-
-
-def _tell(console: Console, text: str) -> None:
-    console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
@@ -274,7 +296,8 @@ def _cameras(shifts: Mapping[str, Shift]) -> dict[str, Any]:
     }
 
 
-def _flags(args: argparse.Namespace) -> dict[str, Any]:
+def given_settings(args: argparse.Namespace) -> dict[str, Any]:
+    """The settings among the arguments that were given."""
     named = {key: getattr(args, key) for key in (*_KEYS, "preset")}
     return {key: value for key, value in named.items() if value is not None}
 

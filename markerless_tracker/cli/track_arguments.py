@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from markerless_tracker.datasets import FORMATS
+from markerless_tracker.datasets.upright import AXES, UNITS
 from markerless_tracker.results.smooth import CUTOFF_HZ
 from markerless_tracker.tracking import OPTIMIZERS, PRESETS
 
@@ -10,7 +12,10 @@ from markerless_tracker.tracking import OPTIMIZERS, PRESETS
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments, in groups."""
     parser.add_argument(
-        "source", metavar="SOURCE", type=Path, help="recording folder, Pose2Sim project or bag"
+        "source",
+        metavar="SOURCE",
+        type=Path,
+        help="recording folder, bag or other recording",
     )
     parser.add_argument(
         "-o",
@@ -24,6 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--force", action="store_true", help="replace the files of an earlier result of that NAME"
     )
+    add_options(parser)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Declare all options but those of the result's place and of the output, in groups."""
     _person(parser.add_argument_group("the person (all optional)"))
     _images(parser.add_argument_group("images"))
     _search(parser.add_argument_group("search"))
@@ -86,6 +96,34 @@ def _images(group: argparse._ArgumentGroup) -> None:
         type=Path,
         metavar="DIR",
         help="empty-scene images or learned backgrounds (.npz), one per camera",
+    )
+    add_world(group)
+    add_format(group)
+
+
+def add_format(group: "argparse._ActionsContainer") -> None:
+    """Declare what says how a recording is to be read."""
+    group.add_argument(
+        "--format", choices=FORMATS, help="format of the recording (default: detected)"
+    )
+    group.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images, 1/s")
+
+
+def add_world(group: "argparse._ActionsContainer") -> None:
+    """Declare what turns the world of a calibration upright."""
+    group.add_argument(
+        "--up",
+        choices=AXES,
+        default="z",
+        metavar="AXIS",
+        help="axis of the calibration's world that is up: x, y, z, or -x, -y, -z as --up=-y "
+        "(default z)",
+    )
+    group.add_argument(
+        "--units",
+        choices=tuple(UNITS),
+        default="m",
+        help="of the lengths in the calibration (default m)",
     )
 
 

@@ -6,10 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from markerless_tracker.camera import CameraRig, read_calibration
-from markerless_tracker.datasets.markers.track import MarkerTrack
-from markerless_tracker.datasets.markers.trc import read_trc
 from markerless_tracker.datasets.recording import FrameSet, Recording
-from markerless_tracker.datasets.truth import truth_path
 from markerless_tracker.datasets.video.decode import read_together
 from markerless_tracker.datasets.video.images import (
     find_stream,
@@ -144,11 +141,6 @@ class FolderRecording(VideoRecording):
             )
         found = {name: source for name, source in sources.items() if source is not None}
         super().__init__(path, found, rig, scale=scale, input_fps=input_fps)
-
-    def ground_truth(self) -> MarkerTrack | None:
-        """The markers of `ground_truth.trc`, None if there is no such file."""
-        path = truth_path(self.path)
-        return read_trc(path) if path.is_file() else None
 
     def masks(self, camera: str) -> dict[int, Image]:
         """Frame index -> true silhouette (h, w) of a camera, 0 or 255, scaled: `masks/NAME/`."""

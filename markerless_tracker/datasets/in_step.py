@@ -6,6 +6,7 @@ from pathlib import Path
 
 import yaml
 
+from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.datasets.video.rates import stamp_of
 from markerless_tracker.errors import ConfigError
@@ -91,6 +92,10 @@ class InStepRecording(Recording):
     def room_stills(self) -> dict[str, list[Image]]:
         """As of the stored recording."""
         return self._inner.room_stills()
+
+    def ground_truth(self) -> MarkerTrack | None:
+        """As of the stored recording."""
+        return self._inner.ground_truth()
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
         index, nearest_ns = self._inner._nearest(stamp_ns)

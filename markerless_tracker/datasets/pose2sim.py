@@ -1,4 +1,7 @@
-"""Pose2Sim projects: `videos/*.mp4` and `calibration/*.toml` or a Qualisys `*.qca.txt`."""
+"""Pose2Sim projects: `videos/*.mp4` and `calibration/*.toml` or a Qualisys `*.qca.txt`.
+
+In a batch session the trials, each with its own `videos/`, share the calibration beside them.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +20,7 @@ from markerless_tracker.imaging import Image, scale_image
 
 
 class Pose2SimRecording(VideoRecording):
-    """A Pose2Sim project of one trial.
+    """A Pose2Sim project of one trial, or a trial of a batch session.
 
     A video whose size differs from its calibration gets its K rescaled per axis, with a warning:
     projects often store videos a few pixels narrower than they were calibrated.
@@ -66,12 +69,19 @@ class Pose2SimRecording(VideoRecording):
         return stills
 
 
+def is_pose2sim(path: Path) -> bool:
+    """Whether a folder is a project, or a trial of a batch session."""
+    return (path / "videos").is_dir() and calibration_folder(path) is not None
+
+
 def calibration_folder(path: Path) -> Path | None:
-    """A project's folder of calibration files, whose name starts with `calib`."""
-    if not path.is_dir():
-        return None
-    folders = [entry for entry in path.iterdir() if entry.name.lower().startswith("calib")]
-    return next((folder for folder in sorted(folders) if folder.is_dir()), None)
+    """The folder of calibration files (its name starts with `calib`): in the trial or beside it."""
+    for folder in (path, path.resolve().parent):
+        found = sorted(folder.glob("[Cc]alib*")) if folder.is_dir() else []
+        own = next((entry for entry in found if entry.is_dir()), None)
+        if own is not None:
+            return own
+    return None
 
 
 def _read_rig(folder: Path) -> CameraRig:

@@ -8,6 +8,9 @@ from types import MappingProxyType
 
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets.background import read_background, read_background_models
+from markerless_tracker.datasets.markers.track import MarkerTrack
+from markerless_tracker.datasets.markers.trc import read_trc
+from markerless_tracker.datasets.truth import truth_path
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.imaging import BackgroundModel, Image
 
@@ -135,6 +138,15 @@ class Recording(ABC):
     def room_stills(self) -> dict[str, list[Image]]:
         """Camera name -> still images (scaled) of the room, in which people may be visible."""
         return {}
+
+    def ground_truth(self) -> MarkerTrack | None:
+        """The reference markers, None without any; `ground_truth.trc` unless a format has others.
+
+        Raises:
+            DatasetError: their file cannot be read.
+        """
+        path = truth_path(self.path)
+        return read_trc(path) if path.is_file() else None
 
     @abstractmethod
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:

@@ -6,6 +6,7 @@ from typing import cast
 
 import numpy as np
 
+from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.datasets.video.images import numbered_files, read_image
 from markerless_tracker.errors import DatasetError
@@ -59,6 +60,10 @@ class SilhouetteRecording(Recording):
     def warnings(self) -> tuple[str, ...]:
         """Problems found, one line each."""
         return (*self._inner.warnings, *self._warnings.values())
+
+    def ground_truth(self) -> MarkerTrack | None:
+        """As of the stored recording."""
+        return self._inner.ground_truth()
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
         return self._inner._nearest(stamp_ns)

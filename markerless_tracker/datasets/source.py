@@ -1,13 +1,43 @@
 """Opening a recording of any supported format, detected or named."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from markerless_tracker.datasets.folder import CALIBRATION, FolderRecording
-from markerless_tracker.datasets.pose2sim import Pose2SimRecording, calibration_folder
+from markerless_tracker.datasets.formats.anipose import AniposeRecording, is_anipose
+from markerless_tracker.datasets.formats.bodytrack import BodytrackRecording, is_bodytrack
+from markerless_tracker.datasets.formats.humaneva import HumanEvaRecording, is_humaneva
+from markerless_tracker.datasets.formats.opencv import OpenCVRecording, is_opencv
+from markerless_tracker.datasets.pose2sim import Pose2SimRecording, is_pose2sim
 from markerless_tracker.datasets.recording import Recording
+from markerless_tracker.datasets.upright import upright
 from markerless_tracker.errors import DatasetError
 
-FORMATS = ("folder", "pose2sim", "bag")
+_READERS: Mapping[str, Callable[..., Recording]] = MappingProxyType(
+    {
+        "folder": FolderRecording,
+        "pose2sim": Pose2SimRecording,
+        "humaneva": HumanEvaRecording,
+        "bodytrack": BodytrackRecording,
+        "anipose": AniposeRecording,
+        "opencv": OpenCVRecording,
+    }
+)
+"""Readers of videos and images by format."""
+_SIGNS: Mapping[str, Callable[[Path], bool]] = MappingProxyType(
+    {
+        "folder": lambda path: (path / CALIBRATION).is_file(),
+        "humaneva": is_humaneva,
+        "bodytrack": is_bodytrack,
+        "anipose": is_anipose,
+        "pose2sim": is_pose2sim,
+        "opencv": is_opencv,
+    }
+)
+"""Whether a path has a format; the first that fits counts."""
+
+FORMATS = (*_READERS, "bag")
 
 
 def open_recording(
@@ -16,14 +46,18 @@ def open_recording(
     scale: float = 1.0,
     format: str | None = None,
     input_fps: float | None = None,
+    up: str = "z",
+    units: str = "m",
 ) -> Recording:
-    """Open a recording folder, a Pose2Sim project or a bag (folder or `.mcap`).
+    """Open a recording folder, a bag (folder or `.mcap`) or a recording of another format.
 
     Args:
         path: the folder or file.
         scale: factor for all images and cameras, in (0, 1].
         format: one of `FORMATS`; None detects it.
         input_fps: rate of numbered images (and, if given, of videos), 1/s.
+        up: axis of the calibration's world that is up, such as `-y`; it becomes z.
+        units: of the calibration's lengths: m, cm or mm.
 
     Raises:
         DatasetError: no supported format, or the recording is damaged.
@@ -33,31 +67,29 @@ def open_recording(
     if not path.exists():
         raise DatasetError(f"{path}: no such file or folder")
     kind = format or detect_format(path)
+    recording: Recording
     if kind == "bag":
         # rosbags and mcap are slow to import, and only bags need them.
         from markerless_tracker.datasets.bag.recording import BagRecording
 
-        return BagRecording(path, scale=scale)
-    if kind == "folder":
-        return FolderRecording(path, scale=scale, input_fps=input_fps)
-    if kind == "pose2sim":
-        return Pose2SimRecording(path, scale=scale, input_fps=input_fps)
-    if format is not None:
+        recording = BagRecording(path, scale=scale)
+    elif kind is not None and kind in _READERS:
+        recording = _READERS[kind](path, scale=scale, input_fps=input_fps)
+    elif format is not None:
         raise DatasetError(f"format {format!r}: expected one of {', '.join(FORMATS)}")
-    raise DatasetError(
-        f"{path}: no recording; expected a folder with {CALIBRATION} and videos, a Pose2Sim "
-        "project (videos/ and calibration/), or a bag (folder or .mcap)"
-    )
+    else:
+        raise DatasetError(
+            f"{path}: no recording; expected a folder with {CALIBRATION} and videos, a bag (folder "
+            f"or .mcap), or one of the formats {', '.join(_READERS)}"
+        )
+    recording.rig = upright(recording.rig, up=up, units=units)
+    return recording
 
 
 def detect_format(path: Path) -> str | None:
     """The format (one of `FORMATS`) of what is at a path, None if it has none of them."""
-    if path.is_file():
-        return "bag" if path.suffix == ".mcap" else None
+    if path.is_file() and path.suffix == ".mcap":
+        return "bag"
     if (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")):
         return "bag"
-    if (path / CALIBRATION).is_file():
-        return "folder"
-    if (path / "videos").is_dir() and calibration_folder(path) is not None:
-        return "pose2sim"
-    return None
+    return next((name for name, sign in _SIGNS.items() if sign(path)), None)

@@ -1,7 +1,10 @@
 """Folders that are created complete or not at all."""
 
+import ctypes
 import os
+import re
 import shutil
+import socket
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +21,9 @@ def new_folder(path: str | Path, *, replace: bool = False) -> Iterator[Path]:
     """A folder to fill; it is renamed to `path` when the block ends without an exception.
 
     Until then it is in a hidden `.NAME.partial-*` next to it, which is removed on any exception,
-    Ctrl-C included. An empty folder at `path` is replaced.
+    Ctrl-C included, or after a kill by the next call with that path. An empty folder at `path` is
+    replaced. At every moment an earlier bag or the new one is at `path`, where the system can
+    exchange two folders (Linux, on local disks).
 
     Args:
         path: the folder.
@@ -38,7 +43,9 @@ def new_folder(path: str | Path, *, replace: bool = False) -> Iterator[Path]:
         )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        holder = Path(tempfile.mkdtemp(prefix=f".{path.name}.partial-", dir=path.parent))
+        _sweep(path)
+        prefix = f"{_prefix(path)}{os.getpid()}-"
+        holder = Path(tempfile.mkdtemp(prefix=prefix, dir=path.parent))
     except OSError as error:
         raise DatasetError(f"{path}: cannot be created: {error.strerror}") from error
     try:
@@ -47,6 +54,8 @@ def new_folder(path: str | Path, *, replace: bool = False) -> Iterator[Path]:
         inner.mkdir()
         yield inner
         if earlier:
+            if _exchanged(inner, path):
+                return
             path.rename(holder / f"{path.name}.earlier")
         elif path.is_dir():
             path.rmdir()
@@ -55,3 +64,31 @@ def new_folder(path: str | Path, *, replace: bool = False) -> Iterator[Path]:
         raise DatasetError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         shutil.rmtree(holder, ignore_errors=True)
+
+
+def _prefix(path: Path) -> str:
+    """Start of the names of folders that this machine fills for a path; their process follows."""
+    return f".{path.name}.partial-{socket.gethostname()}-"
+
+
+def _sweep(path: Path) -> None:
+    """Remove what killed processes of this machine left beside a path."""
+    for folder in path.parent.iterdir():
+        if not folder.name.startswith(_prefix(path)):
+            continue
+        match = re.match(r"(\d+)-", folder.name.removeprefix(_prefix(path)))
+        if match and not os.path.exists(f"/proc/{match[1]}") and os.path.isdir("/proc/self"):
+            left = folder / f"{path.name}.earlier"
+            if left.is_dir() and not path.exists():
+                left.rename(path)
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Exchange two folders at once; False where the system cannot."""
+    try:
+        exchange = ctypes.CDLL(None).renameat2
+    except (OSError, AttributeError):
+        return False
+    here, both = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    return bool(exchange(here, os.fsencode(one), here, os.fsencode(other), both) == 0)

@@ -35,7 +35,7 @@ def assert_same(read: Recording, source: Recording, *, every: int = 1) -> None:
             np.testing.assert_array_equal(a, b)
 
 
-@pytest.mark.parametrize("compress", ["none", "zstd"])
+@pytest.mark.parametrize("compress", ["none", "zstd", "png"])
 @pytest.mark.parametrize(("scale", "every", "backgrounds"), [(1.0, 1, 1), (0.5, 3, 3)])
 def test_a_bag_holds_the_same_bytes(
     make_recording, tmp_path: Path, compress: str, scale: float, every: int, backgrounds: int
@@ -148,7 +148,7 @@ def test_existing_targets_and_unknown_compressions_are_refused(
     source = open_recording(make_recording())
     with pytest.raises(DatasetError, match="exists and is not empty"):
         write_bag(source, tmp_path / "small")
-    with pytest.raises(ConfigError, match="'bzip'.*none, zstd, jpeg"):
+    with pytest.raises(ConfigError, match="'bzip'.*none, zstd, png, jpeg"):
         write_bag(source, tmp_path / "out", compress="bzip")
     (tmp_path / "out").mkdir()
     assert write_bag(source, tmp_path / "out").sets == 6

@@ -1,6 +1,7 @@
 """What `track` reports: warnings of frames, no person found, and how often it reads a bag."""
 
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import yaml
 from markerless_tracker.bags import write_bag
 from markerless_tracker.cli import track
 from markerless_tracker.cli.main import main
-from markerless_tracker.datasets import new_recording, open_recording, read_trc
+from markerless_tracker.datasets import new_recording, open_recording, read_trc, write_image
 from markerless_tracker.datasets.bag.stream import McapFiles, RawMessage
 from markerless_tracker.results.run import TrackedFrame, track_recording
 from markerless_tracker.synthesis import SyntheticScene
@@ -129,3 +130,20 @@ def test_a_bag_is_read_as_often_for_few_frames_as_for_many(
     assert run(tmp_path / "bag", *words)[0] == 0
     # Once to open, once each for the start and the number of frames, and once to track.
     assert passes == ["heads", "heads", "heads", "messages"]
+
+
+def test_numbered_images_give_the_result_of_the_video(run: Run, walk, tmp_path) -> None:
+    status, _, _ = run(walk, "--start", walk / "ground_truth.trc")
+    assert status == 0
+    of_video = (tmp_path / "out.trc").read_bytes()
+    folder = tmp_path / "walk"
+    shutil.copytree(walk, folder)
+    for frame in open_recording(walk).frames():
+        for name, image in frame.images.items():
+            write_image(folder / name / f"{frame.index}.png", image)
+            (folder / f"{name}.mkv").unlink(missing_ok=True)
+    status, _, err = run(folder, "--start", folder / "ground_truth.trc", "--force")
+    assert status == 1 and "cam01 states no rate, expected --input-fps" in err
+    words = ["--input-fps", 30, "--format", "folder", "--force"]
+    status, _, _ = run(folder, "--start", folder / "ground_truth.trc", *words)
+    assert status == 0 and (tmp_path / "out.trc").read_bytes() == of_video

@@ -115,3 +115,12 @@ def test_a_real_rig_round_trips_through_qualisys(balance_real: Path, tmp_path: P
     for read, expected in zip(read_calibration(tmp_path / "rig.toml"), rig, strict=True):
         np.testing.assert_allclose(read.matrix, expected.matrix, atol=1e-9)
         np.testing.assert_allclose(read.T_cam_world, expected.T_cam_world, atol=1e-9)
+
+
+def test_a_trial_of_a_batch_session_has_the_calibration_beside_it(project: Path) -> None:
+    trial = project / "Trial_1"
+    trial.mkdir()
+    (project / "videos").rename(trial / "videos")
+    recording = open_recording(trial)
+    assert isinstance(recording, Pose2SimRecording) and recording.name == "Trial_1"
+    assert len(list(recording.frames())) == 6

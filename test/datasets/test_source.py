@@ -16,7 +16,7 @@ def test_unknown_formats_are_refused(tmp_path: Path) -> None:
     (tmp_path / "file.txt").write_text("hello")
     with pytest.raises(DatasetError, match="no recording"):
         open_recording(tmp_path / "file.txt")
-    with pytest.raises(DatasetError, match="'video'.*folder, pose2sim, bag"):
+    with pytest.raises(DatasetError, match="'video'.*folder, pose2sim, humaneva, .*, bag"):
         open_recording(tmp_path, format="video")
 
 

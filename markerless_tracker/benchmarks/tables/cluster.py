@@ -11,14 +11,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from markerless_tracker.benchmarks.cluster import check_same, code_and_versions, submitted
 from markerless_tracker.benchmarks.tables.evidence import Evidence, EvidenceOrder
-from markerless_tracker.benchmarks.tables.fingerprint import code_key
 from markerless_tracker.benchmarks.tables.runs import Run, execute
-from markerless_tracker.errors import ConfigError, DatasetError, SearchError
-from markerless_tracker.results.result import versions
+from markerless_tracker.errors import DatasetError
 
-ANSWER_S = 10.0
-"""Timeout for the scheduler's answer, s."""
 _KEPT = 2
 """Recordings whose evidence a worker keeps."""
 
@@ -41,41 +38,11 @@ def run_all_on(
             worker has other code or versions.
         TrackerError: a run failed.
     """
-    try:
-        from distributed import Client, KilledWorker, as_completed
-    except ImportError as error:
-        raise ConfigError(
-            f"scheduler {scheduler}: the package distributed is not installed here, "
-            "expected markerless_tracker[cluster]"
-        ) from error
-    try:
-        client = Client(scheduler, timeout=ANSWER_S, set_as_default=False)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise ConfigError(
-            f"scheduler {scheduler}: no answer: {' '.join(str(error).split())}"
-        ) from error
-    with client:
-        if not client.nthreads():
-            raise ConfigError(f"scheduler {scheduler}: it has no worker, expected at least one")
-        same = code_and_versions()
-        futures = {
-            client.submit(execute_there, run, order, same, pure=False): number
-            for number, run in enumerate(runs)
-        }
-        try:
-            for future in as_completed(futures, loop=client.loop):
-                yield futures[future], future.result()
-        except KilledWorker as error:
-            raise SearchError(
-                f"scheduler {scheduler}: several workers died in a run: killed, or out of memory"
-            ) from error
-        finally:
-            client.cancel(list(futures))
-
-
-def code_and_versions() -> dict[str, str]:
-    """What must be equal on all machines: key of this package's code, and versions by name."""
-    return {"code": code_key(), **{name: str(value) for name, value in versions().items()}}
+    same = code_and_versions()
+    calls = [(run, order, same) for run in runs]
+    with submitted(scheduler, execute_there, calls) as answers:
+        for number, answer in answers:
+            yield number, answer()
 
 
 def execute_there(run: Run, order: EvidenceOrder, same: Mapping[str, str]) -> dict[str, Any]:
@@ -90,18 +57,11 @@ def execute_there(run: Run, order: EvidenceOrder, same: Mapping[str, str]) -> di
         ConfigError: the worker has others.
         TrackerError: the run failed.
     """
-    host = socket.gethostname()
-    here = code_and_versions()
-    differing = [name for name, value in same.items() if here.get(name) != value]
-    if differing:
-        raise ConfigError(
-            f"worker {host}: {', '.join(differing)} differ from those of the machine that makes "
-            "the table, expected the same"
-        )
+    check_same(same)
     try:
         evidence = _evidence(order)
     except DatasetError as error:
-        raise DatasetError(f"worker {host}: {error}") from error
+        raise DatasetError(f"worker {socket.gethostname()}: {error}") from error
     return execute(run, evidence)
 
 

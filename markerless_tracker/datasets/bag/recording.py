@@ -1,7 +1,7 @@
 """Bags (rosbag2, MCAP): images as topics, `calibration.toml` and `background/` in the folder."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path
@@ -110,6 +110,15 @@ class BagRecording(Recording):
             )
         if self._files.damage:
             self.warn(self._files.damage)
+
+    @property
+    def types(self) -> Mapping[str, str]:
+        """Topic -> message type of all topics of the bag."""
+        return self._files.types
+
+    def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        """The messages of some topics in file order, up to the first damage."""
+        return (message for message in self._files if message.topic in topics)
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
         best = (0, 0)

@@ -1,6 +1,6 @@
 """Messages of MCAP files in file order, up to the first damage; seeking by their chunk index."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -9,6 +9,7 @@ from mcap.records import Channel, Chunk, ChunkIndex, McapRecord, Message, Messag
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.summary import Summary
 
+from markerless_tracker.datasets.bag.cut_chunk import intact_records
 from markerless_tracker.errors import DatasetError
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -31,12 +32,17 @@ FIRST = Place(0, 0)
 
 
 class RawMessage(NamedTuple):
-    """One message as stored; `place` is its own record or the chunk that holds it."""
+    """One message as stored.
+
+    `place` is its own record or the chunk that holds it; `log_ns` the time at which it was
+    recorded, 0 in `McapFiles.heads`.
+    """
 
     topic: str
     type: str
     data: bytes
     place: Place
+    log_ns: int = 0
 
 
 class IndexDamaged(Exception):
@@ -132,7 +138,7 @@ class McapFiles:
                         yield RawMessage(topic, self.types[topic], data, place)
 
     def _messages(self, number: int, offset: int) -> Iterator[RawMessage]:
-        path, channels = self.paths[number], self._channels[number]
+        path = self.paths[number]
         with path.open("rb") as file:
             file.seek(offset)
             # No record is longer than its file: a damaged length must not allocate gigabytes.
@@ -148,19 +154,30 @@ class McapFiles:
                 place = Place(number, file.tell())
                 try:
                     record = next(records, None)
-                    parts = breakup_chunk(record) if isinstance(record, Chunk) else [record]
+                    parts = (
+                        breakup_chunk(record, validate_crc=True)
+                        if isinstance(record, Chunk)
+                        else [record]
+                    )
                 except Exception as error:  # damaged bytes raise any exception
                     self.damage = (
                         f"{path}: cut or damaged, read up to there ({type(error).__name__})"
                     )
+                    yield from self._known(number, intact_records(file, place.offset), place)
                     return
                 if record is None:
                     return
-                for part in parts:
-                    self._define(number, part)
-                    if isinstance(part, Message) and part.channel_id in channels:
-                        topic = channels[part.channel_id].topic
-                        yield RawMessage(topic, self.types[topic], part.data, place)
+                yield from self._known(number, parts, place)
+
+    def _known(
+        self, number: int, records: Iterable[McapRecord | None], place: Place
+    ) -> Iterator[RawMessage]:
+        """The messages among records of known topics; what defines topics is kept."""
+        for record in records:
+            self._define(number, record)
+            if isinstance(record, Message) and record.channel_id in self._channels[number]:
+                topic = self._channels[number][record.channel_id].topic
+                yield RawMessage(topic, self.types[topic], record.data, place, record.log_time)
 
     def _define(self, number: int, record: McapRecord | None) -> None:
         if isinstance(record, Schema):

@@ -1,6 +1,6 @@
 """Sets of a bag as serialised messages: as they are stored where that can be published."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -22,14 +22,27 @@ class PlayedSet:
     Attributes:
         stamp_ns: time of the images.
         messages: camera -> serialised sensor_msgs/CameraInfo and sensor_msgs/Image.
+        others: messages of other topics since the last set, as they are stored.
     """
 
     stamp_ns: int
     messages: dict[str, tuple[bytes, bytes]]
+    others: list[RawMessage]
 
 
-def played_sets(recording: BagRecording, start: int) -> Iterator[PlayedSet]:
+def played_sets(
+    recording: BagRecording,
+    start: int,
+    cameras: Collection[str],
+    others: Callable[[int], list[RawMessage]],
+) -> Iterator[PlayedSet]:
     """The sets of a bag from one on, serialised.
+
+    Args:
+        recording: the bag.
+        start: number of the first set.
+        cameras: those whose images are wanted.
+        others: gives the messages of other topics up to a time in ns.
 
     An image message is taken as it is stored if it is a raw image in its camera's frame; others are
     decoded and written anew.
@@ -44,7 +57,8 @@ def played_sets(recording: BagRecording, start: int) -> Iterator[PlayedSet]:
     infos = {camera.name: serialize_message(info_of(camera, 0)) for camera in recording.rig}
     with ThreadPoolExecutor(len(recording.rig), thread_name_prefix="decode") as pool:
         for found in recording.stored_sets(start):
-            names, stored = list(found.messages), list(found.messages.values())
+            wanted = {name: raw for name, raw in found.messages.items() if name in cameras}
+            names, stored = list(wanted), list(wanted.values())
             images = [_as_stored(recording, n, raw) for n, raw in zip(names, stored, strict=True)]
             if None in images:
                 decoded = pool.map(recording.image, stored)
@@ -59,6 +73,7 @@ def played_sets(recording: BagRecording, start: int) -> Iterator[PlayedSet]:
                     for name, image in zip(names, images, strict=True)
                     if image is not None
                 },
+                others(found.stamp_ns),
             )
 
 

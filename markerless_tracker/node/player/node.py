@@ -1,7 +1,7 @@
 """The node `player`: publishes the images of a bag, with their stamps, at the recorded rate."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -11,8 +11,11 @@ from sensor_msgs.msg import CameraInfo, Image
 from markerless_tracker.datasets import detect_format
 from markerless_tracker.datasets.bag.recording import BagRecording
 from markerless_tracker.errors import DatasetError
+from markerless_tracker.node.player.clock import BagClock
+from markerless_tracker.node.player.control import Control
 from markerless_tracker.node.player.encode import PlayedSet, played_sets
 from markerless_tracker.node.player.lockstep import Lockstep
+from markerless_tracker.node.player.others import OtherTopics
 from markerless_tracker.node.player.pace import Pace
 from markerless_tracker.node.player.parameters import (
     PlayerSettings,
@@ -41,6 +44,9 @@ _LINGER_S = 0.5
 class PlayerNode(GivenNode):
     """Publishes ``NAME/image_raw`` and ``NAME/camera_info`` of every camera of a bag.
 
+    On request only some topics, also others that the bag has, and `/clock`. Its services are those
+    of `Control`.
+
     Args:
         node_arguments: passed on to ``rclpy.node.Node`` (context, parameter_overrides, ...).
 
@@ -57,10 +63,13 @@ class PlayerNode(GivenNode):
         self._ready = False
         self._lockstep = Lockstep(self.settings.lockstep_timeout, clock=time.monotonic)
         self._served_s = time.monotonic()
-        names = self._recording.rig.names
+        images, infos, others = _choice(self._recording, self.settings.topics)
         qos = image_qos()
-        self._images = {n: self.create_publisher(Image, f"{n}/image_raw", qos) for n in names}
-        self._infos = {n: self.create_publisher(CameraInfo, f"{n}/camera_info", qos) for n in names}
+        self._images = {n: self.create_publisher(Image, f"{n}/image_raw", qos) for n in images}
+        self._infos = {n: self.create_publisher(CameraInfo, f"{n}/camera_info", qos) for n in infos}
+        self._others = OtherTopics(self, self._recording, others)
+        self._control = Control(self, paused=self.settings.paused)
+        self._clock = BagClock(self, self.settings.clock, self.settings.rate)
         self._states: Any = self.create_subscription(
             DiagnosticArray, "state", self._on_state, latched_qos()
         )
@@ -149,8 +158,12 @@ class PlayerNode(GivenNode):
         pace = Pace(self.settings.rate, clock=time.monotonic)
         with prefetch(self._sets, _PREFETCH_SETS) as sets:
             for played in sets:
-                if not self._sleep(0.0 if self._in_step else pace.wait_s(played.stamp_ns), spin):
+                wait_s = 0.0 if self._in_step else pace.wait_s(played.stamp_ns)
+                if not self._sleep(wait_s, played.stamp_ns, spin):
                     return False
+                if (held_s := self._control.hold(spin)) is None:
+                    return False
+                pace.held(held_s)
                 self._publish(played)
                 if not self._until_dealt_with(played.stamp_ns, spin):
                     return False
@@ -162,12 +175,17 @@ class PlayerNode(GivenNode):
         return True
 
     def _sets(self) -> Iterator[PlayedSet]:
-        return played_sets(self._recording, self._start)
+        wanted = {*self._images, *self._infos}
+        return played_sets(self._recording, self._start, wanted, self._others.up_to())
 
     def _publish(self, played: PlayedSet) -> None:
+        self._clock.publish(played.stamp_ns)
+        self._others.publish(played.others)
         for name, (info, image) in played.messages.items():
-            self._infos[name].publish(info)
-            self._images[name].publish(image)
+            if name in self._infos:
+                self._infos[name].publish(info)
+            if name in self._images:
+                self._images[name].publish(image)
         self.sets_played += 1
 
     def _until_dealt_with(self, stamp_ns: int, spin: Callable[[float], bool]) -> bool:
@@ -186,8 +204,14 @@ class PlayerNode(GivenNode):
                 )
         return True
 
-    def _sleep(self, seconds: float, spin: Callable[[float], bool]) -> bool:
-        """Sleep exactly, serving callbacks now and then; returns False when it is time to end."""
+    def _sleep(self, seconds: float, next_ns: int, spin: Callable[[float], bool]) -> bool:
+        """Sleep exactly until a set, serving callbacks now and then; False when it is time to end.
+
+        Args:
+            seconds: until the set.
+            next_ns: its stamp.
+            spin: as in `play`.
+        """
         until_s = time.monotonic() + seconds
         while True:
             now_s = time.monotonic()
@@ -198,7 +222,7 @@ class PlayerNode(GivenNode):
             left_s = until_s - time.monotonic()
             if left_s <= 0.0:
                 return True
-            time.sleep(min(left_s, _SERVE_S))
+            time.sleep(min(left_s, _SERVE_S, self._clock.tick(next_ns, left_s)))
 
     def _on_state(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -206,6 +230,22 @@ class PlayerNode(GivenNode):
             self._lockstep.hear(status.name, values)
             if "ready" in values:
                 self._ready = values["ready"] == "true"
+
+
+def _choice(
+    recording: BagRecording, topics: Sequence[str] | None
+) -> tuple[list[str], list[str], list[str]]:
+    """Cameras whose images, cameras whose infos are played, and names of other topics."""
+    names = recording.rig.names
+    if topics is None:
+        return list(names), list(names), []
+    images = {f"/{name}/image_raw": name for name in names}
+    infos = {f"/{name}/camera_info": name for name in names}
+    return (
+        [images[topic] for topic in topics if topic in images],
+        [infos[topic] for topic in topics if topic in infos],
+        [topic for topic in topics if topic not in images and topic not in infos],
+    )
 
 
 def _open_bag(settings: PlayerSettings) -> BagRecording:

@@ -45,3 +45,10 @@ class Pace:
         self._last = (at_s, stamp_ns)
         self.late_s = at_s - due_s
         return at_s - now_s
+
+    def held(self, seconds: float) -> None:
+        """Shift all later times by a pause, which is no delay."""
+        if self._origin is not None:
+            self._origin = (self._origin[0] + seconds, self._origin[1])
+        if self._last is not None:
+            self._last = (self._last[0] + seconds, self._last[1])

@@ -21,6 +21,9 @@ class PlayerSettings:
         wait_for_subscribers: wait until every image topic has a subscriber and `state` says ready.
         lockstep: send the next set when `state` tells that the last was dealt with; ignores `rate`.
         lockstep_timeout: s after which the next set is sent nevertheless.
+        paused: begin paused: nothing is sent before `~/step` or `~/resume`.
+        clock: messages per s on `/clock` between the sets, beside one with every set; 0 for none.
+        topics: topics to play (default: images and camera infos of all cameras).
     """
 
     bag: Path
@@ -30,6 +33,9 @@ class PlayerSettings:
     wait_for_subscribers: bool = False
     lockstep: bool = False
     lockstep_timeout: float = 60.0
+    paused: bool = False
+    clock: float = 0.0
+    topics: tuple[str, ...] | None = None
 
 
 _NAMES = tuple(entry.name for entry in fields(PlayerSettings))
@@ -50,18 +56,24 @@ def read_player_settings(given: Mapping[str, Any]) -> PlayerSettings:
         ("rate", 1e-3, 1e3),
         ("start_offset", 0.0, 1e9),
         ("lockstep_timeout", 0.1, 1e6),
+        ("clock", 0.0, 1e3),
     ):
         if name in values:
             chosen[name] = declared.number(name, values[name], least, most)
-    for name in ("loop", "wait_for_subscribers", "lockstep"):
+    for name in ("loop", "wait_for_subscribers", "lockstep", "paused"):
         if name in values:
             chosen[name] = declared.flag(name, values[name])
+    if "topics" in values:
+        chosen["topics"] = tuple(
+            f"/{name.strip('/')}" for name in declared.names("topics", values["topics"])
+        )
     return PlayerSettings(**chosen)
 
 
 def player_values(settings: PlayerSettings) -> dict[str, Any]:
     """Value of every parameter in a type that ROS supports."""
-    return {**asdict(settings), "bag": str(settings.bag)}
+    topics = None if settings.topics is None else list(settings.topics)
+    return {**asdict(settings), "bag": str(settings.bag), "topics": topics}
 
 
 def descriptions() -> dict[str, str]:

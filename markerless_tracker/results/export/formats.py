@@ -8,6 +8,7 @@ from markerless_tracker.results.export.bvh import write_bvh
 from markerless_tracker.results.export.c3d import write_c3d
 from markerless_tracker.results.export.csv import write_csv
 from markerless_tracker.results.export.grid import Grid
+from markerless_tracker.results.export.humaneva_xml import write_humaneva
 from markerless_tracker.results.export.mot import write_mot
 from markerless_tracker.results.export.npz import write_npz
 from markerless_tracker.results.export.osim import write_osim
@@ -65,6 +66,7 @@ EXPORTS: Mapping[str, Callable[[Path, ResultReader, tuple[str, ...]], Notes]] = 
         "bvh": _bvh,
         "c3d": _c3d,
         "csv": _plain(write_csv),
+        "humaneva.xml": _plain(write_humaneva),
         "mot": _plain(write_mot),
         "npz": _plain(write_npz),
         "osim": _plain(write_osim),

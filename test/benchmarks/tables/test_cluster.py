@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from markerless_tracker.benchmarks import cluster as calls
 from markerless_tracker.benchmarks.tables import cluster
 from markerless_tracker.benchmarks.tables.accuracy import Plan, make_table
 from markerless_tracker.benchmarks.tables.evidence import EvidenceOrder
@@ -75,7 +76,7 @@ def test_an_error_on_a_worker_is_raised_here(walk, scheduler) -> None:
 
 def test_a_scheduler_that_does_not_answer(walk, monkeypatch) -> None:
     pytest.importorskip("distributed", reason="distributed is not installed (extra [cluster])")
-    monkeypatch.setattr(cluster, "ANSWER_S", 0.5)
+    monkeypatch.setattr(calls, "ANSWER_S", 0.5)
     plan = Plan(configs=(SWARM,), seeds=1)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         with pytest.raises(ConfigError, match=f"scheduler {address}: no answer"):
@@ -99,7 +100,7 @@ class TestAWorker:
 
     def test_makes_evidence_once(self, order, run, monkeypatch) -> None:
         monkeypatch.setattr(cluster, "_made", {})
-        same = cluster.code_and_versions()
+        same = calls.code_and_versions()
         first = cluster.execute_there(run, order, same)
         monkeypatch.setattr(EvidenceOrder, "make", None)
         again = cluster.execute_there(run, order, same)
@@ -112,7 +113,7 @@ class TestAWorker:
 
     @pytest.mark.parametrize("name", ["code", "numpy"])
     def test_of_another_version_is_refused(self, order, run, name) -> None:
-        same = {**cluster.code_and_versions(), name: "another"}
+        same = {**calls.code_and_versions(), name: "another"}
         with pytest.raises(
             ConfigError, match=f"worker .*: {name} differ from those of the machine"
         ):
@@ -121,4 +122,4 @@ class TestAWorker:
     def test_without_the_recording_names_worker_and_recording(self, order, run, tmp_path) -> None:
         lost = replace(order, source=tmp_path / "lost")
         with pytest.raises(DatasetError, match="worker .*lost: no such file or folder"):
-            cluster.execute_there(run, lost, cluster.code_and_versions())
+            cluster.execute_there(run, lost, calls.code_and_versions())

@@ -56,3 +56,13 @@ def test_a_long_delay_shifts_all_later_times() -> None:
     assert pace.wait_s(100 * MS) == 0.0
     assert pace.shifted_s == pytest.approx(2.9) and pace.late_s == 0.0
     assert pace.wait_s(200 * MS) == pytest.approx(0.1)
+
+
+def test_a_pause_is_no_delay() -> None:
+    clock = Clock()
+    pace = Pace(1.0, clock=clock)
+    pace.wait_s(0)
+    clock.now_s += 60.0
+    pace.held(60.0)
+    assert pace.wait_s(100 * MS) == pytest.approx(0.1)
+    assert pace.shifted_s == pace.late_s == 0.0

@@ -1,0 +1,195 @@
+"""Writing of bag folders as rosbag2 of Jazzy writes them: one MCAP file and its metadata.yaml."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import yaml
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
+
+from markerless_tracker.bags.messages import typestore
+from markerless_tracker.errors import DatasetError
+
+LAST_SECOND = 2**31 - 1
+"""Stamps of ROS have int32 seconds; later ones cannot be written."""
+CHUNK_BYTES = 768 * 1024
+"""Least size of a chunk, as rosbag2 sets it; a killed writer loses one chunk at most."""
+
+_VERSION = 9
+_DISTRIBUTION = "jazzy"
+# What rclcpp states for a duration that is not limited.
+_FOREVER = {"sec": 9223372036, "nsec": 854775807}
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a bag that is being written.
+
+    Attributes:
+        name: absolute name.
+        kind: message type, such as sensor_msgs/msg/Image.
+        number: of its channel.
+        latched: whether late subscribers receive its last message.
+        digest: RIHS01 hash of its type.
+    """
+
+    name: str
+    kind: str
+    number: int
+    latched: bool
+    digest: str
+
+
+class BagWriter:
+    """A new bag in a folder that exists: `NAME.mcap` for a folder NAME, and `metadata.yaml`.
+
+    Chunks and the summary have checksums. The metadata is written when the block ends without an
+    exception; without it, the messages of complete chunks can be read.
+
+    Args:
+        folder: of the bag.
+        zstd: whether chunks are compressed.
+        chunk_bytes: least size of a chunk.
+    """
+
+    def __init__(self, folder: Path, *, zstd: bool = False, chunk_bytes: int = CHUNK_BYTES) -> None:
+        self._folder = folder
+        self._path = folder / f"{folder.name}.mcap"
+        self._file = self._path.open("xb")
+        self._mcap = McapWriter(
+            self._file,
+            chunk_size=chunk_bytes,
+            compression=CompressionType.ZSTD if zstd else CompressionType.NONE,
+        )
+        self._mcap.start(profile="ros2", library="markerless_tracker")
+        self._schemas: dict[str, int] = {}
+        self._topics: list[Topic] = []
+        self._counts: Counter[int] = Counter()
+        self._first_ns: int | None = None
+        self._last_ns = 0
+
+    def topic(self, name: str, kind: str, *, latched: bool = False) -> Topic:
+        """Declare a topic of a message type."""
+        if kind not in self._schemas:
+            text, _ = typestore().generate_msgdef(kind, ros_version=2)
+            self._schemas[kind] = self._mcap.register_schema(kind, "ros2msg", text.encode())
+        digest = typestore().hash_rihs01(kind)
+        about = {
+            "offered_qos_profiles": _dump([_qos(latched)]).rstrip("\n"),
+            "topic_type_hash": digest,
+        }
+        number = self._mcap.register_channel(name, "cdr", self._schemas[kind], about)
+        self._topics.append(Topic(name, kind, number, latched, digest))
+        return self._topics[-1]
+
+    def write(self, topic: Topic, stamp_ns: int, message: Any) -> None:
+        """Write a message (of rosbags' types) with the time at which it was received.
+
+        Raises:
+            DatasetError: the stamp does not fit in a message.
+        """
+        self.write_serialized(topic, stamp_ns, typestore().serialize_cdr(message, topic.kind))
+
+    def write_serialized(self, topic: Topic, stamp_ns: int, data: Any) -> None:
+        """Write a message that is serialised already; as `write`."""
+        if not 0 <= stamp_ns < LAST_SECOND * 10**9:
+            raise DatasetError(f"{topic.name}: stamp {stamp_ns} ns cannot be written to a bag")
+        number = self._counts[topic.number]
+        self._mcap.add_message(topic.number, stamp_ns, data, stamp_ns, number)
+        self._counts[topic.number] += 1
+        self._first_ns = stamp_ns if self._first_ns is None else min(self._first_ns, stamp_ns)
+        self._last_ns = max(self._last_ns, stamp_ns)
+
+    @property
+    def messages(self) -> int:
+        """Number of messages written."""
+        return self._counts.total()
+
+    def flush(self) -> None:
+        """End the current chunk and give everything to the operating system."""
+        self._mcap.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        with self._file:
+            if kind is not None:
+                return
+            about = self._metadata()
+            self._mcap.add_metadata("rosbag2", {"serialized_metadata": _dump(about).rstrip("\n")})
+            self._mcap.finish()
+        text = _dump({"rosbag2_bagfile_information": about})
+        (self._folder / "metadata.yaml").write_text(text, encoding="utf-8")
+
+    def _metadata(self) -> dict[str, Any]:
+        start = {"nanoseconds_since_epoch": self._first_ns or 0}
+        duration = {"nanoseconds": self._last_ns - (self._first_ns or 0)}
+        return {
+            "version": _VERSION,
+            "storage_identifier": "mcap",
+            "duration": duration,
+            "starting_time": start,
+            "message_count": self.messages,
+            "topics_with_message_count": [
+                {
+                    "topic_metadata": {
+                        "name": topic.name,
+                        "type": topic.kind,
+                        "serialization_format": "cdr",
+                        "offered_qos_profiles": [_qos(topic.latched)],
+                        "type_description_hash": topic.digest,
+                    },
+                    "message_count": self._counts[topic.number],
+                }
+                for topic in self._topics
+            ],
+            "compression_format": "",
+            "compression_mode": "",
+            "relative_file_paths": [self._path.name],
+            "files": [
+                {
+                    "path": self._path.name,
+                    "starting_time": start,
+                    "duration": duration,
+                    "message_count": self.messages,
+                }
+            ],
+            "custom_data": None,
+            "ros_distro": _DISTRIBUTION,
+        }
+
+
+def _qos(latched: bool) -> Mapping[str, Any]:
+    """Reliable; a latched topic keeps its last message for late subscribers."""
+    return {
+        "history": "keep_last",
+        "depth": 1 if latched else 10,
+        "reliability": "reliable",
+        "durability": "transient_local" if latched else "volatile",
+        "deadline": _FOREVER,
+        "lifespan": _FOREVER,
+        "liveliness": "automatic",
+        "liveliness_lease_duration": _FOREVER,
+        "avoid_ros_namespace_conventions": False,
+    }
+
+
+class _Plain(yaml.SafeDumper):
+    """Without references: yaml-cpp reads them, people do not like to."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _dump(content: Any) -> str:
+    return yaml.dump(content, Dumper=_Plain, sort_keys=False, default_flow_style=False)

@@ -1,0 +1,83 @@
+"""The recordings in a folder or a list, and a name for each."""
+
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from markerless_tracker.datasets import detect_format
+from markerless_tracker.errors import DatasetError
+
+
+def find_recordings(source: Path) -> dict[str, Path]:
+    """Name -> absolute path of every recording, in order of the names (of the lines of a list).
+
+    A folder is searched to any depth; what lies in a recording is not searched, nor are hidden
+    folders. A list is a text file with one path per line, relative to the list's folder; blank
+    lines and lines that begin with # are left out, and so are repeated paths. What a list names is
+    a recording, whether it exists or not. A name is the path below the folder (below the longest
+    common folder of a list), without the suffix `.mcap`.
+
+    Raises:
+        DatasetError: there is no such folder or list, or no recording in it.
+    """
+    if source.is_dir():
+        base = Path(os.path.abspath(source))
+        found = sorted(_below(base, set()))
+        base = base.parent if found == [base] else base
+    elif source.suffix == ".mcap" and source.is_file():
+        found = [Path(os.path.abspath(source))]
+        base = found[0].parent
+    else:
+        found = _listed(source)
+        base = Path(os.path.commonpath([path.parent for path in found])) if found else Path()
+    if not found:
+        raise DatasetError(f"{source}: no recording, expected some in this folder or list")
+    return _named(found, base)
+
+
+def _below(folder: Path, seen: set[str]) -> Iterator[Path]:
+    """The recordings at and below a folder; folders that a link repeats count once."""
+    real = os.path.realpath(folder)
+    if real in seen:
+        return
+    seen.add(real)
+    loose = sorted(folder.glob("*.mcap"))
+    if len(loose) > 1 and not (folder / "metadata.yaml").is_file():
+        # Without a description the files belong to different recordings.
+        yield from loose
+    elif detect_format(folder) is not None:
+        yield folder
+        return
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError as error:
+        raise DatasetError(f"{folder}: cannot be read: {error.strerror}") from error
+    for entry in entries:
+        if entry.is_dir() and not entry.name.startswith("."):
+            yield from _below(entry, seen)
+
+
+def _listed(path: Path) -> list[Path]:
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not a text file"
+        raise DatasetError(
+            f"{path}: {reason}, expected a folder or a list of recordings"
+        ) from error
+    words = (line.strip() for line in lines)
+    paths = [
+        Path(os.path.abspath(path.parent / Path(word).expanduser()))
+        for word in words
+        if word and not word.startswith("#")
+    ]
+    return list(dict.fromkeys(paths))
+
+
+def _named(paths: Sequence[Path], base: Path) -> dict[str, Path]:
+    names: dict[str, Path] = {}
+    for path in paths:
+        whole = path.relative_to(base).as_posix()
+        short = whole.removesuffix(".mcap")
+        names[whole if short in names else short] = path
+    return names

@@ -1,0 +1,91 @@
+"""The trials of a batch: arguments of each, and the key of all that its result depends on."""
+
+import argparse
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from markerless_tracker.benchmarks.tables.fingerprint import file_key, recording_key, run_key
+from markerless_tracker.cli.batch.trial import Trial
+from markerless_tracker.cli.track import given_settings, read_config
+from markerless_tracker.datasets.folder import CALIBRATION
+from markerless_tracker.datasets.pose2sim import calibration_folder
+from markerless_tracker.errors import ConfigError
+
+NOT_OF_TRACK = ("source", "out", "json", "force", "jobs", "scheduler")
+"""Arguments of `batch` that are none of `track`, or differ in each trial."""
+_OUTPUTS = {"debug_images": "--debug-images", "refine_calibration": "--refine-calibration"}
+_MAYBE_FILES = ("body", "time_offsets")
+
+
+def plan(args: argparse.Namespace, found: Mapping[str, Path], *, threads: int) -> list[Trial]:
+    """The trials of the recordings that were found.
+
+    Args:
+        args: parsed arguments of `batch`.
+        found: name -> absolute path of every recording.
+        threads: of each trial, unless the arguments say otherwise.
+
+    Raises:
+        ConfigError: a setting is impossible, or an output of all trials would be one file.
+    """
+    config = read_config(args.config, given_settings(args))
+    options = {key: value for key, value in vars(args).items() if key not in NOT_OF_TRACK}
+    for key, option in _OUTPUTS.items():
+        if options[key] is not None and "{name}" not in str(options[key]):
+            raise ConfigError(
+                f"{option} {options[key]}: is the same for all recordings, expected {{name}} in it"
+            )
+    # Results do not depend on the number of threads.
+    settings = {key: value for key, value in config.as_mapping().items() if key != "threads"}
+    if not config.threads:
+        options["threads"] = threads
+    out = Path(os.path.abspath(args.out))
+    return [_trial(name, source, out, options, settings) for name, source in found.items()]
+
+
+def _trial(
+    name: str, source: Path, out: Path, options: Mapping[str, Any], settings: Mapping[str, Any]
+) -> Trial:
+    own = {key: _filled(key, value, name, source) for key, value in options.items()}
+    # The settings stand for the options that give them; some files hold more than a name says.
+    files = {
+        key: _content(value)
+        for key, value in own.items()
+        if key not in settings and key not in ("config", "threads")
+    }
+    parts = {
+        "settings": settings,
+        "options": files,
+        "body": file_key(Path(own["body"] or settings["body"])),
+        "recording": _recording(source),
+    }
+    return Trial(name, source, out, run_key(parts), own)
+
+
+def _filled(option: str, value: Any, name: str, source: Path) -> Any:
+    """An argument with this trial's name and source; paths are absolute for other processes."""
+    if not isinstance(value, str | Path):
+        return value
+    text = str(value).replace("{source}", str(source)).replace("{name}", name)
+    if isinstance(value, Path):
+        return Path(os.path.abspath(text))
+    return os.path.abspath(text) if option in _MAYBE_FILES and os.path.isfile(text) else text
+
+
+def _content(value: Any) -> Any:
+    if isinstance(value, Path):
+        return recording_key(value) if value.is_dir() else file_key(value)
+    return value
+
+
+def _recording(source: Path) -> list[str]:
+    """Keys of a recording and of the calibrations that may lie beside it."""
+    try:
+        keys = [recording_key(source), file_key(source.parent / CALIBRATION)]
+        shared = calibration_folder(source)
+        return [*keys, recording_key(shared)] if shared is not None else keys
+    except OSError:
+        # Its trial will say what is wrong with it.
+        return [str(source)]

@@ -1,0 +1,74 @@
+"""The summary table of a batch, as text, CSV and JSON."""
+
+import csv
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+Row = Mapping[str, Any]
+
+COLUMNS = (
+    "name", "status", "found", "frames", "tracked", "overlap", "disagree", "warnings", "seconds",
+    "error", "source",
+)  # fmt: skip
+CSV = "summary.csv"
+JSON = "summary.json"
+
+
+def text_table(rows: Sequence[Row]) -> Table:
+    """The rows for people."""
+    table = Table()
+    table.add_column("recording", overflow="fold")
+    table.add_column("found")
+    for heading in ("tracked", "overlap"):
+        table.add_column(heading, justify="right")
+    table.add_column("cameras that disagree", overflow="fold")
+    table.add_column("seconds", justify="right")
+    for row in rows:
+        seconds = "" if row["seconds"] is None else f"{row['seconds']:.1f}"
+        if row["status"] != "done":
+            table.add_row(row["name"], "failed", "", "", row["error"], seconds)
+            continue
+        table.add_row(
+            row["name"],
+            "yes" if row["found"] else "no",
+            f"{row['tracked']} of {row['frames']}",
+            "" if row["overlap"] is None else f"{row['overlap']:.2f}",
+            ", ".join(row["disagree"]) or "none",
+            seconds,
+        )
+    return table
+
+
+def totals(rows: Sequence[Row]) -> dict[str, int]:
+    """Numbers of recordings: all, done, of them found and done earlier; failed."""
+    done = [row for row in rows if row["status"] == "done"]
+    return {
+        "recordings": len(rows),
+        "done": len(done),
+        "found": sum(row["found"] for row in done),
+        "earlier": sum(row["earlier"] for row in done),
+        "failed": len(rows) - len(done),
+    }
+
+
+def write_tables(out: Path, rows: Sequence[Row]) -> None:
+    """Write `summary.csv` (`COLUMNS`) and `summary.json` (`totals` and `trials`) into a folder.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    part = out / f"{CSV}.part"
+    with part.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({**row, "disagree": " ".join(row["disagree"])} for row in rows)
+    os.replace(part, out / CSV)
+    part = out / f"{JSON}.part"
+    content = {"totals": totals(rows), "trials": rows}
+    part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    os.replace(part, out / JSON)

@@ -1,0 +1,175 @@
+"""One trial of a batch: `track` on one recording, in any process.
+
+A trial is done in a folder of its own. Its files are moved to their places when they are complete,
+and its record is written last: a trial with a record is done, one without is not.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean
+from typing import Any, NamedTuple
+
+import cv2
+
+from markerless_tracker.cli.track import track_source
+from markerless_tracker.cli.track_notices import COMPILING, Notices
+from markerless_tracker.errors import TrackerError
+
+RECORDS = ".batch"
+"""Folder of the records, in that of the results."""
+PARTIAL = ".partial-"
+"""Start of the names of the folders in `RECORDS` in which trials are done."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A recording and all that is to be done with it.
+
+    Attributes:
+        name: of the recording and its result, may have folders.
+        source: absolute path of the recording.
+        out: absolute path of the batch's results.
+        key: of the recording's files and of everything that the result depends on.
+        arguments: arguments of `track` by name, but `source`, `name`, `force` and `json`.
+    """
+
+    name: str
+    source: Path
+    out: Path
+    key: str
+    arguments: Mapping[str, Any]
+
+    @property
+    def record(self) -> Path:
+        """File of the record."""
+        return self.out / RECORDS / f"{self.name}.json"
+
+    def stored(self) -> "Record | None":
+        """What is recorded of this name, None without a readable record."""
+        try:
+            found = json.loads(self.record.read_text(encoding="utf-8"))
+            files = tuple(str(name) for name in found["files"])
+            return Record(str(found["key"]), dict(found["row"]), files)
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+
+class Record(NamedTuple):
+    """A trial that was done: its key, its row, the names of its files."""
+
+    key: str
+    row: dict[str, Any]
+    files: tuple[str, ...]
+
+
+def do_trial(trial: Trial) -> dict[str, Any]:
+    """Track a trial's recording and write its result; returns its row of the table.
+
+    An error of the recording or of its processing is in the row, under `error`; nothing is written
+    then. Keys: `name`, `source`, `status` (done or failed), `found`, `frames`, `tracked`,
+    `overlap` (mean over the cameras of the median overlap), `disagree` (names of cameras),
+    `warnings`, `seconds`, `error`. A trial that is done already is not done again.
+    """
+    clock = _Clock()
+    stored = trial.stored()
+    if stored is not None and stored.key == trial.key:
+        return stored.row
+    cv2.setNumThreads(1)
+    try:
+        summary, files = _track(trial, stored, clock)
+    except Exception as error:  # a damaged recording may raise any exception: it costs its trial
+        return failed(trial, _line(error), clock.seconds)
+    verdict = summary["verdict"]
+    overlap = list(verdict["overlap"].values())
+    row = {
+        "name": trial.name,
+        "source": str(trial.source),
+        "status": "done",
+        "found": summary["tracked"] > 0,
+        "frames": summary["frames"],
+        "tracked": summary["tracked"],
+        "overlap": round(fmean(overlap), 3) if overlap else None,
+        "disagree": [name for name, one in summary["cameras"].items() if one["disagrees"]],
+        "warnings": len(summary["warnings"]) + len(summary["frame_warnings"]),
+        "seconds": round(clock.seconds, 2),
+        "error": None,
+    }
+    try:
+        _write(trial.record, {"key": trial.key, "row": row, "files": files})
+    except OSError as error:
+        return failed(trial, _line(error), clock.seconds)
+    return row
+
+
+def failed(trial: Trial, error: str, seconds: float | None = None) -> dict[str, Any]:
+    """Row of a trial that failed with an error of one line, after so many seconds."""
+    nothing = dict.fromkeys(("found", "frames", "tracked", "overlap"))
+    return {
+        "name": trial.name, "source": str(trial.source), "status": "failed", **nothing,
+        "disagree": [], "warnings": 0,
+        "seconds": None if seconds is None else round(seconds, 2), "error": error,
+    }  # fmt: skip
+
+
+class _Clock(Notices):
+    """Time of a trial, without the compilation that the first one of a process may wait for."""
+
+    def __init__(self) -> None:
+        self._from = time.perf_counter()
+        self._compiling: float | None = None
+
+    def begin(self, part: str, total: int | None = None) -> None:
+        now = time.perf_counter()
+        if self._compiling is not None:
+            self._from += now - self._compiling
+        self._compiling = now if part == COMPILING else None
+
+    @property
+    def seconds(self) -> float:
+        """Until now, s."""
+        return time.perf_counter() - self._from
+
+
+def _track(
+    trial: Trial, earlier: Record | None, clock: _Clock
+) -> tuple[Mapping[str, Any], list[str]]:
+    """Track and put the files in place; returns the summary of `track` and the files' names."""
+    target = trial.out / trial.name
+    target.parent.mkdir(parents=True, exist_ok=True)
+    trial.record.parent.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix=PARTIAL, dir=trial.out / RECORDS))
+    try:
+        chosen = argparse.Namespace(
+            **trial.arguments, source=trial.source, name=folder / target.name, force=False
+        )
+        summary = track_source(chosen, clock).summary
+        files = sorted(file.name for file in folder.iterdir())
+        # A record without a row: from here on neither result is complete.
+        _write(trial.record, {"key": trial.key, "files": files})
+        for name in earlier.files if earlier is not None else ():
+            (target.parent / name).unlink(missing_ok=True)
+        for name in files:
+            os.replace(folder / name, target.parent / name)
+        return summary, files
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _write(path: Path, content: Mapping[str, Any]) -> None:
+    part = path.with_name(path.name + ".part")
+    part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    os.replace(part, path)
+
+
+def _line(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    if isinstance(error, TrackerError):
+        return text
+    return f"{type(error).__name__}: {text}"

@@ -1,0 +1,92 @@
+"""Verb `record`: writes the topics of a running graph to an MCAP bag."""
+
+import argparse
+import json
+import shutil
+import sys
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress, TextColumn, TimeElapsedColumn
+
+from markerless_tracker.bags.mcap_bag import BagWriter
+from markerless_tracker.camera import read_calibration
+from markerless_tracker.errors import DatasetError
+
+HELP = (
+    "Record the topics of a running graph to an MCAP bag folder: the tracker's outputs beside the "
+    "images, so that Foxglove and RViz replay them together. Ends with Ctrl-C. At most the last "
+    "second is lost by a kill. Needs ROS 2. Exit status 3: no message arrived."
+)
+EXAMPLE = "markerless_tracker record session_bag --calibration calibration.toml"
+
+NOTHING_ARRIVED = 3
+"""Exit status when no message arrived."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("bag", metavar="BAG", type=Path, help="folder to write (new or empty)")
+    parser.add_argument(
+        "--topics",
+        metavar="A,B,...",
+        help="topics to record (default: all but /rosout and /parameter_events)",
+    )
+    parser.add_argument("--seconds", type=float, metavar="S", help="end after S seconds")
+    parser.add_argument(
+        "--calibration",
+        type=Path,
+        metavar="FILE",
+        help="calibration.toml to put beside the bag, for `track`",
+    )
+    parser.add_argument("--json", action="store_true", help="print the counts as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Record; returns 0, or 3 if no message arrived."""
+    # ROS is imported by this verb alone.
+    from markerless_tracker.node.recorder.process import prepare, record
+    from markerless_tracker.node.ros.process import StopSignals
+
+    prepare()
+    if args.calibration is not None:
+        read_calibration(args.calibration)
+    topics = None if args.topics is None else [name for name in args.topics.split(",") if name]
+    _make(args.bag, args.calibration)
+    bars = Progress(
+        TextColumn("{task.description}"),
+        TextColumn("{task.completed:.0f} messages"),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+    )
+    with StopSignals() as stop, BagWriter(args.bag) as writer, bars:
+        task = bars.add_task(f"recording {args.bag}", total=None)
+        counts = record(
+            writer,
+            stop,
+            topics=topics,
+            seconds=args.seconds,
+            progress=lambda messages: bars.update(task, completed=messages),
+        )
+    total = sum(counts.values())
+    if args.json:
+        json.dump({"bag": str(args.bag), "messages": total, "topics": counts}, sys.stdout, indent=2)
+        sys.stdout.write("\n")
+    else:
+        for name, count in sorted(counts.items()):
+            print(f"{name}: {count}")
+        print(f"{args.bag}: {total} messages of {len(counts)} topics")
+    return 0 if total else NOTHING_ARRIVED
+
+
+def _make(folder: Path, calibration: Path | None) -> None:
+    """Make the bag's folder.
+
+    Raises:
+        DatasetError: something is there already, or it cannot be made.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise DatasetError(f"{folder}: exists and is not empty, expected a new or an empty folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    if calibration is not None:
+        shutil.copy(calibration, folder / "calibration.toml")

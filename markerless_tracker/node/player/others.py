@@ -1,0 +1,77 @@
+"""Topics of a bag beside the images and camera infos: played as they are stored."""
+
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
+from typing import Any
+
+from markerless_tracker.datasets.bag.recording import BagRecording
+from markerless_tracker.datasets.bag.stream import RawMessage
+from markerless_tracker.errors import ConfigError, DatasetError
+from markerless_tracker.node.ros.qos import latched_qos, output_qos
+
+LATCHED = ("tf_static", "robot_description")
+"""Last parts of the topics whose last message late subscribers receive."""
+
+
+class OtherTopics:
+    """Publishes some topics of a bag, with the sets among which they were recorded.
+
+    Args:
+        node: creates the publishers.
+        recording: the bag.
+        names: of the topics.
+
+    Raises:
+        ConfigError: the bag has no such topic.
+        DatasetError: the type of a topic is not installed.
+    """
+
+    def __init__(self, node: Any, recording: BagRecording, names: Sequence[str]) -> None:
+        self._recording = recording
+        self._publishers: dict[str, Any] = {}
+        types = recording.types
+        for name in names:
+            if name not in types:
+                raise ConfigError(
+                    f"topics: {name} is not in the bag, expected some of {', '.join(sorted(types))}"
+                )
+            qos = latched_qos() if name.rsplit("/", 1)[-1] in LATCHED else output_qos()
+            self._publishers[name] = node.create_publisher(_type(name, types[name]), name, qos)
+
+    def up_to(self) -> Callable[[int], list[RawMessage]]:
+        """A function that gives the messages recorded up to a time in ns, each once, in order."""
+        if not self._publishers:
+            return lambda stamp_ns: []
+        stored: Iterator[RawMessage] = self._recording.messages(tuple(self._publishers))
+        following: list[RawMessage] = []
+
+        def take(stamp_ns: int) -> list[RawMessage]:
+            due = following[:]
+            following.clear()
+            if due and due[0].log_ns > stamp_ns:
+                following.extend(due)
+                return []
+            for message in stored:
+                if message.log_ns > stamp_ns:
+                    following.append(message)
+                    break
+                due.append(message)
+            return due
+
+        return take
+
+    def publish(self, messages: Sequence[RawMessage]) -> None:
+        """Publish messages as they are stored."""
+        for message in messages:
+            self._publishers[message.topic].publish(bytes(message.data))
+
+
+def _type(topic: str, kind: str) -> Any:
+    """The Python class of a message type such as geometry_msgs/msg/PoseArray."""
+    package, _, name = kind.replace("/msg/", "/").partition("/")
+    try:
+        return getattr(import_module(f"{package}.msg"), name)
+    except (ImportError, AttributeError) as error:
+        raise DatasetError(
+            f"topics: {topic} has the type {kind}, whose package is not installed here"
+        ) from error

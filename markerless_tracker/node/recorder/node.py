@@ -1,0 +1,99 @@
+"""The node `recorder`: writes the messages of topics, as serialised, to a bag."""
+
+import time
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, Protocol
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from markerless_tracker.node.ros.declared import GivenNode
+
+_LOOK_S = 0.5
+"""Time between two looks for new topics."""
+_FLUSH_S = 1.0
+"""Largest time of which a kill loses the messages."""
+_DEPTH = 50
+_OF_ROS = ("/rosout", "/parameter_events")
+
+
+class Bag(Protocol):
+    """What the recorder asks of the writer of a bag (`bags.mcap_bag.BagWriter`)."""
+
+    def topic(self, name: str, kind: str, *, latched: bool = False) -> Any:
+        """Declare a topic."""
+
+    def write_serialized(self, topic: Any, stamp_ns: int, data: Any) -> None:
+        """Write a message of a topic."""
+
+    def flush(self) -> None:
+        """Write what waits to the disk."""
+
+    @property
+    def messages(self) -> int:
+        """Number of messages written."""
+
+
+class RecorderNode(GivenNode):
+    """Subscribes to topics as soon as somebody publishes them, and writes what arrives.
+
+    The time of a message in the bag is that of its arrival.
+
+    Args:
+        writer: of the bag.
+        topics: names of the topics; None takes all but those of ROS itself.
+        node_arguments: passed on to ``rclpy.node.Node`` (context, ...).
+    """
+
+    def __init__(self, writer: Bag, topics: Sequence[str] | None, **node_arguments: Any) -> None:
+        super().__init__("recorder", **node_arguments)
+        self._writer = writer
+        self._wanted = None if topics is None else {f"/{name.strip('/')}" for name in topics}
+        self._seen: set[str] = set()
+        self._flushed_s = time.monotonic()
+        self.counts: dict[str, int] = {}
+        self.create_timer(_LOOK_S, self._look)
+        self._look()
+
+    def _look(self) -> None:
+        """Subscribe to topics that are new; write what waits, now and then."""
+        if time.monotonic() - self._flushed_s > _FLUSH_S:
+            self._writer.flush()
+            self._flushed_s = time.monotonic()
+        for name, kinds in self.get_topic_names_and_types():
+            if name in self._seen or name in _OF_ROS:
+                continue
+            if self._wanted is not None and name not in self._wanted:
+                continue
+            offers = self.get_publishers_info_by_topic(name)
+            if offers:
+                self._record(name, kinds[0], [offer.qos_profile for offer in offers])
+
+    def _record(self, name: str, kind: str, offers: Sequence[QoSProfile]) -> None:
+        self._seen.add(name)
+        reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
+        latched = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
+        try:
+            package, _, own = kind.replace("/msg/", "/").partition("/")
+            message = getattr(import_module(f"{package}.msg"), own)
+            topic = self._writer.topic(name, kind, latched=latched)
+        except Exception as error:  # an unknown type raises any exception of its library
+            self.get_logger().warning(
+                f"{name} is not recorded: its type {kind} is not known here "
+                f"({type(error).__name__})"
+            )
+            return
+        self.counts[name] = 0
+        qos = QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=_DEPTH,
+            reliability=(ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT),
+            durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE),
+        )
+
+        def write(data: bytes) -> None:
+            self._writer.write_serialized(topic, time.time_ns(), data)
+            self.counts[name] += 1
+
+        self.create_subscription(message, name, write, qos, raw=True)
+        self.get_logger().info(f"recording {name}")

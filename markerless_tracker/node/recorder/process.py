@@ -1,0 +1,69 @@
+"""A recorder in this process, until a signal or for some time."""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from markerless_tracker.node.ros.process import StopSignals, init_context, require_ros
+from markerless_tracker.node.ros.profile import apply_profile
+
+if TYPE_CHECKING:
+    from markerless_tracker.node.recorder.node import Bag
+
+_NOTICE_S = 0.1
+
+
+def record(
+    writer: "Bag",
+    stop: StopSignals,
+    *,
+    topics: Sequence[str] | None = None,
+    seconds: float | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> dict[str, int]:
+    """Record topics into a bag.
+
+    Args:
+        writer: of the bag.
+        stop: ends it.
+        topics: names; None takes all but those of ROS itself.
+        seconds: ends after that time, too; None records until a signal.
+        progress: called with the number of messages.
+
+    Returns:
+        Topic -> number of messages.
+
+    Raises:
+        RosMissingError: ROS is not installed.
+    """
+    prepare()
+    from rclpy.executors import SingleThreadedExecutor
+
+    from markerless_tracker.node.recorder.node import RecorderNode
+
+    context = init_context([])
+    try:
+        node = RecorderNode(writer, topics, context=context)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        until_s = None if seconds is None else time.monotonic() + seconds
+        while not stop.asked and (until_s is None or time.monotonic() < until_s):
+            executor.spin_once(timeout_sec=_NOTICE_S)
+            if progress is not None:
+                progress(writer.messages)
+        executor.shutdown(timeout_sec=0)
+        counts = dict(node.counts)
+        node.destroy_node()
+    finally:
+        context.try_shutdown()
+    return counts
+
+
+def prepare() -> None:
+    """Choose the profile of the middleware and make sure that ROS is installed.
+
+    Raises:
+        RosMissingError: it is not.
+    """
+    apply_profile()
+    require_ros()

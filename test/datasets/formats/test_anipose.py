@@ -1,0 +1,125 @@
+"""Anipose sessions, and worlds turned upright."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from markerless_tracker.camera import CameraModel, CameraRig, write_calibration
+from markerless_tracker.cli.main import main
+from markerless_tracker.datasets import detect_format, open_recording
+from markerless_tracker.datasets.upright import AXES, rotation_to, upright
+from markerless_tracker.errors import CalibrationError, ConfigError, DatasetError
+from markerless_tracker.geometry import apply
+
+NAMES = ("A", "B")
+
+
+@pytest.fixture
+def session(make_rig, write_video, tmp_path: Path) -> Path:
+    """A session of one trial in a project."""
+    folder = tmp_path / "project" / "2024-05-01"
+    (folder / "calibration").mkdir(parents=True)
+    write_calibration(folder / "calibration" / "calibration.toml", make_rig(*NAMES))
+    with (folder / "calibration" / "calibration.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[metadata]\nadjusted = false\nerror = 0.3\n")
+    for number, name in enumerate(NAMES):
+        write_video(folder / "videos-raw" / f"walk-cam{name}.avi", number)
+    (tmp_path / "project" / "config.toml").write_text(
+        'project = "walks"\n[triangulation]\ncam_regex = "-cam([A-Z])$"\n', encoding="utf-8"
+    )
+    return folder
+
+
+def test_a_session_of_one_trial(session: Path, make_rig, check) -> None:
+    assert detect_format(session) == "anipose"
+    recording = open_recording(session)
+    check(recording, make_rig(*NAMES))
+    assert recording.name == "2024-05-01_walk" and recording.fps == 30.0
+
+
+def test_without_a_pattern_names_end_with_the_cameras(session: Path, make_rig, check) -> None:
+    (session.parent / "config.toml").unlink()
+    check(open_recording(session), make_rig(*NAMES))
+
+
+def test_a_video_chooses_the_trial(session: Path, write_video, make_rig, check) -> None:
+    for number, name in enumerate(NAMES):
+        write_video(session / "videos-raw" / f"run-cam{name}.avi", number)
+    with pytest.raises(DatasetError, match="trials run, walk, expected videos of one trial"):
+        open_recording(session)
+    video = session / "videos-raw" / "run-camB.avi"
+    assert detect_format(video) == "anipose"
+    check(open_recording(video), make_rig(*NAMES))
+    (session / "videos-raw" / "run-camA.avi").unlink()
+    with pytest.raises(DatasetError, match="trial 'run' has no video of A, expected one of each"):
+        open_recording(video)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[triangulation", "config.toml: cannot be read: "),
+        ("[triangulation]\ncam_regex = '(['", "cam_regex is .*expected a pattern"),
+        ("[triangulation]\ncam_regex = 3", "cam_regex is 3, expected a pattern"),
+        ("[triangulation]\ncam_regex = 'cam'", "cam_regex is 'cam', expected one group"),
+    ],
+)
+def test_a_malformed_config_is_named(session: Path, text: str, message: str) -> None:
+    (session.parent / "config.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(DatasetError, match=message):
+        open_recording(session)
+
+
+def test_a_malformed_calibration_is_named(session: Path) -> None:
+    file = session / "calibration" / "calibration.toml"
+    text = file.read_text(encoding="utf-8").replace("translation", "position")
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(CalibrationError, match="calibration.toml: A: translation is missing"):
+        open_recording(session)
+    file.unlink()
+    assert detect_format(session) is None
+
+
+@pytest.mark.parametrize("up", AXES)
+def test_the_chosen_axis_becomes_z_and_images_stay(make_rig, up: str) -> None:
+    rig = make_rig(*NAMES)
+    in_mm = CameraRig(
+        tuple(
+            CameraModel(c.name, c.size_px, c.matrix, c.distortion, _longer(c.T_cam_world))
+            for c in rig
+        )
+    )
+    turned = upright(in_mm, up=up, units="mm")
+    axis = np.zeros(3)
+    axis["xyz".index(up[-1])] = -1.0 if up.startswith("-") else 1.0
+    np.testing.assert_array_equal(rotation_to(up) @ axis, [0.0, 0.0, 1.0])
+    points = np.random.default_rng(2).normal(size=(5, 3))
+    for old, new in zip(rig, turned, strict=True):
+        np.testing.assert_allclose(
+            apply(new.T_cam_world, points @ rotation_to(up).T),
+            apply(old.T_cam_world, points),
+            atol=1e-12,
+        )
+
+
+def _longer(transform: np.ndarray) -> np.ndarray:
+    changed = transform.copy()
+    changed[:3, 3] *= 1000.0
+    return changed
+
+
+def test_convert_turns_the_world(session: Path, tmp_path: Path, make_rig) -> None:
+    bag = tmp_path / "bag"
+    words = ["convert", str(session), str(bag), "--up=-y", "--units", "cm"]
+    assert main(words) == 0
+    expected = upright(make_rig(*NAMES), up="-y", units="cm")
+    for read, true in zip(open_recording(bag).rig, expected, strict=True):
+        np.testing.assert_allclose(read.T_cam_world, true.T_cam_world, atol=1e-9)
+
+
+def test_unknown_axes_and_units(session: Path) -> None:
+    with pytest.raises(ConfigError, match="up 'w': expected one of z, -z, y"):
+        open_recording(session, up="w")
+    with pytest.raises(ConfigError, match="units 'inch': expected one of m, cm, mm"):
+        open_recording(session, units="inch")
