@@ -70,6 +70,7 @@ setup(
             "ruff",
             "scipy-stubs",
             "types-PyYAML",
+            "yourdfpy",
         ],
     },
     entry_points={

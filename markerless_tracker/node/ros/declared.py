@@ -141,6 +141,17 @@ def text(name: str, value: Any) -> str:
     return value
 
 
+def choice(name: str, value: Any, choices: Sequence[str]) -> str:
+    """The value, checked to be one of a few texts.
+
+    Raises:
+        ConfigError: it is not; names the parameter.
+    """
+    if value not in choices:
+        raise ConfigError(f"{name}: got {value!r}, expected one of {', '.join(choices)}")
+    return str(value)
+
+
 def flag(name: str, value: Any) -> bool:
     """The value, checked to be true or false.
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from markerless_tracker.datasets.background import MAX_FRAMES
 from markerless_tracker.node.ros import declared
+from markerless_tracker.node.ros.transforms import TF_CHOICES
 from markerless_tracker.settings import Setting
 from markerless_tracker.tracking import TrackerConfig
 
@@ -28,6 +29,9 @@ class NodeSettings:
         wait_for_background: start without backgrounds and wait for the service learn_background.
         learn_background_sets: sets of images that the service learn_background learns from.
         sync_tolerance: largest difference of the stamps of one set in s; 0 means equal stamps.
+        tf: frames of the body on /tf: all links, the root link alone (with robot_state_publisher).
+        tf_cameras: publish the optical frames of `calibration_file` on /tf_static.
+        frame_prefix: begins the names of the links' frames, such as `person1/`.
         config: the tracker's settings.
     """
 
@@ -43,6 +47,9 @@ class NodeSettings:
     wait_for_background: bool = False
     learn_background_sets: int = 20
     sync_tolerance: float = 0.0
+    tf: str = "links"
+    tf_cameras: bool = True
+    frame_prefix: str = ""
     config: TrackerConfig
 
 
@@ -65,6 +72,8 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "learn_background_sets": (2, MAX_FRAMES),
 }
 """Least and largest value of the node's own parameters."""
+CHOICES: Mapping[str, tuple[str, ...]] = {"tf": TF_CHOICES}
+"""Values of the node's own parameters that are one of a few."""
 
 
 def parameter_names() -> tuple[str, ...]:
@@ -79,7 +88,11 @@ def held_settings() -> tuple[Setting, ...]:
         Setting(name, type(least), least, lines[name], None, least, most)
         for name, (least, most) in RANGES.items()
     )
-    return (*own, *TrackerConfig.settings())
+    chosen = (
+        Setting(name, str, values[0], lines[name], values, None, None)
+        for name, values in CHOICES.items()
+    )
+    return (*own, *chosen, *TrackerConfig.settings())
 
 
 def read_settings(given: Mapping[str, Any]) -> NodeSettings:
@@ -100,9 +113,14 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
     for name in ("stature", "scale", "sync_tolerance"):
         if name in values:
             own[name] = declared.number(name, values[name], *RANGES[name])
-    for name in ("overwrite", "wait_for_background"):
+    for name in ("overwrite", "wait_for_background", "tf_cameras"):
         if name in values:
             own[name] = declared.flag(name, values[name])
+    for name, choices in CHOICES.items():
+        if name in values:
+            own[name] = declared.choice(name, values[name], choices)
+    if "frame_prefix" in values:
+        own["frame_prefix"] = declared.text("frame_prefix", values["frame_prefix"])
     if "learn_background_sets" in values:
         name = "learn_background_sets"
         own[name] = declared.count(name, values[name], *map(int, RANGES[name]))
@@ -121,6 +139,7 @@ def descriptions() -> dict[str, str]:
     """One line about every parameter: the most used first, then the node's, then the tracker's."""
     own = declared.attribute_lines(NodeSettings)
     lines = {name: own[name] for name in dict.fromkeys((*_FIRST, *_OWN))}
+    lines |= {name: f"{lines[name]} ({', '.join(values)})" for name, values in CHOICES.items()}
     for setting in TrackerConfig.settings():
         choices = f" ({', '.join(map(str, setting.choices))})" if setting.choices else ""
         lines[setting.name] = f"{setting.doc}{choices}"

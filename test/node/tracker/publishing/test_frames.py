@@ -1,0 +1,109 @@
+"""TF of a running tracker, over the real middleware."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+# ruff: noqa: E402
+rclpy = pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+from markerless_tracker.body import MARKER_NAMES
+from markerless_tracker.geometry import (
+    inverse,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    transform,
+)
+from markerless_tracker.node.ros.qos import image_qos, latched_qos
+from markerless_tracker.node.ros.stamps import stamp_of
+from markerless_tracker.node.ros.transforms import TransformMessages
+
+
+@pytest.fixture(scope="module")
+def seen(
+    world: Any, tf2_msgs: dict[str, str], tmp_path_factory: Any, tools: Any, scenes: Any
+) -> Iterator[Any]:
+    """A tracker in an environment with tf2_msgs, and its transforms."""
+    from tf2_msgs.msg import TFMessage
+
+    context = rclpy.Context()
+    rclpy.init(context=context, args=[])
+    peer = tools.Peer(context)
+    log = tmp_path_factory.mktemp("frames") / "tracker.log"
+    process = tools.Process(
+        "tracker", log, {**world.parameters(), "frame_prefix": "one/"}, tf2_msgs
+    )
+    try:
+        live = scenes.Live(peer, process, world)
+        live.frames = peer.collect(TFMessage, "/tf", image_qos(depth=100))
+        live.statics = peer.collect(TFMessage, "/tf_static", latched_qos())
+        yield live
+    finally:
+        process.stop()
+        peer.close()
+        context.try_shutdown()
+
+
+def tree(*messages: Any) -> dict[str, tuple[str, np.ndarray]]:
+    """Child -> parent and transform to it."""
+    found = {}
+    for stamped in (entry for message in messages for entry in message.transforms):
+        q, t = stamped.transform.rotation, stamped.transform.translation
+        T = transform(rotation_from_quaternion((q.w, q.x, q.y, q.z)), (t.x, t.y, t.z))
+        found[stamped.child_frame_id] = (stamped.header.frame_id, T)
+    return found
+
+
+def in_map(frames: dict[str, tuple[str, np.ndarray]], name: str) -> np.ndarray:
+    T = np.eye(4)
+    while name != "map":
+        name, step = frames[name]
+        T = step @ T
+    return T
+
+
+def test_all_links_and_cameras_hang_on_map(seen: Any) -> None:
+    seen.until(lambda: seen.statics and len(seen.statics[-1].transforms) > 4, "the static frames")
+    index = seen.track()
+    stamp_ns = seen.camera.scene.stamp_ns(index)
+    seen.until(
+        lambda: seen.frames and stamp_of(seen.frames[-1].transforms[0]) == stamp_ns, "the frames"
+    )
+    moving = seen.frames[-1]
+    assert all(stamp_of(stamped) == stamp_ns for stamped in moving.transforms)
+    frames = tree(seen.statics[-1], moving)
+    assert moving.transforms[0].child_frame_id == "one/pelvis"
+    for name, point in zip(MARKER_NAMES, seen.points(), strict=True):
+        np.testing.assert_allclose(in_map(frames, f"one/{name}")[:3, 3], point, atol=1e-6)
+    p, root = seen.roots[-1].pose.pose.position, in_map(frames, "one/pelvis")
+    np.testing.assert_allclose(root[:3, 3], [p.x, p.y, p.z], atol=1e-9)
+    for camera in seen.camera.scene.rig:
+        placed = in_map(frames, f"{camera.name}_optical_frame")
+        np.testing.assert_allclose(placed, inverse(camera.T_cam_world), atol=1e-9)
+
+
+def test_extrinsics_come_from_the_transforms_of_another_node(
+    begin: Callable[..., Any], peer: Any, world: Any, scenes: Any, tf2_msgs: dict[str, str]
+) -> None:
+    from tf2_msgs.msg import TFMessage
+
+    rig = world.scene.rig
+    poses = [inverse(camera.T_cam_world) for camera in rig]
+    frames = TransformMessages([("map", f"{name}_optical_frame") for name in rig.names])
+    turned = np.array([quaternion_from_rotation(pose[:3, :3]) for pose in poses])
+    static = peer.node.create_publisher(TFMessage, "/tf_static", latched_qos())
+    static.publish(frames.serialised(0, np.array([pose[:3, 3] for pose in poses]), turned))
+    camera = scenes.Camera(peer.node, world.scene)
+    peer.node.create_timer(0.2, camera.send_infos)
+    seen = begin(
+        environment=tf2_msgs, calibration_file=None, cameras=f"[{', '.join(rig.names)}]", tf="root"
+    )
+    moving = peer.collect(TFMessage, "/tf", image_qos(depth=100))
+    seen.until(lambda: peer.node.count_publishers("/tf"), "the topic /tf")
+    seen.track()
+    seen.until(lambda: moving, "the frame of the root")
+    assert [stamped.child_frame_id for stamped in moving[-1].transforms] == ["pelvis"]
+    assert peer.node.count_publishers("/tf_static") == 2
+    assert float(seen.value("fitness")) > 0.9
