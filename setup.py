@@ -45,6 +45,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         *shared_files("config"),
+        *shared_files("launch"),
     ],
     install_requires=[
         "PyYAML>=6",

@@ -1,13 +1,18 @@
 """TF of a running tracker, over the real middleware."""
 
+import json
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 # ruff: noqa: E402
 rclpy = pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+from geometry_msgs.msg import PoseWithCovarianceStamped
 
 from markerless_tracker.body import MARKER_NAMES
 from markerless_tracker.geometry import (
@@ -107,3 +112,64 @@ def test_extrinsics_come_from_the_transforms_of_another_node(
     assert [stamped.child_frame_id for stamped in moving[-1].transforms] == ["pelvis"]
     assert peer.node.count_publishers("/tf_static") == 2
     assert float(seen.value("fitness")) > 0.9
+
+
+def shown_by_rviz(root: Path) -> dict[str, str]:
+    """Topic -> type of every display, and the fixed frame."""
+    kinds = {
+        "RobotModel": "std_msgs/msg/String",
+        "MarkerArray": "visualization_msgs/msg/MarkerArray",
+        "PoseArray": "geometry_msgs/msg/PoseArray",
+        "PoseWithCovariance": "geometry_msgs/msg/PoseWithCovarianceStamped",
+        "Image": "sensor_msgs/msg/Image",
+    }
+    manager = yaml.safe_load((root / "config" / "tracker.rviz").read_text())[
+        "Visualization Manager"
+    ]
+    assert manager["Global Options"]["Fixed Frame"] == "map"
+    topics = {}
+    for display in manager["Displays"]:
+        kind = display["Class"].removeprefix("rviz_default_plugins/")
+        topic = display.get("Description Topic", display.get("Topic"))
+        assert (topic is not None) == (kind in kinds), kind
+        if topic is not None:
+            topics[topic["Value"]] = kinds[kind]
+    return topics
+
+
+def shown_by_foxglove(root: Path) -> dict[str, str | None]:
+    """Topics of every panel; None where the panel takes several types."""
+    layout = json.loads((root / "config" / "foxglove.json").read_text())
+    panels, used, todo = layout["configById"], set(), [layout["layout"]]
+    while todo:
+        part = todo.pop()
+        if isinstance(part, str):
+            used.add(part)
+        else:
+            todo += [part["first"], part["second"]]
+    assert used == set(panels)
+    topics: dict[str, str | None] = dict.fromkeys(panels["3D!body"]["topics"])
+    layers = panels["3D!body"]["layers"].values()
+    topics |= {layer["topic"]: "std_msgs/msg/String" for layer in layers if "topic" in layer}
+    topics[panels["Image!overlay"]["imageMode"]["imageTopic"]] = "sensor_msgs/msg/Image"
+    state = panels["DiagnosticStatusPanel!state"]
+    assert state["selectedName"] == "tracker: tracking"
+    topics[state["topicToRender"]] = "diagnostic_msgs/msg/DiagnosticArray"
+    for path in panels["Plot!pelvis"]["paths"]:
+        topic, *fields = path["value"].split(".")
+        message: Any = PoseWithCovarianceStamped()
+        for field in fields:
+            message = getattr(message, field)
+        assert topic == "/root_pose" and isinstance(message, float)
+    return topics
+
+
+@pytest.mark.parametrize("shown", [shown_by_rviz, shown_by_foxglove])
+def test_viewers_are_set_to_topics_that_exist(seen: Any, shown: Any, project_root: Path) -> None:
+    seen.track()
+    expected = shown(project_root)
+    assert "/robot_description" in expected and len(expected) >= 5
+    offered = dict(seen.peer.node.get_topic_names_and_types())
+    for topic, kind in expected.items():
+        assert seen.peer.node.count_publishers(topic) == 1, topic
+        assert kind is None or offered[topic] == [kind]
