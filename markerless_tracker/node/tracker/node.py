@@ -27,7 +27,6 @@ from markerless_tracker.node.tracker.announcer import Announcer
 from markerless_tracker.node.tracker.inputs import CameraInput
 from markerless_tracker.node.tracker.learning import Learning
 from markerless_tracker.node.tracker.publishing.files import Pictures, ResultFile
-from markerless_tracker.node.tracker.publishing.frames import FramePublisher
 from markerless_tracker.node.tracker.publishing.results import ResultPublishers
 from markerless_tracker.node.tracker.report import RunReport
 from markerless_tracker.node.tracker.setup import RigSource, build
@@ -102,16 +101,7 @@ class TrackerNode(GivenNode):
             self._settings.result_file, overwrite=self._settings.overwrite, report=self._warn
         )
         self._report = RunReport(start_given=self._settings.start_file is not None)
-        frames = FramePublisher(
-            self,
-            self._settings.tf,
-            cameras=self._settings.tf_cameras and self._source.rig is not None,
-            prefix=self._settings.frame_prefix,
-            inform=self._inform,
-        )
-        if self._source.rig is not None:
-            frames.cameras(self._source.rig)
-        self._results = ResultPublishers(self, frames)
+        self._results = ResultPublishers(self, self._settings, self._source.rig, self._inform)
         self._states = self.create_publisher(DiagnosticArray, "state", latched_qos())
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._worker = TrackWorker(

@@ -7,6 +7,7 @@ from typing import Any
 
 from markerless_tracker.datasets.background import MAX_FRAMES
 from markerless_tracker.node.ros import declared
+from markerless_tracker.node.ros.ros4hri import check_id
 from markerless_tracker.node.ros.transforms import TF_CHOICES
 from markerless_tracker.settings import Setting
 from markerless_tracker.tracking import TrackerConfig
@@ -32,6 +33,7 @@ class NodeSettings:
         tf: frames of the body on /tf: all links, the root link alone (with robot_state_publisher).
         tf_cameras: publish the optical frames of `calibration_file` on /tf_static.
         frame_prefix: begins the names of the links' frames, such as `person1/`.
+        human_id: id of the person below /humans/bodies (REP-155); left out, nothing is published.
         config: the tracker's settings.
     """
 
@@ -50,6 +52,7 @@ class NodeSettings:
     tf: str = "links"
     tf_cameras: bool = True
     frame_prefix: str = ""
+    human_id: str = ""
     config: TrackerConfig
 
 
@@ -119,11 +122,13 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
     for name, choices in CHOICES.items():
         if name in values:
             own[name] = declared.choice(name, values[name], choices)
-    if "frame_prefix" in values:
-        own["frame_prefix"] = declared.text("frame_prefix", values["frame_prefix"])
+    for name in ("frame_prefix", "human_id"):
+        if name in values:
+            own[name] = declared.text(name, values[name])
     if "learn_background_sets" in values:
         name = "learn_background_sets"
         own[name] = declared.count(name, values[name], *map(int, RANGES[name]))
+    check_id("human_id", own.get("human_id", ""))
     rest = {name: value for name, value in values.items() if name not in _OWN}
     return NodeSettings(config=TrackerConfig.from_mapping(rest), **own)
 

@@ -25,15 +25,25 @@ class FramePublisher:
             "root": the root link, for use with one; "none": no body.
         cameras: whether the cameras' frames are published.
         prefix: of the links' frames, such as ``person1/``.
+        human: id of the person, whose frame ``body_<id>`` is the root link (REP-155); may be empty.
         inform: called with one line if nothing can be published.
     """
 
     def __init__(
-        self, node: Any, choice: str, *, cameras: bool, prefix: str, inform: Callable[[str], None]
+        self,
+        node: Any,
+        choice: str,
+        *,
+        cameras: bool,
+        prefix: str,
+        human: str,
+        inform: Callable[[str], None],
     ) -> None:
+        self._human = human
         self._choice, self._with_cameras, self._prefix = choice, cameras, prefix
         self._camera_frames: list[tuple[str, str]] = []
         self._camera_numbers = (np.empty((0, 3)), np.empty((0, 4)))
+        self._root = ""
         self._moving: UrdfJoints | None = None
         self._fixed: UrdfJoints | None = None
         self._messages: TransformMessages | None = None
@@ -66,11 +76,12 @@ class FramePublisher:
         """Take a body: its URDF (text) and the name of its root link."""
         if self._publisher is None:
             return
-        frames = [(WORLD_FRAME, f"{self._prefix}{root}")]
+        self._root = f"{self._prefix}{root}"
+        frames = [(WORLD_FRAME, self._root)]
         if self._choice == "links":
             self._moving, self._fixed = read_joints(urdf)
             frames += self._prefixed(self._moving)
-            self._publish_static()
+        self._publish_static()
         self._messages = TransformMessages(frames)
 
     def publish(self, T_world_root: FloatArray, values: dict[str, float], stamp_ns: int) -> None:
@@ -103,6 +114,10 @@ class FramePublisher:
             fixed = self._fixed.transforms({})
             translations = np.vstack([translations, fixed[0]])
             quaternions = np.vstack([quaternions, fixed[1]])
+        if self._root and self._human:
+            frames.append((self._root, f"body_{self._human}"))
+            translations = np.vstack([translations, np.zeros(3)])
+            quaternions = np.vstack([quaternions, [1.0, 0.0, 0.0, 0.0]])
         if frames:
             message = TransformMessages(frames)
             self._static.publish(message.serialised(0, translations, quaternions))

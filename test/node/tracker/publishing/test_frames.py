@@ -1,6 +1,7 @@
 """TF of a running tracker, over the real middleware."""
 
 import json
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ import yaml
 rclpy = pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from markerless_tracker.body import MARKER_NAMES
 from markerless_tracker.geometry import (
@@ -22,6 +25,7 @@ from markerless_tracker.geometry import (
     transform,
 )
 from markerless_tracker.node.ros.qos import image_qos, latched_qos
+from markerless_tracker.node.ros.ros4hri import JOINTS
 from markerless_tracker.node.ros.stamps import stamp_of
 from markerless_tracker.node.ros.transforms import TransformMessages
 
@@ -38,7 +42,7 @@ def seen(
     peer = tools.Peer(context)
     log = tmp_path_factory.mktemp("frames") / "tracker.log"
     process = tools.Process(
-        "tracker", log, {**world.parameters(), "frame_prefix": "one/"}, tf2_msgs
+        "tracker", log, {**world.parameters(), "frame_prefix": "one/", "human_id": "p1"}, tf2_msgs
     )
     try:
         live = scenes.Live(peer, process, world)
@@ -87,6 +91,22 @@ def test_all_links_and_cameras_hang_on_map(seen: Any) -> None:
     for camera in seen.camera.scene.rig:
         placed = in_map(frames, f"{camera.name}_optical_frame")
         np.testing.assert_allclose(placed, inverse(camera.T_cam_world), atol=1e-9)
+
+
+def test_the_person_is_published_under_the_names_of_rep_155(seen: Any) -> None:
+    states = seen.peer.collect(JointState, "/humans/bodies/p1/joint_states", image_qos())
+    urdfs = seen.peer.collect(String, "/humans/bodies/p1/urdf", latched_qos())
+    seen.until(lambda: urdfs, "the URDF")
+    index = seen.track()
+    seen.until(lambda: states, "the joints")
+    stamp_ns = seen.camera.scene.stamp_ns(index)
+    assert stamp_of(states[-1]) == stamp_ns
+    assert states[-1].name == [f"{name}_p1" for name in JOINTS]
+    robot = ElementTree.fromstring(urdfs[-1].data)
+    moving = [j.get("name") for j in robot.findall("joint") if j.get("type") == "revolute"]
+    assert sorted(moving) == sorted(states[-1].name)
+    frames = tree(seen.statics[-1], seen.frames[-1])
+    np.testing.assert_allclose(in_map(frames, "body_p1"), in_map(frames, "one/pelvis"))
 
 
 def test_extrinsics_come_from_the_transforms_of_another_node(
