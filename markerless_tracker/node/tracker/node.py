@@ -1,7 +1,7 @@
 """The node `tracker`: image topics in, the pose of one person out."""
 
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import partial
 from threading import Lock
 from types import coroutine
@@ -17,9 +17,9 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.imaging import scale_image
 from markerless_tracker.node.health import QUIET_S, Facts, assess
 from markerless_tracker.node.ros import messages
-from markerless_tracker.node.ros.cdr import ImageMessage
+from markerless_tracker.node.ros.cdr import CompressedMessage, ImageMessage
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
-from markerless_tracker.node.ros.images import decode_image
+from markerless_tracker.node.ros.images import decode_received
 from markerless_tracker.node.ros.notices import Notices
 from markerless_tracker.node.ros.qos import latched_qos
 from markerless_tracker.node.tracker import parameters
@@ -87,7 +87,7 @@ class TrackerNode(GivenNode):
         self._announcer = Announcer(self._news, self._notices)
         self._source = RigSource(self._settings)
         self._status = TrackerStatus()
-        self._sets: Synchronizer[ImageMessage] = Synchronizer(
+        self._sets: Synchronizer[ImageMessage | CompressedMessage] = Synchronizer(
             self._source.names, tolerance_ns=round(self._settings.sync_tolerance * 1e9)
         )
         self._tracker: Tracker | None = None
@@ -161,10 +161,14 @@ class TrackerNode(GivenNode):
             report=self._warn,
             clock=self._seconds,
             channels=self._background_channels,
+            image_topic=self._settings.image_topic,
+            info_topic=self._settings.info_topic,
         )
 
     def _listen(self) -> None:
-        self._topics = CameraTopics(self, self._inputs, clock=self._seconds)
+        self._topics = CameraTopics(
+            self, self._inputs, transport=self._settings.image_transport, clock=self._seconds
+        )
         self._source.listen(self, self._warn)
         self.create_service(Trigger, "~/reset", self._on_reset)
         # Images must be received while the request is answered.
@@ -233,7 +237,7 @@ class TrackerNode(GivenNode):
         return TrackerHandle(
             setup.tracker,
             setup.start_stamp_ns,
-            partial(_decode, sizes_px),
+            partial(_decode, sizes_px, {s.name: s.image_topic for s in self._inputs}),
             waits=setup.tracker.segmenter(scaled.names[0]) is None,
         )
 
@@ -336,5 +340,10 @@ def _yield_to_executor() -> Generator[None, None, None]:
     yield
 
 
-def _decode(sizes_px: dict[str, tuple[int, int]], name: str, message: ImageMessage) -> Any:
-    return scale_image(decode_image(message, f"{name}/image_raw"), sizes_px[name])
+def _decode(
+    sizes_px: Mapping[str, tuple[int, int]],
+    topics: Mapping[str, str],
+    name: str,
+    message: ImageMessage | CompressedMessage,
+) -> Any:
+    return scale_image(decode_received(message, topics[name]), sizes_px[name])

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from markerless_tracker.datasets.background import MAX_FRAMES
+from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.ros import declared
+from markerless_tracker.node.ros.qos import TRANSPORTS
 from markerless_tracker.node.ros.ros4hri import check_id
 from markerless_tracker.node.ros.transforms import TF_CHOICES
 from markerless_tracker.settings import Setting
@@ -30,6 +32,9 @@ class NodeSettings:
         wait_for_background: start without backgrounds and wait for the service learn_background.
         learn_background_sets: sets of images that the service learn_background learns from.
         sync_tolerance: largest difference of the stamps of one set in s; 0 means equal stamps.
+        image_topic: topic of a camera's images, NAME stands for the camera.
+        info_topic: topic of a camera's camera infos, NAME stands for the camera.
+        image_transport: images that are received; auto: raw, or compressed if only those are sent.
         tf: frames of the body on /tf: all links, the root link alone (with robot_state_publisher).
         tf_cameras: publish the optical frames of `calibration_file` on /tf_static.
         frame_prefix: begins the names of the links' frames, such as `person1/`.
@@ -49,6 +54,9 @@ class NodeSettings:
     wait_for_background: bool = False
     learn_background_sets: int = 20
     sync_tolerance: float = 0.0
+    image_topic: str = "NAME/image_raw"
+    info_topic: str = "NAME/camera_info"
+    image_transport: str = "auto"
     tf: str = "links"
     tf_cameras: bool = True
     frame_prefix: str = ""
@@ -75,7 +83,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "learn_background_sets": (2, MAX_FRAMES),
 }
 """Least and largest value of the node's own parameters."""
-CHOICES: Mapping[str, tuple[str, ...]] = {"tf": TF_CHOICES}
+CHOICES: Mapping[str, tuple[str, ...]] = {"tf": TF_CHOICES, "image_transport": TRANSPORTS}
 """Values of the node's own parameters that are one of a few."""
 
 
@@ -122,12 +130,17 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
     for name, choices in CHOICES.items():
         if name in values:
             own[name] = declared.choice(name, values[name], choices)
-    for name in ("frame_prefix", "human_id"):
+    for name in ("frame_prefix", "human_id", "image_topic", "info_topic"):
         if name in values:
             own[name] = declared.text(name, values[name])
     if "learn_background_sets" in values:
         name = "learn_background_sets"
         own[name] = declared.count(name, values[name], *map(int, RANGES[name]))
+    for name in ("image_topic", "info_topic"):
+        if "NAME" not in own.get(name, "NAME"):
+            raise ConfigError(
+                f"{name}: got {own[name]!r}, expected NAME where the camera's name stands"
+            )
     check_id("human_id", own.get("human_id", ""))
     rest = {name: value for name, value in values.items() if name not in _OWN}
     return NodeSettings(config=TrackerConfig.from_mapping(rest), **own)

@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
+import cv2
 import numpy as np
 from sensor_msgs.msg import Image
 
@@ -44,7 +45,7 @@ def test_a_missing_camera_info_is_named_and_does_not_stop_it(live: Any) -> None:
 @pytest.mark.parametrize(
     ("encoding", "width", "height", "says"),
     [
-        ("yuv422", 328, 245, "cam02/image_raw: image encoding 'yuv422' is not known"),
+        ("mono16", 328, 245, "cam02/image_raw: image encoding 'mono16' is not known"),
         ("bgr8", 164, 122, "cam02/image_raw: an image of 164x122 px came"),
     ],
 )
@@ -172,3 +173,18 @@ def test_stamps_that_differ_are_named_with_the_parameter(live: Any) -> None:
     live.send_until(lambda: says in live.message, "the spread", cam04=late)
     assert live.level == 1 and says in live.process.output
     live.send_until(lambda: live.level == 0, "OK again")
+
+
+def test_compressed_images_on_other_topics_are_tracked(begin: Any) -> None:
+    live = begin(camera={"compressed": True, "image_topic": "/rig/NAME"}, image_topic="/rig/NAME")
+    live.track()
+    assert float(live.value("fitness")) > 0.9
+    assert "/rig/cam01: compressed images are received" in live.process.output
+    says = "/rig/cam02/compressed: an image of 164x122 px came, the calibration of cam02 expects"
+    message = live.camera.message("cam02", live.next)
+    small = cv2.imencode(".jpg", np.zeros((122, 164, 3), np.uint8))[1].tobytes()
+    message.data = small
+    live.send_without_pose(cam02=message)
+    live.until(lambda: live.value("last_error").startswith(says), "the refusal")
+    live.track()
+    assert live.value("state") == "TRACKING"
