@@ -29,6 +29,7 @@ class NodeSettings:
         scale: factor by which images are made smaller on arrival.
         result_file: NAME of NAME.trc and NAME.json; left out, nothing is written.
         overwrite: replace an earlier result of that NAME, once the first frame is tracked.
+        save_dir: folder of what save_subject and save_calibration write.
         wait_for_background: start without backgrounds and wait for the service learn_background.
         learn_background_sets: sets of images that the service learn_background learns from.
         sync_tolerance: largest difference of the stamps of one set in s; 0 means equal stamps.
@@ -51,6 +52,7 @@ class NodeSettings:
     scale: float = 1.0
     result_file: Path | None = None
     overwrite: bool = False
+    save_dir: Path = Path()
     wait_for_background: bool = False
     learn_background_sets: int = 20
     sync_tolerance: float = 0.0
@@ -73,7 +75,14 @@ _FIRST = (
     "start_file",
     "result_file",
 )
-_FILES = ("calibration_file", "background_dir", "subject_file", "start_file", "result_file")
+_FILES = (
+    "calibration_file",
+    "background_dir",
+    "subject_file",
+    "start_file",
+    "result_file",
+    "save_dir",
+)
 
 
 RANGES: Mapping[str, tuple[float, float]] = {
@@ -142,8 +151,13 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
                 f"{name}: got {own[name]!r}, expected NAME where the camera's name stands"
             )
     check_id("human_id", own.get("human_id", ""))
-    rest = {name: value for name, value in values.items() if name not in _OWN}
-    return NodeSettings(config=TrackerConfig.from_mapping(rest), **own)
+    return NodeSettings(config=TrackerConfig.from_mapping(tracker_settings(given)), **own)
+
+
+def tracker_settings(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The tracker's settings among the parameters a user gave, by name."""
+    values = declared.present(given)
+    return {name: value for name, value in values.items() if name not in _OWN}
 
 
 def effective_values(settings: NodeSettings) -> dict[str, Any]:
