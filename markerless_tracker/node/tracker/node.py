@@ -261,7 +261,11 @@ class TrackerNode(GivenNode):
                 self._status.dealt_with(late_ns)
             health = assess(self._facts(now_s))
             values = self._status.values(
-                self._sets.counts, self._sets.cameras, self._missing, now_s=now_s
+                self._sets.counts,
+                self._sets.cameras,
+                self._missing,
+                now_s=now_s,
+                views=self._sets.camera_counts,
             )
             message = messages.state_message(
                 self.get_fully_qualified_name(), values, health, self._status.stamp_ns

@@ -136,6 +136,8 @@ def test_a_camera_that_stops_is_named_and_its_return_too(live: Any) -> None:
 def test_duplicates_and_late_sets_are_dropped_and_counted(live: Any) -> None:
     index = live.track()
     before = {key: int(live.value(key)) for key in ("tracked", "late", "duplicates", "restarts")}
+    counted = ("received", "matched", "late", "dropped")
+    views = {what: int(live.value(f"{what}/cam02")) for what in counted}
     live.camera.send(index)
     live.until(lambda: int(live.value("duplicates")) == before["duplicates"] + 4, "duplicates")
     scene = live.camera.scene
@@ -150,6 +152,10 @@ def test_duplicates_and_late_sets_are_dropped_and_counted(live: Any) -> None:
     live.track()
     assert int(live.value("tracked")) == before["tracked"] + 4
     assert int(live.value("restarts")) == before["restarts"]
+    after = {what: int(live.value(f"{what}/cam02")) for what in views}
+    changes = {what: after[what] - views[what] for what in views}
+    assert changes == {"received": 8, "matched": 4, "late": 3, "dropped": 1}
+    assert float(live.value("offset_ms/cam02")) == 0.0
 
 
 def test_without_images_the_state_is_stale_and_says_why(live: Any) -> None:

@@ -85,14 +85,14 @@ class FramePublisher:
         self._messages = TransformMessages(frames)
 
     def publish(self, T_world_root: FloatArray, values: dict[str, float], stamp_ns: int) -> None:
-        """Publish a pose.
+        """Publish a pose, if anybody listens.
 
         Args:
             T_world_root: (4, 4), takes points of the root link to the world.
             values: joint angles by name, rad.
             stamp_ns: time of the images.
         """
-        if self._messages is None:
+        if self._messages is None or not self._publisher.get_subscription_count():
             return
         translations = T_world_root[None, :3, 3]
         quaternions = np.array([quaternion_from_rotation(T_world_root[:3, :3])])

@@ -35,8 +35,8 @@ class HumanPublisher:
             self._urdfs.publish(String(data=self._human.urdf()))
 
     def publish(self, pose: FloatArray, stamp_ns: int) -> None:
-        """Publish the joints of a pose (p,) at the time of its images."""
-        if self._human is not None:
+        """Publish the joints of a pose (p,) at the time of its images, if anybody listens."""
+        if self._human is not None and self._states.get_subscription_count():
             values = self._human.joints(pose)
             self._states.publish(
                 JointState(
