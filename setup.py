@@ -45,6 +45,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         *shared_files("config"),
+        *shared_files("launch"),
     ],
     install_requires=[
         "PyYAML>=6",
@@ -72,6 +73,7 @@ setup(
             "ruff",
             "scipy-stubs",
             "types-PyYAML",
+            "yourdfpy",
         ],
         "view": ["av>=14", "rerun-sdk>=0.24"],
     },

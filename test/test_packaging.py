@@ -27,7 +27,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
     pytest.importorskip("setuptools", minversion="70.1", reason="needed to build the wheel")
     root = Path(__file__).resolve().parent.parent
     work = tmp_path_factory.mktemp("wheel")
-    for item in (NAME, "config", "resource"):
+    for item in (NAME, "config", "launch", "resource"):
         shutil.copytree(root / item, work / item, ignore=shutil.ignore_patterns("__pycache__"))
     for item in ("setup.py", "setup.cfg", "pyproject.toml", "package.xml", "LICENSE"):
         shutil.copy(root / item, work)
@@ -91,7 +91,8 @@ def test_wheel_holds_config_and_manifest(wheel: zipfile.ZipFile, project_root: P
     data = f"{NAME}-{__version__}.data/data/share"
     config = {
         f"{data}/{NAME}/{p.relative_to(project_root).as_posix()}"
-        for p in (project_root / "config").rglob("*")
+        for folder in ("config", "launch")
+        for p in (project_root / folder).rglob("*")
         if p.is_file()
     }
     index = f"{data}/ament_index/resource_index/packages/{NAME}"

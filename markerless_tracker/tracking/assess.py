@@ -77,8 +77,17 @@ class Assessor:
     def __init__(self, rig: CameraRig, body: BodyModel, config: TrackerConfig) -> None:
         self.limbs = LimbWatch(rig)
         self._with_confidence = config.refinement != "none"
-        self._smooth = OneEuro(body) if config.smoothing == "one_euro" else None
+        self._filter = OneEuro(body)
+        self._smooth: OneEuro | None = None
+        self.configure(config)
         self.reset()
+
+    def configure(self, config: TrackerConfig) -> None:
+        """Use another `smoothing` from the next frame on."""
+        smooth = self._filter if config.smoothing == "one_euro" else None
+        if smooth is not self._smooth:
+            self._filter.reset()
+        self._smooth = smooth
 
     def reset(self) -> None:
         """Forget all frames."""

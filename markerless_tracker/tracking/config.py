@@ -58,6 +58,22 @@ OPTIMIZERS = tuple(PAPERS)
 """The search algorithms, by name."""
 
 
+_LIVE = (
+    "optimizer", "evaluations", "min_improvement", "prediction", "smoothing", "search_again",
+    "partition",
+)  # fmt: skip
+_LIVE_GROUPS = ("refine", "sigma", "sppso", "pso", "hmcpso", "apf", "pf")
+
+
+def live_settings() -> frozenset[str]:
+    """Names of the settings that may change between two steps: those of the search.
+
+    The others belong to what is made once: backgrounds, body, limits.
+    """
+    names = (entry.name for entry in TrackerConfig.settings())
+    return frozenset(n for n in names if n in _LIVE or n.partition(".")[0] in _LIVE_GROUPS)
+
+
 def own_evaluations(optimizer: str) -> int:
     """Evaluations per frame that an optimiser was published with."""
     return 1000 if optimizer == "sppso" else 3600

@@ -31,6 +31,10 @@ class MotionModel:
         self._config = config
         self.reset()
 
+    def configure(self, config: TrackerConfig) -> None:
+        """Use other settings from the next frame on."""
+        self._config = config
+
     def reset(self) -> None:
         """Back to the start pose, at rest, before the first frame."""
         self.pose = self.start

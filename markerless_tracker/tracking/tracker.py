@@ -122,6 +122,20 @@ class Tracker:
         self._starter = None if self._given else self._new_starter()
         self._lookahead.restart(self._outlook(-1), self._outlook(0))
 
+    def configure(self, config: TrackerConfig) -> None:
+        """Use other `live_settings` from the next step on; the track goes on.
+
+        Raises:
+            ConfigError: the budget cannot be spent; all stays as it was.
+        """
+        frame_stages(self.body, config, self._motion.pose, self.body.sigma)
+        self.config = config
+        for part in (self._motion, self._body, self._assessor, self._effort):
+            part.configure(config)
+        self._searcher_for = partial(self._searcher_for, config=config)
+        self._starter_for = partial(self._starter_for, config=config)
+        self._searcher = self._searcher_for(self.body)
+
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
         blank = self.evidence.warm_up()
@@ -209,8 +223,7 @@ class Tracker:
                 fit its calibration or background; names the camera.
         """
         self._effort.begin(effort, doubt=bool(self._assessor.limbs.lost))
-        prepared = views if isinstance(views, Prepared) else None
-        outlook = self._lookahead.begin(prepared)
+        outlook = self._lookahead.begin(views if isinstance(views, Prepared) else None)
         latest = None
         try:
             result = self._step(views, stamp_ns, outlook)
@@ -228,7 +241,8 @@ class Tracker:
         if self.config.search_again and self._assessor.track.given_up:
             self._assessor.give_up()
             self._starter = self._new_starter(self._motion.pose)
-        evidence = self._segmented(views, stamp_ns, outlook)
+        views, made = self._lookahead.made(views, stamp_ns, outlook)
+        evidence = made or self.evidence.segment(views, stamp_ns, outlook)
         predicted = self._motion.predict(stamp_ns, self._body.limits)
         seen = self._observe(evidence, stamp_ns, predicted)
         if self._starter is not None:
@@ -243,19 +257,6 @@ class Tracker:
             self._learn(found)
         exposure = {name: v.exposure for name, v in evidence.items() if v.exposure is not None}
         return replace(result, exposure=exposure)
-
-    def _segmented(
-        self,
-        views: Mapping[str, Image | Observation] | Prepared,
-        stamp_ns: int,
-        outlook: Outlook,
-    ) -> Mapping[str, SeenView]:
-        """What was made ahead, or the same made now."""
-        if isinstance(views, Prepared):
-            if views.outlook is outlook and views.stamp_ns == stamp_ns:
-                return views.seen
-            views = views.views
-        return self.evidence.segment(views, stamp_ns, outlook)
 
     def _observe(
         self, evidence: Mapping[str, SeenView], stamp_ns: int, predicted: FloatArray
@@ -329,8 +330,7 @@ class Tracker:
         kept = np.clip(search.pose, *limits)
         kept[jumped] = search.pose[jumped]
         search.pose = kept
-        warnings = seen.notes + notes + seen.left_out
-        return Found(search, stamp_ns, believed, warnings, jumped=jumped)
+        return Found(search, stamp_ns, believed, seen.notes + notes + seen.left_out, jumped=jumped)
 
     def _learn(self, found: Found) -> None:
         """Take a frame into the motion and, while the body is tracked, into its fit."""
@@ -338,8 +338,7 @@ class Tracker:
         self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
         if not tracked or found.anew:
             return
-        moved = self._body.fit_tracked_frame(found.search)
-        if moved is not None:
+        if (moved := self._body.fit_tracked_frame(found.search)) is not None:
             self._searcher = self._searcher_for(self.body)
             self._motion.shift(moved, self._body.limits)
 

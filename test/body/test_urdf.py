@@ -1,6 +1,7 @@
 """The kinematics of the URDF, at the reported angles, are those of the body."""
 
 import dataclasses
+import io
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -110,6 +111,26 @@ def test_cones_are_cylinders_of_their_length() -> None:
         assert float(cylinder.get("length")) == pytest.approx(length)
     thigh = origin(visuals["l_thigh"])[:3, 3]
     np.testing.assert_allclose(thigh, [0, 0, BODY.lengths_m["l_thigh"] / 2])
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_an_independent_reader_finds_it_valid_and_the_markers_in_place(name) -> None:
+    yourdfpy = pytest.importorskip("yourdfpy", reason="an independent reader of URDF")
+    body = BODIES[name]
+    robot = yourdfpy.URDF.load(io.BytesIO(urdf(body).encode()), load_meshes=False)
+    assert robot.validate() and not robot.errors
+    assert robot.base_link == "pelvis"
+    pose = body.neutral + np.random.default_rng(5).uniform(-1.0, 1.0, body.size)
+    angles = AngleReader(body).read(pose)
+    values = dict(zip(angles.names, angles.values_rad, strict=True))
+    assert {name for name in angles.names if not name.startswith("pelvis_")} == set(
+        robot.actuated_joint_names
+    )
+    robot.update_cfg({name: values[name] for name in robot.actuated_joint_names})
+    T = root_transform(body, pose)
+    for marker_name, marker in zip(MARKER_NAMES, markers(body, pose), strict=True):
+        at = T @ robot.get_transform(marker_name)
+        np.testing.assert_allclose(at[:3, 3], marker, atol=1e-6)
 
 
 def renamed(body, old, new):

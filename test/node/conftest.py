@@ -1,9 +1,13 @@
 """A ROS graph of its own for every test process, and a node in it."""
 
+import ctypes
+import importlib.util
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import sysconfig
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -176,6 +180,29 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Process]]:
     yield begin
     for process in started:
         process.stop()
+
+
+@pytest.fixture(scope="session")
+def tf2_msgs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Makes tf2_msgs importable; the environment in which it is for other processes.
+
+    Pip has no wheel of it: it is built from its definition with the generators' wheels.
+    """
+    if importlib.util.find_spec("tf2_msgs") is not None:
+        return {}
+    header = Path(sysconfig.get_path("include")) / "Python.h"
+    for need, found in (("gcc", shutil.which("gcc")), ("g++", shutil.which("g++")),
+                        ("Python.h", header.is_file())):  # fmt: skip
+        if not found:
+            pytest.skip(f"tf2_msgs is not installed, and building it needs {need}")
+    folder = tmp_path_factory.mktemp("tf2_msgs") / "built"
+    builder = Path(__file__).with_name("build_tf2_msgs.py")
+    subprocess.run([sys.executable, str(builder), str(folder)], check=True, capture_output=True)
+    for library in sorted((folder / "lib").glob("*.so")):
+        ctypes.CDLL(str(library))  # LD_LIBRARY_PATH is read when a process starts
+    libraries = f"{folder / 'lib'}{os.pathsep}{os.environ.get('LD_LIBRARY_PATH', '')}"
+    sys.path.append(str(folder))
+    return {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}", "LD_LIBRARY_PATH": libraries}
 
 
 @pytest.fixture(scope="session")

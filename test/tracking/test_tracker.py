@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import Segmenter
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.tracking import Tracker, TrackerConfig
@@ -307,3 +308,43 @@ def test_the_preset_paper_spends_the_papers_counts_to_the_unit(
     settings = {"preset": "paper", "optimizer": optimizer, "evaluations": evaluations, "threads": 1}
     result = make_tracker(settings).step(frames[0].observations, frames[0].stamp_ns)
     assert (result.evaluations, result.refinements) == (evaluations, 0)
+
+
+def test_settings_of_the_search_change_between_two_steps(make_tracker, frames, swarm_settings):
+    tracker = make_tracker(swarm_settings, evaluations=1000)
+    steps = iter(frames)
+
+    def spent(**changes):
+        if changes:
+            values = tracker.config.as_mapping() | changes
+            tracker.configure(TrackerConfig.from_mapping(values))
+        frame = next(steps)
+        result = tracker.step(frame.observations, frame.stamp_ns)
+        assert result.state is TrackState.TRACKING
+        return result.evaluations, errors_mm(result, frame).mean()
+
+    assert spent()[0] == 1000
+    assert spent(evaluations=200)[0] == 200
+    with pytest.raises(ConfigError, match="evaluations is 7"):
+        tracker.configure(
+            TrackerConfig.from_mapping(tracker.config.as_mapping() | {"evaluations": 7})
+        )
+    assert spent()[0] == 200
+    evaluations, error = spent(optimizer="pso", evaluations=1080)
+    assert evaluations == 1080 and error < 40.0
+    tracker.reset()
+    assert tracker.config.optimizer == "pso"
+
+
+def test_smoothing_begins_and_ends_between_two_steps(make_tracker, frames, refined_settings):
+    plain, changed = (make_tracker(refined_settings) for _ in range(2))
+    same = []
+    for index, frame in enumerate(frames[:5]):
+        smoothing = "one_euro" if index in (1, 2, 3) else "none"
+        changed.configure(
+            TrackerConfig.from_mapping(changed.config.as_mapping() | {"smoothing": smoothing})
+        )
+        poses = [t.step(frame.observations, frame.stamp_ns).pose for t in (plain, changed)]
+        same.append(np.array_equal(*poses))
+    # The filter begins with the pose that it is first given.
+    assert same == [True, True, False, False, True]

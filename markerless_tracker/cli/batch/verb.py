@@ -12,7 +12,6 @@ from typing import Any
 
 from rich.console import Console
 
-from markerless_tracker.benchmarks.machine import usable_cores
 from markerless_tracker.cli.batch.cluster import on_cluster
 from markerless_tracker.cli.batch.find import find_recordings
 from markerless_tracker.cli.batch.plan import plan
@@ -23,6 +22,7 @@ from markerless_tracker.cli.benchmark.arguments import count, progress_bars
 from markerless_tracker.cli.track import NO_PERSON_FOUND
 from markerless_tracker.cli.track_arguments import add_options
 from markerless_tracker.errors import DatasetError
+from markerless_tracker.libraries import usable_cores
 
 HELP = (
     "Track the person in every recording of a folder (at any depth) or of a list (a text file with "

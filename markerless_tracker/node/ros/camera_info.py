@@ -20,14 +20,23 @@ def info_of(camera: CameraModel, stamp_ns: int) -> CameraInfo:
     )
 
 
-def camera_of(name: str, info: CameraInfo, T_cam_world: FloatArray) -> CameraModel:
+FIRST_INFO = "the first camera info"
+"""Name of the reference where the rig comes from camera infos."""
+
+
+def camera_of(name: str, info: CameraInfo, T_cam_world: FloatArray, topic: str) -> CameraModel:
     """The camera that a CameraInfo describes.
+
+    Args:
+        name: the camera's.
+        info: the message.
+        T_cam_world: (4, 4), takes world points to the camera.
+        topic: the message's, for messages.
 
     Raises:
         CalibrationError: uncalibrated, cropped, or a lens model other than plumb_bob; names the
             topic.
     """
-    topic = f"{name}/camera_info"
     matrix, distortion = lens_of(info, topic)
     try:
         return CameraModel(name, (info.width, info.height), matrix, distortion, T_cam_world)
@@ -35,24 +44,35 @@ def camera_of(name: str, info: CameraInfo, T_cam_world: FloatArray) -> CameraMod
         raise CalibrationError(f"{topic}: {error}") from error
 
 
-def check_info(info: CameraInfo, camera: CameraModel) -> str:
-    """Compare a CameraInfo with the calibration file.
+def check_info(
+    info: CameraInfo,
+    camera: CameraModel,
+    topic: str,
+    reference: str = "the calibration file",
+) -> str:
+    """Compare a CameraInfo with the calibration in use.
 
     A size of 0 and a K of zeros (uncalibrated) say nothing.
 
+    Args:
+        info: the message.
+        camera: the calibration in use.
+        topic: the message's, for messages.
+        reference: where the calibration in use is from, in words.
+
     Returns:
-        How its K and D differ from the calibration file by more than `TOLERANCE`, in one line;
-        empty if they do not.
+        How its K and D differ from those in use by more than `TOLERANCE`, in one line; empty if
+        they do not.
 
     Raises:
-        CalibrationError: the images cannot be those that the calibration file describes: another
-            size, another lens model, binning or a region of interest, or K or D is not finite.
+        CalibrationError: the images cannot be those that the calibration describes: another size,
+            another lens model, binning or a region of interest, or K or D is not finite.
     """
-    topic, ignored = f"{camera.name}/camera_info", f"; {camera.name} is left out until it is right"
+    ignored = f"; {camera.name} is left out until it is right"
     width, height = camera.size_px
     if info.width and info.height and (info.width, info.height) != (width, height):
         raise CalibrationError(
-            f"{topic}: says {info.width}x{info.height} px, the calibration file says "
+            f"{topic}: says {info.width}x{info.height} px, {reference} says "
             f"{width}x{height} px{ignored}"
         )
     if not np.any(info.k) and not np.any(info.d):
@@ -63,16 +83,17 @@ def check_info(info: CameraInfo, camera: CameraModel) -> str:
         raise CalibrationError(f"{error}{ignored}") from error
     notes = []
     if np.abs(matrix - camera.matrix).max() > TOLERANCE * camera.matrix[[0, 1], [0, 1]].min():
-        notes.append(_difference("K", matrix[:2].ravel(), camera.matrix[:2].ravel()))
+        notes.append(_difference("K", matrix[:2].ravel(), camera.matrix[:2].ravel(), reference))
     if np.abs(distortion - camera.distortion).max() > TOLERANCE * max(
         np.abs(camera.distortion).max(), TOLERANCE
     ):
-        notes.append(_difference("D", distortion, camera.distortion))
+        notes.append(_difference("D", distortion, camera.distortion, reference))
     if not notes:
         return ""
-    return f"{topic}: {', '.join(notes)}; the calibration file is used"
+    restart = " until the tracker is restarted" if reference == FIRST_INFO else ""
+    return f"{topic}: {', '.join(notes)}; {reference} is used{restart}"
 
 
-def _difference(name: str, came: FloatArray, expected: FloatArray) -> str:
+def _difference(name: str, came: FloatArray, expected: FloatArray, reference: str) -> str:
     listed = [" ".join(f"{value:.5g}" for value in values) for values in (came, expected)]
-    return f"{name} is [{listed[0]}], the calibration file says [{listed[1]}]"
+    return f"{name} is [{listed[0]}], {reference} says [{listed[1]}]"

@@ -1,4 +1,4 @@
-"""sensor_msgs/Image as serialised bytes (CDR), read and written without a copy of the pixels.
+"""Image messages as serialised bytes (CDR), read and written without a copy of the pixels.
 
 Layout: four bytes of encapsulation (the second one's lowest bit: little endian), then the fields in
 order, each at a multiple of its own size counted from the end of the encapsulation. A string is its
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.datasets.bag.encodings import compressed_layout
 from markerless_tracker.errors import ImageError
 
 _START = 4
@@ -43,6 +44,28 @@ class ImageMessage:
     data: NDArray[np.uint8]
 
 
+@dataclass(frozen=True, eq=False)
+class CompressedMessage:
+    """The fields of a sensor_msgs/CompressedImage.
+
+    Attributes:
+        stamp_ns: time of the header, ns.
+        frame_id: frame of the header.
+        format: its name.
+        data: (n,) uint8, the message's own memory; to be read only.
+        width, height: of the image, px, from its own header.
+        channels: of the decoded image: 1 (grey) or 3 (BGR).
+    """
+
+    stamp_ns: int
+    frame_id: str
+    format: str
+    data: NDArray[np.uint8]
+    width: int
+    height: int
+    channels: int
+
+
 class _Fields:
     """Reads the fields of a serialised message one after the other."""
 
@@ -64,6 +87,12 @@ class _Fields:
         values = layout.unpack_from(self._message, self.at)
         self.at += layout.size
         return values
+
+    def header(self) -> tuple[int, str]:
+        """Stamp, ns, and frame of a std_msgs/Header."""
+        seconds, *_ = self.numbers("i")
+        nanoseconds, *_ = self.numbers("I")
+        return seconds * _SECOND_NS + nanoseconds, self.text()
 
     def text(self) -> str:
         """A string; bytes that are no UTF-8 are replaced."""
@@ -98,17 +127,31 @@ def read_image(message: bytes, topic: str) -> ImageMessage:
         ImageError: not plain CDR, or shorter than its own lengths say.
     """
     fields = _Fields(message, topic)
-    seconds, *_ = fields.numbers("i")
-    nanoseconds, *_ = fields.numbers("I")
-    frame_id = fields.text()
+    stamp_ns, frame_id = fields.header()
     height, width = fields.numbers("II")
     encoding = fields.text()
     fields.numbers("B")  # is_bigendian
     (step,) = fields.numbers("I")
     data = _writable(fields.elements())
-    return ImageMessage(
-        seconds * _SECOND_NS + nanoseconds, frame_id, height, width, encoding, step, data
-    )
+    return ImageMessage(stamp_ns, frame_id, height, width, encoding, step, data)
+
+
+def read_compressed(message: bytes, topic: str) -> CompressedMessage:
+    """The fields of a serialised sensor_msgs/CompressedImage.
+
+    Args:
+        message: the bytes, encapsulation included.
+        topic: its topic, for error messages.
+
+    Raises:
+        ImageError: not plain CDR, shorter than its own lengths say, or neither JPEG nor PNG.
+    """
+    fields = _Fields(message, topic)
+    stamp_ns, frame_id = fields.header()
+    kind = fields.text()
+    data = fields.elements()
+    layout = compressed_layout(data, where=topic)
+    return CompressedMessage(stamp_ns, frame_id, kind, data, *layout)
 
 
 def image_bytes(image: NDArray[np.uint8], stamp_ns: int, frame_id: str) -> bytes:

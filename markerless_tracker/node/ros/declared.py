@@ -1,6 +1,6 @@
 """Parameters of a node: checks of the given names and values, declaration of those in effect."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
 
@@ -69,21 +69,29 @@ def declare_effective(
     values: Mapping[str, Any],
     lines: Mapping[str, str],
     settings: Iterable[Setting] = (),
+    *,
+    live: Collection[str] = (),
+    fixed: str = "",
 ) -> None:
-    """Declare the parameters in effect, read-only and described, in place of the given ones.
+    """Declare the parameters in effect, described, in place of the given ones.
 
     Args:
         node: the node.
         values: every parameter's value; None where there is none.
         lines: a line about each.
         settings: whose ranges and choices the descriptors have.
+        live: those that may be set; the others are read-only.
+        fixed: why they are, for their descriptors.
     """
     held = {setting.name: setting for setting in settings}
     for name in given_parameters(node):
         node.undeclare_parameter(name)
     for name, value in values.items():
         descriptor = ParameterDescriptor(
-            description=lines.get(name, ""), read_only=True, dynamic_typing=value is None
+            description=lines.get(name, ""),
+            read_only=name not in live,
+            dynamic_typing=value is None,
+            additional_constraints="" if name in live else fixed,
         )
         if name in held and value is not None:
             _hold(descriptor, held[name])
@@ -118,7 +126,9 @@ def attribute_lines(owner: type) -> dict[str, str]:
 def _hold(descriptor: ParameterDescriptor, setting: Setting) -> None:
     """Put a setting's range and choices into its parameter's descriptor."""
     if setting.choices:
-        descriptor.additional_constraints = f"one of {', '.join(setting.choices)}"
+        choices = f"one of {', '.join(setting.choices)}"
+        fixed = descriptor.additional_constraints
+        descriptor.additional_constraints = f"{choices}; {fixed}" if fixed else choices
     if setting.min is None or setting.max is None:
         return
     if setting.type is int:
@@ -139,6 +149,17 @@ def text(name: str, value: Any) -> str:
     if not isinstance(value, str):
         raise ConfigError(f"{name}: got {value!r}, expected a text")
     return value
+
+
+def choice(name: str, value: Any, choices: Sequence[str]) -> str:
+    """The value, checked to be one of a few texts.
+
+    Raises:
+        ConfigError: it is not; names the parameter.
+    """
+    if value not in choices:
+        raise ConfigError(f"{name}: got {value!r}, expected one of {', '.join(choices)}")
+    return str(value)
 
 
 def flag(name: str, value: Any) -> bool:

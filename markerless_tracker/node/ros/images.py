@@ -1,13 +1,20 @@
-"""sensor_msgs/Image and numpy arrays, without cv_bridge and with as few copies as possible."""
+"""Image messages and numpy arrays, without cv_bridge and with as few copies as possible."""
 
 import array
 from typing import Any, Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.datasets.bag.encodings import ENCODINGS, decode_raw
+from markerless_tracker.datasets.bag.encodings import (
+    ENCODINGS,
+    decode_compressed,
+    decode_raw,
+    decoded_channels,
+)
 from markerless_tracker.errors import ImageError
+from markerless_tracker.node.ros.cdr import CompressedMessage, ImageMessage
 
 Array = NDArray[np.uint8]
 
@@ -54,25 +61,46 @@ def check_layout(message: ImageLike, topic: str) -> None:
             f"{topic}: image encoding {message.encoding[:_SHOWN]!r} is not known, expected one of "
             f"{', '.join(ENCODINGS)}"
         )
-    channels = ENCODINGS[message.encoding][0]
+    pixel = ENCODINGS[message.encoding][0]
     height, width, step, size = message.height, message.width, message.step, len(message.data)
-    if height < 1 or width < 1 or step < width * channels or size != height * step:
+    if height < 1 or width < 1 or step < width * pixel or size != height * step:
         raise ImageError(
             f"{topic}: {size} bytes in rows of {step} are no image of {width}x{height} px "
-            f"{message.encoding}, expected {height} rows of at least {width * channels} bytes"
+            f"{message.encoding}, expected {height} rows of at least {width * pixel} bytes"
         )
 
 
-def channels_of(message: ImageLike) -> int:
+def received_channels(message: ImageMessage | CompressedMessage) -> int:
     """Channels of the decoded image of a checked message: 1 (grey) or 3 (BGR)."""
-    return 1 if ENCODINGS[message.encoding][0] == 1 else 3
+    if isinstance(message, CompressedMessage):
+        return message.channels
+    return decoded_channels(message.encoding)
+
+
+def decode_received(message: ImageMessage | CompressedMessage, topic: str) -> Array:
+    """The image of a received message: as `decode_image`, or of a JPEG or PNG.
+
+    Raises:
+        ImageError: it cannot be decoded, or is not as its header says.
+    """
+    if not isinstance(message, CompressedMessage):
+        return decode_image(message, topic)
+    image = decode_compressed(message.data, where=topic)
+    if image.shape[:2] != (message.height, message.width):
+        raise ImageError(
+            f"{topic}: an image of {image.shape[1]}x{image.shape[0]} px came, its header says "
+            f"{message.width}x{message.height} px"
+        )
+    if image.ndim == 2 and message.channels == 3:
+        return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8)
+    return image
 
 
 def decode_image(message: ImageLike, topic: str) -> Array:
     """The image of a sensor_msgs/Image as C-contiguous uint8, BGR (h, w, 3) or grey (h, w).
 
-    Shares the message's memory for mono8 and bgr8 without padding; padded rows, RGB and alpha
-    channels (dropped) cost one copy. ``is_bigendian`` says nothing about 8-bit channels.
+    Shares the message's memory for mono8 and bgr8 without padding; padded rows and other encodings
+    cost one copy; alpha channels are dropped. ``is_bigendian`` says nothing about 8-bit channels.
 
     Raises:
         ImageError: as `check_layout`.

@@ -10,13 +10,22 @@ IMAGE_DEPTH = 5
 """Queue depth for images; with the shipped Fast DDS profile none is lost at 60 Hz."""
 
 
-def image_qos(*, reliable: bool = True, depth: int = IMAGE_DEPTH) -> QoSProfile:
-    """For images and camera infos. A reliable subscription does not match best-effort cameras."""
+TRANSPORTS = ("auto", "raw", "compressed")
+"""Which images are received: what is offered, sensor_msgs/Image, sensor_msgs/CompressedImage."""
+
+
+def image_qos(
+    *, reliable: bool = True, latched: bool = False, depth: int = IMAGE_DEPTH
+) -> QoSProfile:
+    """For images and camera infos.
+
+    A reliable subscription does not match best-effort publishers, a latched one only latched ones.
+    """
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=depth,
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.VOLATILE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
 
 
@@ -38,9 +47,10 @@ def output_qos() -> QoSProfile:
 
 
 class FollowingSubscription:
-    """A subscription that becomes best effort if a publisher offers no more.
+    """A subscription with the quality of service that its publishers offer.
 
-    A reliable subscription does not match a best-effort publisher.
+    Best effort if one of them is: a reliable subscription does not match it. Latched if all are:
+    it then receives what they sent before.
 
     Args:
         node: creates the subscription.
@@ -67,19 +77,31 @@ class FollowingSubscription:
         self._node, self._kind, self._topic, self._callback = node, kind, topic, callback
         self._depth, self._raw = depth, raw
         self._group = _NotExecuted() if polled else None
-        self._reliable = True
+        self._offered = (True, False)
         self._subscription = self._subscribe()
 
     def follow(self) -> None:
-        """Adapt to the publishers' reliability; to be called periodically."""
-        if not self._reliable:
+        """Adapt to the publishers; to be called periodically."""
+        offers = [o.qos_profile for o in self._node.get_publishers_info_by_topic(self._topic)]
+        if not offers:
             return
-        offers = self._node.get_publishers_info_by_topic(self._topic)
-        if any(o.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for o in offers):
-            self._node.get_logger().info(f"{self._topic} is best effort, subscribed likewise")
-            self._reliable = False
-            self._node.destroy_subscription(self._subscription)
-            self._subscription = self._subscribe()
+        reliable = all(o.reliability != ReliabilityPolicy.BEST_EFFORT for o in offers)
+        latched = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
+        if (reliable, latched) == self._offered:
+            return
+        words = f"{'reliable' if reliable else 'best effort'}{' and latched' if latched else ''}"
+        self._node.get_logger().info(f"{self._topic} is {words}, subscribed likewise")
+        self._offered = (reliable, latched)
+        self.close()
+        self._subscription = self._subscribe()
+
+    def offered(self) -> bool:
+        """Whether the topic has a publisher."""
+        return bool(self._node.count_publishers(self._topic))
+
+    def close(self) -> None:
+        """End the subscription."""
+        self._node.destroy_subscription(self._subscription)
 
     def poll(self) -> None:
         """Call back with the newest message that waits, if any; from the executor's thread."""
@@ -92,7 +114,8 @@ class FollowingSubscription:
             self._callback(newest[0])
 
     def _subscribe(self) -> Any:
-        qos = image_qos(reliable=self._reliable, depth=self._depth)
+        reliable, latched = self._offered
+        qos = image_qos(reliable=reliable, latched=latched, depth=self._depth)
         return self._node.create_subscription(
             self._kind,
             self._topic,

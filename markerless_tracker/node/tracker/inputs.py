@@ -9,13 +9,23 @@ from sensor_msgs.msg import CameraInfo
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.node.health import QUIET_S
-from markerless_tracker.node.ros.camera_info import check_info
-from markerless_tracker.node.ros.cdr import ImageMessage, read_image, without_stamp
-from markerless_tracker.node.ros.images import channels_of, check_layout
+from markerless_tracker.node.ros.camera_info import FIRST_INFO, check_info
+from markerless_tracker.node.ros.cdr import (
+    CompressedMessage,
+    ImageMessage,
+    read_compressed,
+    read_image,
+    without_stamp,
+)
+from markerless_tracker.node.ros.images import check_layout, received_channels
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 
+COMPRESSED_SUFFIX = "/compressed"
+"""Follows the topic of raw images in that of compressed ones."""
 _GAP_MAX = 1000
+_SHOWN = 80
+"""Characters of a received text that messages show."""
 _KINDS = {1: "grey", 3: "colour"}
 
 
@@ -33,6 +43,10 @@ class CameraInput:
         report: called with one line when a problem begins and when it ends.
         clock: monotonic time in s.
         channels: number of channels of the camera's background, None if there is none to match.
+        image_topic, info_topic: names with the camera's in place of ``NAME``.
+
+    Attributes:
+        image_topic, info_topic: the camera's.
     """
 
     def __init__(
@@ -45,12 +59,14 @@ class CameraInput:
         report: Callable[[str], None],
         clock: Callable[[], float],
         channels: Callable[[str], int | None] = lambda _: None,
+        image_topic: str = "NAME/image_raw",
+        info_topic: str = "NAME/camera_info",
     ) -> None:
         self.name = name
         self.camera = camera
         self.info: Any = None
-        self.image_topic = f"{name}/image_raw"
-        self.info_topic = f"{name}/camera_info"
+        self.image_topic = image_topic.replace("NAME", name)
+        self.info_topic = info_topic.replace("NAME", name)
         self._sets = sets
         self._status = status
         self._report = report
@@ -63,6 +79,7 @@ class CameraInput:
         self._refused_s = 0.0
         self._sequence: int | None = None
         self._info_bytes = b""
+        self._reference = "the calibration file" if camera is not None else FIRST_INFO
         self._info_reported = False
         self._silent_since_s: float | None = None
 
@@ -78,13 +95,27 @@ class CameraInput:
             serialised: the message's bytes; the stored image shares them.
             sequence: its sequence number at the publisher; gaps are images lost by the middleware.
         """
+        self._take(serialised, sequence, read_image, self.image_topic)
+
+    def on_compressed(self, serialised: bytes, sequence: int | None = None) -> None:
+        """As `on_image`, of a sensor_msgs/CompressedImage."""
+        topic = f"{self.image_topic}{COMPRESSED_SUFFIX}"
+        self._take(serialised, sequence, read_compressed, topic)
+
+    def _take(
+        self,
+        serialised: bytes,
+        sequence: int | None,
+        read: Callable[[bytes, str], ImageMessage | CompressedMessage],
+        topic: str,
+    ) -> None:
         now_s = self._clock()
         self._count_lost(sequence)
         if self._first_image_s is None:
             self._first_image_s = now_s
         try:
-            message = read_image(serialised, self.image_topic)
-            self._check(message)
+            message = read(serialised, topic)
+            self._check(message, topic)
         except ImageError as error:
             self._status.refused(self.name)
             self._refused_s, self._refusal = now_s, str(error)
@@ -112,7 +143,7 @@ class CameraInput:
         if self.camera is None:
             return
         try:
-            note, refusal = check_info(message, self.camera), ""
+            note, refusal = check_info(message, self.camera, self.info_topic, self._reference), ""
         except TrackerError as error:
             note, refusal = "", str(error)
         if refusal and refusal != self._info_refusal:
@@ -120,7 +151,7 @@ class CameraInput:
         if note and note != self._info_note:
             self._report(note)
         if self._info_refusal and not refusal:
-            self._report(f"{self.info_topic}: agrees with the calibration file again")
+            self._report(f"{self.info_topic}: agrees with {self._reference} again")
         self._info_refusal, self._info_note = refusal, note
 
     def missing(self, silent: bool, left_out: bool, others_send: bool, now_s: float) -> list[str]:
@@ -150,21 +181,23 @@ class CameraInput:
                 self._say(f"{self.info_topic}: no camera info comes with the images; {source}")
         return topics
 
-    def _check(self, message: ImageMessage) -> None:
-        check_layout(message, self.image_topic)
+    def _check(self, message: ImageMessage | CompressedMessage, topic: str) -> None:
+        if isinstance(message, ImageMessage):
+            check_layout(message, topic)
         if self._info_refusal:
             raise ImageError(self._info_refusal)
         if self.camera is not None:
             width, height = self.camera.size_px
             if (message.width, message.height) != (width, height):
                 raise ImageError(
-                    f"{self.image_topic}: an image of {message.width}x{message.height} px came, "
+                    f"{topic}: an image of {message.width}x{message.height} px came, "
                     f"the calibration of {self.name} expects {width}x{height} px"
                 )
-        expected, came = self._channels(self.name), channels_of(message)
+        expected, came = self._channels(self.name), received_channels(message)
         if expected is not None and came != expected:
+            kind = message.encoding if isinstance(message, ImageMessage) else message.format
             raise ImageError(
-                f"{self.image_topic}: a {_KINDS[came]} image ({message.encoding}) came, the "
+                f"{topic}: a {_KINDS[came]} image ({kind[:_SHOWN]}) came, the "
                 f"background of {self.name} is {_KINDS[expected]}"
             )
 

@@ -1,43 +1,42 @@
 """The node `tracker`: image topics in, the pose of one person out."""
 
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from threading import Lock
-from types import coroutine
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from std_srvs.srv import Trigger
 
+from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.imaging import scale_image
 from markerless_tracker.node.health import QUIET_S, Facts, assess
 from markerless_tracker.node.ros import messages
-from markerless_tracker.node.ros.cdr import ImageMessage
+from markerless_tracker.node.ros.cdr import CompressedMessage, ImageMessage
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
-from markerless_tracker.node.ros.images import decode_image
+from markerless_tracker.node.ros.images import decode_received
 from markerless_tracker.node.ros.notices import Notices
 from markerless_tracker.node.ros.qos import latched_qos
 from markerless_tracker.node.tracker import parameters
 from markerless_tracker.node.tracker.announcer import Announcer
+from markerless_tracker.node.tracker.changes import FIXED, LIVE, LiveSettings
 from markerless_tracker.node.tracker.inputs import CameraInput
-from markerless_tracker.node.tracker.learning import Learning
-from markerless_tracker.node.tracker.outputs import Pictures, ResultFile
-from markerless_tracker.node.tracker.publishers import ResultPublishers
+from markerless_tracker.node.tracker.publishing.files import Pictures, ResultFile
+from markerless_tracker.node.tracker.publishing.results import ResultPublishers
 from markerless_tracker.node.tracker.report import RunReport
+from markerless_tracker.node.tracker.services import Services
 from markerless_tracker.node.tracker.setup import RigSource, build
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.node.tracker.topics import CameraTopics
 from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, TrackWorker
+from markerless_tracker.records import TrackState
 from markerless_tracker.tracking import Tracker
 
 STATE_PERIOD_S = 0.5
-_POLL_S = 0.002
 
 _NOTED = (
     "tracked",
@@ -74,12 +73,18 @@ class TrackerNode(GivenNode):
 
     def __init__(self, **node_arguments: Any) -> None:
         super().__init__("tracker", **node_arguments)
-        self._settings = parameters.read_settings(given_parameters(self))
+        given = given_parameters(self)
+        self._settings = parameters.read_settings(given)
         declare_effective(
             self,
             parameters.effective_values(self._settings),
             parameters.descriptions(),
             parameters.held_settings(),
+            live=LIVE,
+            fixed=FIXED,
+        )
+        self._live = LiveSettings(
+            self, parameters.tracker_settings(given), self._settings.config, self._inform
         )
         self._seconds: Callable[[], float] = time.monotonic
         self._notices = Notices(self._log_warning, self._seconds)
@@ -87,10 +92,11 @@ class TrackerNode(GivenNode):
         self._announcer = Announcer(self._news, self._notices)
         self._source = RigSource(self._settings)
         self._status = TrackerStatus()
-        self._sets: Synchronizer[ImageMessage] = Synchronizer(
+        self._sets: Synchronizer[ImageMessage | CompressedMessage] = Synchronizer(
             self._source.names, tolerance_ns=round(self._settings.sync_tolerance * 1e9)
         )
         self._tracker: Tracker | None = None
+        self._found = False
         self._handle: TrackerHandle | None = None
         self._missing: Sequence[str] = ()
         self._repeated = (0, 0.0)
@@ -101,7 +107,7 @@ class TrackerNode(GivenNode):
             self._settings.result_file, overwrite=self._settings.overwrite, report=self._warn
         )
         self._report = RunReport(start_given=self._settings.start_file is not None)
-        self._results = ResultPublishers(self)
+        self._results = ResultPublishers(self, self._settings, self._source.rig, self._inform)
         self._states = self.create_publisher(DiagnosticArray, "state", latched_qos())
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._worker = TrackWorker(
@@ -147,6 +153,8 @@ class TrackerNode(GivenNode):
             for line in verdict.lines():
                 self._inform(line)
             notes["verdict"] = verdict.as_mapping()
+        if self._live.record:
+            notes["changed"] = self._live.record
         written = self._result_file.close(notes)
         if written is not None:
             self._inform(written)
@@ -163,18 +171,24 @@ class TrackerNode(GivenNode):
             report=self._warn,
             clock=self._seconds,
             channels=self._background_channels,
+            image_topic=self._settings.image_topic,
+            info_topic=self._settings.info_topic,
         )
 
     def _listen(self) -> None:
-        self._topics = CameraTopics(self, self._inputs, clock=self._seconds)
+        self._topics = CameraTopics(
+            self, self._inputs, transport=self._settings.image_transport, clock=self._seconds
+        )
         self._source.listen(self, self._warn)
-        self.create_service(Trigger, "~/reset", self._on_reset)
-        # Images must be received while the request is answered.
-        self.create_service(
-            Trigger,
-            "~/learn_background",
-            self._on_learn,
-            callback_group=ReentrantCallbackGroup(),
+        self._requests = Services(
+            self,
+            self._worker,
+            self._settings,
+            cameras=self._source.names,
+            rig=lambda: self._source.rig,
+            person=self._person,
+            clock=self._seconds,
+            inform=self._inform,
         )
         # A steady clock: without /clock simulated time stops, and the state must be published.
         self.create_timer(STATE_PERIOD_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -186,27 +200,9 @@ class TrackerNode(GivenNode):
         segmenter = self._tracker.segmenter(camera)
         return None if segmenter is None else segmenter.background.channels
 
-    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._worker.reset()
-        response.success = True
-        response.message = "the next set of images is tracked as if it were the first"
-        return response
-
-    async def _on_learn(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        learning = Learning(
-            self._source.names,
-            self._settings.learn_background_sets,
-            self._settings.config,
-            self._settings.background_dir,
-            clock=self._seconds,
-        )
-        self._worker.learn(learning)
-        while not learning.answered:
-            # The executor polls a waiting coroutine after every callback, without a pause.
-            time.sleep(_POLL_S)
-            await _yield_to_executor()
-        self._inform(f"learn_background: {learning.message}")
-        return learning.answer(response)
+    def _person(self) -> BodyModel | None:
+        """The tracked body; None before a person was tracked."""
+        return self._tracker.body if self._tracker is not None and self._found else None
 
     # work, in the worker's thread
 
@@ -235,9 +231,9 @@ class TrackerNode(GivenNode):
         for doubt in self._report.begin(setup.tracker, rig):
             self._warn(doubt)
         return TrackerHandle(
-            setup.tracker,
+            self._live.settable(setup.tracker),
             setup.start_stamp_ns,
-            partial(_decode, sizes_px),
+            partial(_decode, sizes_px, {s.name: s.image_topic for s in self._inputs}),
             waits=setup.tracker.segmenter(scaled.names[0]) is None,
         )
 
@@ -248,6 +244,7 @@ class TrackerNode(GivenNode):
         self._result_file.add(tracked.result)
         self._report.add(tracked.result)
         self._announcer.result(tracked.result)
+        self._found = self._found or tracked.result.state is TrackState.TRACKING
         if not self.context.ok():  # a signal was received while this set was tracked
             return
         self._results.publish(tracked.result, self._tracker.body)
@@ -268,7 +265,11 @@ class TrackerNode(GivenNode):
                 self._status.dealt_with(late_ns)
             health = assess(self._facts(now_s))
             values = self._status.values(
-                self._sets.counts, self._sets.cameras, self._missing, now_s=now_s
+                self._sets.counts,
+                self._sets.cameras,
+                self._missing,
+                now_s=now_s,
+                views=self._sets.camera_counts,
             )
             message = messages.state_message(
                 self.get_fully_qualified_name(), values, health, self._status.stamp_ns
@@ -334,11 +335,10 @@ class TrackerNode(GivenNode):
         self.get_logger().info(text)
 
 
-@coroutine
-def _yield_to_executor() -> Generator[None, None, None]:
-    """Return to the executor."""
-    yield
-
-
-def _decode(sizes_px: dict[str, tuple[int, int]], name: str, message: ImageMessage) -> Any:
-    return scale_image(decode_image(message, f"{name}/image_raw"), sizes_px[name])
+def _decode(
+    sizes_px: Mapping[str, tuple[int, int]],
+    topics: Mapping[str, str],
+    name: str,
+    message: ImageMessage | CompressedMessage,
+) -> Any:
+    return scale_image(decode_received(message, topics[name]), sizes_px[name])

@@ -6,7 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from markerless_tracker.datasets.background import MAX_FRAMES
+from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.ros import declared
+from markerless_tracker.node.ros.qos import TRANSPORTS
+from markerless_tracker.node.ros.ros4hri import check_id
+from markerless_tracker.node.ros.transforms import TF_CHOICES
 from markerless_tracker.settings import Setting
 from markerless_tracker.tracking import TrackerConfig
 
@@ -25,9 +29,17 @@ class NodeSettings:
         scale: factor by which images are made smaller on arrival.
         result_file: NAME of NAME.trc and NAME.json; left out, nothing is written.
         overwrite: replace an earlier result of that NAME, once the first frame is tracked.
+        save_dir: folder of what save_subject and save_calibration write.
         wait_for_background: start without backgrounds and wait for the service learn_background.
         learn_background_sets: sets of images that the service learn_background learns from.
         sync_tolerance: largest difference of the stamps of one set in s; 0 means equal stamps.
+        image_topic: topic of a camera's images, NAME stands for the camera.
+        info_topic: topic of a camera's camera infos, NAME stands for the camera.
+        image_transport: images that are received; auto: raw, or compressed if only those are sent.
+        tf: frames of the body on /tf: all links, the root link alone (with robot_state_publisher).
+        tf_cameras: publish the optical frames of `calibration_file` on /tf_static.
+        frame_prefix: begins the names of the links' frames, such as `person1/`.
+        human_id: id of the person below /humans/bodies (REP-155); left out, nothing is published.
         config: the tracker's settings.
     """
 
@@ -40,9 +52,17 @@ class NodeSettings:
     scale: float = 1.0
     result_file: Path | None = None
     overwrite: bool = False
+    save_dir: Path = Path()
     wait_for_background: bool = False
     learn_background_sets: int = 20
     sync_tolerance: float = 0.0
+    image_topic: str = "NAME/image_raw"
+    info_topic: str = "NAME/camera_info"
+    image_transport: str = "auto"
+    tf: str = "links"
+    tf_cameras: bool = True
+    frame_prefix: str = ""
+    human_id: str = ""
     config: TrackerConfig
 
 
@@ -55,7 +75,14 @@ _FIRST = (
     "start_file",
     "result_file",
 )
-_FILES = ("calibration_file", "background_dir", "subject_file", "start_file", "result_file")
+_FILES = (
+    "calibration_file",
+    "background_dir",
+    "subject_file",
+    "start_file",
+    "result_file",
+    "save_dir",
+)
 
 
 RANGES: Mapping[str, tuple[float, float]] = {
@@ -65,6 +92,8 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "learn_background_sets": (2, MAX_FRAMES),
 }
 """Least and largest value of the node's own parameters."""
+CHOICES: Mapping[str, tuple[str, ...]] = {"tf": TF_CHOICES, "image_transport": TRANSPORTS}
+"""Values of the node's own parameters that are one of a few."""
 
 
 def parameter_names() -> tuple[str, ...]:
@@ -79,7 +108,11 @@ def held_settings() -> tuple[Setting, ...]:
         Setting(name, type(least), least, lines[name], None, least, most)
         for name, (least, most) in RANGES.items()
     )
-    return (*own, *TrackerConfig.settings())
+    chosen = (
+        Setting(name, str, values[0], lines[name], values, None, None)
+        for name, values in CHOICES.items()
+    )
+    return (*own, *chosen, *TrackerConfig.settings())
 
 
 def read_settings(given: Mapping[str, Any]) -> NodeSettings:
@@ -100,14 +133,31 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
     for name in ("stature", "scale", "sync_tolerance"):
         if name in values:
             own[name] = declared.number(name, values[name], *RANGES[name])
-    for name in ("overwrite", "wait_for_background"):
+    for name in ("overwrite", "wait_for_background", "tf_cameras"):
         if name in values:
             own[name] = declared.flag(name, values[name])
+    for name, choices in CHOICES.items():
+        if name in values:
+            own[name] = declared.choice(name, values[name], choices)
+    for name in ("frame_prefix", "human_id", "image_topic", "info_topic"):
+        if name in values:
+            own[name] = declared.text(name, values[name])
     if "learn_background_sets" in values:
         name = "learn_background_sets"
         own[name] = declared.count(name, values[name], *map(int, RANGES[name]))
-    rest = {name: value for name, value in values.items() if name not in _OWN}
-    return NodeSettings(config=TrackerConfig.from_mapping(rest), **own)
+    for name in ("image_topic", "info_topic"):
+        if "NAME" not in own.get(name, "NAME"):
+            raise ConfigError(
+                f"{name}: got {own[name]!r}, expected NAME where the camera's name stands"
+            )
+    check_id("human_id", own.get("human_id", ""))
+    return NodeSettings(config=TrackerConfig.from_mapping(tracker_settings(given)), **own)
+
+
+def tracker_settings(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The tracker's settings among the parameters a user gave, by name."""
+    values = declared.present(given)
+    return {name: value for name, value in values.items() if name not in _OWN}
 
 
 def effective_values(settings: NodeSettings) -> dict[str, Any]:
@@ -121,6 +171,7 @@ def descriptions() -> dict[str, str]:
     """One line about every parameter: the most used first, then the node's, then the tracker's."""
     own = declared.attribute_lines(NodeSettings)
     lines = {name: own[name] for name in dict.fromkeys((*_FIRST, *_OWN))}
+    lines |= {name: f"{lines[name]} ({', '.join(values)})" for name, values in CHOICES.items()}
     for setting in TrackerConfig.settings():
         choices = f" ({', '.join(map(str, setting.choices))})" if setting.choices else ""
         lines[setting.name] = f"{setting.doc}{choices}"

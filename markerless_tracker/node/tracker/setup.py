@@ -31,6 +31,7 @@ class RigSource:
     def __init__(self, settings: NodeSettings) -> None:
         self.rig: CameraRig | None = None
         self._tree: Any = None
+        self._info_topic = settings.info_topic
         if settings.calibration_file is not None:
             with _named("calibration_file"):
                 rig = read_calibration(settings.calibration_file)
@@ -97,7 +98,8 @@ class RigSource:
             T_cam_world = self._tree.T_cam_world(name)
             if T_cam_world is None or infos[name] is None:
                 return None
-            cameras.append(camera_of(name, infos[name], T_cam_world))
+            topic = self._info_topic.replace("NAME", name)
+            cameras.append(camera_of(name, infos[name], T_cam_world, topic))
         self.rig = CameraRig(tuple(cameras))
         return self.rig
 

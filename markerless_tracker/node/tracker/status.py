@@ -4,10 +4,11 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
+from types import MappingProxyType
 
 import numpy as np
 
-from markerless_tracker.node.tracker.synchronizer import SyncCounts
+from markerless_tracker.node.tracker.cameras.counts import CameraCounts, SyncCounts
 from markerless_tracker.records import LimbState, TrackResult, TrackState
 
 WINDOW = 300
@@ -150,6 +151,7 @@ class TrackerStatus:
         missing: Sequence[str],
         *,
         now_s: float | None = None,
+        views: Mapping[str, CameraCounts] = MappingProxyType({}),
     ) -> dict[str, str]:
         """Everything as text, by key, in a fixed order.
 
@@ -162,6 +164,7 @@ class TrackerStatus:
             cameras: names, in order.
             missing: topics or transforms that are missing.
             now_s: the time, for `fps` over the last `RATE_S`; None = over the last `WINDOW` frames.
+            views: counts of the cameras' views; none are told of others.
         """
         with self._lock:
             result = self._result
@@ -208,6 +211,10 @@ class TrackerStatus:
                 values[f"refused/{name}"] = str(self._refused[name])
             for name in cameras:
                 values[f"lost/{name}"] = str(self._lost[name])
+            for name, count in views.items():
+                for what in ("received", "matched", "late", "dropped"):
+                    values[f"{what}/{name}"] = str(getattr(count, what))
+                values[f"offset_ms/{name}"] = _number(count.offset_ms, 3)
             values["missing"] = ", ".join(missing)
             values["warnings"] = "" if result is None else "; ".join(result.warnings)
             values["last_error"] = self._last_error

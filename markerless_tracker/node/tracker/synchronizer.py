@@ -8,6 +8,11 @@ from threading import Condition
 from typing import Generic, NamedTuple, TypeVar
 
 from markerless_tracker.errors import ConfigError
+from markerless_tracker.node.tracker.cameras.counts import (
+    CameraCounter,
+    CameraCounts,
+    SyncCounts,
+)
 
 View = TypeVar("View")
 
@@ -47,27 +52,6 @@ class MatchedSet(Generic[View]):
     restarted: bool
     replaced: int = 0
     period_s: float = 0.0
-
-
-@dataclass(frozen=True)
-class SyncCounts:
-    """Counts of sets and views.
-
-    Attributes:
-        complete: sets of which every camera's view came, in order of time.
-        skipped: complete sets that a newer one replaced before they were taken.
-        incomplete: sets dropped because a view of them never came.
-        late: complete sets dropped because a newer one was complete before.
-        duplicates: views dropped because their camera had sent that stamp just before.
-        restarts: times that the stamps were set back.
-    """
-
-    complete: int = 0
-    skipped: int = 0
-    incomplete: int = 0
-    late: int = 0
-    duplicates: int = 0
-    restarts: int = 0
 
 
 class Synchronizer(Generic[View]):
@@ -120,6 +104,7 @@ class Synchronizer(Generic[View]):
         self._last_late_ns: int | None = None
         self._complete_s: float | None = None
         self._counts: Counter[str] = Counter()
+        self._counter = CameraCounter(cameras)
         self._changed = Condition()
 
     @property
@@ -127,6 +112,12 @@ class Synchronizer(Generic[View]):
         """Counts since the start, or since `start_counting`."""
         with self._changed:
             return SyncCounts(**self._counts)
+
+    @property
+    def camera_counts(self) -> dict[str, CameraCounts]:
+        """Counts of each camera's views, likewise."""
+        with self._changed:
+            return self._counter.counts()
 
     @property
     def held(self) -> int:
@@ -173,8 +164,10 @@ class Synchronizer(Generic[View]):
         with self._changed:
             if self._first_s is None:
                 self._first_s = now_s
+            self._counter.note("received", camera)
             if self._last_stamps.get(camera) == stamp_ns:
                 self._counts["duplicates"] += 1
+                self._counter.note("dropped", camera)
                 return False
             self._last_stamps[camera] = stamp_ns
             self._heard_s[camera] = now_s
@@ -243,6 +236,7 @@ class Synchronizer(Generic[View]):
         with self._changed:
             counts = SyncCounts(**self._counts)
             self._counts.clear()
+            self._counter.reset()
             self._waiting = None
             return counts
 
@@ -286,8 +280,11 @@ class Synchronizer(Generic[View]):
             members[name] = self._pending[name].popleft()
         period_s = 0.0 if self._complete_s is None else now_s - self._complete_s
         self._complete_s = now_s
-        stamp_ns = min(entry.stamp_ns for entry in members.values())
-        if not self._accepts(stamp_ns):
+        stamps = {name: entry.stamp_ns for name, entry in members.items()}
+        stamp_ns = min(stamps.values())
+        accepted = self._accepts(stamp_ns)
+        self._counter.complete(stamps, late=not accepted)
+        if not accepted:
             self._counts["late"] += 1
             self._last_late_ns = stamp_ns
             return
@@ -320,6 +317,7 @@ class Synchronizer(Generic[View]):
     def _drop_oldest(self, camera: str) -> None:
         """Drop a camera's oldest view; the set is incomplete once its last view is dropped."""
         stamp_ns = self._pending[camera].popleft().stamp_ns
+        self._counter.note("dropped", camera)
         others = (queue for name, queue in self._pending.items() if name != camera)
         if not any(_nearest(queue, stamp_ns, self._tolerance_ns) is not None for queue in others):
             self._counts["incomplete"] += 1

@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from markerless_tracker.node.ros.qos import FollowingSubscription
-from markerless_tracker.node.tracker.inputs import CameraInput
+from markerless_tracker.node.tracker.inputs import COMPRESSED_SUFFIX, CameraInput
 
 POLL_INFOS_S = 0.1
 """Time between two looks at the camera infos: they come with every image and rarely change."""
@@ -19,11 +19,17 @@ class CameraTopics:
     Args:
         node: creates the subscriptions.
         inputs: the cameras'.
+        transport: one of `qos.TRANSPORTS`.
         clock: monotonic time in s.
     """
 
     def __init__(
-        self, node: Any, inputs: Sequence[CameraInput], *, clock: Callable[[], float]
+        self,
+        node: Any,
+        inputs: Sequence[CameraInput],
+        *,
+        transport: str,
+        clock: Callable[[], float],
     ) -> None:
         self._clock = clock
         self._polled_s = -math.inf
@@ -35,27 +41,70 @@ class CameraTopics:
             for source in inputs
         ]  # fmt: skip
         self._images = [
-            FollowingSubscription(node, Image, source.image_topic, self._image(source), raw=True)
-            for source in inputs
+            _ImageSubscription(node, source, transport, self._before_image) for source in inputs
         ]
 
     def tick(self) -> None:
         """Adapt to the publishers and take camera infos; to be called periodically."""
-        for subscription in (*self._images, *self._infos):
-            subscription.follow()
+        for images in self._images:
+            images.follow()
+        for infos in self._infos:
+            infos.follow()
         self._poll_infos()
 
-    def _image(self, source: CameraInput) -> Callable[[bytes, Any], None]:
-        """Takes a camera's images, and now and then the camera infos before them."""
-
-        def take(serialised: bytes, info: Any) -> None:
-            if self._clock() - self._polled_s > POLL_INFOS_S:
-                self._poll_infos()
-            source.on_image(serialised, info["publication_sequence_number"])
-
-        return take
+    def _before_image(self) -> None:
+        """Take the camera infos now and then before an image."""
+        if self._clock() - self._polled_s > POLL_INFOS_S:
+            self._poll_infos()
 
     def _poll_infos(self) -> None:
         self._polled_s = self._clock()
         for subscription in self._infos:
             subscription.poll()
+
+
+class _ImageSubscription:
+    """Receives one camera's images, raw or compressed.
+
+    Args:
+        node: creates the subscription.
+        source: gets the messages.
+        transport: "auto": raw images, compressed ones while only those are offered.
+        before: called before each message.
+    """
+
+    def __init__(
+        self, node: Any, source: CameraInput, transport: str, before: Callable[[], None]
+    ) -> None:
+        self._node, self._source, self._before = node, source, before
+        self._auto = transport == "auto"
+        self._compressed = transport == "compressed"
+        # A remapped topic's compressed images have the name it is mapped to.
+        self._topic = node.resolve_topic_name(source.image_topic)
+        self._subscription = self._subscribe()
+
+    def follow(self) -> None:
+        """Adapt to the publishers; to be called periodically."""
+        if self._auto and not self._subscription.offered():
+            other = self._topic if self._compressed else f"{self._topic}{COMPRESSED_SUFFIX}"
+            if self._node.count_publishers(other):
+                self._compressed = not self._compressed
+                self._subscription.close()
+                self._subscription = self._subscribe()
+                self._node.get_logger().info(
+                    f"{self._topic}: {'compressed' if self._compressed else 'raw'} images are "
+                    "received"
+                )
+        self._subscription.follow()
+
+    def _subscribe(self) -> FollowingSubscription:
+        before = self._before
+        take = self._source.on_compressed if self._compressed else self._source.on_image
+
+        def receive(serialised: bytes, info: Any) -> None:
+            before()
+            take(serialised, info["publication_sequence_number"])
+
+        topic = f"{self._topic}{COMPRESSED_SUFFIX}" if self._compressed else self._topic
+        kind = CompressedImage if self._compressed else Image
+        return FollowingSubscription(self._node, kind, topic, receive, raw=True)

@@ -121,6 +121,22 @@ class Lookahead:
             self._ahead = 0 if missed else max(0, self._ahead - 1)
             return self._previous
 
+    @staticmethod
+    def made(
+        views: Mapping[str, Image | Observation] | Prepared, stamp_ns: int, outlook: Outlook
+    ) -> tuple[Mapping[str, Image | Observation], Mapping[str, SeenView] | None]:
+        """The views of a step, and their evidence if what was made ahead holds for it; else None.
+
+        Args:
+            views: the step's.
+            stamp_ns: their time.
+            outlook: the step's, from `begin`.
+        """
+        if not isinstance(views, Prepared):
+            return views, None
+        holds = views.outlook is outlook and views.stamp_ns == stamp_ns
+        return views.views, views.seen if holds else None
+
     def end(self, latest: Outlook | None) -> None:
         """A step ends; None if it failed."""
         with self._lock:

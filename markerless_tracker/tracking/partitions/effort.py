@@ -34,6 +34,10 @@ class Effort:
         self._needed_only = needed_only
         self.reset()
 
+    def configure(self, config: TrackerConfig) -> None:
+        """Use other settings from the next frame on."""
+        self._needed_only = config.refine.swarms == "needed"
+
     def reset(self) -> None:
         """Forget all frames."""
         self._usual_cost: float | None = None

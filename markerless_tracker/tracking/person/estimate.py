@@ -69,6 +69,10 @@ class BodyEstimate:
         self._fits_sections = config.fit_shape and not shape_known
         self.reset()
 
+    def configure(self, config: TrackerConfig) -> None:
+        """Use other settings of the search in frames that the body is fitted to."""
+        self._config = config
+
     def reset(self) -> None:
         """Back to the generic body."""
         self.body = self.generic

@@ -22,7 +22,7 @@ def test_round_trip(camera: CameraModel) -> None:
     info = info_of(camera, 1_500_000_000)
     assert info.header.frame_id == "cam03_optical_frame" and stamp_of(info) == 1_500_000_000
     assert list(info.p)[:3] == [500.0, 0.0, 320.0] and list(info.p)[3] == 0.0
-    back = camera_of("cam03", info, camera.T_cam_world)
+    back = camera_of("cam03", info, camera.T_cam_world, "cam03/camera_info")
     assert back.size_px == camera.size_px
     np.testing.assert_array_equal(back.matrix, camera.matrix)
     np.testing.assert_array_equal(back.distortion, camera.distortion)
@@ -32,7 +32,7 @@ def test_round_trip(camera: CameraModel) -> None:
 def test_a_lens_may_be_left_out(camera: CameraModel) -> None:
     info = info_of(camera, 0)
     info.d, info.distortion_model = [], ""
-    assert not camera_of("cam03", info, camera.T_cam_world).is_distorted
+    assert not camera_of("cam03", info, camera.T_cam_world, "cam03/camera_info").is_distorted
 
 
 @pytest.mark.parametrize(
@@ -51,16 +51,16 @@ def test_what_cannot_be_used_names_the_camera(camera: CameraModel, change: dict,
     for name, value in change.items():
         setattr(info, name, value)
     with pytest.raises(CalibrationError, match=rf"cam03.*{says}"):
-        camera_of("cam03", info, camera.T_cam_world)
+        camera_of("cam03", info, camera.T_cam_world, "cam03/camera_info")
 
 
 def test_what_agrees_or_says_nothing_is_fine(camera: CameraModel) -> None:
-    assert check_info(info_of(camera, 0), camera) == ""
-    assert check_info(CameraInfo(), camera) == ""
+    assert check_info(info_of(camera, 0), camera, "cam03/camera_info") == ""
+    assert check_info(CameraInfo(), camera, "cam03/camera_info") == ""
     near = info_of(camera, 0)
     near.k[0] *= 1.005
     near.d[0] *= 1.005
-    assert check_info(near, camera) == ""
+    assert check_info(near, camera, "cam03/camera_info") == ""
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_what_differs_is_reported(camera: CameraModel, change: dict, says: str) 
     info = info_of(camera, 0)
     for name, value in change.items():
         setattr(info, name, value)
-    note = check_info(info, camera)
+    note = check_info(info, camera, "cam03/camera_info")
     assert re.search(rf"^cam03/camera_info: {says}", note) and "\n" not in note
 
 
@@ -100,4 +100,4 @@ def test_what_cannot_be_right_is_refused(camera: CameraModel, change: dict, says
     for name, value in change.items():
         setattr(info, name, value)
     with pytest.raises(CalibrationError, match=rf"cam03/camera_info: .*{says}.*left out until"):
-        check_info(info, camera)
+        check_info(info, camera, "cam03/camera_info")

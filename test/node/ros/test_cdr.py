@@ -3,6 +3,7 @@
 import struct
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,13 +12,14 @@ from hypothesis import strategies as st
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from markerless_tracker.errors import ImageError
 from markerless_tracker.node.ros.cdr import (
     ImageMessage,
     image_bytes,
+    read_compressed,
     read_image,
     with_stamp,
     without_stamp,
@@ -100,6 +102,25 @@ def test_any_bytes_give_an_image_or_one_line(data: bytes, plain: bool) -> None:
         assert "\n" not in str(error) and len(str(error)) < 200
     else:
         assert isinstance(image, ImageMessage) and image.data.size <= len(data)
+
+
+def test_a_compressed_image_as_rclpy_writes_it() -> None:
+    data = cv2.imencode(".jpg", np.zeros((3, 5), np.uint8))[1].tobytes()
+    message = CompressedImage(
+        header=Header(stamp=time_message(STAMP_NS), frame_id="cam"), format="jpeg", data=data
+    )
+    serialised = serialize_message(message)
+    image = read_compressed(serialised, "a")
+    assert (image.stamp_ns, image.frame_id, image.format) == (STAMP_NS, "cam", "jpeg")
+    assert (image.width, image.height, image.channels) == (5, 3, 1)
+    assert bytes(image.data) == data
+    assert np.shares_memory(image.data, np.frombuffer(serialised, np.uint8))
+    message.data = b"no image"
+    with pytest.raises(ImageError, match="cam01/x: .*8 bytes, expected a JPEG or PNG"):
+        read_compressed(serialize_message(message), "cam01/x")
+    for size in range(40):
+        with pytest.raises(ImageError):
+            read_compressed(serialised[:size], "a")
 
 
 @pytest.mark.parametrize("shape", [(3, 5), (3, 5, 3)])

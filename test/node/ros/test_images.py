@@ -1,14 +1,24 @@
 import array
+import dataclasses
 from types import SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from markerless_tracker.datasets.bag.encodings import compressed_layout
 from markerless_tracker.errors import ImageError
-from markerless_tracker.node.ros.images import check_layout, decode_image, fill_image
+from markerless_tracker.node.ros.cdr import CompressedMessage
+from markerless_tracker.node.ros.images import (
+    check_layout,
+    decode_image,
+    decode_received,
+    fill_image,
+    received_channels,
+)
 
 CHANNELS = {"mono8": 1, "8UC1": 1, "bgr8": 3, "8UC3": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
 
@@ -73,11 +83,36 @@ def test_inconsistent_sizes_name_topic_and_sizes(
         decode_image(came, "cam07/image_raw")
 
 
-@pytest.mark.parametrize("encoding", ["", "mono16", "bayer_rggb8", "yuv422", "32FC1"])
+@pytest.mark.parametrize("encoding", ["", "mono16", "bayer_rggb16", "nv21", "32FC1"])
 def test_unknown_encodings_name_themselves_and_the_known(encoding: str) -> None:
     with pytest.raises(ImageError, match=rf"cam07/image_raw: .*'{encoding}'.*bgr8") as error:
         check_layout(message(encoding, 4, 2, 12, bytes(24)), "cam07/image_raw")
     assert "\n" not in str(error.value)
+
+
+def compressed(end: str, picture: Any, **instead: Any) -> CompressedMessage:
+    data = np.frombuffer(cv2.imencode(end, picture)[1].tobytes(), np.uint8)
+    layout = compressed_layout(data, where="a")._asdict() | instead
+    return CompressedMessage(0, "", end, data, **layout)
+
+
+@pytest.mark.parametrize("shape", [(5, 7), (5, 7, 3)])
+def test_compressed_images_are_decoded(shape: tuple[int, ...]) -> None:
+    picture = np.random.default_rng(1).integers(0, 256, shape, dtype=np.uint8)
+    came = compressed(".png", picture)
+    assert received_channels(came) == (3 if len(shape) == 3 else 1)
+    np.testing.assert_array_equal(decode_received(came, "a"), picture)
+    smooth = np.full(shape, 130, np.uint8)
+    assert np.abs(decode_received(compressed(".jpg", smooth), "a").astype(int) - 130).max() < 4
+
+
+def test_a_compressed_image_that_contradicts_its_header_is_refused() -> None:
+    picture = np.zeros((5, 7, 3), np.uint8)
+    with pytest.raises(ImageError, match="a/x: an image of 7x5 px came, its header says 8x5 px"):
+        decode_received(compressed(".png", picture, width=8), "a/x")
+    cut = compressed(".png", picture)
+    with pytest.raises(ImageError, match="a/x: .*cannot be decoded"):
+        decode_received(dataclasses.replace(cut, data=cut.data[:30]), "a/x")
 
 
 @pytest.mark.parametrize("shape", [(5, 7), (5, 7, 3)])

@@ -18,7 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import CameraInfo, Image, JointState
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
@@ -76,23 +76,45 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> World:
 
 
 class Camera:
-    """Publishes the images of a scene as cameras would."""
+    """Publishes the images of a scene as cameras would.
 
-    def __init__(self, node: Node, scene: SyntheticScene, *, reliable: bool = True) -> None:
+    `compressed`: as PNG, on the topics' subtopics; `latched`: late subscribers get camera infos.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        scene: SyntheticScene,
+        *,
+        reliable: bool = True,
+        compressed: bool = False,
+        latched: bool = False,
+        image_topic: str = "NAME/image_raw",
+    ) -> None:
         self.scene = scene
         self.names = scene.rig.names
+        self.compressed = compressed
         reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
         qos = QoSProfile(depth=10, reliability=reliability)
-        self.images = {n: node.create_publisher(Image, f"{n}/image_raw", qos) for n in self.names}
+        kind, topic = Image, image_topic
+        if compressed:
+            kind, topic = CompressedImage, f"{image_topic}/compressed"
+        self.images = {
+            n: node.create_publisher(kind, topic.replace("NAME", n), qos) for n in self.names
+        }
+        info_qos = latched_qos() if latched else qos
         self.infos = {
-            n: node.create_publisher(CameraInfo, f"{n}/camera_info", qos) for n in self.names
+            n: node.create_publisher(CameraInfo, f"{n}/camera_info", info_qos) for n in self.names
         }
 
-    def message(self, name: str, index: int, stamp_ns: int | None = None) -> Image:
+    def message(self, name: str, index: int, stamp_ns: int | None = None) -> Any:
         """One camera's image, at another time if wanted."""
         stamp_ns = self.scene.stamp_ns(index) if stamp_ns is None else stamp_ns
-        message = Image(header=header(stamp_ns, optical_frame(name)))
-        return fill_image(message, self.scene.frame(index)[0][name], name)
+        head, picture = header(stamp_ns, optical_frame(name)), self.scene.frame(index)[0][name]
+        if self.compressed:
+            data = cv2.imencode(".png", picture)[1].tobytes()
+            return CompressedImage(header=head, format="bgr8; png compressed bgr8", data=data)
+        return fill_image(Image(header=head), picture, name)
 
     def send(self, index: int, *, stamp_ns: int | None = None, **instead: Image | None) -> int:
         """Publish one set, some cameras' messages replaced or left out; returns its stamp."""
@@ -113,9 +135,11 @@ class Camera:
 class Live:
     """A tracker process, cameras, and everything the tracker publishes."""
 
-    def __init__(self, peer: Any, process: Any, world: World, *, reliable: bool = True) -> None:
+    def __init__(
+        self, peer: Any, process: Any, world: World, *, reliable: bool = True, **camera: Any
+    ) -> None:
         self.peer, self.process, self.world = peer, process, world
-        self.camera = Camera(peer.node, world.scene, reliable=reliable)
+        self.camera = Camera(peer.node, world.scene, reliable=reliable, **camera)
         self.states = peer.collect(DiagnosticArray, "state", latched_qos())
         self.diagnostics = peer.collect(DiagnosticArray, "/diagnostics", output_qos())
         self.joints = peer.collect(JointState, "joint_states", output_qos())
@@ -212,11 +236,13 @@ def live(world: World, tmp_path_factory: pytest.TempPathFactory, tools: Any) -> 
 def begin(world: World, other_domain: None, start: Any, peer: Any) -> Callable[..., Live]:
     """Start a tracker of the test's own, with further parameters (None: left out)."""
 
-    def begun(*, reliable: bool = True, environment: Any = None, **parameters: Any) -> Live:
+    def begun(
+        *, reliable: bool = True, environment: Any = None, camera: Any = None, **parameters: Any
+    ) -> Live:
         given = {**world.parameters(), **parameters}
         given = {name: value for name, value in given.items() if value is not None}
         process = start("tracker", environment=environment, **given)
-        return Live(peer, process, world, reliable=reliable)
+        return Live(peer, process, world, reliable=reliable, **(camera or {}))
 
     return begun
 

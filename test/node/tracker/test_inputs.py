@@ -2,13 +2,14 @@ import array
 import re
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from markerless_tracker.camera import CameraModel
@@ -197,3 +198,44 @@ def test_an_unchanged_camera_info_is_decoded_once(
     assert len(seen) == 1 and seen[0].k[0] == 50.0
     bench.input.on_info_bytes(serialize_message(info_of(bench.camera.scaled(0.5), 7)))
     assert len(seen) == 2 and seen[1].width == 4
+
+
+def compressed(picture: Any, stamp: int = 1) -> bytes:
+    data = cv2.imencode(".png", picture)[1].tobytes()
+    return bytes(
+        serialize_message(
+            CompressedImage(header=Header(stamp=time_message(stamp)), format="png", data=data)
+        )
+    )
+
+
+def test_compressed_images_are_checked_before_they_are_decoded(bench: Bench) -> None:
+    bench.channels = 1
+    bench.input.on_compressed(compressed(np.zeros((4, 8), np.uint8)))
+    assert bench.sets.held == 1 and not bench.reports
+    bench.input.on_compressed(compressed(np.zeros((4, 9), np.uint8), 2))
+    bench.input.on_compressed(compressed(np.zeros((4, 8, 3), np.uint8), 3))
+    assert bench.sets.held == 1 and bench.refused() == 2
+    assert bench.reports == [
+        "cam02/image_raw/compressed: an image of 9x4 px came, the calibration of cam02 expects "
+        "8x4 px",
+        "cam02/image_raw/compressed: a colour image (png) came, the background of cam02 is grey",
+    ]
+
+
+def test_a_changed_camera_info_is_reported_where_the_first_gave_the_calibration() -> None:
+    bench = Bench(calibrated=False)
+    first = info_of(bench.camera, 0)
+    bench.input.on_info(first)
+    bench.input.camera = bench.camera
+    bench.input.on_info(first)
+    assert not bench.reports
+    other = info_of(bench.camera, 0)
+    other.k[0] *= 1.05
+    bench.input.on_info(other)
+    assert bench.reports == [
+        "cam02/camera_info: K is [52.5 0 4 0 50 2], the first camera info says [50 0 4 0 50 2]; "
+        "the first camera info is used until the tracker is restarted"
+    ]
+    bench.input.on_info(info_of(bench.camera.scaled(0.5), 0))
+    assert "says 4x2 px, the first camera info says 8x4 px; cam02 is left out" in bench.reports[-1]

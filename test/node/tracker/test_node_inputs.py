@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
+import cv2
 import numpy as np
 from sensor_msgs.msg import Image
 
@@ -44,7 +45,7 @@ def test_a_missing_camera_info_is_named_and_does_not_stop_it(live: Any) -> None:
 @pytest.mark.parametrize(
     ("encoding", "width", "height", "says"),
     [
-        ("yuv422", 328, 245, "cam02/image_raw: image encoding 'yuv422' is not known"),
+        ("mono16", 328, 245, "cam02/image_raw: image encoding 'mono16' is not known"),
         ("bgr8", 164, 122, "cam02/image_raw: an image of 164x122 px came"),
     ],
 )
@@ -135,6 +136,8 @@ def test_a_camera_that_stops_is_named_and_its_return_too(live: Any) -> None:
 def test_duplicates_and_late_sets_are_dropped_and_counted(live: Any) -> None:
     index = live.track()
     before = {key: int(live.value(key)) for key in ("tracked", "late", "duplicates", "restarts")}
+    counted = ("received", "matched", "late", "dropped")
+    views = {what: int(live.value(f"{what}/cam02")) for what in counted}
     live.camera.send(index)
     live.until(lambda: int(live.value("duplicates")) == before["duplicates"] + 4, "duplicates")
     scene = live.camera.scene
@@ -149,6 +152,10 @@ def test_duplicates_and_late_sets_are_dropped_and_counted(live: Any) -> None:
     live.track()
     assert int(live.value("tracked")) == before["tracked"] + 4
     assert int(live.value("restarts")) == before["restarts"]
+    after = {what: int(live.value(f"{what}/cam02")) for what in views}
+    changes = {what: after[what] - views[what] for what in views}
+    assert changes == {"received": 8, "matched": 4, "late": 3, "dropped": 1}
+    assert float(live.value("offset_ms/cam02")) == 0.0
 
 
 def test_without_images_the_state_is_stale_and_says_why(live: Any) -> None:
@@ -172,3 +179,18 @@ def test_stamps_that_differ_are_named_with_the_parameter(live: Any) -> None:
     live.send_until(lambda: says in live.message, "the spread", cam04=late)
     assert live.level == 1 and says in live.process.output
     live.send_until(lambda: live.level == 0, "OK again")
+
+
+def test_compressed_images_on_other_topics_are_tracked(begin: Any) -> None:
+    live = begin(camera={"compressed": True, "image_topic": "/rig/NAME"}, image_topic="/rig/NAME")
+    live.track()
+    assert float(live.value("fitness")) > 0.9
+    assert "/rig/cam01: compressed images are received" in live.process.output
+    says = "/rig/cam02/compressed: an image of 164x122 px came, the calibration of cam02 expects"
+    message = live.camera.message("cam02", live.next)
+    small = cv2.imencode(".jpg", np.zeros((122, 164, 3), np.uint8))[1].tobytes()
+    message.data = small
+    live.send_without_pose(cam02=message)
+    live.until(lambda: live.value("last_error").startswith(says), "the refusal")
+    live.track()
+    assert live.value("state") == "TRACKING"

@@ -151,6 +151,11 @@ def test_parameters_show_what_is_in_effect(live: Any) -> None:
     assert (body.string_value, seed.integer_value, scale.double_value) == ("balan31", 0, 1.0)
 
 
+def test_without_tf2_msgs_the_node_says_so_once(live: Any) -> None:
+    said = live.process.output.count("tf2_msgs is not installed: no TF is published")
+    assert said == int(not live.peer.node.count_publishers("/tf"))
+
+
 def test_a_person_who_left_has_no_pose_and_is_tracked_again_later(live: Any, scenes: Any) -> None:
     live.track()
     here = live.camera.scene

@@ -1,6 +1,7 @@
 """Starting and ending the node: parameters and files that cannot work, signals, clocks."""
 
 import signal
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from markerless_tracker.errors import TrackerError
         ({"calibration_file": "", "cameras": ["cam01"]}, "tf2_msgs"),
         ({"cameras": ["cam01", "cam09"]}, "cameras: .*cam09"),
         ({"cameras": []}, "cameras: an empty list"),
+        ({"tf": "all"}, "tf: got 'all', expected one of links, root, none"),
         ({"background_dir": ""}, "background_dir: not given"),
         ({"background_dir": "{empty}"}, "background_dir: .*nothing for cam01, cam02"),
         ({"start_file": "nowhere.yaml"}, "start_file: no start pose: nowhere.yaml"),
@@ -35,17 +37,16 @@ from markerless_tracker.errors import TrackerError
     ],
 )
 def test_what_cannot_work_is_one_line(
-    change: dict[str, Any], says: str, world: Any, tmp_path: Path, ros_context: Any
+    change: dict[str, Any],
+    says: str,
+    world: Any,
+    tmp_path: Path,
+    ros_context: Any,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from markerless_tracker.node.tracker.node import TrackerNode
 
-    if "tf2_msgs" in says:
-        try:
-            import tf2_msgs.msg  # noqa: F401
-        except ImportError:
-            pass
-        else:
-            pytest.skip("tf2_msgs is installed here")
+    monkeypatch.setitem(sys.modules, "tf2_msgs", None)
     given = {key: str(value) for key, value in world.parameters().items()}
     for key, value in change.items():
         given[key] = value.format(empty=tmp_path) if isinstance(value, str) else value

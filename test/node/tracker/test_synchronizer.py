@@ -306,3 +306,17 @@ def test_a_set_knows_how_many_it_replaced_and_the_time_since_the_one_before() ->
     assert sets.late_ns is None
     send(3, 0.8)
     assert sets.take() is None and sets.late_ns == 3
+
+
+def test_every_view_is_counted_for_its_camera() -> None:
+    sets: Synchronizer[str] = Synchronizer(("a", "b"), tolerance_ns=3)
+    feed(sets, ("a", 10), ("b", 12), ("a", 20), ("a", 30), ("b", 32), ("b", 32), ("a", 29))
+    feed(sets, ("b", 29), ("a", 40))
+    counts = sets.camera_counts
+    assert (counts["a"].received, counts["b"].received) == (5, 4)
+    assert (counts["a"].matched, counts["b"].matched) == (2, 2)
+    assert (counts["a"].late, counts["b"].late) == (1, 1)
+    assert (counts["a"].dropped, counts["b"].dropped) == (1, 1)
+    assert counts["b"].offset_ms == pytest.approx(1e-6)
+    sets.start_counting()
+    assert sets.camera_counts["a"].received == 0

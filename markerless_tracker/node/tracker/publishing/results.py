@@ -1,5 +1,6 @@
-"""Results as topics."""
+"""Results as topics and frames."""
 
+from collections.abc import Callable
 from typing import Any
 
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
@@ -7,11 +8,15 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from markerless_tracker.body import BodyModel
+from markerless_tracker.body import BodyModel, root_transform
 from markerless_tracker.body.angles import AngleReader
 from markerless_tracker.body.urdf import urdf
+from markerless_tracker.camera import CameraRig
 from markerless_tracker.node.ros import messages
 from markerless_tracker.node.ros.qos import latched_qos, output_qos
+from markerless_tracker.node.tracker.parameters import NodeSettings
+from markerless_tracker.node.tracker.publishing.frames import FramePublisher
+from markerless_tracker.node.tracker.publishing.humans import HumanPublisher
 from markerless_tracker.records import TrackResult
 
 
@@ -20,9 +25,29 @@ class ResultPublishers:
 
     Args:
         node: creates the publishers.
+        settings: the node's.
+        rig: cameras whose frames are published; None for none.
+        inform: called with a line about what cannot be published.
     """
 
-    def __init__(self, node: Any) -> None:
+    def __init__(
+        self,
+        node: Any,
+        settings: NodeSettings,
+        rig: CameraRig | None,
+        inform: Callable[[str], None],
+    ) -> None:
+        self._human = HumanPublisher(node, settings.human_id)
+        self._frames = FramePublisher(
+            node,
+            settings.tf,
+            cameras=settings.tf_cameras and rig is not None,
+            prefix=settings.frame_prefix,
+            human=settings.human_id,
+            inform=inform,
+        )
+        if rig is not None:
+            self._frames.cameras(rig)
         qos = output_qos()
         self._descriptions = node.create_publisher(String, "robot_description", latched_qos())
         self._joint_states = node.create_publisher(JointState, "joint_states", qos)
@@ -37,7 +62,10 @@ class ResultPublishers:
     def describe(self, body: BodyModel) -> None:
         """Publish the body's URDF if it is another than the last."""
         if body is not self._described:
-            self._descriptions.publish(String(data=urdf(body)))
+            description = urdf(body)
+            self._descriptions.publish(String(data=description))
+            self._frames.describe(description, body.root_frame)
+            self._human.describe(body)
             self._described = body
             if self._angles is None:
                 self._angles = AngleReader(body)
@@ -57,6 +85,9 @@ class ResultPublishers:
         assert self._angles is not None
         angles = self._angles.read(pose, stamp_ns, covariance)
         self._joint_states.publish(messages.joint_state(angles, stamp_ns))
+        values = dict(zip(angles.names, angles.values_rad.tolist(), strict=True))
+        self._frames.publish(root_transform(body, pose), values, stamp_ns)
+        self._human.publish(pose, stamp_ns)
         self._root_poses.publish(messages.root_pose(body, pose, stamp_ns, confidence))
         if confidence is not None:
             self._deviations.publish(messages.joint_deviations(angles, stamp_ns))

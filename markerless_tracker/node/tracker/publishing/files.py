@@ -54,8 +54,8 @@ class ResultFile:
             raise DatasetError(f"result_file: {error}") from error
 
     def begin(self, tracker: Tracker) -> None:
-        """Set the tracker whose results are written."""
-        self._tracker = tracker
+        """Set the tracker whose results are written; the file states its settings as they are."""
+        self._tracker, self._config = tracker, tracker.config
 
     def add(self, result: TrackResult) -> None:
         """Write a result and the body as it is now; too late after `close`."""
@@ -100,7 +100,7 @@ class ResultFile:
             return None
         if self._writer is None:
             self._writer = ResultWriter(
-                self._name, self._tracker.body, self._tracker.config, fps=None, source="live"
+                self._name, self._tracker.body, self._config, fps=None, source="live"
             )
         return self._writer
 

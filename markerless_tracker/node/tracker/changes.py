@@ -1,0 +1,171 @@
+"""Settings that are changed while the tracker runs: checked when set, used from the next set on."""
+
+from collections.abc import Callable, Mapping
+from threading import Lock
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+
+from markerless_tracker.errors import ConfigError
+from markerless_tracker.imaging import BackgroundModel
+from markerless_tracker.records import TrackResult
+from markerless_tracker.tracking import Tracker, TrackerConfig
+from markerless_tracker.tracking.config import live_settings
+from markerless_tracker.tracking.partitions.frame import frame_stages
+
+LIVE = live_settings()
+"""Parameters that may be set while the tracker runs."""
+FIXED = "fixed while the tracker runs"
+"""Constraint of the others, as their descriptors say it."""
+
+
+class SettableTracker:
+    """A tracker whose settings other threads may change between two steps.
+
+    Args:
+        tracker: steps on the images.
+        changed: called in the thread of the steps with the stamp from which on settings hold.
+    """
+
+    def __init__(
+        self, tracker: Tracker, changed: Callable[[int, TrackerConfig], None] = lambda *_: None
+    ) -> None:
+        self._tracker = tracker
+        self._changed = changed
+        self._lock = Lock()
+        self._next: TrackerConfig | None = None
+
+    def check(self, config: TrackerConfig) -> None:
+        """Make sure that settings can be used.
+
+        Raises:
+            ConfigError: their budget cannot be spent.
+        """
+        body = self._tracker.body
+        frame_stages(body, config, body.neutral, body.sigma)
+
+    def configure(self, config: TrackerConfig) -> None:
+        """Use settings that were checked from the next step on."""
+        with self._lock:
+            self._next = config
+
+    def warm_up(self) -> None:
+        """As `Tracker.warm_up`."""
+        self._tracker.warm_up()
+
+    def prepare(self, views: Mapping[str, Any], stamp_ns: int) -> Any:
+        """As `Tracker.prepare`."""
+        return self._tracker.prepare(views, stamp_ns)
+
+    def step(self, views: Any, stamp_ns: int, effort: float = 1.0) -> TrackResult:
+        """As `Tracker.step`, with the settings given last."""
+        with self._lock:
+            config, self._next = self._next, None
+        if config is not None:
+            self._tracker.configure(config)
+            self._changed(stamp_ns, config)
+        return self._tracker.step(views, stamp_ns, effort)
+
+    def reset(self) -> None:
+        """As `Tracker.reset`."""
+        self._tracker.reset()
+
+    def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
+        """As `Tracker.take_backgrounds`."""
+        self._tracker.take_backgrounds(backgrounds)
+
+
+class LiveSettings:
+    """The parameters of a node that change its tracker's settings.
+
+    A setting that follows from another one unless it was given, as `evaluations` from `optimizer`,
+    follows it here, too.
+
+    Args:
+        node: its parameters are declared already.
+        given: the tracker's settings that the user gave, by name.
+        config: the settings in effect.
+        inform: called with a line about a change.
+
+    Attributes:
+        record: what was changed, in order: stamp from which on it holds, ns, and values by name.
+    """
+
+    def __init__(
+        self,
+        node: Any,
+        given: Mapping[str, Any],
+        config: TrackerConfig,
+        inform: Callable[[str], None],
+    ) -> None:
+        self._given, self._config, self._inform = dict(given), config, inform
+        self._used = config
+        self._asked: dict[str, Any] = {}
+        self._tracker: SettableTracker | None = None
+        self.record: list[dict[str, Any]] = []
+        node.add_pre_set_parameters_callback(self._complete)
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._apply)
+
+    def settable(self, tracker: Tracker) -> SettableTracker:
+        """The tracker that the parameters change from now on."""
+        self._tracker = SettableTracker(tracker, self._changed)
+        return self._tracker
+
+    def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Add what follows from the values that are set."""
+        self._asked = {p.name: p.value for p in parameters if p.name in LIVE}
+        try:
+            config = self._asked_config()
+        except ConfigError:
+            return parameters  # refused by `_check`
+        follows = set(_differences(self._config, config)) & LIVE - {p.name for p in parameters}
+        values = config.by_name()
+        return parameters + [Parameter(name, value=values[name]) for name in sorted(follows)]
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        if not any(p.name in LIVE for p in parameters):
+            return SetParametersResult(successful=True)
+        try:
+            if self._tracker is None:
+                raise ConfigError("the tracker is starting; settings can change once it is ready")
+            config = self._asked_config()
+            fixed = sorted(set(_differences(self._config, config)) - LIVE)
+            if fixed:
+                raise ConfigError(
+                    f"{', '.join(fixed)} would change, too, and cannot while the tracker runs; "
+                    "start it with these parameters"
+                )
+            self._tracker.check(config)
+        except ConfigError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, parameters: list[Parameter]) -> None:
+        if self._tracker is None or not self._asked:
+            return
+        self._given |= self._asked
+        config = self._asked_config()
+        changed = _differences(self._config, config)
+        self._config = config
+        if changed:
+            self._tracker.configure(config)
+            listed = ", ".join(f"{name} is {value}" for name, value in changed.items())
+            self._inform(f"from the next set on: {listed}")
+
+    def _asked_config(self) -> TrackerConfig:
+        unset = [name for name, value in self._asked.items() if value is None]
+        if unset:
+            raise ConfigError(f"{', '.join(unset)}: no value, expected one")
+        return TrackerConfig.from_mapping(self._given | self._asked)
+
+    def _changed(self, stamp_ns: int, config: TrackerConfig) -> None:
+        self.record.append({"stamp_ns": stamp_ns, **_differences(self._used, config)})
+        self._used = config
+
+
+def _differences(before: TrackerConfig, after: TrackerConfig) -> dict[str, Any]:
+    """Settings that differ, with their values after."""
+    old = before.by_name()
+    return {name: value for name, value in after.by_name().items() if value != old[name]}

@@ -1,0 +1,86 @@
+"""Cameras' topics, remapped, raw or compressed, over the real middleware."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+from rclpy.node import Node
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+
+from markerless_tracker.node.ros.qos import latched_qos, output_qos
+from markerless_tracker.node.tracker.topics import CameraTopics
+
+REMAPPED = ["cam01/image_raw:=/left/image", "cam01/camera_info:=/left/info"]
+
+
+class Source:
+    """Takes the messages of a camera, as `CameraInput` does."""
+
+    image_topic, info_topic = "cam01/image_raw", "cam01/camera_info"
+
+    def __init__(self) -> None:
+        self.got: list[str] = []
+
+    def on_image(self, serialised: bytes, sequence: int) -> None:
+        self.got.append("raw")
+
+    def on_compressed(self, serialised: bytes, sequence: int) -> None:
+        self.got.append("compressed")
+
+    def on_info_bytes(self, serialised: bytes) -> None:
+        self.got.append("info")
+
+
+@pytest.fixture
+def node(ros_context: Any, peer: Any) -> Iterator[Node]:
+    arguments = ["--ros-args", *(word for rule in REMAPPED for word in ("-r", rule))]
+    node = Node("receiver", context=ros_context, cli_args=arguments)
+    peer.executor.add_node(node)
+    yield node
+    node.destroy_node()
+
+
+def test_what_is_offered_on_a_remapped_topic_is_received(node: Node, peer: Any) -> None:
+    source = Source()
+    topics = CameraTopics(node, [source], transport="auto", clock=lambda: 0.0)
+    infos = peer.node.create_publisher(CameraInfo, "/left/info", latched_qos())
+    infos.publish(CameraInfo())
+
+    def received(publisher: Any, message: Any, kind: str) -> None:
+        def found() -> bool:
+            topics.tick()
+            publisher.publish(message)
+            return kind in source.got
+
+        peer.until(found, kind)
+        peer.node.destroy_publisher(publisher)
+
+    small = peer.node.create_publisher(CompressedImage, "/left/image/compressed", output_qos())
+    received(small, CompressedImage(), "compressed")
+    large = peer.node.create_publisher(Image, "/left/image", output_qos())
+    received(large, Image(), "raw")
+    peer.until(lambda: topics.tick() or "info" in source.got, "the camera info sent before")
+
+
+@pytest.mark.parametrize("transport", ["raw", "compressed"])
+def test_a_chosen_transport_is_kept(node: Node, peer: Any, transport: str) -> None:
+    source = Source()
+    topics = CameraTopics(node, [source], transport=transport, clock=lambda: 0.0)
+    publishers = {
+        "raw": peer.node.create_publisher(Image, "/left/image", output_qos()),
+        "compressed": peer.node.create_publisher(
+            CompressedImage, "/left/image/compressed", output_qos()
+        ),
+    }
+    if transport == "raw":
+        publishers.pop("raw")
+        peer.until(lambda: peer.node.count_publishers("/left/image/compressed"), "a publisher")
+    topics.tick()
+    subscriptions = {
+        kind: peer.node.get_subscriptions_info_by_topic(topic)
+        for kind, topic in (("raw", "/left/image"), ("compressed", "/left/image/compressed"))
+    }
+    assert [kind for kind, found in subscriptions.items() if found] == [transport]
