@@ -19,6 +19,9 @@ from markerless_tracker.node.tracker.publishing.frames import FramePublisher
 from markerless_tracker.node.tracker.publishing.humans import HumanPublisher
 from markerless_tracker.records import TrackResult
 
+DESCRIBED_EVERY_NS = 1_000_000_000
+"""Shortest time between two descriptions of a body that is being revised."""
+
 
 class ResultPublishers:
     """Publishes poses, and the body whenever it changes.
@@ -56,6 +59,8 @@ class ResultPublishers:
         self._marker_poses = node.create_publisher(PoseArray, "marker_poses", qos)
         self._markers = node.create_publisher(MarkerArray, "markers", qos)
         self._described: BodyModel | None = None
+        self._described_ns: int | None = None
+        self._reported: BodyModel | None = None
         self._angles: AngleReader | None = None
         self._no_pose_shown = False
 
@@ -67,13 +72,27 @@ class ResultPublishers:
             self._frames.describe(description, body.root_frame)
             self._human.describe(body)
             self._described = body
-            if self._angles is None:
-                self._angles = AngleReader(body)
+            self._take(body)
+
+    def _take(self, body: BodyModel) -> None:
+        """Report the angles of this body from now on."""
+        if self._angles is None:
+            self._angles = AngleReader(body)
+        if body is not self._reported:
             self._angles.take(body)
+            self._reported = body
+
+    def _follow(self, body: BodyModel, stamp_ns: int) -> None:
+        """As `describe`, at most once in `DESCRIBED_EVERY_NS`: a revised body hardly differs."""
+        self._take(body)
+        last_ns = self._described_ns
+        if last_ns is None or abs(stamp_ns - last_ns) >= DESCRIBED_EVERY_NS:
+            self._described_ns = stamp_ns
+            self.describe(body)
 
     def publish(self, result: TrackResult, body: BodyModel) -> None:
         """Publish a result; without a pose viewers lose the body, once."""
-        self.describe(body)
+        self._follow(body, result.stamp_ns)
         pose, points, stamp_ns = result.pose, result.markers_m, result.stamp_ns
         if pose is None or points is None:
             if not self._no_pose_shown:
