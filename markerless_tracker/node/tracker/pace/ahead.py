@@ -1,6 +1,7 @@
 """The next set is taken, and its evidence made, while the set before it is fitted."""
 
 import time
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -9,7 +10,8 @@ from typing import Any
 
 from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
 
-_RECENT = 0.2
+_RECENT = 5
+"""Fits, and sets made ahead, by whose times the next set is taken."""
 _SPARE_S = 0.002
 STALE_S = 0.15
 """Age from which on a set whose evidence is ready is left out, if a newer one is complete."""
@@ -59,8 +61,8 @@ class Ahead:
         self._following: Future[Taken | None] | None = None
         self._fitted = Event()
         self._began_s = 0.0
-        self._fit_s = 0.0
-        self._make_s = 0.0
+        self._fits_s = deque([0.0], maxlen=_RECENT)
+        self._makes_s = deque([0.0], maxlen=_RECENT)
 
     def next(self) -> Taken | None:
         """The set to fit now; None if none came in time."""
@@ -75,12 +77,13 @@ class Ahead:
         """A fit begins: the next set is made beside it."""
         self._fitted.clear()
         self._began_s = self._clock()
-        delay_s = max(0.0, self._fit_s - 1.5 * self._make_s - _SPARE_S)
+        # A single long fit must not make all sets after it wait.
+        delay_s = max(0.0, min(self._fits_s) - max(self._makes_s) - _SPARE_S)
         self._following = self._pool.submit(self._take, delay_s)
 
     def fitted(self) -> None:
         """The fit ended."""
-        self._fit_s += _RECENT * (self._clock() - self._began_s - self._fit_s)
+        self._fits_s.append(self._clock() - self._began_s)
         self._fitted.set()
 
     def _age_s(self, taken: Taken) -> float:
@@ -104,4 +107,4 @@ class Ahead:
         except Exception as error:
             return Taken(matched, error=error)
         finally:
-            self._make_s += _RECENT * (self._clock() - began_s - self._make_s)
+            self._makes_s.append(self._clock() - began_s)
