@@ -1,5 +1,6 @@
 """Parameters of a node: checks of the given names and values, declaration of those in effect."""
 
+from array import array
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
@@ -200,6 +201,17 @@ def count(name: str, value: Any, least: int, most: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise ConfigError(f"{name}: got {value!r}, expected a whole number from {least} to {most}")
     return value
+
+
+def numbers(name: str, value: Any, least: float, most: float) -> tuple[float, ...]:
+    """The value, checked to be a list of numbers in a range.
+
+    Raises:
+        ConfigError: it is not; names the parameter.
+    """
+    if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, array)):
+        raise ConfigError(f"{name}: got {value!r}, expected a list of numbers")
+    return tuple(number(name, entry, least, most) for entry in value)
 
 
 def number(name: str, value: Any, least: float, most: float) -> float:

@@ -44,6 +44,7 @@ class CameraInput:
         clock: monotonic time in s.
         channels: number of channels of the camera's background, None if there is none to match.
         image_topic, info_topic: names with the camera's in place of ``NAME``.
+        offset_ns: by which its stamps are late.
 
     Attributes:
         image_topic, info_topic: the camera's.
@@ -61,13 +62,14 @@ class CameraInput:
         channels: Callable[[str], int | None] = lambda _: None,
         image_topic: str = "NAME/image_raw",
         info_topic: str = "NAME/camera_info",
+        offset_ns: int = 0,
     ) -> None:
         self.name = name
         self.camera = camera
         self.info: Any = None
         self.image_topic = image_topic.replace("NAME", name)
         self.info_topic = info_topic.replace("NAME", name)
-        self._sets = sets
+        self._sets, self._offset_ns = sets, offset_ns
         self._status = status
         self._report = report
         self._clock = clock
@@ -128,7 +130,7 @@ class CameraInput:
                 f"{now_s - self._silent_since_s:.1f} s"
             )
             self._silent_since_s = None
-        self._sets.add(self.name, message.stamp_ns, message, now_s=now_s)
+        self._sets.add(self.name, message.stamp_ns - self._offset_ns, message, now_s=now_s)
 
     def on_info_bytes(self, serialised: bytes) -> None:
         """Take a serialised sensor_msgs/CameraInfo, if it differs from the last in its content."""

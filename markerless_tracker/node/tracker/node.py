@@ -173,6 +173,7 @@ class TrackerNode(GivenNode):
             channels=self._background_channels,
             image_topic=self._settings.image_topic,
             info_topic=self._settings.info_topic,
+            offset_ns=self._source.offset_ns(name),
         )
 
     def _listen(self) -> None:

@@ -33,6 +33,7 @@ class NodeSettings:
         wait_for_background: start without backgrounds and wait for the service learn_background.
         learn_background_sets: sets of images that the service learn_background learns from.
         sync_tolerance: largest difference of the stamps of one set in s; 0 means equal stamps.
+        stamp_offsets: s by which each camera's stamps are late, in the order of the cameras.
         image_topic: topic of a camera's images, NAME stands for the camera.
         info_topic: topic of a camera's camera infos, NAME stands for the camera.
         image_transport: images that are received; auto: raw, or compressed if only those are sent.
@@ -56,6 +57,7 @@ class NodeSettings:
     wait_for_background: bool = False
     learn_background_sets: int = 20
     sync_tolerance: float = 0.0
+    stamp_offsets: tuple[float, ...] = ()
     image_topic: str = "NAME/image_raw"
     info_topic: str = "NAME/camera_info"
     image_transport: str = "auto"
@@ -92,6 +94,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "learn_background_sets": (2, MAX_FRAMES),
 }
 """Least and largest value of the node's own parameters."""
+_OFFSET_MAX_S = 10.0
 CHOICES: Mapping[str, tuple[str, ...]] = {"tf": TF_CHOICES, "image_transport": TRANSPORTS}
 """Values of the node's own parameters that are one of a few."""
 
@@ -128,6 +131,9 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
         for name in _FILES
         if name in values
     }
+    if "stamp_offsets" in values:
+        name = "stamp_offsets"
+        own[name] = declared.numbers(name, values[name], -_OFFSET_MAX_S, _OFFSET_MAX_S)
     if "cameras" in values:
         own["cameras"] = declared.names("cameras", values["cameras"])
     for name in ("stature", "scale", "sync_tolerance"):

@@ -24,8 +24,8 @@ class RigSource:
         rig: the rig of full-size images, None while it is not known.
 
     Raises:
-        ConfigError: the calibration file cannot be used or lacks a camera, or there is neither one
-            nor TF; names the parameter.
+        ConfigError: the calibration file cannot be used or lacks a camera, there is neither one nor
+            TF, or the offsets are not one for each camera; names the parameter.
     """
 
     def __init__(self, settings: NodeSettings) -> None:
@@ -38,6 +38,7 @@ class RigSource:
             with _named("cameras"):
                 self.rig = rig.selected(settings.cameras or rig.names)
             self.names = self.rig.names
+            self._take_offsets(settings.stamp_offsets)
             return
         if not settings.cameras:
             raise ConfigError(
@@ -45,6 +46,7 @@ class RigSource:
                 "whose extrinsics come from TF"
             )
         self.names = settings.cameras
+        self._take_offsets(settings.stamp_offsets)
         try:
             import tf2_msgs.msg  # noqa: F401
         except ImportError as error:
@@ -55,6 +57,21 @@ class RigSource:
         from markerless_tracker.node.ros.extrinsics import TransformTree
 
         self._tree = TransformTree()
+
+    def _take_offsets(self, offsets_s: tuple[float, ...]) -> None:
+        if offsets_s and len(offsets_s) != len(self.names):
+            raise ConfigError(
+                f"stamp_offsets: got {len(offsets_s)} values, expected one for each of "
+                f"{', '.join(self.names)}"
+            )
+        self._offsets_ns = {
+            name: round(offset_s * 1e9)
+            for name, offset_s in zip(self.names, offsets_s, strict=False)
+        }
+
+    def offset_ns(self, camera: str) -> int:
+        """Time by which a camera's stamps are late."""
+        return self._offsets_ns.get(camera, 0)
 
     def listen(self, node: Any, report: Callable[[str], None]) -> None:
         """Subscribe to TF if that is needed.

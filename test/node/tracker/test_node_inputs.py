@@ -182,15 +182,22 @@ def test_stamps_that_differ_are_named_with_the_parameter(live: Any) -> None:
 
 
 def test_compressed_images_on_other_topics_are_tracked(begin: Any) -> None:
-    live = begin(camera={"compressed": True, "image_topic": "/rig/NAME"}, image_topic="/rig/NAME")
-    live.track()
+    live = begin(
+        camera={"compressed": True, "image_topic": "/rig/NAME"},
+        image_topic="/rig/NAME",
+        stamp_offsets="[0.0, 0.004, 0.0, 0.0]",
+    )
+    live.next = 1
+    late = live.camera.message("cam02", 1, live.camera.scene.stamp_ns(1) + 4_000_000)
+    live.track(cam02=late)
     assert float(live.value("fitness")) > 0.9
     assert "/rig/cam01: compressed images are received" in live.process.output
     says = "/rig/cam02/compressed: an image of 164x122 px came, the calibration of cam02 expects"
-    message = live.camera.message("cam02", live.next)
+    message = live.camera.message("cam02", live.next, live.camera.scene.stamp_ns(live.next))
     small = cv2.imencode(".jpg", np.zeros((122, 164, 3), np.uint8))[1].tobytes()
     message.data = small
     live.send_without_pose(cam02=message)
     live.until(lambda: live.value("last_error").startswith(says), "the refusal")
-    live.track()
+    stamp_ns = live.camera.scene.stamp_ns(live.next) + 4_000_000
+    live.track(cam02=live.camera.message("cam02", live.next, stamp_ns))
     assert live.value("state") == "TRACKING"

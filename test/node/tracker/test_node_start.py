@@ -25,6 +25,7 @@ from markerless_tracker.errors import TrackerError
         ({"calibration_file": ""}, "calibration_file: not given"),
         ({"calibration_file": "", "cameras": ["cam01"]}, "tf2_msgs"),
         ({"cameras": ["cam01", "cam09"]}, "cameras: .*cam09"),
+        ({"stamp_offsets": [0.1, 0.2]}, "stamp_offsets: got 2 values, expected .* cam01, cam02"),
         ({"cameras": []}, "cameras: an empty list"),
         ({"tf": "all"}, "tf: got 'all', expected one of links, root, none"),
         ({"background_dir": ""}, "background_dir: not given"),

@@ -80,6 +80,11 @@ def test_what_is_given_is_in_effect() -> None:
         ({"apf.layer": 5}, "'apf.layer'.*'apf.layers'"),
         ({"edges.form": "wavy"}, "edges.form: got"),
         ({"sync_tolerance": -0.1}, "sync_tolerance"),
+        ({"stamp_offsets": 0.1}, "stamp_offsets: got 0.1, expected a list"),
+        ({"stamp_offsets": [0.1, 11.0]}, "stamp_offsets: got 11.0"),
+        ({"image_topic": "/camera/image"}, "image_topic: .* expected NAME"),
+        ({"image_transport": "theora"}, "image_transport: got 'theora', expected one of auto"),
+        ({"human_id": "7"}, "human_id: got '7'"),
     ],
 )
 def test_impossible_values_name_the_parameter(given: dict[str, Any], says: str | None) -> None:
