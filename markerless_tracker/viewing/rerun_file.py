@@ -7,7 +7,9 @@ from typing import Any
 import cv2
 import numpy as np
 
+from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.drawing.outline import cone_surfaces
 from markerless_tracker.drawing.overlay import ELLIPSE_SD, Image, side_colour
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.geometry import FloatArray
@@ -27,6 +29,18 @@ BONES = (
 
 _JPEG_QUALITY = 80
 _FLOOR_M = 4.0
+_BACKGROUND = (28, 30, 34)
+_END_POINTS = 16
+# Two ends of so many points each: sides, then a fan over each end.
+_TRIANGLES = np.array(
+    [
+        corner
+        for i, j in ((k, (k + 1) % _END_POINTS) for k in range(_END_POINTS))
+        for corner in ((i, j, _END_POINTS + i), (j, _END_POINTS + j, _END_POINTS + i))
+    ]
+    + [(end, end + i, end + i + 1) for end in (0, _END_POINTS) for i in range(1, _END_POINTS - 1)],
+    dtype=np.uint32,
+)
 
 
 def require_rerun() -> Any:
@@ -76,9 +90,12 @@ def write_rrd(
     stream.log("world/floor", _floor(rr), static=True)
     for camera in rig or ():
         _camera(rr, stream, camera)
+    body = result.body()
+    _cones(rr, stream, body)
     for row in range(len(result)):
         stream.set_time(TIMELINE, duration=float(result.times_s[row]))
         _body(rr, stream, result, row)
+        _move_cones(rr, stream, body, result.parameters[row])
         _curves(rr, stream, result, row)
     if overlays is not None:
         for row, pictures in overlays.pictures(list(range(len(result))) if rows is None else rows):
@@ -110,6 +127,30 @@ def _camera(rr: Any, stream: Any, camera: CameraModel) -> None:
         ),
         static=True,
     )
+
+
+def _cones(rr: Any, stream: Any, body: BodyModel) -> None:
+    """The surface of each cone in its base frame."""
+    for name, points in zip(
+        body.cone_names, cone_surfaces(body, end_points=_END_POINTS, sections=0), strict=True
+    ):
+        mesh = rr.Mesh3D(
+            vertex_positions=points,
+            triangle_indices=_TRIANGLES,
+            vertex_colors=np.tile(np.array(_rgb(name), dtype=np.uint8), (len(points), 1)),
+        )
+        stream.log(f"world/cones/{name}", mesh, static=True)
+
+
+def _move_cones(rr: Any, stream: Any, body: BodyModel, pose: FloatArray) -> None:
+    """The place of each cone; without a pose none has a size."""
+    if not np.isfinite(pose).all():
+        stream.log("world/cones", rr.Transform3D(scale=0.0))
+        return
+    stream.log("world/cones", rr.Transform3D(scale=1.0))
+    for name, T in zip(body.cone_names, cone_transforms(body, pose), strict=True):
+        placed = rr.Transform3D(translation=T[:, 3], mat3x3=T[:, :3])
+        stream.log(f"world/cones/{name}", placed)
 
 
 def _body(rr: Any, stream: Any, result: StoredResult, row: int) -> None:
@@ -175,7 +216,7 @@ def _blueprint(result: StoredResult, rig: CameraRig | None) -> Any:
     ]
     curves = [("angles", "joint angles, degrees"), ("sd_mm", "sd, mm"), ("overlap", "overlap")]
     views = [rrb.TimeSeriesView(origin=folder, name=name) for folder, name in curves]
-    space = rrb.Spatial3DView(origin="world", name="world")
+    space = rrb.Spatial3DView(origin="world", name="world", background=_BACKGROUND)
     above = rrb.Horizontal(space, rrb.Grid(*cameras)) if cameras else space
     return rrb.Blueprint(
         rrb.Vertical(above, rrb.Tabs(*views), row_shares=[3, 1]), collapse_panels=True

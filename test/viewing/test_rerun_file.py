@@ -34,7 +34,12 @@ def test_body_cameras_pictures_and_curves(make_result, walk: Path, tmp_path: Pat
         entities.add(chunk.entity_path)
         if chunk.entity_path == "/world/body/joints":
             joints += chunk.to_record_batch().column("Points3D:positions").to_pylist()
-    assert {"/world/floor", "/world/cameras/cam01", "/world/body/bones"} <= entities
+    assert {
+        "/world/floor",
+        "/world/cameras/cam01",
+        "/world/body/bones",
+        "/world/cones/torso",
+    } <= entities
     assert {"/angles/knee_angle_l", "/overlap/cam01", "/sd_mm/LKnee"} <= entities
     assert len(joints) == 5, "no body in the frame without a pose"
     np.testing.assert_allclose(joints[0], result.positions_m[0], atol=1e-5)
