@@ -31,6 +31,7 @@ HELP_WIDTH = 88
 VERBS: Mapping[str, str] = MappingProxyType(
     {
         "calibrate": "calibrate cameras with a checkerboard or ChArUco board",
+        "check": "say before tracking what will go wrong with a recording",
         "convert": "write a recording, dataset or videos as an MCAP bag",
         "track": "track the person in a recording or bag",
         "export": "write a result in the formats of OpenSim, C3D, BVH, CSV, NumPy and ROS",
