@@ -130,6 +130,19 @@ class CameraRig:
         return CameraRig(tuple(self[name] for name in names))
 
 
+def nominal_camera(name: str, size_px: tuple[int, int]) -> CameraModel:
+    """A camera of that name and size, at the origin of the world."""
+    focal = 1.2 * max(size_px)
+    matrix = np.array(
+        [
+            [focal, 0.0, 0.5 * (size_px[0] - 1)],
+            [0.0, focal, 0.5 * (size_px[1] - 1)],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    return CameraModel(name, size_px, matrix, np.zeros(5), np.eye(4))
+
+
 def scaled_size(size_px: tuple[int, int], scale: float) -> tuple[int, int]:
     """(width, height) of an image scaled by a factor, each at least 1."""
     return max(1, round(size_px[0] * scale)), max(1, round(size_px[1] * scale))

@@ -30,6 +30,8 @@ HELP_WIDTH = 88
 
 VERBS: Mapping[str, str] = MappingProxyType(
     {
+        "calibrate": "calibrate cameras with a checkerboard or ChArUco board",
+        "check": "say before tracking what will go wrong with a recording",
         "convert": "write a recording, dataset or videos as an MCAP bag",
         "track": "track the person in a recording or bag",
         "batch": "track many recordings: results and one summary table",

@@ -4,7 +4,7 @@ import argparse
 import json
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +12,21 @@ from rich.console import Console
 from rich.progress import Progress
 
 from markerless_tracker.body import MARKER_NAMES, write_pose, write_subject
+from markerless_tracker.camera.board import (
+    BOARD_FILE,
+    CHARUCO,
+    CHECKERBOARD,
+    DICTIONARY,
+    MARKER_SHARE,
+    Board,
+    board_squares,
+    write_board,
+)
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.datasets.writer import new_recording
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.synthesis import LIGHTS, MILD_LENS, MOTIONS, SyntheticScene
+from markerless_tracker.synthesis.boards import BoardScene
 from markerless_tracker.synthesis.people import ACTIONS
 from markerless_tracker.synthesis.scenes import GeneratedScene
 
@@ -23,7 +34,8 @@ HELP = (
     "Render a synthetic person (shaded cones in a textured room) as a recording folder: "
     "calibration, videos, empty-scene images, exact masks and markers, subject and start pose. "
     "Errors on it test the software; they do not measure the accuracy on real images. --scene "
-    "SEED renders a sampled room and a clothed person with other shapes than the tracker's cones."
+    "SEED renders a sampled room and a clothed person with other shapes than the tracker's cones; "
+    "--checkerboard renders a moving calibration board for `calibrate`, seen by the same cameras."
 )
 EXAMPLE = "markerless_tracker synthesize recordings/synthetic --seconds 2 --motion balance"
 EMPTY_IMAGES = 10
@@ -32,13 +44,30 @@ _NOT_WITH_SCENE = (
     "cameras", "size", "seed", "stature", "body", "noise", "shadow", "light", "grey", "dull",
     "undistorted",
 )  # fmt: skip
+_ONLY_PEOPLE = ("scene", "motion", "stature", "body", "shadow", "light", "grey", "dull")
+_RATES = {"person": (4.0, 60.0), "board": (40.0, 10.0)}
+"""Seconds and frames per second unless given."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("out", metavar="OUT", type=Path, help="folder to write (new or empty)")
-    parser.add_argument("--seconds", type=float, default=4.0, help="duration in s (default 4)")
-    parser.add_argument("--fps", type=float, default=60.0, help="frames per second (default 60)")
+    parser.add_argument("--seconds", type=float, help="duration in s (default 4, of a board 40)")
+    parser.add_argument("--fps", type=float, help="frames per second (default 60, of a board 10)")
+    parser.add_argument(
+        "--checkerboard", action="store_true",
+        help="render a checkerboard instead of a person: on the floor, where its frame is the "
+        "world's, then moved in front of all cameras",
+    )  # fmt: skip
+    parser.add_argument(
+        "--charuco", action="store_true", help="as --checkerboard, with a ChArUco board"
+    )
+    parser.add_argument(
+        "--squares", metavar="CxR", help="columns and rows of the board (default 10x7)"
+    )
+    parser.add_argument(
+        "--square-size", metavar="M", type=float, help="side of a square in m (default 0.12)"
+    )
     parser.add_argument(
         "--motion", choices=ACTIONS,
         help="motion of the person (default walk, or the scene's); without --scene "
@@ -92,7 +121,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the recording; returns the exit status."""
+    is_board = args.checkerboard or args.charuco
+    default_s, default_fps = _RATES["board" if is_board else "person"]
+    args.seconds = default_s if args.seconds is None else args.seconds
+    args.fps = default_fps if args.fps is None else args.fps
     frames = _frames(args.seconds, args.fps)
+    if is_board:
+        return _board(args, frames)
+    for name in ("squares", "square_size"):
+        if getattr(args, name) is not None:
+            raise ConfigError(f"--{name.replace('_', '-')} needs --checkerboard or --charuco")
     scene = _synthetic(args) if args.scene is None else _generated(args)
     with Progress(console=Console(file=sys.stderr)) as bar:
         task = bar.add_task("frames", total=frames)
@@ -110,6 +148,42 @@ def run(args: argparse.Namespace) -> int:
         }))  # fmt: skip
     else:
         print(f"{args.out}: {frames} frames of {len(scene.rig)} cameras, with exact truth")
+    return 0
+
+
+def _board(args: argparse.Namespace, frames: int) -> int:
+    """Write the recording of a board."""
+    _refuse(args, _ONLY_PEOPLE, "a board has no person")
+    columns, rows = board_squares(args.squares or "10x7")
+    square_m = 0.12 if args.square_size is None else args.square_size
+    board = (
+        Board(CHARUCO, columns, rows, square_m, MARKER_SHARE * square_m, DICTIONARY)
+        if args.charuco
+        else Board(CHECKERBOARD, columns, rows, square_m)
+    )
+    scene = BoardScene(
+        board,
+        cameras=args.cameras,
+        size_px=_size(args.size),
+        fps=args.fps,
+        seconds=args.seconds,
+        seed=args.seed,
+        noise=args.noise,
+        distortion=(0.0,) * 5 if args.undistorted else MILD_LENS,
+    )
+    with Progress(console=Console(file=sys.stderr)) as bar:
+        with new_recording(args.out, scene.rig, scene.fps, lossless=args.lossless) as writer:
+            write_board(writer.folder / BOARD_FILE, board)
+            for index in bar.track(range(frames), description="frames"):
+                writer.write(scene.frame(index))
+    if args.json:
+        print(json.dumps({
+            "path": str(args.out), "frames": frames, "fps": args.fps, "board": board.kind,
+            "squares": [columns, rows], "square_size": square_m,
+            "cameras": list(scene.rig.names), "seed": scene.seed,
+        }))  # fmt: skip
+    else:
+        print(f"{args.out}: {frames} frames of {len(scene.rig)} cameras, {board.describe()}")
     return 0
 
 
@@ -132,12 +206,16 @@ def _synthetic(args: argparse.Namespace) -> SyntheticScene:
 
 
 def _generated(args: argparse.Namespace) -> GeneratedScene:
+    _refuse(args, _NOT_WITH_SCENE, "--scene samples everything itself")
+    return GeneratedScene(args.scene, fps=args.fps, motion=args.motion)
+
+
+def _refuse(args: argparse.Namespace, names: Sequence[str], why: str) -> None:
     parser = argparse.ArgumentParser()
     add_arguments(parser)
-    for name in _NOT_WITH_SCENE:
+    for name in names:
         if getattr(args, name) != parser.get_default(name):
-            raise ConfigError(f"--scene samples everything itself, expected no --{name}")
-    return GeneratedScene(args.scene, fps=args.fps, motion=args.motion)
+            raise ConfigError(f"{why}, expected no --{name}")
 
 
 def synthesize(

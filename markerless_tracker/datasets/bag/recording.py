@@ -11,7 +11,8 @@ import numpy as np
 import yaml
 from rosbags.typesys import Stores, get_typestore
 
-from markerless_tracker.camera import CameraRig, read_calibration
+from markerless_tracker.camera import CameraModel, CameraRig, read_calibration
+from markerless_tracker.camera.model import nominal_camera
 from markerless_tracker.datasets.bag.calibration import rig_from_messages
 from markerless_tracker.datasets.bag.encodings import decode_compressed, decode_raw
 from markerless_tracker.datasets.bag.sets import SetGrouping, StampedSet
@@ -41,23 +42,28 @@ class BagRecording(Recording):
     Args:
         path: the bag's folder, or its `.mcap`.
         scale: factor for all images.
+        nominal: take any calibration for missing: the rig has the cameras' names and sizes only.
 
     Raises:
         DatasetError: not an MCAP bag, topics are missing, or no set is complete.
         CalibrationError: the calibration is missing or malformed.
     """
 
-    def __init__(self, path: Path, *, scale: float = 1.0) -> None:
+    def __init__(self, path: Path, *, scale: float = 1.0, nominal: bool = False) -> None:
         folder = path if path.is_dir() else path.parent
+        names: tuple[str, ...]
         self._files = McapFiles(_mcap_files(path))
         self._store = get_typestore(Stores.ROS2_JAZZY)
         if self._files.counts is None:
             for _ in self._files:  # the topics of a damaged bag are known only after reading it
                 pass
         calibration = folder / "calibration.toml"
-        if calibration.is_file():
+        if nominal:
+            names = self._cameras_with_images(path)
+            rig = self._nominal_rig(path, names)
+        elif calibration.is_file():
             rig = read_calibration(calibration)
-            names: tuple[str, ...] = rig.names
+            names = rig.names
         else:
             names = self._cameras_with_images(path)
             rig = self._rig_from_topics(path, names)
@@ -167,18 +173,7 @@ class BagRecording(Recording):
         """
         name = self._topics[message.topic]
         where = f"{self.name}: {message.topic}"
-        content = self._decoded(message)
-        if message.type == RAW_TYPE:
-            image = decode_raw(
-                content.data,
-                encoding=content.encoding,
-                width=content.width,
-                height=content.height,
-                step=content.step,
-                where=where,
-            )
-        else:
-            image = decode_compressed(content.data, where=where)
+        image = self._stored_image(message, where)
         stored = self._stored_rig[name].size_px
         if (image.shape[1], image.shape[0]) != stored:
             raise ImageError(
@@ -186,6 +181,19 @@ class BagRecording(Recording):
                 f"expected {stored[0]}x{stored[1]} px as {name} is calibrated"
             )
         return scale_image(image, self.rig[name].size_px)
+
+    def _stored_image(self, message: RawMessage, where: str) -> Image:
+        content = self._decoded(message)
+        if message.type != RAW_TYPE:
+            return decode_compressed(content.data, where=where)
+        return decode_raw(
+            content.data,
+            encoding=content.encoding,
+            width=content.width,
+            height=content.height,
+            step=content.step,
+            where=where,
+        )
 
     def _decoded(self, message: RawMessage) -> Any:
         try:
@@ -218,6 +226,22 @@ class BagRecording(Recording):
                 f"NAME/image_raw/compressed; the bag has {self._listed()}"
             )
         return tuple(sorted(set(names)))
+
+    def _nominal_rig(self, path: Path, names: tuple[str, ...]) -> CameraRig:
+        """Cameras of the sizes of the first images."""
+        topics = {self._image_topic(path, name): name for name in names}
+        cameras: dict[str, CameraModel] = {}
+        for message in self._files:
+            name = topics.get(message.topic)
+            if name is not None and name not in cameras:
+                image = self._stored_image(message, f"{path}: {message.topic}")
+                cameras[name] = nominal_camera(name, (image.shape[1], image.shape[0]))
+                if len(cameras) == len(names):
+                    break
+        missing = [name for name in names if name not in cameras]
+        if missing:
+            raise DatasetError(f"{path}: no image of {', '.join(missing)}")
+        return CameraRig(tuple(cameras[name] for name in names))
 
     def _rig_from_topics(self, path: Path, names: tuple[str, ...]) -> CameraRig:
         infos: dict[str, Any] = {}

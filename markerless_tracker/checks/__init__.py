@@ -1,0 +1,1 @@
+"""Checks of a recording before tracking: step, background, light, views, calibration."""
