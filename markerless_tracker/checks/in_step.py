@@ -17,6 +17,8 @@ MOST_LAG_S = 1.5
 """Largest offset that is searched."""
 LEAST_CORRELATION = 0.45
 """Pairs whose best correlation is lower are not used."""
+LEAST_EVIDENCE = 5.0
+"""And so are those whose best correlation times the root of the common frames is lower."""
 LEAST_FRAMES = 40
 _SMOOTH_S = 1.0
 _LEAST_MOTION = 0.02
@@ -34,7 +36,7 @@ class Offsets:
             cameras of which nothing can be said are missing.
         correlation: camera -> mean correlation of the pairs it is in, at these offsets.
         gained: camera -> how much higher that is than without offsets.
-        others: camera -> further offsets that fit almost as well: motion repeats itself.
+        others: camera -> further such offsets that fit almost as well: motion repeats itself.
         pairs: number of pairs used.
     """
 
@@ -49,7 +51,9 @@ def find_offsets(motion: Mapping[str, FloatArray], fps: float) -> Offsets:
     """Offsets of cameras by their motion signals (n,) each.
 
     The offsets maximise the sum of the correlations of all pairs, one camera after the other, from
-    none on. Steps of a walk look alike: of similar offsets the smaller one is taken.
+    none on. Steps of a walk look alike: of similar offsets the smaller one is taken. Of a
+    camera that resembles the others less than LEAST_CORRELATION at the offsets found, nothing is
+    said.
     """
     names = [n for n, m in motion.items() if len(m) >= LEAST_FRAMES and m.mean() > _LEAST_MOTION]
     signals = {n: _varying(motion[n], fps) for n in names}
@@ -57,7 +61,8 @@ def find_offsets(motion: Mapping[str, FloatArray], fps: float) -> Offsets:
     pairs: dict[tuple[str, str], FloatArray] = {}
     for a, b in combinations(names, 2):
         values = [_correlation(signals[a], signals[b], lag) for lag in range(-most, most + 1)]
-        if max(values) >= LEAST_CORRELATION:
+        common = min(len(signals[a]), len(signals[b])) - abs(int(np.argmax(values)) - most)
+        if max(values) >= max(LEAST_CORRELATION, LEAST_EVIDENCE / np.sqrt(common)):
             pairs[a, b] = np.array(values)
             pairs[b, a] = pairs[a, b][::-1]
     names = [n for n in names if any(n in pair for pair in pairs)]
@@ -75,11 +80,12 @@ def find_offsets(motion: Mapping[str, FloatArray], fps: float) -> Offsets:
         {n: [_at(pairs[n, m], at[m], at[n]) for m in names if (n, m) in pairs] for n in names}
         for at in (dict.fromkeys(names, 0), offsets)
     )
+    sure = [n for n in names if np.mean(there[n]) >= LEAST_CORRELATION]
     return Offsets(
-        {n: value - middle for n, value in exact.items()},
-        {n: float(np.mean(there[n])) for n in names},
-        {n: float(np.mean(there[n]) - np.mean(still[n])) for n in names},
-        {n: _similar(_totals(n, offsets, pairs, lags), lags) for n in names},
+        {n: exact[n] - middle for n in sure},
+        {n: float(np.mean(there[n])) for n in sure},
+        {n: float(np.mean(there[n]) - np.mean(still[n])) for n in sure},
+        {n: _similar(_totals(n, offsets, pairs, lags), lags - round(middle)) for n in sure},
         len(pairs) // 2,
     )
 

@@ -23,8 +23,12 @@ def moved_px(scene: FloatArray, background: FloatArray) -> float:
 
     0 where the pictures have too little in common.
     """
+    # phaseCorrelate fills up to the next fast size, by which the shift is half a pixel off.
+    height, width = (_fast_size(length) for length in scene.shape)
     edges = [
-        cv2.Laplacian(cv2.GaussianBlur(image.astype(np.float32), (0, 0), 1.5), cv2.CV_32F)
+        cv2.Laplacian(
+            cv2.GaussianBlur(image[:height, :width].astype(np.float32), (0, 0), 1.5), cv2.CV_32F
+        )
         for image in (background, scene)
     ]
     # A few strong edges, such as those of a person, would decide alone.
@@ -33,3 +37,8 @@ def moved_px(scene: FloatArray, background: FloatArray) -> float:
     window = cv2.createHanningWindow((first.shape[1], first.shape[0]), cv2.CV_32F)
     (du, dv), response = cv2.phaseCorrelate(first, second, window)
     return float(np.hypot(du, dv)) if response >= _LEAST_RESPONSE else 0.0
+
+
+def _fast_size(length: int) -> int:
+    """The largest even length, at most as long, for which a Fourier transform needs no filling."""
+    return max(n for n in range(2, length + 1, 2) if cv2.getOptimalDFTSize(n) == n)

@@ -22,7 +22,10 @@ def scene():
 
 @pytest.fixture(scope="module")
 def frames(scene):
-    return [scene.frame(i)[0] for i in range(FRAMES + 6)]
+    """The person stops and goes: a steady walk does not tell cameras' offsets."""
+    steps = np.random.default_rng(0).choice([0, 0, 0, 1, 2], FRAMES + 6)
+    drawn = [scene.frame(i)[0] for i in range(int(steps.sum()) + 1)]
+    return [drawn[i] for i in np.cumsum(steps)]
 
 
 def written(path, scene, frames, backgrounds):

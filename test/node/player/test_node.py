@@ -99,7 +99,7 @@ def test_a_bag_arrives_whole_with_its_own_stamps(
             assert stamp_of(image) == stamp_of(info) == FIRST_NS + round(index * 1e9 / FPS)
             assert image.header.frame_id == info.header.frame_id == f"{name}_optical_frame"
             np.testing.assert_array_equal(decode_image(image, name), pictures.picture(name, index))
-            camera = camera_of(name, info, pictures.rig[name].T_cam_world)
+            camera = camera_of(name, info, pictures.rig[name].T_cam_world, f"{name}/camera_info")
             np.testing.assert_array_equal(camera.matrix, pictures.rig[name].matrix)
     assert f"played {SETS} sets" in player.output
 
