@@ -19,10 +19,10 @@ _EXAMPLE = (
     "-p background_dir:=bag/background -p stature:=1.75"
 )
 _CLOSE_S = 3.0
-# Longest time until a signal is noticed.
 _SWITCH_S = 0.001
 """Time after which a thread that runs Python gives way to another one."""
 _NOTICE_S = 0.1
+"""Longest time until a signal is noticed."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
