@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.masks import SOLID
 from markerless_tracker.imaging.region import Region
@@ -18,8 +18,22 @@ from markerless_tracker.imaging.region import Region
 _NEAR_PX = 3
 
 
-@compiled()
-def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, gone):  # type: ignore[no-untyped-def]
+@kernel
+def _sum_near(image, source, top, bottom, left, right, sums):  # type: ignore[no-untyped-def]
+    """Number of the pixels of a window that are in ``source``, and their sums by channel."""
+    count = 0
+    sums[:] = 0
+    for y in range(top, bottom):
+        for x in range(left, right):
+            if source[y, x] != 0:
+                count += 1
+                for c in range(sums.size):
+                    sums[c] += image[y, x, c]
+    return count
+
+
+@kernel
+def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, sums, gone):  # type: ignore[no-untyped-def]
     """Mark pixels of the mask's border that the body covers by less than half.
 
     Args:
@@ -29,34 +43,28 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, go
         mask: (a, b) uint8, 0 or 255.
         inner, deep: (a, b) the mask without its border, and without two layers.
         least: least squared difference of body and background; smaller ones are not decided.
+        sums: (c,) int32, scratch.
         gone: (a, b) uint8, 255 at pixels to clear; written.
     """
     rows, columns = mask.shape
     channels = image.shape[2]
-    body = np.empty(channels, dtype=np.float32)
     for i in range(rows):
+        first, last = max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)
         for j in range(columns):
             gone[i, j] = 0
             if mask[i, j] == 0 or inner[i, j] != 0:
                 continue
-            count = 0
-            for source in (deep, inner):
-                body[:] = 0.0
-                for y in range(max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)):
-                    for x in range(max(j - _NEAR_PX, 0), min(j + _NEAR_PX + 1, columns)):
-                        if source[y, x] != 0:
-                            count += 1
-                            for c in range(channels):
-                                body[c] += np.float32(image[y, x, c])
-                if count > 0:
-                    break
+            begin, end = max(j - _NEAR_PX, 0), min(j + _NEAR_PX + 1, columns)
+            count = _sum_near(image, deep, first, last, begin, end, sums)
+            if count == 0:
+                count = _sum_near(image, inner, first, last, begin, end, sums)
             if count == 0:
                 continue
             along = np.float32(0.0)
             length = np.float32(0.0)
             for c in range(channels):
                 base = min(gain[c] * mean[c, top + i, left + j], np.float32(255.0))
-                contrast = body[c] / np.float32(count) - base
+                contrast = np.float32(sums[c]) / np.float32(count) - base
                 along += (np.float32(image[i, j, c]) - base) * contrast
                 length += contrast * contrast
             if length >= least and along < np.float32(0.5) * length:
@@ -89,11 +97,21 @@ def trim_border(
         layers: largest number of border layers to clear, one after the other.
         least: least difference of body and background, grey levels; smaller ones are not decided.
     """
-    gone = np.empty_like(mask)
+    gone, sums = np.empty_like(mask), np.empty(image.shape[2], dtype=np.int32)
     for _ in range(layers):
         inner = cv2.erode(mask, SOLID)
         deep = cv2.erode(inner, SOLID)
         mark_half_covered(
-            image, mean, gain, part.left, part.top, mask, inner, deep, np.float32(least**2), gone
+            image,
+            mean,
+            gain,
+            part.left,
+            part.top,
+            mask,
+            inner,
+            deep,
+            np.float32(least**2),
+            sums,
+            gone,
         )
         cv2.subtract(mask, gone, dst=mask)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
+from markerless_tracker.observation import locked
 
 # Pixels of the sampling grid.
 _SAMPLES = 6_000
@@ -28,6 +29,40 @@ _LEAST_SAMPLES = 200
 
 
 @compiled()
+def _mode(counts, sums):  # type: ignore[no-untyped-def]
+    """Ratio at the fullest stretch of bins; 1 if too few are in it."""
+    inside = 0
+    for place in range(_WINDOW):
+        inside += counts[place]
+    most = inside
+    first = 0
+    equals = 1
+    for place in range(1, _BINS - _WINDOW + 1):
+        inside += counts[place + _WINDOW - 1] - counts[place - 1]
+        if inside > most:
+            most = inside
+            first = place
+            equals = 1
+        elif inside == most:
+            equals += 1
+    if most < max(_LEAST_SAMPLES, _LEAST_SHARE * counts.sum()):
+        return 1.0
+    # The middle one of equal maxima: a flat maximum then causes no bias.
+    inside = most
+    place = first
+    seen = 1
+    while seen <= equals // 2:
+        inside += counts[place + _WINDOW] - counts[place]
+        place += 1
+        if inside == most:
+            seen += 1
+    middle = 0.0
+    for k in range(place, place + _WINDOW):
+        middle += sums[k]
+    return math.exp(middle / most)
+
+
+@compiled()
 def modal_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-untyped-def]
     """Fill gain (c,) from the pixels where (n, 2) = (v, u) of an image (h, w, c).
 
@@ -35,49 +70,20 @@ def modal_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-u
     where not usable.
     """
     per_log = _BINS / (2.0 * _LOG_RANGE)
-    counts = np.empty(_BINS, dtype=np.int64)
-    sums = np.empty(_BINS, dtype=np.float64)
-    for c in range(gain.size):
-        counts[:] = 0
-        sums[:] = 0.0
-        total = 0
-        for i in range(where.shape[0]):
-            ratio = value_logs[image[where[i, 0], where[i, 1], c]] - base_logs[i, c]
+    channels = gain.size
+    counts = np.zeros((channels, _BINS), dtype=np.int64)
+    sums = np.zeros((channels, _BINS), dtype=np.float64)
+    # The channels of a pixel lie side by side in memory.
+    for i in range(where.shape[0]):
+        pixel = image[where[i, 0], where[i, 1]]
+        for c in range(channels):
+            ratio = value_logs[pixel[c]] - base_logs[i, c]
             if abs(ratio) < _LOG_RANGE:  # not for NaN either
                 place = min(int((ratio + _LOG_RANGE) * per_log), _BINS - 1)
-                counts[place] += 1
-                sums[place] += ratio
-                total += 1
-        gain[c] = 1.0
-        inside = 0
-        for place in range(_WINDOW):
-            inside += counts[place]
-        most = inside
-        first = 0
-        equals = 1
-        for place in range(1, _BINS - _WINDOW + 1):
-            inside += counts[place + _WINDOW - 1] - counts[place - 1]
-            if inside > most:
-                most = inside
-                first = place
-                equals = 1
-            elif inside == most:
-                equals += 1
-        if most < max(_LEAST_SAMPLES, _LEAST_SHARE * total):
-            continue
-        # The middle one of equal maxima: a flat maximum then causes no bias.
-        inside = most
-        place = first
-        seen = 1
-        while seen <= equals // 2:
-            inside += counts[place + _WINDOW] - counts[place]
-            place += 1
-            if inside == most:
-                seen += 1
-        middle = 0.0
-        for k in range(place, place + _WINDOW):
-            middle += sums[k]
-        gain[c] = math.exp(middle / most)
+                counts[c, place] += 1
+                sums[c, place] += ratio
+    for c in range(channels):
+        gain[c] = _mode(counts[c], sums[c])
 
 
 class ExposureMeter:
@@ -99,7 +105,7 @@ class ExposureMeter:
     def gain(self, image: Image) -> NDArray[np.float32]:
         """(c,) float32: relative brightness of an image (h, w, c) uint8; 1 if it has no mode."""
         gain = np.empty(self._channels, dtype=np.float32)
-        modal_ratio(image, self._where, self._base_logs, self._value_logs, gain)
+        modal_ratio(locked(image, np.uint8), self._where, self._base_logs, self._value_logs, gain)
         return gain
 
 

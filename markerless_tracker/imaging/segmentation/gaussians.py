@@ -12,6 +12,7 @@ from markerless_tracker.imaging.background.model import (
 from markerless_tracker.imaging.images import Image, grey_of
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.settings import ImagingSettings
+from markerless_tracker.observation import locked
 
 # Largest difference between the channels of a grey camera's background, grey levels.
 _GREY_TOLERANCE = 0.5
@@ -65,16 +66,19 @@ class BackgroundGaussians:
         self.mean[...] = self._learned()[0]
 
     def pixels(self, image: Image, region: Region) -> Image:
-        """(h, w, c) of a region as it is compared: smoothed if too noisy, one channel if grey."""
+        """(h, w, c) of a region as it is compared: smoothed if too noisy, one channel if grey.
+
+        Contiguous, and not to be written.
+        """
         wide = region.grown(_SMOOTH_PX[0] // 2 if self._smooth else 0, self.size_px)
         part = image[wide.slices]
         if self._smooth:
             part = np.asarray(cv2.GaussianBlur(part, _SMOOTH_PX, 0.0), dtype=np.uint8)
             part = part[region.within(wide).slices]
-        part = np.ascontiguousarray(part)
         if self.is_grey:
             part = grey_of(part)
-        return part.reshape(region.height, region.width, -1)
+        # Kernels are compiled once for all images, also for those that may not be written.
+        return locked(part.reshape(region.height, region.width, -1), np.uint8)
 
     def _smoothed(self, mean: FloatImage, variance: FloatImage) -> tuple[FloatImage, FloatImage]:
         """Mean and variance (h, w, c) of images as they are compared: smoothed if too noisy."""

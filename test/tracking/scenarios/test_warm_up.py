@@ -1,4 +1,7 @@
-"""After `warm_up` no step waits for a kernel: none is compiled, or loaded, for other arguments."""
+"""After `warm_up` no step waits for a kernel: none is compiled, or loaded, for other arguments.
+
+Images may be read-only, as those of messages and of shared memory are, and have padded rows.
+"""
 
 import os
 import subprocess
@@ -10,6 +13,8 @@ PROGRAM = """
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from markerless_tracker.compiled import _dispatchers
 from markerless_tracker.imaging import learn_background
 from markerless_tracker.synthesis import SyntheticScene
@@ -20,6 +25,13 @@ scene = SyntheticScene(body="person32", motion="walk", size_px=(256, 192), seed=
 config = TrackerConfig.from_mapping({"threads": 1})
 backgrounds = {n: learn_background(f, config) for n, f in scene.backgrounds(6).items()}
 images = {number: scene.frame(number)[0] for number in range(0, 16, 2)}
+for number, views in images.items():
+    for name, image in views.items():
+        if number % 4 == 0:
+            padded = np.zeros((image.shape[0], image.shape[1] + 5, 3), np.uint8)
+            padded[:, :-5] = image
+            views[name] = padded[:, :-5]
+        views[name].flags.writeable = number > 10
 given = sys.argv[1] == "given"
 tracker = Tracker(
     scene.rig, scene.body, config, backgrounds=backgrounds,
