@@ -109,6 +109,10 @@ class MotionModel:
         """Move the last pose (p,) within limits (2, p); its velocity stays."""
         self.pose = np.clip(self.pose + change, *limits)
 
+    def since_s(self, stamp_ns: int) -> float:
+        """Time from the last frame to a time, s; 0 before the first and if time did not go on."""
+        return self._elapsed_ns(stamp_ns) * 1e-9
+
     def _elapsed_ns(self, stamp_ns: int) -> int:
         """Time since the last frame; 0 before the first and if time did not go on."""
         return 0 if self.stamp_ns is None else max(0, stamp_ns - self.stamp_ns)

@@ -216,13 +216,15 @@ class Tracker:
             stamp_ns: time of the images; the search widens with the time since the last step.
             effort: fraction of the frames, 0 to 1, in which swarms and searches for limbs may run
                 beside the refinement. Less than 1 where images come faster than they are tracked.
+                Frames more than 45 ms apart are all searched, unless it is 0.
 
         Raises:
             ConfigError: the effort is no such fraction.
             ImageError, CalibrationError: no view, one of an unknown camera, or one that does not
                 fit its calibration or background; names the camera.
         """
-        self._effort.begin(effort, doubt=bool(self._assessor.limbs.lost))
+        since_s = self._motion.since_s(stamp_ns)
+        self._effort.begin(effort, doubt=bool(self._assessor.limbs.lost), since_s=since_s)
         outlook = self._lookahead.begin(views if isinstance(views, Prepared) else None)
         latest = None
         try:

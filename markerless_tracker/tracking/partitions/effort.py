@@ -17,6 +17,8 @@ WORSE = 0.01
 """A frame is explained badly whose f lies this far below the track's usual one."""
 NEAR = 0.1
 """A pose is refined once more if a parameter has moved by more than this, rad or m."""
+FAR_S = 0.045
+"""Frames farther apart than this are all searched: a limb can be lost from each to the next."""
 _MEMORY = 0.05
 
 
@@ -45,12 +47,13 @@ class Effort:
         self._granted = True
         self._doubt = False
 
-    def begin(self, effort: float, *, doubt: bool) -> None:
+    def begin(self, effort: float, *, doubt: bool, since_s: float = 0.0) -> None:
         """Begin a frame.
 
         Args:
             effort: fraction of the frames that may be searched beside the refinement, 0 to 1.
             doubt: whether a limb is in doubt.
+            since_s: time since the last frame.
 
         Raises:
             ConfigError: no such fraction.
@@ -59,7 +62,7 @@ class Effort:
             raise ConfigError(f"effort is {effort}, expected 0 to 1")
         self._credit = min(1.0, self._credit + effort)
         # Sums of fractions such as a tenth fall short of 1 by a rounding.
-        self._granted = self._credit > 1.0 - 1e-9
+        self._granted = self._credit > 1.0 - 1e-9 or (effort > 0.0 and since_s > FAR_S)
         if self._granted:
             self._credit = 0.0
         self._doubt = doubt

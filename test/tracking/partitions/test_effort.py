@@ -95,3 +95,14 @@ def test_a_pose_is_refined_again_if_it_moved_or_swarms_searched(step, cost, poli
     assert search.names[0] == "align"
     assert (search.names[-1] == "polish") is polished
     assert (len(search.names) > 2) is (cost > 0.05 + WORSE)
+
+
+def test_frames_far_apart_are_all_searched() -> None:
+    effort = _settled()
+    granted = []
+    for since_s in (0.01, 0.01, 0.1, 0.1, 0.01):
+        effort.begin(0.4, doubt=True, since_s=since_s)
+        granted.append(effort.granted)
+    assert granted == [False, False, True, True, False]
+    effort.begin(0.0, doubt=True, since_s=0.1)
+    assert not effort.granted

@@ -3,8 +3,8 @@
 from collections import deque
 from dataclasses import dataclass
 
-LEAST = 0.25
-"""Least effort."""
+LEAST = 0.5
+"""Least effort: searching fewer frames costs more accuracy than it saves time."""
 LATE_SETS = 2
 """Late sets among the last `WINDOW` before the effort falls: one long search is no overload."""
 WINDOW = 12
