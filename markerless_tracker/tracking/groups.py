@@ -217,7 +217,7 @@ class RegionSettings(SettingsGroup):
         most=100000,
     )
     margin_m: float = setting(
-        0.15,
+        0.08,
         "margin around the predicted body within which images are processed; it grows with the "
         "time between frames",
         least=0.0,

@@ -13,6 +13,8 @@ from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation
 
 _POINTS_PER_CONE = 6
+HAND_M = 0.07
+"""Side of a square: smaller patches of person pixels are no limb that goes on elsewhere."""
 
 
 class PlacedCones(NamedTuple):
@@ -95,29 +97,49 @@ def explained_in_region(
     That is so if no component with person pixels is near to the body, or if person pixels of one
     that is come nearer than `clear_px` to a side of the region beyond which the frame goes on: the
     person may go on there too. Undecided pixels at a side do not ask for more: shadows and faint
-    patches go on across the floor, and count neither way. Components are those of the region: one
-    that joins the body's through undecided pixels outside of it is left out.
+    patches go on across the floor, and count neither way. Nor do specks of person pixels among
+    them, smaller than a hand. Components are those of the region: one that joins the body's
+    through undecided pixels outside of it is left out.
     """
     count, labels = _components(observation)
     kept = _near(labels, count, observation, lines, margin_px)
     if not kept.any():
         return None
     part, left_out = _only(observation, labels, kept)
-    left, top, width, height = cv2.boundingRect(part.mask.view(np.uint8))
-    if width == 0:
+    mask = part.mask.view(np.uint8)
+    if not mask.any():
         return None
+    if _goes_on(mask, observation, clear_px):
+        hand_px = lines.px_m * HAND_M / float(np.median(lines.depths_m))
+        if _goes_on(_larger(mask, hand_px**2), observation, clear_px):
+            return None
+    return part, left_out
+
+
+def _goes_on(mask: NDArray[np.uint8], observation: Observation, clear_px: int) -> bool:
+    """Whether a mask (h, w) comes near a side of the region beyond which the frame goes on."""
+    left, top, width, height = cv2.boundingRect(mask)
+    if width == 0:
+        return False
     box = Region(left, top, left + width, top + height).moved(*observation.offset_px)
     u, v = observation.offset_px
     region = Region(u, v, u + observation.width, v + observation.height)
     # Grown by that much it must stay inside, but for what the frame itself cuts off.
     wide = box.grown(clear_px, observation.size_px)
-    cut = (
+    return (
         wide.left < region.left
         or wide.top < region.top
         or wide.right > region.right
         or wide.bottom > region.bottom
     )
-    return None if cut else (part, left_out)
+
+
+def _larger(mask: NDArray[np.uint8], least: float) -> NDArray[np.uint8]:
+    """The components of a mask (h, w) with that many pixels or more, 0 or 1."""
+    _, labels, table, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    large = table[:, cv2.CC_STAT_AREA] >= least
+    large[0] = False
+    return large[labels].astype(np.uint8)
 
 
 def body_region(lines: BodyLines, margin_m: float, least_px: int) -> Region | None:

@@ -7,7 +7,9 @@ from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
 from markerless_tracker.tracking.evidence.selection import (
+    HAND_M,
     body_lines,
+    explained_in_region,
     explained_part,
     place_cones,
 )
@@ -104,6 +106,26 @@ def test_regions_are_cut_as_full_frames(camera, body, pose, person):
     np.testing.assert_array_equal(kept.mask, person[window])
     assert left_out == 144
     assert kept.offset_px == (3, 20)
+
+
+@pytest.mark.parametrize(("larger", "goes_on"), [(0.7, False), (1.5, True)])
+def test_a_speck_at_a_side_of_the_region_is_no_limb_that_goes_on(
+    camera, body, pose, person, larger, goes_on
+) -> None:
+    placed = lines(camera, body, pose)
+    side = round(larger * HAND_M * placed.px_m / float(np.median(placed.depths_m)))
+    columns = np.flatnonzero(person.any(axis=0))
+    left = columns[0] - 8 - side
+    window = np.s_[:, left : columns[-1] + 20]
+    mask = person.copy()
+    mask[80 : 80 + side, left : left + side] = True
+    # A shadow joins the patch to the body.
+    shadow = np.zeros_like(mask)
+    shadow[80, left : left + 100] = True
+    place = {"size_px": (240, 180), "offset_px": (int(left), 0)}
+    seen = observe(mask[window], undecided=(shadow & ~mask)[window], **place)
+    found = explained_in_region(seen, placed, 0, 3)
+    assert (found is None) == goes_on
 
 
 def test_more_specks_than_fit_sixteen_bits(body, pose):
