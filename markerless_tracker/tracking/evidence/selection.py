@@ -139,7 +139,7 @@ def _larger(mask: NDArray[np.uint8], least: float) -> NDArray[np.uint8]:
     _, labels, table, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     large = table[:, cv2.CC_STAT_AREA] >= least
     large[0] = False
-    return large[labels].astype(np.uint8)
+    return np.asarray(large[labels], dtype=np.uint8)
 
 
 def body_region(lines: BodyLines, margin_m: float, least_px: int) -> Region | None:
