@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 
 from markerless_tracker.cli.terminal.bars import progress_bars
+from markerless_tracker.cli.view_node import run_node
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.results.read import read_result
 from markerless_tracker.results.stored_result import StoredResult
@@ -25,7 +26,8 @@ HELP = (
     "standard deviations), as a film, as a picture of some frames, or in the Rerun viewer, which "
     "has the body in 3D with cameras and floor, and angles, deviations and overlap over time. The "
     "images are those of the result's source, or of --source. Without an output the Rerun viewer "
-    "opens. Films and the viewer need markerless_tracker[view]."
+    "opens. Films and the viewer need markerless_tracker[view]. With --node the same of a running "
+    "tracker, from its topics."
 )
 EXAMPLE = "markerless_tracker view out/walk --film walk.webm --sheet walk.png --rrd walk.rrd"
 
@@ -35,7 +37,18 @@ MOST_RRD_PICTURES = 300
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("name", metavar="NAME", type=Path, help="NAME of NAME.trc and NAME.json")
+    parser.add_argument(
+        "name", metavar="NAME", nargs="?", type=Path, help="NAME of NAME.trc and NAME.json"
+    )
+    parser.add_argument(
+        "--node",
+        action="store_true",
+        help="show the running tracker instead of a result: in the Rerun viewer, or with --rrd "
+        "and --sheet (the last pictures)",
+    )
+    parser.add_argument(
+        "--seconds", metavar="S", type=float, help="with --node: end after S seconds"
+    )
     parser.add_argument(
         "--source",
         metavar="DIR",
@@ -81,11 +94,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show the result; returns the exit status."""
+    """Show the result, or the running tracker; returns the exit status."""
     targets = [path for path in (args.film, args.sheet, args.rrd) if path is not None]
     for path in targets:
         if path.exists() and not args.force:
             raise DatasetError(f"{path}: exists already, expected a new name or --force")
+    if args.node:
+        return run_node(args)
+    if args.name is None:
+        raise ConfigError("expected NAME of a result, or --node")
+    if args.seconds is not None:
+        raise ConfigError("--seconds is given without --node, expected both")
     if args.film is not None:
         require_av()
     if args.rrd is not None or not targets:
