@@ -64,6 +64,11 @@ def test_options_in_sentences_exist(markdown) -> None:
     assert wrong == []
 
 
+def test_the_page_on_offline_use_lists_every_verb(project_root: Path) -> None:
+    text = (project_root / "docs" / "offline.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)) == set(VERBS)
+
+
 def test_targets_of_make_exist(markdown, project_root: Path) -> None:
     made = set(re.findall(r"^([\w-]+):", (project_root / "Makefile").read_text(), re.MULTILINE))
     named = [
