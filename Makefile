@@ -4,6 +4,8 @@ PYTHON ?= python3
 VENV := .venv
 PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
+DOCS_VENV := .venv-docs
+DOCS_READY := $(DOCS_VENV)/.ready
 WORKERS ?= 2
 
 # Variables of another ROS environment would mix its libraries with those of .venv.
@@ -11,7 +13,7 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME AM
 unexport RMW_IMPLEMENTATION
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-long lint format demo bench lock clean
+.PHONY: help setup test test-long lint format docs demo bench lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 20
@@ -37,19 +39,29 @@ format: $(READY) ## format the code as lint expects it
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
+$(DOCS_READY): requirements/docs.txt requirements/venv.sh
+	@sh requirements/venv.sh "$(PYTHON)" "$(DOCS_VENV)" requirements/docs.txt
+	@touch $@
+
+docs: $(DOCS_READY) ## build the documentation as a site in site/ (strict: a warning is an error)
+	NO_MKDOCS_2_WARNING=1 $(DOCS_VENV)/bin/python -m mkdocs build --strict $(ARGS)
+
 demo: $(READY) ## track a person in a real recording, live over ROS 2 (5 minutes)
 	$(PY) -m markerless_tracker.cli.demo $(ARGS)
 
 bench: $(READY) ## measure the published figures (an hour)
 	@set -e; for script in bench/*.py; do echo "$$script"; $(PY) "$$script" $(ARGS); done
 
-lock: ## pin the newest versions of requirements/direct.txt
-	rm -rf $(VENV)-lock
+lock: ## pin the newest versions of requirements/direct.txt and docs-direct.txt
+	rm -rf $(VENV)-lock $(DOCS_VENV)-lock
 	$(PYTHON) -m venv $(VENV)-lock
 	$(VENV)-lock/bin/python -m pip install -q -r requirements/direct.txt
-	sh requirements/pin.sh $(VENV)-lock/bin/python > requirements/lock.txt
-	rm -rf $(VENV)-lock
+	sh requirements/pin.sh $(VENV)-lock/bin/python $(VENV) > requirements/lock.txt
+	$(PYTHON) -m venv $(DOCS_VENV)-lock
+	$(DOCS_VENV)-lock/bin/python -m pip install -q -r requirements/docs-direct.txt
+	sh requirements/pin.sh $(DOCS_VENV)-lock/bin/python $(DOCS_VENV) > requirements/docs.txt
+	rm -rf $(VENV)-lock $(DOCS_VENV)-lock
 
 clean: ## remove everything that the targets make
-	rm -rf $(VENV) build install log dist demo out .hypothesis .mypy_cache .ruff_cache *.egg-info
+	rm -rf $(VENV) $(DOCS_VENV) site build install log dist demo out .hypothesis .mypy_cache .ruff_cache *.egg-info
 	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Print the versions that an environment holds, as lock.txt wants them. Usage: pin.sh PYTHON
+# Print the versions that an environment holds, as lock.txt wants them. Usage: pin.sh PYTHON VENV
 set -eu
-echo "# Every package of .venv, pinned (x86-64 Linux, Python 3.11 to 3.14). Remake: make lock"
+echo "# Every package of $2, pinned (x86-64 Linux, Python 3.11 to 3.14). Remake: make lock"
 # A ROS wheel brings the Python package it holds along as a second distribution (rclpy beside
 # ros-rclpy) that no index has: a pin of that name is left out.
 "$1" -m pip list --format=freeze --disable-pip-version-check | sort -f | awk -F== '

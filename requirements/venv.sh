@@ -1,8 +1,10 @@
 #!/bin/sh
-# Make the virtual environment that the make targets use. Usage: venv.sh PYTHON VENV
+# Make a virtual environment for the make targets: that of the package, with it and lock.txt, or one
+# with another list only. Usage: venv.sh PYTHON VENV [LIST]
 set -eu
 python=$1
 venv=$2
+list=${3:-}
 here=$(dirname "$0")
 root=$(dirname "$here")
 
@@ -47,6 +49,10 @@ fi
 
 quiet=-q
 if [ -t 1 ]; then quiet=; fi
+if [ -n "$list" ]; then
+    echo "make: installing $list into $venv"
+    exec "$venv/bin/python" -m pip install $quiet --disable-pip-version-check -r "$list"
+fi
 echo "make: installing the pinned dependencies into $venv (a minute or two, 1 GB)"
 "$venv/bin/python" -m pip install $quiet --disable-pip-version-check -r "$here/lock.txt"
 "$venv/bin/python" -m pip install -q --disable-pip-version-check \

@@ -22,9 +22,6 @@ ROOMS = """
 """
 """The picture of CONTRIBUTING.md: floors and their rooms; modules of one file on the ground."""
 
-PLANNED = {"checks", "calibration"}
-"""Rooms that have a floor and need not exist."""
-
 FLOORS = {
     name: int(line.split()[0]) for line in ROOMS.strip().splitlines() for name in line.split()[1:]
 }
@@ -115,7 +112,7 @@ FOLDERS = sorted({Path(file).parent.as_posix() for file in FILES})
 def test_every_room_has_a_floor() -> None:
     folders = {p.name for p in SOURCE.iterdir() if p.is_dir() and p.name != "__pycache__"}
     files = {p.stem for p in SOURCE.glob("*.py")} - {"__init__", "__main__"}
-    assert folders | PLANNED == set(FLOORS) - GROUND | PLANNED
+    assert folders == set(FLOORS) - GROUND
     assert files == GROUND
 
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from markerless_tracker.calibration.calibrate import Calibration, calibrate
@@ -25,6 +24,7 @@ from markerless_tracker.camera.board import (
     board_squares,
     read_board,
 )
+from markerless_tracker.cli.terminal.bars import progress_bars, warn
 from markerless_tracker.datasets.uncalibrated import open_uncalibrated
 from markerless_tracker.datasets.writer import write_image
 from markerless_tracker.errors import ConfigError, DatasetError
@@ -104,10 +104,7 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"thickness is {args.thickness:g} m, expected 0 to 1")
     recording = open_uncalibrated(args.recording)
     board = board_of(args, recording.path)
-    with Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
-        console=console,
-    ) as bars:  # fmt: skip
+    with progress_bars(console) as bars:
         task = bars.add_task(f"searching {recording.name}", total=None)
         found = calibrate(
             recording,
@@ -123,7 +120,7 @@ def run(args: argparse.Namespace) -> int:
     pictures = args.pictures or args.out.with_name(f"{args.out.stem}_pictures")
     _draw(found, board, pictures)
     for text in (*recording.warnings, *found.doubts):
-        console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
+        warn(console, text)
     if args.json:
         summary = {
             "calibration": str(args.out), "pictures": str(pictures), "board": board.describe(),
@@ -181,17 +178,9 @@ def _draw(found: Calibration, board: Board, folder: Path) -> None:
 
 
 def _tables(found: Calibration) -> list[Table]:
-    cameras = Table(title="cameras")
-    for head in (
-        "camera",
-        "views",
-        "error px",
-        "covered",
-        "focal px",
-        "field",
-        "x, y, z m",
-        "± mm",
-    ):
+    cameras = Table(title="cameras: error, share of the image that is covered, place")
+    heads = ("camera", "views", "px", "cover", "focal px", "field", "x, y, z m", "± mm")
+    for head in heads:
         cameras.add_column(head, justify="left" if head == "camera" else "right", no_wrap=True)
     for camera in found.rig:
         of = found.cameras[camera.name]

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from markerless_tracker.checks.finding import GREEN, RED, YELLOW
 from markerless_tracker.checks.recording import check_recording
+from markerless_tracker.cli.terminal.bars import progress_bars
 from markerless_tracker.datasets import open_recording
 
 HELP = (
@@ -38,10 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check; returns 0, or 3 if something is red."""
     recording = open_recording(args.source, input_fps=args.input_fps)
-    with Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
-        console=Console(stderr=True),
-    ) as bars:  # fmt: skip
+    with progress_bars() as bars:
         task = bars.add_task(f"reading {recording.name}", total=None)
         found = check_recording(
             recording,

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.cli.benchmark.arguments import list_of, progress_bars
+from markerless_tracker.cli.benchmark.arguments import list_of
+from markerless_tracker.cli.terminal.bars import progress_bars
 from markerless_tracker.cli.track import read_config
 from markerless_tracker.compiled import compilation
 from markerless_tracker.imaging import learn_background

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from markerless_tracker.bags import COMPRESSIONS, BagSummary, write_bag
+from markerless_tracker.cli.terminal.bars import progress_bars, warn
 from markerless_tracker.cli.track_arguments import add_format, add_world
 from markerless_tracker.datasets import FORMATS, Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
@@ -93,13 +93,7 @@ def run(args: argparse.Namespace) -> int:
         part = PartRecording(recording, cameras=names, from_s=args.start, until_s=args.end)
         recording, start = part, part.first
     every = every_for_fps(recording.fps, args.fps)
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=console,
-    ) as bars:
+    with progress_bars(console) as bars:
         task = bars.add_task("background", total=None)
         backgrounds = backgrounds_of(recording)
         bars.update(task, description=f"writing {args.bag.name}")
@@ -114,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
             progress=lambda done, total: bars.update(task, completed=done, total=total),
         )
     for warning in recording.warnings:
-        console.print(f"warning: {warning}", markup=False, highlight=False, soft_wrap=True)
+        warn(console, warning)
     report = _report(recording, summary, args, every, time.monotonic() - started)
     if args.json:
         json.dump(report, sys.stdout, indent=2)

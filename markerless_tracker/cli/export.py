@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from markerless_tracker.cli.terminal.bars import progress_bars, warn
 from markerless_tracker.datasets.markers.sets import MARKER_SETS, names_in
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.export.formats import EXPORTS, MORE_FILES
@@ -73,22 +74,23 @@ def run(args: argparse.Namespace) -> int:
     if not args.force:
         _refuse_existing(jobs)
     written, notes = [], []
-    for part, path, kind in jobs:
-        reader = ResultReader(part, keep_lost=args.keep_lost)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if kind == BAG:
-            # rosbags takes a moment to import.
-            from markerless_tracker.bags.results import write_result_bag
+    with progress_bars(console) as bars:
+        for part, path, kind in bars.track(jobs, description=f"exporting {name.name}"):
+            reader = ResultReader(part, keep_lost=args.keep_lost)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if kind == BAG:
+                # rosbags takes a moment to import.
+                from markerless_tracker.bags.results import write_result_bag
 
-            write_result_bag(path, reader, replace=args.force)
-        else:
-            names = reader.marker_names
-            if args.names is not None:
-                names = names_in(args.names, names)
-            notes += EXPORTS[kind](path, reader, names)
-        written.append(path)
+                write_result_bag(path, reader, replace=args.force)
+            else:
+                names = reader.marker_names
+                if args.names is not None:
+                    names = names_in(args.names, names)
+                notes += EXPORTS[kind](path, reader, names)
+            written.append(path)
     for note in notes:
-        console.print(f"warning: {note}", markup=False, highlight=False, soft_wrap=True)
+        warn(console, note)
     if args.json:
         json.dump(
             {"files": [str(path) for path in written], "warnings": notes}, sys.stdout, indent=2

@@ -95,8 +95,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
 
 
-def _run(verb: str, words: Sequence[str]) -> int:
-    single_threaded()
+def parser_of(verb: str) -> argparse.ArgumentParser:
+    """The parser of a verb's arguments; a wrong one exits with status 2."""
     module = importlib.import_module(f"markerless_tracker.cli.{verb}")
     parser = _Parser(
         prog=f"{PROGRAM} {verb}",
@@ -105,6 +105,13 @@ def _run(verb: str, words: Sequence[str]) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     module.add_arguments(parser)
+    return parser
+
+
+def _run(verb: str, words: Sequence[str]) -> int:
+    single_threaded()
+    parser = parser_of(verb)
+    module = importlib.import_module(f"markerless_tracker.cli.{verb}")
     status = int(module.run(parser.parse_args(words)))
     sys.stdout.flush()
     return status

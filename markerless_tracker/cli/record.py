@@ -53,11 +53,13 @@ def run(args: argparse.Namespace) -> int:
         read_calibration(args.calibration)
     topics = None if args.topics is None else [name for name in args.topics.split(",") if name]
     _make(args.bag, args.calibration)
+    console = Console(stderr=True)
     bars = Progress(
         TextColumn("{task.description}"),
         TextColumn("{task.completed:.0f} messages"),
         TimeElapsedColumn(),
-        console=Console(stderr=True),
+        console=console,
+        disable=not console.is_terminal,
     )
     with StopSignals() as stop, BagWriter(args.bag) as writer, bars:
         task = bars.add_task(f"recording {args.bag}", total=None)

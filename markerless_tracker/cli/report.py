@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from markerless_tracker.cli.terminal.bars import progress_bars, warn
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.datasets.markers.c3d import read_markers
 from markerless_tracker.datasets.markers.sets import MARKER_SETS, read_marker_map, renamed
@@ -129,10 +129,7 @@ def _film(
     """The film, or why there is none; images that were asked for must be there."""
     try:
         images = ResultImages(result, source, width_px=IMAGE_PX, whole=False)
-        with Progress(
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-            TimeRemainingColumn(), console=console, disable=not console.is_terminal,
-        ) as bars:  # fmt: skip
+        with progress_bars(console) as bars:
             task = bars.add_task(f"film of {name.name}", total=None)
             return embedded_film(
                 result,
@@ -143,9 +140,7 @@ def _film(
     except TrackerError as error:
         if source is not None:
             raise
-        console.print(
-            f"warning: {name}: no film: {error}", markup=False, highlight=False, soft_wrap=True
-        )
+        warn(console, f"{name}: no film: {error}")
         return None, str(error)
 
 

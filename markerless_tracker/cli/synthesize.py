@@ -3,13 +3,10 @@
 import argparse
 import json
 import re
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.progress import Progress
 
 from markerless_tracker.body import MARKER_NAMES, write_pose, write_subject
 from markerless_tracker.camera.board import (
@@ -22,6 +19,7 @@ from markerless_tracker.camera.board import (
     board_squares,
     write_board,
 )
+from markerless_tracker.cli.terminal.bars import progress_bars
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.datasets.writer import new_recording
 from markerless_tracker.errors import ConfigError
@@ -132,8 +130,8 @@ def run(args: argparse.Namespace) -> int:
         if getattr(args, name) is not None:
             raise ConfigError(f"--{name.replace('_', '-')} needs --checkerboard or --charuco")
     scene = _synthetic(args) if args.scene is None else _generated(args)
-    with Progress(console=Console(file=sys.stderr)) as bar:
-        task = bar.add_task("frames", total=frames)
+    with progress_bars() as bar:
+        task = bar.add_task(f"rendering {args.out.name}", total=frames)
         synthesize(
             args.out,
             scene,
@@ -171,10 +169,10 @@ def _board(args: argparse.Namespace, frames: int) -> int:
         noise=args.noise,
         distortion=(0.0,) * 5 if args.undistorted else MILD_LENS,
     )
-    with Progress(console=Console(file=sys.stderr)) as bar:
+    with progress_bars() as bar:
         with new_recording(args.out, scene.rig, scene.fps, lossless=args.lossless) as writer:
             write_board(writer.folder / BOARD_FILE, board)
-            for index in bar.track(range(frames), description="frames"):
+            for index in bar.track(range(frames), description=f"rendering {args.out.name}"):
                 writer.write(scene.frame(index))
     if args.json:
         print(json.dumps({

@@ -16,8 +16,9 @@ from rich.console import Console
 from markerless_tracker.body import load_description
 from markerless_tracker.camera.calibration import write_calibration
 from markerless_tracker.camera.doubts import calibration_doubts
+from markerless_tracker.cli.terminal.bars import tell, warn
+from markerless_tracker.cli.terminal.notices import COMPILING, Bars, Notices
 from markerless_tracker.cli.track_arguments import add_arguments
-from markerless_tracker.cli.track_notices import COMPILING, Bars, Notices, tell, warn
 from markerless_tracker.compiled import compilation
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
@@ -230,6 +231,7 @@ def _track(
                 notices.warn(f"frame {kind.first_frame}: {kind.text}")
             if debug:
                 debug.write(tracked.images, result, tracker.rig, body, tracker.segmenter)
+            notices.pose(result.state, result.iou.values())
             notices.step(record.frames)
         seconds = time.perf_counter() - started
         shifts = check.shifts()

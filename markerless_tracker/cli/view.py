@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from markerless_tracker.cli.terminal.bars import progress_bars
+from markerless_tracker.cli.view_node import run_node
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.results.read import read_result
 from markerless_tracker.results.stored_result import StoredResult
@@ -26,7 +26,8 @@ HELP = (
     "standard deviations), as a film, as a picture of some frames, or in the Rerun viewer, which "
     "has the body in 3D with cameras and floor, and angles, deviations and overlap over time. The "
     "images are those of the result's source, or of --source. Without an output the Rerun viewer "
-    "opens. Films and the viewer need markerless_tracker[view]."
+    "opens. Films and the viewer need markerless_tracker[view]. With --node the same of a running "
+    "tracker, from its topics."
 )
 EXAMPLE = "markerless_tracker view out/walk --film walk.webm --sheet walk.png --rrd walk.rrd"
 
@@ -36,7 +37,18 @@ MOST_RRD_PICTURES = 300
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("name", metavar="NAME", type=Path, help="NAME of NAME.trc and NAME.json")
+    parser.add_argument(
+        "name", metavar="NAME", nargs="?", type=Path, help="NAME of NAME.trc and NAME.json"
+    )
+    parser.add_argument(
+        "--node",
+        action="store_true",
+        help="show the running tracker instead of a result: in the Rerun viewer, or with --rrd "
+        "and --sheet (the last pictures)",
+    )
+    parser.add_argument(
+        "--seconds", metavar="S", type=float, help="with --node: end after S seconds"
+    )
     parser.add_argument(
         "--source",
         metavar="DIR",
@@ -82,11 +94,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show the result; returns the exit status."""
+    """Show the result, or the running tracker; returns the exit status."""
     targets = [path for path in (args.film, args.sheet, args.rrd) if path is not None]
     for path in targets:
         if path.exists() and not args.force:
             raise DatasetError(f"{path}: exists already, expected a new name or --force")
+    if args.node:
+        return run_node(args)
+    if args.name is None:
+        raise ConfigError("expected NAME of a result, or --node")
+    if args.seconds is not None:
+        raise ConfigError("--seconds is given without --node, expected both")
     if args.film is not None:
         require_av()
     if args.rrd is not None or not targets:
@@ -98,23 +116,17 @@ def run(args: argparse.Namespace) -> int:
     name = args.name.with_suffix("") if args.name.suffix.lower() == ".trc" else args.name
     result = read_result(name)
     images = ResultImages(result, args.source, width_px=args.width // 2, whole=args.whole)
-    overlays = Overlays(result, images)
     for path in targets:
         path.parent.mkdir(parents=True, exist_ok=True)
-    if args.film is not None:
-        _write_film(args.film, result, overlays, args.width)
-    if args.sheet is not None:
-        sheet = overlays.contact_sheet(spread_rows(result, args.frames), width_px=args.width)
-        if not cv2.imwrite(str(args.sheet), sheet):
-            raise DatasetError(f"{args.sheet}: cannot be written")
-    rows = chosen_rows(result, MOST_RRD_PICTURES)
-    if args.rrd is not None:
-        write_rrd(args.rrd, result, rig=images.rig, overlays=overlays, rows=rows)
     if not targets:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"{name.name}.rrd"
-            write_rrd(path, result, rig=images.rig, overlays=overlays, rows=rows)
+            _write(result, images, rrd=path)
             return subprocess.run([sys.executable, "-m", "rerun", str(path)]).returncode
+    _write(
+        result, images, film=args.film, sheet=args.sheet, rrd=args.rrd, frames=args.frames,
+        width_px=args.width,
+    )  # fmt: skip
     if args.json:
         json.dump({"files": [str(path) for path in targets]}, sys.stdout, indent=2)
         sys.stdout.write("\n")
@@ -124,20 +136,42 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write_film(path: Path, result: StoredResult, overlays: Overlays, width: int) -> None:
-    """The film, with a progress bar in a terminal."""
-    console = Console(stderr=True)
-    rows = list(range(len(result)))
-    with Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
-        console=console, disable=not console.is_terminal,
-    ) as bars:  # fmt: skip
-        shown = bars.track(
-            (sheet for _, sheet in overlays.sheets(rows, width_px=width)),
-            total=len(rows),
-            description="film",
+def _write(
+    result: StoredResult,
+    images: ResultImages,
+    *,
+    film: Path | None = None,
+    sheet: Path | None = None,
+    rrd: Path | None = None,
+    frames: int = 0,
+    width_px: int = 0,
+) -> None:
+    """Write the files that are named."""
+    with progress_bars() as bars:
+        task = bars.add_task("reading", total=None)
+
+        def begin(path: Path) -> None:
+            bars.reset(task, description=f"drawing {path.name}")
+
+        overlays = Overlays(
+            result,
+            images,
+            progress=lambda done, total: bars.update(task, completed=done, total=total),
         )
-        write_film(path, shown, fps=result.fps, container=path.suffix[1:].lower())
+        if film is not None:
+            begin(film)
+            rows = list(range(len(result)))
+            shown = (picture for _, picture in overlays.sheets(rows, width_px=width_px))
+            write_film(film, shown, fps=result.fps, container=film.suffix[1:].lower())
+        if sheet is not None:
+            begin(sheet)
+            picture = overlays.contact_sheet(spread_rows(result, frames), width_px=width_px)
+            if not cv2.imwrite(str(sheet), picture):
+                raise DatasetError(f"{sheet}: cannot be written")
+        if rrd is not None:
+            begin(rrd)
+            rows = chosen_rows(result, MOST_RRD_PICTURES)
+            write_rrd(rrd, result, rig=images.rig, overlays=overlays, rows=rows)
 
 
 def _file(endings: Sequence[str]) -> Callable[[str], Path]:

@@ -17,6 +17,7 @@ from markerless_tracker.synthesis.motion import Motion
 from markerless_tracker.synthesis.render import Image, Look, Mask, Renderer, clothes, dull_clothes
 from markerless_tracker.synthesis.rig import MILD_LENS, ring_rig
 from markerless_tracker.synthesis.room import room_picture
+from markerless_tracker.synthesis.threads import side_by_side
 
 LIGHTS: Mapping[str, Callable[[float], float]] = {
     "steady": lambda time_s: 1.0,
@@ -131,13 +132,17 @@ class SyntheticScene:
     def frame(self, index: int) -> tuple[dict[str, Image], dict[str, Mask], FloatArray]:
         """Images (h, w, 3) or (h, w) and exact masks (h, w) by camera, and the true pose (p,)."""
         pose = self.pose(index)
-        images, masks = {}, {}
-        for number, (name, renderer) in enumerate(self._renderers.items()):
+        light = self._light(index / self.fps)
+
+        def view(numbered: tuple[int, str]) -> tuple[Image, Mask]:
+            number, name = numbered
             rng = np.random.default_rng([self.seed, _PERSON, number, index])
-            images[name], masks[name] = renderer.render(
-                pose, rng, light=self._light(index / self.fps)
-            )
-        return images, masks, pose
+            return self._renderers[name].render(pose, rng, light=light)
+
+        names = list(self._renderers)
+        views = dict(zip(names, side_by_side(view, list(enumerate(names))), strict=True))
+        images = {name: image for name, (image, _) in views.items()}
+        return images, {name: mask for name, (_, mask) in views.items()}, pose
 
     def backgrounds(self, count: int) -> dict[str, list[Image]]:
         """That many pictures of the empty room by camera."""

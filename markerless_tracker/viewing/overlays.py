@@ -1,6 +1,6 @@
 """Pictures of a result: the body over the person, in each camera, of chosen frames."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -33,20 +33,29 @@ class Overlays:
         result: the result; frames without a pose show the images alone, cameras without an image
             are black.
         images: its images.
+        progress: called with the number of rows that were drawn, and that of the rows asked for.
 
     Raises:
         BodyModelError, DatasetError: the result's body is not described.
     """
 
-    def __init__(self, result: StoredResult, images: ResultImages) -> None:
-        self._result, self._images = result, images
+    def __init__(
+        self,
+        result: StoredResult,
+        images: ResultImages,
+        *,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        self._result, self._images, self._progress = result, images, progress
         self._body = result.body()
         self._surfaces = cone_surfaces(self._body, end_points=_END_POINTS, sections=1)
 
     def pictures(self, rows: list[int]) -> Iterator[tuple[int, Mapping[str, Image]]]:
         """Rows with their whole pictures (h, w, 3) BGR by camera."""
-        for row, images in self._images.frames(rows):
+        for done, (row, images) in enumerate(self._images.frames(rows), start=1):
             yield row, self._drawn(row, images)
+            if self._progress is not None:
+                self._progress(done, len(rows))
 
     def sheets(self, rows: list[int], *, width_px: int = 960) -> Iterator[tuple[int, Image]]:
         """Rows with one picture (h, w, 3) BGR of all cameras, with time and state."""

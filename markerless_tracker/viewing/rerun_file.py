@@ -1,6 +1,6 @@
 """A result for the Rerun viewer: pictures, body, cameras and floor in 3D, angles over time."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,8 @@ from markerless_tracker.viewing.overlays import Overlays
 
 APPLICATION = "markerless_tracker"
 TIMELINE = "time"
+CURVES = {"angles": "joint angles, degrees", "sd_mm": "sd, mm", "overlap": "overlap"}
+"""Folders of the curves over time, and their titles."""
 BONES = (
     ("Pelvis", "Neck"), ("Neck", "Head"),
     ("Neck", "LShoulder"), ("LShoulder", "LElbow"), ("LElbow", "LWrist"),
@@ -81,13 +83,13 @@ def write_rrd(
     """
     rr = require_rerun()
     stream = rr.RecordingStream(APPLICATION)
+    names = rig.names if rig is not None else ()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        stream.save(path, default_blueprint=_blueprint(result, rig))
+        stream.save(path, default_blueprint=blueprint(names, CURVES))
     except (OSError, RuntimeError, ValueError) as error:
         raise DatasetError(f"{path}: cannot be written: {error}") from error
-    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    stream.log("world/floor", _floor(rr), static=True)
+    log_world(rr, stream)
     for camera in rig or ():
         _camera(rr, stream, camera)
     body = result.body()
@@ -100,9 +102,15 @@ def write_rrd(
     if overlays is not None:
         for row, pictures in overlays.pictures(list(range(len(result))) if rows is None else rows):
             stream.set_time(TIMELINE, duration=float(result.times_s[row]))
-            _pictures(rr, stream, pictures)
+            log_pictures(rr, stream, pictures)
     stream.flush()
     stream.disconnect()
+
+
+def log_world(rr: Any, stream: Any) -> None:
+    """Log the axes of the world and its floor."""
+    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    stream.log("world/floor", _floor(rr), static=True)
 
 
 def _floor(rr: Any) -> Any:
@@ -154,19 +162,42 @@ def _move_cones(rr: Any, stream: Any, body: BodyModel, pose: FloatArray) -> None
 
 
 def _body(rr: Any, stream: Any, result: StoredResult, row: int) -> None:
-    positions = result.positions_m[row]
-    if not np.isfinite(positions).any():
+    log_body(
+        rr, stream, result.marker_names, result.positions_m[row], sd_m=result.positions_sd_m[row]
+    )
+
+
+def log_body(
+    rr: Any,
+    stream: Any,
+    names: Sequence[str],
+    positions_m: FloatArray,
+    *,
+    sd_m: FloatArray | None = None,
+) -> None:
+    """Log joints and bones at the stream's time.
+
+    Args:
+        rr: the Rerun SDK.
+        stream: its recording.
+        names: n markers.
+        positions_m: (n, 3) m, world frame; NaN = unknown.
+        sd_m: (n, 3) standard deviations, m; NaN = unknown.
+    """
+    if not np.isfinite(positions_m).any():
         stream.log("world/body", rr.Clear(recursive=True))
         return
-    at = dict(zip(result.marker_names, positions, strict=True))
-    known = np.isfinite(positions).all(axis=1)
-    names = [name for name, here in zip(result.marker_names, known, strict=True) if here]
-    colours = [_rgb(name) for name in names]
+    at = dict(zip(names, positions_m, strict=True))
+    known = np.asarray(np.isfinite(positions_m).all(axis=1))
+    found = [name for name, here in zip(names, known.tolist(), strict=True) if here]
+    colours = [_rgb(name) for name in found]
     stream.log(
         "world/body/joints",
-        rr.Points3D(positions[known], colors=colours, radii=0.02, labels=names, show_labels=False),
+        rr.Points3D(
+            positions_m[known], colors=colours, radii=0.02, labels=found, show_labels=False
+        ),
     )
-    bones = [(a, b) for a, b in BONES if a in names and b in names]
+    bones = [(a, b) for a, b in BONES if a in found and b in found]
     stream.log(
         "world/body/bones",
         rr.LineStrips3D(
@@ -175,11 +206,13 @@ def _body(rr: Any, stream: Any, result: StoredResult, row: int) -> None:
             radii=0.012,
         ),
     )
-    radii = ELLIPSE_SD * result.positions_sd_m[row][known]
+    if sd_m is None:
+        return
+    radii = ELLIPSE_SD * sd_m[known]
     if np.isfinite(radii).all():
         stream.log(
             "world/body/sd",
-            rr.Ellipsoids3D(centers=positions[known], half_sizes=radii, colors=colours),
+            rr.Ellipsoids3D(centers=positions_m[known], half_sizes=radii, colors=colours),
         )
 
 
@@ -198,7 +231,8 @@ def _length(deviations: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt((deviations**2).sum(axis=-1)))
 
 
-def _pictures(rr: Any, stream: Any, pictures: Mapping[str, Image]) -> None:
+def log_pictures(rr: Any, stream: Any, pictures: Mapping[str, Image]) -> None:
+    """Log images (h, w, 3) BGR by camera, as JPEG, at the stream's time."""
     for name, picture in pictures.items():
         done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
         if done:
@@ -206,18 +240,19 @@ def _pictures(rr: Any, stream: Any, pictures: Mapping[str, Image]) -> None:
             stream.log(f"world/cameras/{name}", image)
 
 
-def _blueprint(result: StoredResult, rig: CameraRig | None) -> Any:
-    """3D on the left, the pictures on the right, curves below."""
+def blueprint(cameras: Sequence[str], curves: Mapping[str, str]) -> Any:
+    """3D on the left, the cameras' pictures on the right, curves below.
+
+    Args:
+        cameras: their names.
+        curves: folder of the curves -> title.
+    """
     import rerun.blueprint as rrb
 
-    cameras = [
-        rrb.Spatial2DView(origin=f"world/cameras/{name}", name=name)
-        for name in (rig.names if rig is not None else ())
-    ]
-    curves = [("angles", "joint angles, degrees"), ("sd_mm", "sd, mm"), ("overlap", "overlap")]
-    views = [rrb.TimeSeriesView(origin=folder, name=name) for folder, name in curves]
+    pictures = [rrb.Spatial2DView(origin=f"world/cameras/{name}", name=name) for name in cameras]
+    views = [rrb.TimeSeriesView(origin=folder, name=name) for folder, name in curves.items()]
     space = rrb.Spatial3DView(origin="world", name="world", background=_BACKGROUND)
-    above = rrb.Horizontal(space, rrb.Grid(*cameras)) if cameras else space
+    above = rrb.Horizontal(space, rrb.Grid(*pictures)) if pictures else space
     return rrb.Blueprint(
         rrb.Vertical(above, rrb.Tabs(*views), row_shares=[3, 1]), collapse_panels=True
     )

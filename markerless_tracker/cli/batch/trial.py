@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 
 import cv2
 
+from markerless_tracker.cli.terminal.notices import COMPILING, Notices
 from markerless_tracker.cli.track import track_source
-from markerless_tracker.cli.track_notices import COMPILING, Notices
 from markerless_tracker.errors import TrackerError
 
 RECORDS = ".batch"

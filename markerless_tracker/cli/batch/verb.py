@@ -18,7 +18,8 @@ from markerless_tracker.cli.batch.plan import plan
 from markerless_tracker.cli.batch.processes import on_processes
 from markerless_tracker.cli.batch.table import text_table, totals, write_tables
 from markerless_tracker.cli.batch.trial import PARTIAL, RECORDS, Trial
-from markerless_tracker.cli.benchmark.arguments import count, progress_bars
+from markerless_tracker.cli.benchmark.arguments import count
+from markerless_tracker.cli.terminal.bars import progress_bars, tell, warn
 from markerless_tracker.cli.track import NO_PERSON_FOUND
 from markerless_tracker.cli.track_arguments import add_options
 from markerless_tracker.errors import DatasetError
@@ -120,8 +121,9 @@ def _done(
         )
         for trial, row in rows:
             if row["error"] is not None:
-                text = f"warning: {trial.name} failed: {row['error']}"
-                bars.console.print(text, markup=False, highlight=False, soft_wrap=True)
+                warn(bars.console, f"{trial.name} failed: {row['error']}")
+            elif row["overlap"] is not None:
+                bars.update(task, note=f"overlap {row['overlap']:.2f}")
             bars.advance(task)
             yield row
 
@@ -165,4 +167,4 @@ def _sweep(records: Path) -> None:
 
 
 def _tell(text: str) -> None:
-    Console(stderr=True).print(text, markup=False, highlight=False, soft_wrap=True)
+    tell(Console(stderr=True), text)

@@ -20,10 +20,10 @@ from markerless_tracker.cli.benchmark.arguments import (
     list_of,
     not_negative,
     positive,
-    progress_bars,
 )
 from markerless_tracker.cli.benchmark.choices import Group, every_config, groups, varied
 from markerless_tracker.cli.benchmark.layout import LEGEND, full_table, legend_of, paper_table
+from markerless_tracker.cli.terminal.bars import progress_bars, warn
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.libraries import usable_cores
 from markerless_tracker.results.result import versions
@@ -253,6 +253,4 @@ class _Bars(accuracy.Progress):
         self._bars.update(self._runs, completed=done, total=total)
 
     def warn(self, message: str) -> None:
-        self._bars.console.print(
-            f"warning: {message}", markup=False, highlight=False, soft_wrap=True
-        )
+        warn(self._bars.console, message)

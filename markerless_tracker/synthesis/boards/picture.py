@@ -106,18 +106,17 @@ class BoardView:
         u, v = np.meshgrid(*steps)
         plane = cv2.remap(self._plane, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         to_board = np.linalg.inv(T_cam_board[:3, [0, 1, 3]])
-        x, y, w = np.moveaxis(
-            np.dstack([plane, np.ones(u.shape)]).reshape(-1, 3) @ to_board.T, 1, 0
-        )
+        a, b = cv2.split(plane)
+        x, y, w = (float(p) * a + float(q) * b + float(r) for p, q, r in to_board)
         square = self._board.square_m
-        across = (x / w / square + 1.0 + MARGIN).reshape(u.shape)
-        down = (self._board.rows - 1.0 - y / w / square + MARGIN).reshape(u.shape)
+        across = x / w / square + (1.0 + MARGIN)
+        down = (self._board.rows - 1.0 + MARGIN) - y / w / square
         level = self._level(float(np.linalg.norm(T_cam_board[:3, 3])))
         texels = _SQUARE_PX / 2.0**level
         grey = cv2.remap(
             self._prints[level],
-            (across * texels - 0.5).astype(np.float32),
-            (down * texels - 0.5).astype(np.float32),
+            across * texels - 0.5,
+            down * texels - 0.5,
             cv2.INTER_LINEAR,
             borderMode=cv2.BORDER_REPLICATE,
         )
@@ -131,7 +130,7 @@ class BoardView:
             & (down >= 0.0)
             & (down <= self._board.rows + 2.0 * MARGIN)
         ).astype(np.float32)
-        drawn = np.dstack([grey * inside, inside])
+        drawn = cv2.merge([grey * inside, inside])
         size = (int(columns), int(rows))
         return np.asarray(cv2.resize(drawn, size, interpolation=cv2.INTER_AREA), np.float32)
 

@@ -13,6 +13,7 @@ from markerless_tracker.synthesis.boards.motion import BoardMotion
 from markerless_tracker.synthesis.boards.picture import BoardView
 from markerless_tracker.synthesis.rig import MILD_LENS, ring_rig
 from markerless_tracker.synthesis.room import room_picture
+from markerless_tracker.synthesis.threads import side_by_side
 
 EXPOSURE_S = 0.008
 """Duration of an exposure: a board that moves is blurred."""
@@ -82,10 +83,12 @@ class BoardScene:
         return self._images([self.motion.poses[number]], number)
 
     def _images(self, poses: list[FloatArray], index: int) -> dict[str, NDArray[np.uint8]]:
-        images = {}
-        for number, (name, view) in enumerate(self._views.items()):
-            image = view.draw(self._rooms[name], poses)
+        def image(numbered: tuple[int, str]) -> NDArray[np.uint8]:
+            number, name = numbered
+            drawn = self._views[name].draw(self._rooms[name], poses)
             rng = np.random.default_rng([self.seed, _BOARD, number, index])
-            noise = np.float32(self._noise) * rng.standard_normal(image.shape, dtype=np.float32)
-            images[name] = np.clip(np.rint(image + noise), 0.0, 255.0).astype(np.uint8)
-        return images
+            noise = np.float32(self._noise) * rng.standard_normal(drawn.shape, dtype=np.float32)
+            return np.clip(np.rint(drawn + noise), 0.0, 255.0).astype(np.uint8)
+
+        names = list(self._views)
+        return dict(zip(names, side_by_side(image, list(enumerate(names))), strict=True))

@@ -1,7 +1,12 @@
 """Progress and warnings of a run of `track`."""
 
+import math
+from collections.abc import Iterable
+
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from markerless_tracker.cli.terminal.bars import progress_bars, warn
+from markerless_tracker.records import TrackState
 
 COMPILING = "compiling"
 """Name of the part of a run in which kernels are compiled or loaded."""
@@ -16,18 +21,18 @@ class Notices:
     def step(self, done: int, total: int | None = None) -> None:
         """Receives the number of the part's completed steps, and their total if it changed."""
 
+    def pose(self, state: TrackState, overlap: Iterable[float]) -> None:
+        """Receives the state after a frame, and the overlap (IoU) of each view with the body."""
+
     def warn(self, text: str) -> None:
         """Receives a warning, one line."""
 
 
 class Bars(Notices):
-    """A progress bar from the first part on, and warnings above it."""
+    """A progress bar from the first part on, in a terminal, and warnings above it."""
 
     def __init__(self, console: Console) -> None:
-        self._bars = Progress(
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-            TimeRemainingColumn(), console=console,
-        )  # fmt: skip
+        self._bars = progress_bars(console)
         self._task = self._bars.add_task("", total=None)
 
     def __enter__(self) -> "Bars":
@@ -40,7 +45,8 @@ class Bars(Notices):
     def begin(self, part: str, total: int | None = None) -> None:
         """Show the next part."""
         self._bars.start()
-        self._bars.reset(self._task, description=part, total=total)
+        self._bars.remove_task(self._task)
+        self._task = self._bars.add_task(part, total=total)
 
     def step(self, done: int, total: int | None = None) -> None:
         """Show the part's progress."""
@@ -48,16 +54,14 @@ class Bars(Notices):
             self._bars.update(self._task, total=total)
         self._bars.update(self._task, completed=done)
 
+    def pose(self, state: TrackState, overlap: Iterable[float]) -> None:
+        """Show the mean overlap, or that there is no pose."""
+        known = [value for value in overlap if math.isfinite(value)]
+        note = f"overlap {sum(known) / len(known):.2f}" if known else ""
+        if state is not TrackState.TRACKING:
+            note = state.value
+        self._bars.update(self._task, note=note)
+
     def warn(self, text: str) -> None:
         """Print a warning above the bar."""
         warn(self._bars.console, text)
-
-
-def warn(console: Console, text: str) -> None:
-    """Print a warning, one line."""
-    tell(console, f"warning: {text}")
-
-
-def tell(console: Console, text: str) -> None:
-    """Print a line as it is, whatever the width."""
-    console.print(text, markup=False, highlight=False, soft_wrap=True)

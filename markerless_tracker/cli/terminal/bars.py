@@ -1,0 +1,51 @@
+"""What commands show while they work: progress on standard error, if that is a terminal."""
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
+
+_BAR_WIDTH = 20
+"""Columns of a bar: a line of 80 also holds the description, the counts, the times and a note."""
+
+
+class NoteColumn(ProgressColumn):
+    """The field `note` of a task, such as the overlap of the last frame."""
+
+    def render(self, task: Task) -> Text:
+        """The note; empty without one."""
+        return Text(str(task.fields.get("note", "")))
+
+
+def progress_bars(console: Console | None = None) -> Progress:
+    """Bars with the time since the beginning, the time that is left, and a note.
+
+    Nothing is shown where the console is no terminal.
+
+    Args:
+        console: default: standard error.
+    """
+    console = Console(stderr=True) if console is None else console
+    return Progress(
+        TextColumn("{task.description}"), BarColumn(_BAR_WIDTH), MofNCompleteColumn(),
+        TimeElapsedColumn(), TimeRemainingColumn(), NoteColumn(),
+        console=console, disable=not console.is_terminal,
+    )  # fmt: skip
+
+
+def tell(console: Console, text: str) -> None:
+    """Print a line as it is, whatever the width."""
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def warn(console: Console, text: str) -> None:
+    """Print a warning, one line."""
+    tell(console, f"warning: {text}")

@@ -1,0 +1,97 @@
+"""`view --node`: what a running tracker publishes, until a signal or for some time."""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+from rich.console import Console
+
+from markerless_tracker.cli.terminal.bars import tell
+from markerless_tracker.drawing import overlay_sheet
+from markerless_tracker.drawing.overlay import Image
+from markerless_tracker.errors import ConfigError, DatasetError
+from markerless_tracker.viewing.live import LiveRecording
+from markerless_tracker.viewing.rerun_file import require_rerun
+
+NOTHING_HEARD = 3
+"""Exit status when no tracker was heard."""
+
+
+def run_node(args: argparse.Namespace) -> int:
+    """Show a running tracker; returns 0, or 3 if none was heard.
+
+    Raises:
+        ConfigError: options that need a result, or nothing to show it with.
+        RosMissingError: ROS 2 is not installed.
+    """
+    if args.name is not None or args.film is not None or args.source is not None:
+        raise ConfigError("--node shows a running tracker, expected no NAME, --film and --source")
+    shows = args.rrd is not None or args.sheet is None
+    if shows:
+        require_rerun()
+    if args.sheet is None and args.rrd is None and not _has_display():
+        raise ConfigError("there is no display for the Rerun viewer, expected --sheet or --rrd")
+    for path in (args.sheet, args.rrd):
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+    # ROS is imported here alone.
+    from markerless_tracker.node.recorder.process import prepare
+    from markerless_tracker.node.ros.process import StopSignals
+
+    prepare()
+    from markerless_tracker.node.spectator import Spectator
+
+    results = 0
+    heard_any = False
+    pictures: dict[str, Image] = {}
+    with StopSignals() as stop, Spectator() as spectator:
+        recording = LiveRecording(args.rrd) if shows else None
+        tell(Console(stderr=True), "listening; Ctrl-C ends")
+        for heard in spectator.listen(until=lambda: stop.asked, seconds=args.seconds):
+            if heard is None:
+                continue
+            heard_any = True
+            results += heard.markers_m is not None
+            pictures.update(heard.pictures)
+            if recording is not None:
+                recording.arrange(spectator.cameras)
+                recording.add(
+                    heard.stamp_ns,
+                    markers_m=heard.markers_m,
+                    angles_rad=heard.angles_rad,
+                    overlap=heard.overlap,
+                    state=heard.state,
+                    pictures=heard.pictures,
+                )
+        if recording is not None:
+            recording.close()
+    files = [args.rrd] if args.rrd is not None else []
+    if args.sheet is not None and pictures:
+        _write_sheet(args.sheet, pictures, args.width)
+        files.append(args.sheet)
+    if args.json:
+        summary = {"files": [str(path) for path in files], "results": results}
+        json.dump({**summary, "cameras": list(pictures)}, sys.stdout, indent=2)
+        sys.stdout.write("\n")
+    else:
+        for path in files:
+            print(path)
+        print(f"{results} results, pictures of {', '.join(pictures) or 'no camera'}")
+    if heard_any:
+        return 0
+    tell(Console(stderr=True), "no tracker was heard: is it running, in this ROS_DOMAIN_ID?")
+    return NOTHING_HEARD
+
+
+def _has_display() -> bool:
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _write_sheet(path: Path, pictures: Mapping[str, Image], width_px: int) -> None:
+    named = {name: pictures[name] for name in sorted(pictures)}
+    if not cv2.imwrite(str(path), overlay_sheet(named, max_width_px=width_px)):
+        raise DatasetError(f"{path}: cannot be written")

@@ -1,0 +1,146 @@
+"""What a running tracker publishes, for a viewer in another process."""
+
+import os
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseArray
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import Image as ImageMessage
+from sensor_msgs.msg import JointState
+
+from markerless_tracker.errors import ImageError
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.imaging import Image
+from markerless_tracker.node.ros.images import decode_image
+from markerless_tracker.node.ros.process import init_context
+from markerless_tracker.node.ros.qos import image_qos, latched_qos, output_qos
+from markerless_tracker.node.ros.stamps import stamp_of
+
+_WAIT_S = 0.1
+_OVERLAP = "iou/"
+"""Keys of `state` begin with this, then comes a camera's name."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Heard:
+    """What one message told; what it did not is empty.
+
+    Attributes:
+        stamp_ns: time of the images that it is about.
+        markers_m: (15, 3) of `marker_poses`, m, world frame.
+        angles_rad: joint -> angle, of `joint_states`.
+        state: SEARCHING, TRACKING or LOST, of `state`.
+        overlap: camera -> overlap of silhouette and body, of `state`.
+        pictures: camera -> image (h, w, 3) BGR with the body, of `debug/NAME/overlay`.
+    """
+
+    stamp_ns: int
+    markers_m: FloatArray | None = None
+    angles_rad: Mapping[str, float] = field(default_factory=dict)
+    state: str = ""
+    overlap: Mapping[str, float] = field(default_factory=dict)
+    pictures: Mapping[str, Image] = field(default_factory=dict)
+
+
+class Spectator:
+    """Subscribes to a tracker's outputs; a context manager.
+
+    The cameras are those of `state`; the tracker draws their overlays while they are subscribed.
+    """
+
+    def __init__(self) -> None:
+        self._heard: deque[Heard] = deque()
+        self._overlays: dict[str, Any] = {}
+
+    def __enter__(self) -> "Spectator":
+        self._context = init_context([])
+        self._node = rclpy.create_node(
+            f"spectator_{os.getpid()}", context=self._context, start_parameter_services=False
+        )
+        create = self._node.create_subscription
+        create(DiagnosticArray, "state", self._hear_state, latched_qos())
+        create(PoseArray, "marker_poses", self._hear_markers, output_qos())
+        create(JointState, "joint_states", self._hear_angles, output_qos())
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._executor.shutdown(timeout_sec=0)
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """Names of the tracker's cameras, in its order; empty until `state` was received."""
+        return tuple(self._overlays)
+
+    def listen(
+        self, *, until: Callable[[], bool], seconds: float | None = None
+    ) -> Iterator[Heard | None]:
+        """What is heard, as it comes; None now and then while nothing comes.
+
+        Args:
+            until: ends it.
+            seconds: ends it after that time, too.
+        """
+        end_s = None if seconds is None else time.monotonic() + seconds
+        while not until() and (end_s is None or time.monotonic() < end_s):
+            self._executor.spin_once(timeout_sec=_WAIT_S)
+            if not self._heard:
+                yield None
+            while self._heard:
+                yield self._heard.popleft()
+
+    def _hear_state(self, message: Any) -> None:
+        values = {pair.key: pair.value for status in message.status for pair in status.values}
+        overlap = {
+            key.removeprefix(_OVERLAP): float(value)
+            for key, value in values.items()
+            if key.startswith(_OVERLAP)
+        }
+        for name in overlap:
+            if name not in self._overlays:
+                self._overlays[name] = self._subscribe(name)
+        self._heard.append(
+            Heard(
+                stamp_ns=stamp_of(message),
+                state=values.get("state", ""),
+                overlap={name: value for name, value in overlap.items() if np.isfinite(value)},
+            )
+        )
+
+    def _subscribe(self, camera: str) -> Any:
+        topic = f"debug/{camera}/overlay"
+
+        def hear(message: Any) -> None:
+            try:
+                picture = decode_image(message, topic)
+            except ImageError as error:
+                self._node.get_logger().warning(str(error))
+                return
+            self._heard.append(Heard(stamp_ns=stamp_of(message), pictures={camera: picture}))
+
+        return self._node.create_subscription(ImageMessage, topic, hear, image_qos(depth=2))
+
+    def _hear_markers(self, message: Any) -> None:
+        places = [pose.position for pose in message.poses]
+        markers = np.array([(p.x, p.y, p.z) for p in places]).reshape(-1, 3)
+        self._heard.append(Heard(stamp_ns=stamp_of(message), markers_m=markers))
+
+    def _hear_angles(self, message: Any) -> None:
+        angles = dict(zip(message.name, message.position, strict=False))
+        self._heard.append(Heard(stamp_ns=stamp_of(message), angles_rad=angles))
