@@ -75,13 +75,12 @@ def test_an_observation_arrives_as_it_was(width: int) -> None:
 
 
 def test_nobody_is_two_percent_of_nothing() -> None:
-    empty = Observation.from_mask(
-        "cam01", 5, np.zeros((490, 656)), np.zeros((490, 656), np.uint8)
-    )
+    empty = Observation.from_mask("cam01", 5, np.zeros((490, 656)), np.zeros((490, 656), np.uint8))
     data = silhouette_data(empty, DIGEST)
     assert len(data) < 490 * 656 * 3 / 1000
-    assert parts(unpack("cam01", Evidence(read_evidence(sent(data), "t"), None)))[5:] == (
-        parts(empty)[5:]
+    assert (
+        parts(unpack("cam01", Evidence(read_evidence(sent(data), "t"), None)))[5:]
+        == (parts(empty)[5:])
     )
 
 
@@ -90,7 +89,9 @@ def test_the_digest_is_that_of_the_imaging_alone() -> None:
         return settings_digest(TrackerConfig.from_mapping(given))
 
     assert digest() == digest(evaluations=77, seed=3) == digest(**{"refine.iterations": 2})
-    assert len({digest(), digest(**{"mask.open_px": 5}), digest(**{"shadow.undecided": False})}) == 3
+    assert (
+        len({digest(), digest(**{"mask.open_px": 5}), digest(**{"shadow.undecided": False})}) == 3
+    )
 
 
 @settings(max_examples=150)
