@@ -12,12 +12,21 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.player.parameters import descriptions as player_parameters
+from markerless_tracker.node.segmenter.parameters import (
+    known_parameters,
+    read_segmenter_settings,
+)
+from markerless_tracker.node.segmenter.wire import settings_digest
 from markerless_tracker.node.tracker.parameters import parameter_names, read_settings
 
 ROOT = Path(__file__).resolve().parents[2]
 LAUNCH = sorted((ROOT / "launch").glob("*.xml"))
 PRESETS = ("sppso", "hmcpso", "paper")
-KNOWN = {"tracker": set(parameter_names()), "player": set(player_parameters())}
+KNOWN = {
+    "tracker": set(parameter_names()),
+    "player": set(player_parameters()),
+    "segmenter": set(known_parameters()),
+}
 SHARE = "$(find-pkg-share markerless_tracker)/"
 
 
@@ -68,6 +77,17 @@ def test_an_argument_left_out_is_a_parameter_left_out(path: Path) -> None:
             if found:
                 given[str(param.get("name"))] = yaml.safe_load(declared[found[1]] or "''")
         assert read_settings(given) == read_settings({})
+
+
+def test_one_file_of_parameters_serves_both_nodes_of_the_split_graph() -> None:
+    content = yaml.safe_load((ROOT / "config" / "two_machines.yaml").read_text())
+    shared = content["/**"]["ros__parameters"]
+    own = content["/**/tracker"]["ros__parameters"]
+    assert set(content) == {"/**", "/**/tracker"}
+    tracker = read_settings({**shared, **own})
+    segmenter = read_segmenter_settings({**shared, "camera": "cam01", "background_dir": "empty"})
+    assert tracker.takes_evidence("cam01") and tracker.scale == segmenter.scale
+    assert settings_digest(tracker.config) == settings_digest(segmenter.config)
 
 
 def preset(name: str) -> dict[str, Any]:
