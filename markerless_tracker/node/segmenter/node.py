@@ -171,7 +171,7 @@ class SegmenterNode(GivenNode):
         message.status = [
             DiagnosticStatus(
                 level=level,
-                name=self.get_fully_qualified_name(),
+                name=f"{self.get_fully_qualified_name().strip('/')}: segmenting",
                 message=text,
                 hardware_id=self._name,
                 values=[KeyValue(key=key, value=value) for key, value in values.items()],

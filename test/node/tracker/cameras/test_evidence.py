@@ -179,7 +179,7 @@ def test_a_mixed_graph_gives_the_poses_of_images(
     )
 
     def counted() -> dict[str, str]:
-        found = [s for m in said for s in m.status if s.name == "/segmenter"]
+        found = [s for m in said for s in m.status if s.name == "segmenter: segmenting"]
         return {pair.key: pair.value for pair in found[-1].values} if found else {}
 
     values = live.until(lambda: counted().get("published") == "4" and counted(), "the segmenter")
