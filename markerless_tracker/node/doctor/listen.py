@@ -78,8 +78,6 @@ def image_topics() -> tuple[str, ...]:
     Raises:
         RosMissingError: ROS is not installed.
     """
-    from sensor_msgs.msg import CompressedImage, Image  # noqa: F401
-
     names: set[str] = set()
     with _Listening() as node:
         end_s = time.monotonic() + PATIENCE_S
