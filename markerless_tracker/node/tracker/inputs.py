@@ -158,9 +158,18 @@ class CameraInput:
     def on_info_bytes(self, serialised: bytes) -> None:
         """Take a serialised sensor_msgs/CameraInfo, if it differs from the last in its content."""
         content = without_stamp(serialised)
-        if content != self._info_bytes:
-            self.on_info(deserialize_message(serialised, CameraInfo))
-            self._info_bytes = content
+        if content == self._info_bytes:
+            return
+        self._info_bytes = content
+        try:
+            message = deserialize_message(serialised, CameraInfo)
+        except Exception as error:  # rclpy has no common base class for damaged messages
+            self._say(
+                f"{self.info_topic}: a message of {len(serialised)} bytes cannot be read "
+                f"({type(error).__name__})"
+            )
+            return
+        self.on_info(message)
 
     def on_info(self, message: CameraInfo) -> None:
         """Compare a sensor_msgs/CameraInfo with the calibration; differences are reported."""

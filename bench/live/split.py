@@ -4,8 +4,8 @@ Made-up cameras, a player and a tracker; in the split graph a segmenter beside e
 evidence on the way to the tracker. With --loss the tracker lies in a network namespace of its own,
 behind a forwarder that drops that share of the frames.
 
-    python bench/split.py --cameras 4,8 --rates 60,30
-    python bench/split.py --cameras 8 --rates 0 --loss 0.05      (rate 0: lockstep)
+    python bench/live/split.py --cameras 4,8 --rates 60,30
+    python bench/live/split.py --cameras 8 --rates 0 --loss 0.05      (rate 0: lockstep)
 """
 
 import argparse
@@ -34,7 +34,7 @@ from markerless_tracker.synthesis import SyntheticScene
 
 NODE = "markerless_tracker.node.{}.executable"
 READY_S, STUCK_S = 300.0, 60.0
-LINK = Path(__file__).with_name("link") / "forward.py"
+LINK = Path(__file__).with_name("forward.py")
 
 
 class MadeUp(Recording):
