@@ -27,6 +27,7 @@ import numpy as np
 
 from markerless_tracker.bags import write_bag
 from markerless_tracker.benchmarks.machine import machine
+from markerless_tracker.body import write_pose
 from markerless_tracker.cli.replay.processes import ros_arguments
 from markerless_tracker.datasets import FrameSet, Recording
 from markerless_tracker.node.ros.profile import apply_profile
@@ -88,7 +89,7 @@ class Listener:
 
         self.context = rclpy.Context()
         rclpy.init(context=self.context, args=[])
-        node = Node("listener", context=self.context)
+        node = self.node = Node("listener", context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(node)
         self.sent: dict[int, float] = {}
@@ -142,6 +143,7 @@ def run_graph(
     tracker: dict[str, object] = {
         "calibration_file": bag / "calibration.toml",
         "stature": 1.72,
+        "start_file": bag / "start.yaml",
         "result_file": out / "result",
         **({"image_transport": "evidence"} if split else {"background_dir": bag / "background"}),
     }
@@ -218,6 +220,7 @@ def row(listener: Listener, recording: MadeUp, rate: float, *, split: bool) -> d
         "segmenter_ms": max((float(v["latency_median_ms"]) for v in segmenters), default=None),
         "bandwidth_share": sent / raw if raw else None,
         "bytes_a_set": sent / max(1, int(values["tracked"])) if split else None,
+        "tracker_cpu_ms": 1e3 * float(values["cpu_s"]) / max(1, int(values["tracked"])),
         "dropped": sum(int(v["dropped"]) for v in segmenters),
     }
 
@@ -226,6 +229,7 @@ def measure(cameras: int, args: argparse.Namespace, folder: Path, place: Place) 
     recording = MadeUp(cameras, args.sets, args.size)
     bag = folder / f"bag{cameras}"
     write_bag(recording, bag, backgrounds=recording.scene.backgrounds(6))
+    write_pose(bag / "start.yaml", recording.scene.body, recording.scene.pose(0))
     rows = []
     for rate in args.rates:
         results = []
@@ -272,10 +276,11 @@ class Link:
         return {key: int(value) for key, value in re.findall(r"(\w+)=(\d+)", counts)}
 
 
-def parse() -> argparse.Namespace:
-    def numbers(kind: type) -> Any:
-        return lambda text: [kind(word) for word in text.split(",")]
+def numbers(kind: type) -> Any:
+    return lambda text: [kind(word) for word in text.split(",")]
 
+
+def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--cameras", type=numbers(int), default=[4, 8])
     parser.add_argument("--rates", type=numbers(float), default=[60.0, 30.0])
