@@ -90,6 +90,35 @@ def test_one_file_of_parameters_serves_both_nodes_of_the_split_graph() -> None:
     assert settings_digest(tracker.config) == settings_digest(segmenter.config)
 
 
+def test_the_policy_lets_each_node_do_what_it_does_and_no_more() -> None:
+    """Topics by their names in the sources; the tracker hears no image."""
+    enclaves = {}
+    for enclave in ElementTree.parse(ROOT / "config/sros2/two_machines.xml").iter("enclave"):
+        topics = {
+            (mode, str(topic.text))
+            for block in enclave.iter("topics")
+            for mode in block.attrib
+            for topic in block.iter("topic")
+        }
+        enclaves[str(enclave.get("path")).strip("/")] = topics
+    names = [f"cam0{number}" for number in range(1, 5)]
+    assert set(enclaves) == {"tracker", *(f"segmenter_{name}" for name in names)}
+    sources = "".join(path.read_text() for path in (ROOT / "markerless_tracker/node").rglob("*.py"))
+    of_ros = {"parameter_events", "rosout", "clock"}
+    for enclave, topics in enclaves.items():
+        images = {topic for mode, topic in topics if "image" in topic}
+        if enclave == "tracker":
+            assert images == set()
+            assert {("subscribe", f"{name}/silhouette") for name in names} <= topics
+        else:
+            own = enclave.removeprefix("segmenter_")
+            assert images == {f"{own}/image_raw", f"{own}/image_raw/compressed"}
+            assert {("publish", f"{own}/silhouette"), ("publish", f"{own}/edges")} <= topics
+        for _, topic in topics:
+            last = topic.strip("/").rpartition("/")[2]
+            assert last in of_ros or last in sources, topic
+
+
 def preset(name: str) -> dict[str, Any]:
     content = yaml.safe_load((ROOT / "config" / f"{name}.yaml").read_text())
     return dict(content["/**"]["ros__parameters"])

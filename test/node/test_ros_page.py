@@ -39,7 +39,7 @@ def test_the_page_about_two_machines_names_what_exists() -> None:
     arguments = set(re.findall(r'<arg name="(\w+)" (?:default|description)', launch))
     given = set(re.findall(r"(?<![\w./])([a-z_]+):=", SPLIT))
     assert {"camera", "background_dir", "image_transport", "evidence_cameras"} <= given
-    assert given <= {*parameter_names(), *known_parameters(), *arguments}
+    assert given <= {*parameter_names(), *known_parameters(), *arguments, "__node"}
     for link in re.findall(r"\]\(([\w./-]+?)(?:#\w+)?\)", SPLIT):
         assert (ROOT / "docs" / link).is_file(), link
     for test in re.findall(r"`(test/[\w/]+\.py)`", SPLIT):
