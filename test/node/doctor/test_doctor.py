@@ -68,7 +68,7 @@ def test_lines_of_cameras_that_send_and_do_not(
     folder: Path, sending: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["doctor", "--calibration", str(folder / "calibration.toml"), "--background",
-             str(folder / "background"), "--json"]  # fmt: skip
+             str(folder / "background"), "--seconds", "1", "--json"]  # fmt: skip
     assert main(words) == 3
     found = json.loads(capsys.readouterr().out)["findings"]
     by = {(line["check"], line["camera"]): line for line in found}
@@ -87,7 +87,7 @@ def test_lines_of_cameras_that_send_and_do_not(
 def test_without_a_calibration_it_finds_the_cameras_that_send(
     sending: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status = main(["doctor", "--seconds", "1"])
+    status = main(["doctor", "--seconds", "0.5"])
     lines = capsys.readouterr().out.splitlines()
     assert any(line.split()[1:3] == ["rate:", "cam01:"] for line in lines)
     assert any(line.split()[1:3] == ["rate:", "cam02:"] for line in lines)

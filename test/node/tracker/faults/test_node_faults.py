@@ -78,7 +78,6 @@ def test_a_camera_that_shows_nothing_of_the_scene(live: Any, kind: str) -> None:
     live.track(cam03=filled(live, "cam03", index, picture[kind]))
     error = np.linalg.norm(live.points() - live.camera.scene.markers(index), axis=1).mean()
     assert live.value("state") == "TRACKING" and error < 0.05
-    assert_tracking(live)
 
 
 def test_a_camera_whose_images_arrive_late_is_waited_for(live: Any) -> None:
