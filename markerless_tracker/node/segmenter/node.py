@@ -159,6 +159,9 @@ class SegmenterNode(GivenNode):
             level, text = DiagnosticStatus.WARN, self._input.refusal
         elif silent:
             level, text = DiagnosticStatus.STALE, f"no image on {self._input.image_topic}"
+        elif self._images.share > 1:
+            level = DiagnosticStatus.WARN
+            text = f"images come too fast: one of {self._images.share} is segmented"
         values = {
             "camera": self._name,
             "ready": "true",

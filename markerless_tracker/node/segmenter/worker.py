@@ -12,7 +12,11 @@ from markerless_tracker.node.tracker.worker import one_line
 from markerless_tracker.observation import Observation
 
 QUEUE = 8
-"""Images that may wait; further ones replace the oldest."""
+"""Images that may wait."""
+SHARE_MAX = 64
+CALM = 60
+"""Images in a row that did not wait for one another, after which more are kept again."""
+_MIXER = 0x9E3779B97F4A7C15
 WINDOW = 300
 """Images over which latency is computed."""
 
@@ -26,22 +30,35 @@ class Waiting(NamedTuple):
 
 
 class ImageQueue:
-    """Images in the order of their arrival; the oldest are dropped where they come too fast."""
+    """Images in the order of their arrival, thinned out where they come too fast.
+
+    Of images that cannot all be segmented, one of 2, 4, 8... is kept. Which ones follows from their
+    stamps alone, so that the segmenters of other cameras keep the same sets.
+
+    Attributes:
+        received, dropped: counts of images.
+        share: one of so many images is kept.
+        heard_s: time of the last arrival, s; None before the first.
+    """
 
     def __init__(self) -> None:
         self._images: deque[Waiting] = deque()
         self._changed = Condition()
+        self._calm = 0
         self.received = self.dropped = 0
+        self.share = 1
         self.heard_s: float | None = None
 
     def add(self, camera: str, stamp_ns: int, view: Any, *, now_s: float) -> bool:
-        """Store an image; as `Synchronizer.add`. Returns True: every image is a set."""
+        """Store an image; as `Synchronizer.add`. Returns whether it is kept."""
         with self._changed:
             self.received += 1
             self.heard_s = now_s
-            if len(self._images) >= QUEUE:
-                self._images.popleft()
+            if not self._kept(stamp_ns):
                 self.dropped += 1
+                return False
+            if len(self._images) >= QUEUE:
+                self._thin_out()
             self._images.append(Waiting(stamp_ns, view, now_s))
             self._changed.notify()
         return True
@@ -51,7 +68,26 @@ class ImageQueue:
         with self._changed:
             if not self._images:
                 self._changed.wait(timeout_s)
-            return self._images.popleft() if self._images else None
+            if not self._images:
+                return None
+            taken = self._images.popleft()
+            self._calm = 0 if self._images else self._calm + 1
+            if self._calm >= CALM and self.share > 1:
+                self.share, self._calm = self.share // 2, 0
+            return taken
+
+    def _kept(self, stamp_ns: int) -> bool:
+        # The high bits of the product depend on all bits of the stamp.
+        return (stamp_ns * _MIXER >> 40) % self.share == 0
+
+    def _thin_out(self) -> None:
+        """Keep half as many images from now on, of those that wait, too; at least one leaves."""
+        self.share, self._calm = min(2 * self.share, SHARE_MAX), 0
+        kept = deque(image for image in self._images if self._kept(image.stamp_ns))
+        if len(kept) >= QUEUE:
+            kept.popleft()
+        self.dropped += len(self._images) - len(kept)
+        self._images = kept
 
 
 class SegmenterStatus:
