@@ -26,6 +26,7 @@ _ROS = (
     "std_srvs",
     "visualization_msgs",
 )
+_THREADS = "NUMBA_NUM_THREADS"
 _RMW = "rmw_fastrtps_cpp"
 _MIB = 2**20
 
@@ -98,13 +99,8 @@ def _threads(environment: Mapping[str, str]) -> Finding:
     cores = usable_cores()
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     text = f"{cores} cores may be used, load {load:.1f}"
-    limits = [
-        f"{name}={environment[name]}"
-        for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
-        if environment.get(name)
-    ]
-    if limits:
-        text += f", {', '.join(limits)}"
+    if limit := environment.get(_THREADS):
+        text += f", {_THREADS}={limit}"
     if cores < 2:
         return Finding(
             "threads", YELLOW, "", text,

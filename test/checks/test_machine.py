@@ -80,6 +80,8 @@ def test_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "usable_cores", lambda: 1)
     assert found(tmp_path)["threads"].state == "yellow"
     monkeypatch.setattr(machine, "usable_cores", lambda: 4)
-    assert found(tmp_path, {"OMP_NUM_THREADS": "1"})["threads"].text.endswith("OMP_NUM_THREADS=1")
+    assert found(tmp_path, {"NUMBA_NUM_THREADS": "1"})["threads"].text.endswith(
+        "NUMBA_NUM_THREADS=1"
+    )
     monkeypatch.setattr(machine.os, "getloadavg", lambda: (3.5, 0.1, 0.1))
     assert found(tmp_path)["threads"].state == "yellow"
