@@ -81,6 +81,7 @@ setup(
         "console_scripts": [
             f"markerless_tracker = {NAME}.cli.main:main",
             f"player = {NAME}.node.player.executable:main",
+            f"segmenter = {NAME}.node.segmenter.executable:main",
             f"tracker = {NAME}.node.tracker.executable:main",
         ],
     },

@@ -55,6 +55,8 @@ class Observation:
         edges: (h, w) uint8, edge strength M = value / 255, in the same region.
         undecided_words: the undecided pixels, packed likewise; none if left out. No pixel is
             person and undecided.
+        exposure: brightness of the image relative to its background's, by channel; None if the
+            maker of the observation does not tell it.
     """
 
     camera: str
@@ -64,6 +66,7 @@ class Observation:
     mask_words: MaskWords
     edges: NDArray[np.uint8]
     undecided_words: MaskWords | None = None
+    exposure: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mask_words", locked(self.mask_words, np.uint64))
@@ -98,6 +101,11 @@ class Observation:
     def height(self) -> int:
         """Height of the region in px."""
         return int(self.edges.shape[0])
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the region is the full frame."""
+        return (self.width, self.height) == self.size_px
 
     @property
     def mask(self) -> NDArray[np.bool_]:

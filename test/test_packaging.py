@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
 
 from markerless_tracker import __version__
 
@@ -17,6 +18,7 @@ NAME = "markerless_tracker"
 EXECUTABLES = {
     "markerless_tracker": "markerless_tracker.cli.main:main",
     "player": "markerless_tracker.node.player.executable:main",
+    "segmenter": "markerless_tracker.node.segmenter.executable:main",
     "tracker": "markerless_tracker.node.tracker.executable:main",
 }
 
@@ -50,6 +52,9 @@ def test_the_version_is_the_same_everywhere(project_root: Path) -> None:
     assert package_xml(project_root).findtext("version") == __version__
     changelog = (project_root / "CHANGELOG.md").read_text(encoding="utf-8")
     assert re.search(rf"^## \[{re.escape(__version__)}\]", changelog, re.MULTILINE)
+    citation = yaml.safe_load((project_root / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == __version__ and citation["license"] == "Apache-2.0"
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
 
 
 def test_manifest(project_root: Path) -> None:
@@ -59,6 +64,11 @@ def test_manifest(project_root: Path) -> None:
     assert root.findtext("license") == "Apache-2.0"
     assert root.findtext("export/build_type") == "ament_python"
     assert (project_root / "resource" / NAME).is_file()
+    assert {url.get("type") for url in root.findall("url")} == {
+        "website", "repository", "bugtracker"
+    }  # fmt: skip
+    for tag in ("description", "maintainer", "author"):
+        assert root.findtext(tag), tag
     licence = (project_root / "LICENSE").read_text(encoding="utf-8")
     assert "Apache License" in licence
     assert "END OF TERMS AND CONDITIONS" in licence

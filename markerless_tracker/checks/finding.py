@@ -22,3 +22,13 @@ class Finding:
     camera: str
     text: str
     advice: str = ""
+
+
+def grade(value: float, limits: tuple[float, float]) -> str:
+    """Green below the first limit, yellow below the second, else red."""
+    return GREEN if value < limits[0] else YELLOW if value < limits[1] else RED
+
+
+def worse(one: str, other: str) -> str:
+    """The worse of two states."""
+    return max(one, other, key=(GREEN, YELLOW, RED).index)

@@ -6,7 +6,7 @@ import numpy as np
 
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.camera.doubts import calibration_doubts
-from markerless_tracker.checks.finding import GREEN, RED, YELLOW, Finding
+from markerless_tracker.checks.finding import GREEN, RED, YELLOW, Finding, grade, worse
 from markerless_tracker.checks.in_step import find_offsets
 from markerless_tracker.checks.scene import moved_px, unlike_share
 from markerless_tracker.checks.signals import CameraSignals, read_signals
@@ -27,8 +27,6 @@ HEIGHTS_PX = (150.0, 80.0)
 """Heights of the person in an image below which it is doubted, and is too little."""
 STATURE_M = 1.8
 LEAST_CAMERAS = 3
-
-Range = tuple[float, float]
 
 
 def check_recording(
@@ -114,7 +112,7 @@ def _steps(signals: Mapping[str, CameraSignals], fps: float) -> list[Finding]:
             )
             continue
         late, agree = offsets.frames[name], offsets.correlation[name]
-        state = _grade(abs(late), OUT_OF_STEP) if offsets.gained[name] > GAINED else GREEN
+        state = grade(abs(late), OUT_OF_STEP) if offsets.gained[name] > GAINED else GREEN
         if state == GREEN:
             text = f"in step with the others (correlation {agree:.2f})"
             found.append(Finding("in step", GREEN, name, text))
@@ -154,7 +152,7 @@ def _background(name: str, signals: Mapping[str, CameraSignals]) -> Finding:
                     "exchange the files in background/",
                 )  # fmt: skip
     moved = moved_px(signal.scene, signal.background)
-    state = max(_grade(share, UNLIKE), _grade(moved, MOVED_PX), key=(GREEN, YELLOW, RED).index)
+    state = worse(grade(share, UNLIKE), grade(moved, MOVED_PX))
     text = f"{share:.0%} of the scene differ from it, shifted by {moved:.1f} px"
     if state == GREEN:
         return Finding("background", GREEN, name, text)
@@ -168,7 +166,7 @@ def _light(name: str, signal: CameraSignals) -> Finding:
     low, high = np.quantile(signal.gain, [0.02, 0.98])
     change = float(high / max(low, 1e-3) - 1.0)
     text = f"brightness varies by {change:.0%}"
-    state = _grade(change, GAINS)
+    state = grade(change, GAINS)
     if state == GREEN:
         return Finding("light", GREEN, name, text)
     return Finding(
@@ -192,7 +190,3 @@ def _height(name: str, signal: CameraSignals) -> Finding:
         "person", state, name, text,
         f"expected {HEIGHTS_PX[0]:.0f} or more: larger images, or the camera nearer",
     )  # fmt: skip
-
-
-def _grade(value: float, limits: Range) -> str:
-    return GREEN if value < limits[0] else YELLOW if value < limits[1] else RED

@@ -3,13 +3,14 @@
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
 
-from markerless_tracker.checks.finding import GREEN, RED, YELLOW
+from markerless_tracker.checks.finding import GREEN, RED, YELLOW, Finding
 from markerless_tracker.checks.recording import check_recording
 from markerless_tracker.cli.terminal.bars import progress_bars
 from markerless_tracker.datasets import open_recording
@@ -44,9 +45,14 @@ def run(args: argparse.Namespace) -> int:
             recording,
             progress=lambda done, total: bars.update(task, completed=done, total=total),
         )
+    return print_findings(found, str(args.source), as_json=args.json)
+
+
+def print_findings(found: Sequence[Finding], source: str, *, as_json: bool) -> int:
+    """Print findings, a line each; returns the exit status: 0, or 3 if something is red."""
     red = sum(finding.state == RED for finding in found)
-    if args.json:
-        summary = {"source": str(args.source), "red": red, "findings": [asdict(f) for f in found]}
+    if as_json:
+        summary = {"source": source, "red": red, "findings": [asdict(f) for f in found]}
         json.dump(summary, sys.stdout, indent=2)
         sys.stdout.write("\n")
     else:
@@ -59,5 +65,5 @@ def run(args: argparse.Namespace) -> int:
                 f"{_MARKS[finding.state]} {escape(line + advice)}", highlight=False, soft_wrap=True
             )
         doubted = sum(finding.state == YELLOW for finding in found)
-        print(f"{args.source}: {red} red, {doubted} to look at")
+        print(f"{source}: {red} red, {doubted} to look at")
     return SOMETHING_RED if red else 0

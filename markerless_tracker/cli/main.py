@@ -32,6 +32,7 @@ VERBS: Mapping[str, str] = MappingProxyType(
     {
         "calibrate": "calibrate cameras with a checkerboard or ChArUco board",
         "check": "say before tracking what will go wrong with a recording",
+        "doctor": "say what is wrong with this machine, its ROS graph and its cameras",
         "convert": "write a recording, dataset or videos as an MCAP bag",
         "track": "track the person in a recording or bag",
         "batch": "track many recordings: results and one summary table",
@@ -63,8 +64,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit status: 0 done, 1 failed with one line on standard error, 2 wrong arguments,
-        3 no person found (`track`, `batch`), 130 interrupted, 141 standard output was closed by its
-        reader.
+        3 no person found (`track`, `batch`) or something red (`check`, `doctor`), 130 interrupted,
+        141 standard output was closed by its reader.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if not words:

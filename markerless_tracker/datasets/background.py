@@ -107,6 +107,34 @@ def read_background_models(
     return {name: models[name] for name in rig.names if name in models}
 
 
+def background_size(folder: str | Path, camera: str) -> tuple[int, int]:
+    """(width, height) of a camera's empty scene: of its images, else of its learned model.
+
+    Raises:
+        DatasetError: the folder holds none.
+        ImageError: it cannot be read.
+    """
+    folder = _existing(folder)
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and path.name == camera:
+            image = read_image(numbered_files(path)[0]) if numbered_files(path) else None
+        elif path.suffix.lower() in IMAGE_SUFFIXES and path.stem == camera:
+            image = read_image(path)
+        elif path.suffix.lower() in VIDEO_SUFFIXES and path.stem == camera:
+            return open_stream(path).size_px
+        else:
+            continue
+        if image is not None:
+            return int(image.shape[1]), int(image.shape[0])
+    model = folder / f"{camera}{MODEL_SUFFIX}"
+    if not model.is_file():
+        raise DatasetError(
+            f"{folder} holds nothing for {camera}, expected an image, clip or learned model "
+            f"({MODEL_SUFFIX}) of that name"
+        )
+    return read_background_model(model).size_px
+
+
 def _existing(folder: str | Path) -> Path:
     folder = Path(folder)
     if not folder.is_dir():

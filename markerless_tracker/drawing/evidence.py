@@ -14,6 +14,15 @@ UNDECIDED_BGR = (0, 220, 255)
 """Colour of undecided pixels: yellow."""
 
 
+def class_picture(observation: Observation) -> Image:
+    """A picture (h, w, 3) BGR of the full frame: person white, undecided pixels as in the mask."""
+    picture = np.zeros((observation.size_px[1], observation.size_px[0], 3), dtype=np.uint8)
+    picture[observation.in_full_frame(observation.mask)] = 255
+    if observation.undecided is not None:
+        picture[observation.in_full_frame(observation.undecided)] = UNDECIDED_BGR
+    return picture
+
+
 def draw_evidence(
     image: Image,
     observation: Observation,

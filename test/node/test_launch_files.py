@@ -12,12 +12,21 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.player.parameters import descriptions as player_parameters
+from markerless_tracker.node.segmenter.parameters import (
+    known_parameters,
+    read_segmenter_settings,
+)
+from markerless_tracker.node.segmenter.wire import settings_digest
 from markerless_tracker.node.tracker.parameters import parameter_names, read_settings
 
 ROOT = Path(__file__).resolve().parents[2]
 LAUNCH = sorted((ROOT / "launch").glob("*.xml"))
 PRESETS = ("sppso", "hmcpso", "paper")
-KNOWN = {"tracker": set(parameter_names()), "player": set(player_parameters())}
+KNOWN = {
+    "tracker": set(parameter_names()),
+    "player": set(player_parameters()),
+    "segmenter": set(known_parameters()),
+}
 SHARE = "$(find-pkg-share markerless_tracker)/"
 
 
@@ -68,6 +77,46 @@ def test_an_argument_left_out_is_a_parameter_left_out(path: Path) -> None:
             if found:
                 given[str(param.get("name"))] = yaml.safe_load(declared[found[1]] or "''")
         assert read_settings(given) == read_settings({})
+
+
+def test_one_file_of_parameters_serves_both_nodes_of_the_split_graph() -> None:
+    content = yaml.safe_load((ROOT / "config" / "two_machines.yaml").read_text())
+    shared = content["/**"]["ros__parameters"]
+    own = content["/**/tracker"]["ros__parameters"]
+    assert set(content) == {"/**", "/**/tracker"}
+    tracker = read_settings({**shared, **own})
+    segmenter = read_segmenter_settings({**shared, "camera": "cam01", "background_dir": "empty"})
+    assert tracker.takes_evidence("cam01") and tracker.scale == segmenter.scale
+    assert settings_digest(tracker.config) == settings_digest(segmenter.config)
+
+
+def test_the_policy_lets_each_node_do_what_it_does_and_no_more() -> None:
+    """Topics by their names in the sources; the tracker hears no image."""
+    enclaves = {}
+    for enclave in ElementTree.parse(ROOT / "config/sros2/two_machines.xml").iter("enclave"):
+        topics = {
+            (mode, str(topic.text))
+            for block in enclave.iter("topics")
+            for mode in block.attrib
+            for topic in block.iter("topic")
+        }
+        enclaves[str(enclave.get("path")).strip("/")] = topics
+    names = [f"cam0{number}" for number in range(1, 5)]
+    assert set(enclaves) == {"tracker", *(f"segmenter_{name}" for name in names)}
+    sources = "".join(path.read_text() for path in (ROOT / "markerless_tracker/node").rglob("*.py"))
+    of_ros = {"parameter_events", "rosout", "clock"}
+    for enclave, topics in enclaves.items():
+        images = {topic for mode, topic in topics if "image" in topic}
+        if enclave == "tracker":
+            assert images == set()
+            assert {("subscribe", f"{name}/silhouette") for name in names} <= topics
+        else:
+            own = enclave.removeprefix("segmenter_")
+            assert images == {f"{own}/image_raw", f"{own}/image_raw/compressed"}
+            assert {("publish", f"{own}/silhouette"), ("publish", f"{own}/edges")} <= topics
+        for _, topic in topics:
+            last = topic.strip("/").rpartition("/")[2]
+            assert last in of_ros or last in sources, topic
 
 
 def preset(name: str) -> dict[str, Any]:

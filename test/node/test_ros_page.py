@@ -9,6 +9,8 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from markerless_tracker.datasets.bag.encodings import ENCODINGS
 from markerless_tracker.node.player.parameters import descriptions as player_parameters
+from markerless_tracker.node.segmenter.parameters import known_parameters
+from markerless_tracker.node.segmenter.wire import EDGES_TOPIC, FORMAT, SILHOUETTE_TOPIC
 from markerless_tracker.node.tracker.cameras.counts import CameraCounter
 from markerless_tracker.node.tracker.changes import LIVE
 from markerless_tracker.node.tracker.parameters import parameter_names
@@ -17,6 +19,7 @@ from markerless_tracker.node.tracker.synchronizer import SyncCounts
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "ros.md").read_text(encoding="utf-8")
+SPLIT = (ROOT / "docs" / "two-machines.md").read_text(encoding="utf-8")
 
 
 def section(title: str) -> str:
@@ -29,6 +32,19 @@ def test_every_value_is_given_to_a_parameter_or_an_argument() -> None:
     known = {*parameter_names(), *player_parameters(), *arguments, "in_transport", "out_transport"}
     given = set(re.findall(r"(?<![\w./])([a-z_]+):=", PAGE))
     assert len(given) > 12 and given - known <= {"in", "robot_description"}
+
+
+def test_the_page_about_two_machines_names_what_exists() -> None:
+    launch = "".join(path.read_text() for path in (ROOT / "launch").glob("*.xml"))
+    arguments = set(re.findall(r'<arg name="(\w+)" (?:default|description)', launch))
+    given = set(re.findall(r"(?<![\w./])([a-z_]+):=", SPLIT))
+    assert {"camera", "background_dir", "image_transport", "evidence_cameras"} <= given
+    assert given <= {*parameter_names(), *known_parameters(), *arguments, "__node"}
+    for link in re.findall(r"\]\(([\w./-]+?)(?:#\w+)?\)", SPLIT):
+        assert (ROOT / "docs" / link).is_file(), link
+    for test in re.findall(r"`(test/[\w/]+\.py)`", SPLIT):
+        assert (ROOT / test).is_file(), test
+    assert FORMAT in SPLIT and SILHOUETTE_TOPIC in SPLIT and EDGES_TOPIC in SPLIT
 
 
 def test_what_may_change_is_what_the_node_lets_change() -> None:

@@ -146,12 +146,21 @@ def read_compressed(message: bytes, topic: str) -> CompressedMessage:
     Raises:
         ImageError: not plain CDR, shorter than its own lengths say, or neither JPEG nor PNG.
     """
+    stamp_ns, frame_id, kind, data = compressed_fields(message, topic)
+    layout = compressed_layout(data, where=topic)
+    return CompressedMessage(stamp_ns, frame_id, kind, data, *layout)
+
+
+def compressed_fields(message: bytes, topic: str) -> tuple[int, str, str, NDArray[np.uint8]]:
+    """Stamp (ns), frame, format and data (n,) of a serialised sensor_msgs/CompressedImage.
+
+    Raises:
+        ImageError: not plain CDR, or shorter than its own lengths say.
+    """
     fields = _Fields(message, topic)
     stamp_ns, frame_id = fields.header()
     kind = fields.text()
-    data = fields.elements()
-    layout = compressed_layout(data, where=topic)
-    return CompressedMessage(stamp_ns, frame_id, kind, data, *layout)
+    return stamp_ns, frame_id, kind, fields.elements()
 
 
 def image_bytes(image: NDArray[np.uint8], stamp_ns: int, frame_id: str) -> bytes:

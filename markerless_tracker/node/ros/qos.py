@@ -12,6 +12,8 @@ IMAGE_DEPTH = 5
 
 TRANSPORTS = ("auto", "raw", "compressed")
 """Which images are received: what is offered, sensor_msgs/Image, sensor_msgs/CompressedImage."""
+EVIDENCE = "evidence"
+"""The tracker's transport besides: evidence of segmenters in place of images."""
 
 
 def image_qos(

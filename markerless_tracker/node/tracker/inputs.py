@@ -1,7 +1,7 @@
 """Topics of one camera: messages are checked and stored, pixels are not touched."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import CameraInfo
@@ -18,8 +18,6 @@ from markerless_tracker.node.ros.cdr import (
     without_stamp,
 )
 from markerless_tracker.node.ros.images import check_layout, received_channels
-from markerless_tracker.node.tracker.status import TrackerStatus
-from markerless_tracker.node.tracker.synchronizer import Synchronizer
 
 COMPRESSED_SUFFIX = "/compressed"
 """Follows the topic of raw images in that of compressed ones."""
@@ -27,6 +25,26 @@ _GAP_MAX = 1000
 _SHOWN = 80
 """Characters of a received text that messages show."""
 _KINDS = {1: "grey", 3: "colour"}
+
+
+class TakesViews(Protocol):
+    """Receiver of usable images: a `Synchronizer`, or the segmenter's queue."""
+
+    def add(self, camera: str, stamp_ns: int, view: Any, *, now_s: float) -> bool:
+        """Store one view; never blocks."""
+
+
+class CountsImages(Protocol):
+    """Receiver of counts and errors: a `TrackerStatus`, or the segmenter's."""
+
+    def refused(self, camera: str) -> None:
+        """Count an unusable image."""
+
+    def lost(self, camera: str, images: int) -> None:
+        """Count images that were sent and not received."""
+
+    def failed(self, message: str) -> None:
+        """Record an error."""
 
 
 class CameraInput:
@@ -50,12 +68,14 @@ class CameraInput:
         image_topic, info_topic: the camera's.
     """
 
+    _what = "an image"
+
     def __init__(
         self,
         name: str,
         camera: CameraModel | None,
-        sets: Synchronizer[Any],
-        status: TrackerStatus,
+        sets: TakesViews,
+        status: CountsImages,
         *,
         report: Callable[[str], None],
         clock: Callable[[], float],
@@ -108,7 +128,7 @@ class CameraInput:
         self,
         serialised: bytes,
         sequence: int | None,
-        read: Callable[[bytes, str], ImageMessage | CompressedMessage],
+        read: Callable[[bytes, str], Any],
         topic: str,
     ) -> None:
         now_s = self._clock()
@@ -130,14 +150,26 @@ class CameraInput:
                 f"{now_s - self._silent_since_s:.1f} s"
             )
             self._silent_since_s = None
+        self._store(message, now_s)
+
+    def _store(self, message: Any, now_s: float) -> None:
         self._sets.add(self.name, message.stamp_ns - self._offset_ns, message, now_s=now_s)
 
     def on_info_bytes(self, serialised: bytes) -> None:
         """Take a serialised sensor_msgs/CameraInfo, if it differs from the last in its content."""
         content = without_stamp(serialised)
-        if content != self._info_bytes:
-            self.on_info(deserialize_message(serialised, CameraInfo))
-            self._info_bytes = content
+        if content == self._info_bytes:
+            return
+        self._info_bytes = content
+        try:
+            message = deserialize_message(serialised, CameraInfo)
+        except Exception as error:  # rclpy has no common base class for damaged messages
+            self._say(
+                f"{self.info_topic}: a message of {len(serialised)} bytes cannot be read "
+                f"({type(error).__name__})"
+            )
+            return
+        self.on_info(message)
 
     def on_info(self, message: CameraInfo) -> None:
         """Compare a sensor_msgs/CameraInfo with the calibration; differences are reported."""
@@ -183,18 +215,24 @@ class CameraInput:
                 self._say(f"{self.info_topic}: no camera info comes with the images; {source}")
         return topics
 
-    def _check(self, message: ImageMessage | CompressedMessage, topic: str) -> None:
+    def _check(self, message: Any, topic: str) -> None:
         if isinstance(message, ImageMessage):
             check_layout(message, topic)
         if self._info_refusal:
             raise ImageError(self._info_refusal)
         if self.camera is not None:
-            width, height = self.camera.size_px
+            width, height = self._expected_size_px(self.camera)
             if (message.width, message.height) != (width, height):
                 raise ImageError(
-                    f"{topic}: an image of {message.width}x{message.height} px came, "
+                    f"{topic}: {self._what} of {message.width}x{message.height} px came, "
                     f"the calibration of {self.name} expects {width}x{height} px"
                 )
+        self._check_kind(message, topic)
+
+    def _expected_size_px(self, camera: CameraModel) -> tuple[int, int]:
+        return camera.size_px
+
+    def _check_kind(self, message: ImageMessage | CompressedMessage, topic: str) -> None:
         expected, came = self._channels(self.name), received_channels(message)
         if expected is not None and came != expected:
             kind = message.encoding if isinstance(message, ImageMessage) else message.format

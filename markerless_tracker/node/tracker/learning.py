@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from markerless_tracker.errors import TrackerError
 from markerless_tracker.imaging import BackgroundModel, ImagingSettings, write_background_model
 from markerless_tracker.imaging.background import MODEL_SUFFIX, MOVING_SHARE, LiveBackground
-from markerless_tracker.records import TrackState
+from markerless_tracker.records import Observation, TrackState
 
 PATIENCE_S = 10.0
 """Longest wait for the next set before the request fails."""
@@ -71,11 +71,13 @@ class Learning:
         """Whether the tracker must search the last set for a person."""
         return self._taken in (1, self._sets)
 
-    def take(self, images: Mapping[str, NDArray[np.uint8]]) -> None:
+    def take(self, images: Mapping[str, NDArray[np.uint8] | Observation]) -> None:
         """Add a set of images, by camera; refuses if something moved since the first."""
         self._heard_s = self._clock()
         self._taken += 1
         for name, image in images.items():
+            if isinstance(image, Observation):
+                continue  # Its segmenter has the background.
             share = self._scenes[name].add(image)
             if share > MOVING_SHARE:
                 self.refuse(

@@ -1,8 +1,7 @@
 """The node `tracker`: image topics in, the pose of one person out."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
 from threading import Lock
 from typing import Any
 
@@ -12,18 +11,15 @@ from rclpy.clock_type import ClockType
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.imaging import scale_image
 from markerless_tracker.node.health import QUIET_S, Facts, assess
 from markerless_tracker.node.ros import messages
-from markerless_tracker.node.ros.cdr import CompressedMessage, ImageMessage
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
-from markerless_tracker.node.ros.images import decode_received
 from markerless_tracker.node.ros.notices import Notices
 from markerless_tracker.node.ros.qos import latched_qos
 from markerless_tracker.node.tracker import parameters
 from markerless_tracker.node.tracker.announcer import Announcer
+from markerless_tracker.node.tracker.cameras.build import make_inputs, view_reader
 from markerless_tracker.node.tracker.changes import FIXED, LIVE, LiveSettings
-from markerless_tracker.node.tracker.inputs import CameraInput
 from markerless_tracker.node.tracker.publishing.files import Pictures, ResultFile
 from markerless_tracker.node.tracker.publishing.results import ResultPublishers
 from markerless_tracker.node.tracker.report import RunReport
@@ -92,7 +88,7 @@ class TrackerNode(GivenNode):
         self._announcer = Announcer(self._news, self._notices)
         self._source = RigSource(self._settings)
         self._status = TrackerStatus()
-        self._sets: Synchronizer[ImageMessage | CompressedMessage] = Synchronizer(
+        self._sets: Synchronizer[Any] = Synchronizer(
             self._source.names, tolerance_ns=round(self._settings.sync_tolerance * 1e9)
         )
         self._tracker: Tracker | None = None
@@ -120,7 +116,15 @@ class TrackerNode(GivenNode):
             dealt=self._dealt,
             clock=self._seconds,
         )
-        self._inputs = [self._input(name) for name in self._source.names]
+        self._inputs = make_inputs(
+            self._settings,
+            self._source,
+            self._sets,
+            self._status,
+            channels=self._background_channels,
+            report=self._warn,
+            clock=self._seconds,
+        )
         self._listen()
         self._worker.start()
 
@@ -128,6 +132,12 @@ class TrackerNode(GivenNode):
     def fatal(self) -> str | None:
         """Reason why the tracker cannot start; None otherwise."""
         return self._worker.fatal
+
+    @property
+    def _image_cameras(self) -> tuple[str, ...]:
+        """The cameras whose images are received."""
+        takes_evidence = self._settings.takes_evidence
+        return tuple(name for name in self._source.names if not takes_evidence(name))
 
     @property
     def status(self) -> TrackerStatus:
@@ -162,20 +172,6 @@ class TrackerNode(GivenNode):
 
     # inputs
 
-    def _input(self, name: str) -> CameraInput:
-        return CameraInput(
-            name,
-            None if self._source.rig is None else self._source.rig[name],
-            self._sets,
-            self._status,
-            report=self._warn,
-            clock=self._seconds,
-            channels=self._background_channels,
-            image_topic=self._settings.image_topic,
-            info_topic=self._settings.info_topic,
-            offset_ns=self._source.offset_ns(name),
-        )
-
     def _listen(self) -> None:
         self._topics = CameraTopics(
             self, self._inputs, transport=self._settings.image_transport, clock=self._seconds
@@ -185,7 +181,7 @@ class TrackerNode(GivenNode):
             self,
             self._worker,
             self._settings,
-            cameras=self._source.names,
+            cameras=self._image_cameras,
             rig=lambda: self._source.rig,
             person=self._person,
             clock=self._seconds,
@@ -223,7 +219,6 @@ class TrackerNode(GivenNode):
         scaled = rig.scaled(self._settings.scale)
         setup = build(self._settings, rig, scaled)
         setup.tracker.evidence.start_process()
-        sizes_px = {camera.name: camera.size_px for camera in scaled}
         self._pictures = Pictures(self, scaled)
         self._results.describe(setup.tracker.body)
         self._tracker = setup.tracker
@@ -234,8 +229,8 @@ class TrackerNode(GivenNode):
         return TrackerHandle(
             self._live.settable(setup.tracker),
             setup.start_stamp_ns,
-            partial(_decode, sizes_px, {s.name: s.image_topic for s in self._inputs}),
-            waits=setup.tracker.segmenter(scaled.names[0]) is None,
+            view_reader(scaled, self._inputs),
+            waits=any(setup.tracker.segmenter(name) is None for name in self._image_cameras),
         )
 
     # outputs
@@ -334,12 +329,3 @@ class TrackerNode(GivenNode):
 
     def _inform(self, text: str) -> None:
         self.get_logger().info(text)
-
-
-def _decode(
-    sizes_px: Mapping[str, tuple[int, int]],
-    topics: Mapping[str, str],
-    name: str,
-    message: ImageMessage | CompressedMessage,
-) -> Any:
-    return scale_image(decode_received(message, topics[name]), sizes_px[name])

@@ -8,7 +8,7 @@ from typing import Any
 from markerless_tracker.datasets.background import MAX_FRAMES
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.ros import declared
-from markerless_tracker.node.ros.qos import TRANSPORTS
+from markerless_tracker.node.ros.qos import EVIDENCE, TRANSPORTS
 from markerless_tracker.node.ros.ros4hri import check_id
 from markerless_tracker.node.ros.transforms import TF_CHOICES
 from markerless_tracker.settings import Setting
@@ -36,7 +36,9 @@ class NodeSettings:
         stamp_offsets: s by which each camera's stamps are late, in the order of the cameras.
         image_topic: topic of a camera's images, NAME stands for the camera.
         info_topic: topic of a camera's camera infos, NAME stands for the camera.
-        image_transport: images that are received; auto: raw, or compressed if only those are sent.
+        image_transport: images that are received; auto: raw, or compressed if only those are sent;
+            evidence: none, every camera has a segmenter.
+        evidence_cameras: cameras whose segmenter's evidence is received in place of images.
         tf: frames of the body on /tf: all links, the root link alone (with robot_state_publisher).
         tf_cameras: publish the optical frames of `calibration_file` on /tf_static.
         frame_prefix: begins the names of the links' frames, such as `person1/`.
@@ -61,11 +63,16 @@ class NodeSettings:
     image_topic: str = "NAME/image_raw"
     info_topic: str = "NAME/camera_info"
     image_transport: str = "auto"
+    evidence_cameras: tuple[str, ...] = ()
     tf: str = "links"
     tf_cameras: bool = True
     frame_prefix: str = ""
     human_id: str = ""
     config: TrackerConfig
+
+    def takes_evidence(self, camera: str) -> bool:
+        """Whether a camera's evidence is received in place of its images."""
+        return self.image_transport == EVIDENCE or camera in self.evidence_cameras
 
 
 _OWN = tuple(entry.name for entry in fields(NodeSettings) if entry.name != "config")
@@ -95,7 +102,10 @@ RANGES: Mapping[str, tuple[float, float]] = {
 }
 """Least and largest value of the node's own parameters."""
 _OFFSET_MAX_S = 10.0
-CHOICES: Mapping[str, tuple[str, ...]] = {"tf": TF_CHOICES, "image_transport": TRANSPORTS}
+CHOICES: Mapping[str, tuple[str, ...]] = {
+    "tf": TF_CHOICES,
+    "image_transport": (*TRANSPORTS, EVIDENCE),
+}
 """Values of the node's own parameters that are one of a few."""
 
 
@@ -134,8 +144,9 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
     if "stamp_offsets" in values:
         name = "stamp_offsets"
         own[name] = declared.numbers(name, values[name], -_OFFSET_MAX_S, _OFFSET_MAX_S)
-    if "cameras" in values:
-        own["cameras"] = declared.names("cameras", values["cameras"])
+    for name in ("cameras", "evidence_cameras"):
+        if name in values:
+            own[name] = declared.names(name, values[name])
     for name in ("stature", "scale", "sync_tolerance"):
         if name in values:
             own[name] = declared.number(name, values[name], *RANGES[name])

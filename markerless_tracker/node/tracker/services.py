@@ -29,7 +29,7 @@ class Services:
         node: offers the services.
         worker: does what takes images.
         settings: the node's.
-        cameras: names of all cameras.
+        cameras: those whose backgrounds are learned.
         rig: the cameras of full-size images; None while they are not known.
         person: the tracked body; None before a person was tracked.
         clock: monotonic time in s.
@@ -125,6 +125,10 @@ class Services:
 
     async def _on_learn(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         settings = self._settings
+        if not self._cameras:
+            response.success = False
+            response.message = "nothing learned: every camera's segmenter has its background"
+            return response
         learning = Learning(
             self._cameras,
             settings.learn_background_sets,

@@ -195,6 +195,10 @@ def _backgrounds(
     settings: NodeSettings, rig: CameraRig, scaled: CameraRig
 ) -> dict[str, BackgroundModel]:
     folder = settings.background_dir
+    names = [name for name in rig.names if not settings.takes_evidence(name)]
+    if not names:
+        return {}
+    rig, scaled = rig.selected(names), scaled.selected(names)
     if settings.wait_for_background and not (folder and folder.is_dir()):
         return {}
     if folder is None:

@@ -7,6 +7,7 @@ from typing import Any
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from markerless_tracker.node.ros.qos import FollowingSubscription
+from markerless_tracker.node.tracker.cameras.evidence_input import EvidenceInput
 from markerless_tracker.node.tracker.inputs import COMPRESSED_SUFFIX, CameraInput
 
 POLL_INFOS_S = 0.1
@@ -40,8 +41,11 @@ class CameraTopics:
             )
             for source in inputs
         ]  # fmt: skip
-        self._images = [
-            _ImageSubscription(node, source, transport, self._before_image) for source in inputs
+        self._images: list[ImageSubscription | _EvidenceSubscription] = [
+            _EvidenceSubscription(node, source, self._before_image)
+            if isinstance(source, EvidenceInput)
+            else ImageSubscription(node, source, transport, self._before_image)
+            for source in inputs
         ]
 
     def tick(self) -> None:
@@ -63,7 +67,35 @@ class CameraTopics:
             subscription.poll()
 
 
-class _ImageSubscription:
+class _EvidenceSubscription:
+    """Receives one camera's silhouettes and, where they are used, its edge maps.
+
+    Args:
+        node: creates the subscriptions.
+        source: gets the messages.
+        before: called before each silhouette.
+    """
+
+    def __init__(self, node: Any, source: EvidenceInput, before: Callable[[], None]) -> None:
+        def receive(serialised: bytes, info: Any) -> None:
+            before()
+            source.on_silhouette(serialised, info["publication_sequence_number"])
+
+        takers: dict[str, Callable[..., None]] = {source.image_topic: receive}
+        if source.edges_topic is not None:
+            takers[source.edges_topic] = source.on_edges
+        self._parts = [
+            FollowingSubscription(node, CompressedImage, topic, take, raw=True)
+            for topic, take in takers.items()
+        ]
+
+    def follow(self) -> None:
+        """Adapt to the publishers; to be called periodically."""
+        for part in self._parts:
+            part.follow()
+
+
+class ImageSubscription:
     """Receives one camera's images, raw or compressed.
 
     Args:

@@ -21,9 +21,9 @@ from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
 from markerless_tracker.node.tracker.pace.effort import EffortRule, Lateness
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
-from markerless_tracker.records import TrackResult
+from markerless_tracker.records import Observation, TrackResult
 
-Images = Mapping[str, NDArray[np.uint8]]
+Images = Mapping[str, NDArray[np.uint8] | Observation]
 
 START_TOLERANCE_NS = 4_000_000
 """Tolerance when a frame is compared with the start row's time: marker files round their times, and
@@ -76,7 +76,7 @@ class StartGate:
 
 @dataclass(frozen=True)
 class TrackedSet:
-    """A result and the images it came from (scaled, as the tracker saw them)."""
+    """A result and the images or evidence it came from (scaled, as the tracker saw them)."""
 
     result: TrackResult
     images: Images
@@ -89,13 +89,13 @@ class TrackerHandle:
     Attributes:
         tracker: steps on the images.
         start_ns: see `StartGate`.
-        decode: makes the tracker's image of a camera's view.
+        decode: makes the tracker's image or observation of a camera's view.
         waits: whether the tracker has no backgrounds; sets are dropped until they are learned.
     """
 
     tracker: Stepper
     start_ns: int | None
-    decode: Callable[[str, Any], NDArray[np.uint8]]
+    decode: Callable[[str, Any], NDArray[np.uint8] | Observation]
     waits: bool = False
 
 
@@ -309,7 +309,7 @@ class TrackWorker:
 
     def _decoded(self, handle: TrackerHandle, matched: MatchedSet[Any]) -> Images:
         """The set's images; one that cannot be decoded is left out, unless it is the last."""
-        images: dict[str, NDArray[np.uint8]] = {}
+        images: dict[str, NDArray[np.uint8] | Observation] = {}
         failed: ImageError | None = None
         for name, view in matched.views.items():
             try:

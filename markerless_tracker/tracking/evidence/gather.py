@@ -91,7 +91,10 @@ class EvidenceMaker:
         *,
         ahead: bool = False,
     ) -> dict[str, SeenView]:
-        """The views segmented in the regions that follow from an outlook; ready-made ones pass.
+        """The views segmented in the regions that follow from an outlook.
+
+        A ready-made observation of a whole frame is treated as the image that it was made of: its
+        components are chosen in the same regions. One of a part of the frame is taken as it is.
 
         Args:
             views: camera name to image or observation.
@@ -115,7 +118,8 @@ class EvidenceMaker:
         def one(name: str) -> SeenView:
             view = views[name]
             if isinstance(view, Observation):
-                return SeenView(view, None, None, None)
+                region = regions[name] if view.is_whole else None
+                return SeenView(view, None, region, view.exposure)
             if name in made:
                 return made[name]
             return self._segmented(name, view, stamp_ns, regions[name], outlook.number)
@@ -181,7 +185,7 @@ class EvidenceMaker:
 
     def _whole(self, name: str, seen: SeenView, stamp_ns: int) -> Observation:
         observation = seen.observation
-        if seen.image is None or (observation.width, observation.height) == observation.size_px:
+        if seen.image is None or observation.is_whole:
             return observation
         segmenter = self._segmenter(name)
         with segmenter.lock:
@@ -260,12 +264,19 @@ class EvidenceMaker:
     def _parts(
         self, name: str, view: SeenView, stamp_ns: int, lines: BodyLines
     ) -> Iterator[Observation]:
-        """The view in its region, then in a wider one, segmented when it is asked for."""
+        """The view in its region, then in a wider one, segmented when it is asked for.
+
+        Inside of a region an image's evidence is that of the whole image (`Segmenter.observe`):
+        parts of ready-made evidence are cut out of it.
+        """
         if view.region is None:
             return
         yield view.observation.cut(view.region)
         wide = body_region(lines, WIDE_MARGIN_M, self._clear_px)
-        if view.image is None or wide is None:
+        if wide is None:
+            return
+        if view.image is None:
+            yield view.observation.cut(wide)
             return
         segmenter = self._segmenter(name)
         with segmenter.lock:

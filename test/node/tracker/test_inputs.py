@@ -188,6 +188,18 @@ def test_gaps_in_the_publishers_numbers_are_lost_images(bench: Bench) -> None:
     assert values["lost/cam02"] == "3"
 
 
+def test_a_camera_info_that_is_cut_is_reported_and_changes_nothing(bench: Bench) -> None:
+    good = bytes(serialize_message(info_of(bench.camera, 0)))
+    bench.input.on_info_bytes(good)
+    for size in (12, 20, len(good) // 2):
+        bench.input.on_info_bytes(good[:size])
+    assert len(bench.reports) == 3
+    assert bench.reports[0].startswith("cam02/camera_info: a message of 12 bytes cannot be read")
+    bench.input.on_info_bytes(good)
+    bench.input.on_image(image())
+    assert bench.refused() == 0
+
+
 def test_an_unchanged_camera_info_is_decoded_once(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,6 +9,7 @@ from sensor_msgs.msg import Image
 
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import draw_overlay
+from markerless_tracker.drawing.evidence import class_picture
 from markerless_tracker.drawing.steps import draw_steps
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image as Picture
@@ -16,7 +17,7 @@ from markerless_tracker.node.ros.images import fill_image
 from markerless_tracker.node.ros.messages import header, optical_frame
 from markerless_tracker.node.ros.qos import output_qos
 from markerless_tracker.node.tracker.worker import TrackedSet
-from markerless_tracker.records import TrackResult
+from markerless_tracker.records import Observation, TrackResult
 from markerless_tracker.results.result import ResultWriter, check_target
 from markerless_tracker.tracking import Tracker
 
@@ -141,7 +142,7 @@ class Pictures:
                 publisher.publish(fill_image(message, picture, f"debug/{name}/{kind}"))
 
     def _overlay(self, name: str, fitted: TrackedSet, tracker: Tracker) -> Picture:
-        image = fitted.images[name]
+        image = _picture(fitted.images[name])
         if fitted.result.pose is None:
             return image
         return draw_overlay(image, self._rig[name], tracker.body, fitted.result.pose)
@@ -152,6 +153,15 @@ class Pictures:
         if observation is None:
             return None
         return draw_steps(
-            fitted.images[name], observation, self._rig[name], tracker.body, fitted.result.pose,
+            _picture(fitted.images[name]),
+            observation,
+            self._rig[name],
+            tracker.body,
+            fitted.result.pose,
             tracker.segmenter(name),
-        )  # fmt: skip
+        )
+
+
+def _picture(view: Picture | Observation) -> Picture:
+    """A view as an image."""
+    return class_picture(view) if isinstance(view, Observation) else view

@@ -1,0 +1,131 @@
+"""Arguments and findings of `doctor`."""
+
+import argparse
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from markerless_tracker.camera import CameraRig, read_calibration
+from markerless_tracker.camera.doubts import calibration_doubts
+from markerless_tracker.checks.finding import GREEN, RED, YELLOW, Finding
+from markerless_tracker.checks.machine import check_machine
+from markerless_tracker.checks.stream import CameraStream, check_streams
+from markerless_tracker.cli.check import print_findings
+from markerless_tracker.datasets.background import read_background, read_background_models
+from markerless_tracker.errors import TrackerError
+from markerless_tracker.imaging import Image
+from markerless_tracker.node.ros.process import RosMissingError, StopSignals
+from markerless_tracker.node.ros.profile import USERS_OWN, profile_file
+
+HELP = (
+    "Check this machine and its cameras: shared memory, socket buffers, threads, ROS, profile of "
+    "the middleware, calibration, and of each camera that is sending rate, jitter, age and offset "
+    "of the stamps, sharpness, exposure, and whether the background is still the scene. Red lines "
+    "say what to do; exit status 3 if there is one."
+)
+EXAMPLE = "markerless_tracker doctor --calibration calibration.toml --background background"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("--calibration", type=Path, metavar="FILE", help="calibration.toml")
+    parser.add_argument(
+        "--background", type=Path, metavar="DIR", help="the empty scene, with --calibration"
+    )
+    parser.add_argument(
+        "--cameras", metavar="A,B,...",
+        help="cameras to listen to (those of --calibration, else all that send)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--image-topic", default="NAME/image_raw", metavar="TOPIC",
+        help="topic of the images, NAME stands for the camera",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seconds", type=float, default=3.0, metavar="S",
+        help="how long the cameras are listened to; 0: not at all",
+    )  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check; returns 0, or 3 if something is red."""
+    # The environment as the user set it: listening applies the shipped profile.
+    found = check_machine(dict(os.environ), profiles=USERS_OWN, shipped=profile_file())
+    rig, calibrated = _calibration(args.calibration)
+    found += calibrated
+    backgrounds, missing = _backgrounds(args.background, rig)
+    found += missing
+    if args.seconds > 0.0:
+        chosen = [name for name in (args.cameras or "").split(",") if name]
+        found += _cameras(chosen or (rig.names if rig else ()), backgrounds, args)
+    return print_findings(found, "doctor", as_json=args.json)
+
+
+def _calibration(file: Path | None) -> tuple[CameraRig | None, list[Finding]]:
+    name = "calibration"
+    if file is None:
+        return None, [Finding(name, GREEN, "", "not given (--calibration FILE): not checked")]
+    try:
+        rig = read_calibration(file)
+    except TrackerError as error:
+        return None, [
+            Finding(name, RED, "", str(error), "correct it, or make it anew with `calibrate`")
+        ]
+    doubts = calibration_doubts(rig)
+    if not doubts:
+        return rig, [Finding(name, GREEN, "", f"{len(rig)} cameras, plausible")]
+    advice = "correct calibration.toml, or make it anew with `calibrate`"
+    return rig, [
+        Finding(name, RED, "", doubt.removeprefix("calibration: "), advice) for doubt in doubts
+    ]
+
+
+def _backgrounds(
+    folder: Path | None, rig: CameraRig | None
+) -> tuple[dict[str, Image], list[Finding]]:
+    if folder is None or rig is None:
+        return {}, []
+    advice = "put an image of the scene without the person there, NAME.png for each camera"
+    try:
+        models = read_background_models(folder, rig, ignore_others=True)
+        frames = read_background(folder, rig, ignore_others=True)
+    except TrackerError as error:
+        return {}, [Finding("background", RED, "", str(error), advice)]
+    images = {name: pictures[0] for name, pictures in frames.items()}
+    images |= {name: model.image for name, model in models.items()}
+    return images, [
+        Finding("background", RED, name, f"{folder} holds none", advice)
+        for name in rig.names
+        if name not in images
+    ]
+
+
+def _cameras(
+    names: Sequence[str], backgrounds: dict[str, Image], args: argparse.Namespace
+) -> list[Finding]:
+    # ROS is imported here alone.
+    from markerless_tracker.node.doctor.listen import image_topics, listen
+
+    bars = Progress(TextColumn("{task.description}"), BarColumn(), console=Console(stderr=True))
+    try:
+        with StopSignals() as stop, bars:
+            names = names or image_topics()
+            if not names:
+                return [
+                    Finding(
+                        "cameras", YELLOW, "", "no topic NAME/image_raw is offered",
+                        "start the cameras, or name them (--cameras, --image-topic)",
+                    )
+                ]  # fmt: skip
+            task = bars.add_task(f"listening to {', '.join(names)}", total=args.seconds)
+            heard = listen(
+                names, seconds=args.seconds, image_topic=args.image_topic, stop=stop,
+                progress=lambda seconds: bars.update(task, completed=seconds),
+            )  # fmt: skip
+    except RosMissingError:
+        return []  # `check_machine` says it.
+    streams = {name: CameraStream(*received) for name, received in heard.items()}
+    return check_streams(streams, backgrounds, listened_s=args.seconds)

@@ -1,0 +1,198 @@
+"""Receives cameras' images for some seconds."""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from markerless_tracker.errors import ImageError
+from markerless_tracker.imaging import Image
+from markerless_tracker.node.ros.process import StopSignals, init_context, require_ros
+from markerless_tracker.node.ros.profile import apply_profile
+
+KEPT = 9
+"""Images of each camera that are decoded, evenly in time."""
+PATIENCE_S = 10.0
+"""Longest wait for the first image, or the first topic: discovery takes a few seconds."""
+_TICK_S = 0.25
+_LOOK_S = 1.0
+
+
+class Received(NamedTuple):
+    """What was received of one camera.
+
+    Attributes:
+        topic: of its images.
+        stamps_ns, arrivals_s, ages_s: of each image: stamp, arrival by a monotonic clock, time
+            from the stamp to the arrival by this machine's clock.
+        images: some of them, decoded.
+        refused: number of unusable images.
+        trouble: why the last one could not be used; empty if all could.
+    """
+
+    topic: str
+    stamps_ns: list[int]
+    arrivals_s: list[float]
+    ages_s: list[float]
+    images: list[Image]
+    refused: int
+    trouble: str
+
+
+class _Sink:
+    """Takes one camera's images and troubles as `CameraInput` finds them."""
+
+    def __init__(self, seconds: float) -> None:
+        self._every_s = seconds / KEPT
+        self._next_s = 0.0
+        self.stamps_ns: list[int] = []
+        self.arrivals_s: list[float] = []
+        self.ages_s: list[float] = []
+        self.kept: list[Any] = []
+        self.count, self.trouble = 0, ""
+
+    def add(self, camera: str, stamp_ns: int, view: Any, *, now_s: float) -> bool:
+        """Note an image; keep some."""
+        self.stamps_ns.append(stamp_ns)
+        self.arrivals_s.append(now_s)
+        self.ages_s.append((time.time_ns() - stamp_ns) / 1e9)
+        if now_s >= self._next_s:
+            self._next_s = now_s + self._every_s
+            self.kept.append(view)
+        return True
+
+    def refused(self, camera: str) -> None:
+        """Count an unusable image."""
+        self.count += 1
+
+    def lost(self, camera: str, images: int) -> None:
+        """Lost images show in the rate."""
+
+    def failed(self, message: str) -> None:
+        """Note what was wrong."""
+        self.trouble = message
+
+
+def image_topics() -> tuple[str, ...]:
+    """Names of cameras whose images are offered, raw or compressed, on ``NAME/image_raw``.
+
+    Raises:
+        RosMissingError: ROS is not installed.
+    """
+    names: set[str] = set()
+    with _Listening() as node:
+        end_s = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end_s:
+            node.spin()
+            for topic, _ in node.get_topic_names_and_types():
+                stem = topic.removesuffix("/compressed")
+                if stem.endswith("/image_raw") and node.count_publishers(topic):
+                    if not names:
+                        end_s = time.monotonic() + _LOOK_S
+                    names.add(stem.removesuffix("/image_raw").strip("/"))
+    return tuple(sorted(names))
+
+
+def listen(
+    cameras: Sequence[str],
+    *,
+    seconds: float,
+    image_topic: str,
+    stop: StopSignals,
+    progress: Callable[[float], None] = lambda _: None,
+) -> dict[str, Received]:
+    """Receive the cameras' images.
+
+    Args:
+        cameras: their names.
+        seconds: how long, from the first image on; without any `PATIENCE_S` at least.
+        image_topic: topic, NAME stands for the camera.
+        stop: ends it earlier.
+        progress: called with the seconds that have passed.
+
+    Raises:
+        RosMissingError: ROS is not installed.
+    """
+    with _Listening() as node:
+        return node.receive(cameras, seconds, image_topic, stop, progress)
+
+
+class _Listening:
+    """A node of its own, while the context lasts."""
+
+    def __enter__(self) -> "_Listening":
+        apply_profile()
+        require_ros()
+        from rclpy.executors import SingleThreadedExecutor
+
+        from markerless_tracker.node.ros.declared import GivenNode
+
+        self._context = init_context([])
+        self._node = GivenNode("doctor", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._executor.shutdown(timeout_sec=0)
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._node, name)
+
+    def spin(self) -> None:
+        """Handle what comes within a moment."""
+        self._executor.spin_once(timeout_sec=0.05)
+
+    def receive(
+        self,
+        cameras: Sequence[str],
+        seconds: float,
+        image_topic: str,
+        stop: StopSignals,
+        progress: Callable[[float], None],
+    ) -> dict[str, Received]:
+        """As `listen`."""
+        from markerless_tracker.node.tracker.inputs import CameraInput
+        from markerless_tracker.node.tracker.topics import CameraTopics
+
+        sinks = {name: _Sink(seconds) for name in cameras}
+        inputs = [
+            CameraInput(
+                name, None, sink, sink, report=lambda _: None, clock=time.monotonic,
+                image_topic=image_topic,
+            )
+            for name, sink in sinks.items()
+        ]  # fmt: skip
+        topics = CameraTopics(self._node, inputs, transport="auto", clock=time.monotonic)
+        begun_s = ticked_s = time.monotonic()
+        while not stop.asked:
+            self.spin()
+            now_s = time.monotonic()
+            first = [sink.arrivals_s[0] for sink in sinks.values() if sink.arrivals_s]
+            least_s = now_s - min(first) if first else now_s - begun_s - PATIENCE_S
+            if least_s >= seconds:
+                break
+            if now_s - ticked_s >= _TICK_S:
+                ticked_s = now_s
+                topics.tick()
+                progress(now_s - begun_s)
+        return {entry.name: _received(entry.image_topic, sinks[entry.name]) for entry in inputs}
+
+
+def _received(topic: str, sink: _Sink) -> Received:
+    from markerless_tracker.node.ros.images import decode_received
+
+    images: list[Image] = []
+    for message in sink.kept:
+        try:
+            image = decode_received(message, topic)
+        except ImageError as error:
+            sink.refused(topic)
+            sink.failed(str(error))
+            continue
+        if not images or image.shape == images[-1].shape:
+            images.append(image)
+    return Received(
+        topic, sink.stamps_ns, sink.arrivals_s, sink.ages_s, images, sink.count, sink.trouble
+    )

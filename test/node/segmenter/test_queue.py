@@ -1,0 +1,69 @@
+"""Images that come faster than they are segmented are thinned out alike in all segmenters."""
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+from markerless_tracker.node.segmenter.worker import CALM, QUEUE, ImageQueue
+
+PERIOD_NS = 16_666_667
+FIRST_NS = 1_700_000_000_123_456_789
+
+
+def add(queue: ImageQueue, number: int) -> bool:
+    return queue.add("cam01", FIRST_NS + number * PERIOD_NS, number, now_s=float(number))
+
+
+def rest(queue: ImageQueue) -> list[int]:
+    found = []
+    while (taken := queue.take(0.0)) is not None:
+        found.append(taken.message)
+    return found
+
+
+def test_images_come_in_their_order_and_none_is_lost_in_time() -> None:
+    queue = ImageQueue()
+    for number in range(100):
+        assert add(queue, number)
+        if number % 3 == 2:
+            assert rest(queue) == [number - 2, number - 1, number]
+    assert queue.received == 100 and queue.dropped == 0 and queue.share == 1
+
+
+def test_segmenters_of_unequal_speed_keep_sets_in_common() -> None:
+    """One segments every third image in time, the other every fifth: 1 of 4 and 1 of 8 are kept."""
+    kept = []
+    for takes in (3, 5):
+        queue, done = ImageQueue(), []
+        for number in range(1200):
+            add(queue, number)
+            if number % takes == 0 and (taken := queue.take(0.0)) is not None:
+                done.append(taken.message)
+        assert queue.received == 1200 and queue.share > 1
+        assert len(done) + queue.dropped + len(rest(queue)) == 1200
+        kept.append(set(done))
+    slow, fast = sorted(kept, key=len)
+    settled = {number for number in slow if number > 300}
+    assert len(settled) > 40
+    assert len(settled & fast) > 0.6 * len(settled)
+
+
+def test_memory_is_bounded_whatever_the_stamps() -> None:
+    queue = ImageQueue()
+    for number in range(500):
+        queue.add("cam01", 5, number, now_s=0.0)
+    assert len(rest(queue)) <= QUEUE
+
+
+def test_more_are_kept_again_once_there_is_time() -> None:
+    queue = ImageQueue()
+    for number in range(4 * QUEUE):
+        add(queue, number)
+    assert queue.share > 1
+    number = 4 * QUEUE
+    while queue.share > 1:
+        number += 1
+        add(queue, number)
+        rest(queue)
+        assert number < 100 * CALM
+    assert add(queue, number + 1) and add(queue, number + 2)
