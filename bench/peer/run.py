@@ -111,6 +111,8 @@ def main() -> None:
             print(f"{name}: left out, no such recording with {TRUTH} in {args.data}")
             continue
         rows += compare(args.data / name, args.out, args.python, args.options.split())
+    if not rows:
+        sys.exit(1)
     table = Table("recording", "tracker")
     for heading in ("limb joints, mm", "offsets off, mm", "frames", "sets/s"):
         table.add_column(heading, justify="right")
