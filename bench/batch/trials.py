@@ -36,7 +36,7 @@ QUICK = {
     "body": "balan31", "optimizer": "sppso", "refinement": "contour", "fit_shape": False,
     "edge_weight": 0.5, "seed": 1,
 }  # fmt: skip
-SIZES = {"kills": ((192, 144), 6, 400), "speed": ((320, 240), 12, 4000)}
+SIZES = {"kills": ((192, 144), 6, 500), "speed": ((320, 240), 12, 4000)}
 """Part -> size of the images in px, frames of a trial, evaluations."""
 
 
@@ -120,7 +120,7 @@ class Watch(threading.Thread):
 
     def look(self) -> None:
         """Remember the time of every new complete record."""
-        for path in self._records.rglob("*.json"):
+        for path in self._records.glob("day*/*.json"):
             with contextlib.suppress(OSError, ValueError):
                 at = path.stat().st_mtime_ns
                 if path.name not in self.seen and "row" in json.loads(path.read_text("utf-8")):
@@ -167,7 +167,9 @@ def checked(work: Path, out: str, watch: Watch, count: int, summary: Mapping[str
     watch.look()
     rows = [row["name"] for row in summary["trials"]]
     assert summary["totals"]["done"] == count == len(set(rows)) == len(rows), summary["totals"]
-    final = {path.name: path.stat().st_mtime_ns for path in (work / out / RECORDS).rglob("*.json")}
+    final = {
+        path.name: path.stat().st_mtime_ns for path in (work / out / RECORDS).glob("day*/*.json")
+    }
     assert final == watch.seen, "a record was written twice"
     assert results(work / out) == results(work / "undisturbed"), "other results"
     assert not list((work / out / RECORDS).glob(".partial-*"))
