@@ -7,8 +7,14 @@ from types import MappingProxyType
 from markerless_tracker.datasets.folder import CALIBRATION, FolderRecording
 from markerless_tracker.datasets.formats.anipose import AniposeRecording, is_anipose
 from markerless_tracker.datasets.formats.bodytrack import BodytrackRecording, is_bodytrack
+from markerless_tracker.datasets.formats.caliscope import CaliscopeRecording, is_caliscope
+from markerless_tracker.datasets.formats.freemocap import FreeMoCapRecording, is_freemocap
+from markerless_tracker.datasets.formats.human36m import Human36mRecording, is_human36m
 from markerless_tracker.datasets.formats.humaneva import HumanEvaRecording, is_humaneva
+from markerless_tracker.datasets.formats.mpi_inf_3dhp import MpiInf3dhpRecording, is_mpi_inf_3dhp
 from markerless_tracker.datasets.formats.opencv import OpenCVRecording, is_opencv
+from markerless_tracker.datasets.formats.panoptic import PanopticRecording, is_panoptic
+from markerless_tracker.datasets.formats.totalcapture import TotalCaptureRecording, is_totalcapture
 from markerless_tracker.datasets.pose2sim import Pose2SimRecording, is_pose2sim
 from markerless_tracker.datasets.recording import Recording
 from markerless_tracker.datasets.upright import upright
@@ -21,6 +27,12 @@ _READERS: Mapping[str, Callable[..., Recording]] = MappingProxyType(
         "humaneva": HumanEvaRecording,
         "bodytrack": BodytrackRecording,
         "anipose": AniposeRecording,
+        "panoptic": PanopticRecording,
+        "totalcapture": TotalCaptureRecording,
+        "mpi_inf_3dhp": MpiInf3dhpRecording,
+        "human36m": Human36mRecording,
+        "freemocap": FreeMoCapRecording,
+        "caliscope": CaliscopeRecording,
         "opencv": OpenCVRecording,
     }
 )
@@ -31,6 +43,12 @@ _SIGNS: Mapping[str, Callable[[Path], bool]] = MappingProxyType(
         "humaneva": is_humaneva,
         "bodytrack": is_bodytrack,
         "anipose": is_anipose,
+        "panoptic": is_panoptic,
+        "totalcapture": is_totalcapture,
+        "mpi_inf_3dhp": is_mpi_inf_3dhp,
+        "human36m": is_human36m,
+        "freemocap": is_freemocap,
+        "caliscope": is_caliscope,
         "pose2sim": is_pose2sim,
         "opencv": is_opencv,
     }
