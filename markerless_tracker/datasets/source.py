@@ -5,6 +5,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from markerless_tracker.datasets.folder import CALIBRATION, FolderRecording
+from markerless_tracker.datasets.formats import anipose, caliscope, human36m, humaneva, totalcapture
 from markerless_tracker.datasets.formats.anipose import AniposeRecording, is_anipose
 from markerless_tracker.datasets.formats.bodytrack import BodytrackRecording, is_bodytrack
 from markerless_tracker.datasets.formats.caliscope import CaliscopeRecording, is_caliscope
@@ -15,10 +16,14 @@ from markerless_tracker.datasets.formats.mpi_inf_3dhp import MpiInf3dhpRecording
 from markerless_tracker.datasets.formats.opencv import OpenCVRecording, is_opencv
 from markerless_tracker.datasets.formats.panoptic import PanopticRecording, is_panoptic
 from markerless_tracker.datasets.formats.totalcapture import TotalCaptureRecording, is_totalcapture
-from markerless_tracker.datasets.pose2sim import Pose2SimRecording, is_pose2sim
+from markerless_tracker.datasets.pose2sim import (
+    Pose2SimRecording,
+    calibration_folder,
+    is_pose2sim,
+)
 from markerless_tracker.datasets.recording import Recording
 from markerless_tracker.datasets.upright import upright
-from markerless_tracker.errors import DatasetError
+from markerless_tracker.errors import DatasetError, TrackerError
 
 _READERS: Mapping[str, Callable[..., Recording]] = MappingProxyType(
     {
@@ -54,6 +59,11 @@ _SIGNS: Mapping[str, Callable[[Path], bool]] = MappingProxyType(
     }
 )
 """Whether a path has a format; the first that fits counts."""
+
+_TRIALS: Mapping[str, Callable[[Path], list[Path]]] = MappingProxyType(
+    {"humaneva": humaneva.trials, "anipose": anipose.trials, "human36m": human36m.trials}
+)
+"""Formats whose folders hold several trials: a source for each."""
 
 FORMATS = (*_READERS, "bag")
 
@@ -102,6 +112,33 @@ def open_recording(
         )
     recording.rig = upright(recording.rig, up=up, units=units)
     return recording
+
+
+def trials_at(path: Path) -> list[Path]:
+    """The sources of the trials at a path that has a format: itself, unless there are several."""
+    try:
+        found = _TRIALS.get(detect_format(path) or "", lambda _: [])(path) if path.is_dir() else []
+    except TrackerError:
+        # Opening it will say what is wrong.
+        return [path]
+    return found if len(found) > 1 else [path]
+
+
+def calibration_beside(path: Path) -> Path | None:
+    """A calibration outside of a recording's folder that it uses, file or folder; None without."""
+    kind = detect_format(path)
+    session = path.parent.parent if path.is_file() else path
+    if kind == "anipose":
+        return anipose.calibration_file(session)
+    if kind == "humaneva":
+        return session / humaneva.CALIBRATION
+    if kind == "human36m":
+        return human36m.metadata_file(session)
+    if kind == "totalcapture":
+        return totalcapture.calibration_file(path)
+    if kind == "caliscope":
+        return caliscope.calibration_file(path)
+    return calibration_folder(path) if kind == "pose2sim" else None
 
 
 def detect_format(path: Path) -> str | None:

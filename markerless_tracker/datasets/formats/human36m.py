@@ -11,6 +11,7 @@ from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.formats.numbers import image_sizes
 from markerless_tracker.datasets.upright import upright
+from markerless_tracker.datasets.video.images import VIDEO_SUFFIXES
 from markerless_tracker.errors import CalibrationError, DatasetError
 from markerless_tracker.geometry import FloatArray, transform
 
@@ -20,7 +21,7 @@ UNITS = "mm"
 _SUBJECTS, _POSE, _LENS = 11, 6, 9
 _ABOVE = 3
 _RELEASE = "Release-v*"
-_VIDEO = re.compile(rf"(?P<action>[^_].*)\.(?P<camera>{'|'.join(CAMERAS)})\.mp4")
+_VIDEO = re.compile(rf"(?P<action>[^_].*)\.(?P<camera>{'|'.join(CAMERAS)})")
 
 
 class Human36mRecording(VideoRecording):
@@ -91,12 +92,12 @@ def metadata_file(subject: Path) -> Path | None:
 
 def _actions(path: Path) -> tuple[Path, dict[str, dict[str, Path]]]:
     """The subject's folder, and action -> camera -> video; one action if the path is a video."""
-    chosen = _VIDEO.fullmatch(path.name) if path.is_file() else None
+    chosen = _VIDEO.fullmatch(path.stem) if path.is_file() else None
     subject = path.parent.parent if path.is_file() else path
     folder = subject / "Videos"
     actions: dict[str, dict[str, Path]] = {}
     for video in sorted(folder.iterdir()) if folder.is_dir() else []:
-        match = _VIDEO.fullmatch(video.name)
+        match = _VIDEO.fullmatch(video.stem) if video.suffix.lower() in VIDEO_SUFFIXES else None
         if match and (not path.is_file() or (chosen and match["action"] == chosen["action"])):
             actions.setdefault(match["action"], {})[match["camera"]] = video
     return subject, actions
