@@ -22,6 +22,7 @@ from markerless_tracker.datasets.pose2sim import (
     is_pose2sim,
 )
 from markerless_tracker.datasets.recording import Recording
+from markerless_tracker.datasets.standing import PERSON, standing
 from markerless_tracker.datasets.upright import upright
 from markerless_tracker.errors import DatasetError, TrackerError
 
@@ -84,7 +85,8 @@ def open_recording(
         scale: factor for all images and cameras, in (0, 1].
         format: one of `FORMATS`; None detects it.
         input_fps: rate of numbered images (and, if given, of videos), 1/s.
-        up: axis of the calibration's world that is up, such as `-y`; it becomes z.
+        up: axis of the calibration's world that is up, such as `-y`; it becomes z. `person` finds
+            it from the cameras and the person: see `standing`.
         units: of the calibration's lengths: m, cm or mm.
 
     Raises:
@@ -110,7 +112,9 @@ def open_recording(
             f"{path}: no recording; expected a folder with {CALIBRATION} and videos, a bag (folder "
             f"or .mcap), or one of the formats {', '.join(_READERS)}"
         )
-    recording.rig = upright(recording.rig, up=up, units=units)
+    recording.rig = upright(recording.rig, up="z" if up == PERSON else up, units=units)
+    if up == PERSON:
+        recording.rig = standing(recording)
     return recording
 
 
