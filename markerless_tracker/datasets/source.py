@@ -120,8 +120,9 @@ def open_recording(
 
 def trials_at(path: Path) -> list[Path]:
     """The sources of the trials at a path that has a format: itself, unless there are several."""
+    find = _TRIALS.get(detect_format(path) or "") if path.is_dir() else None
     try:
-        found = _TRIALS.get(detect_format(path) or "", lambda _: [])(path) if path.is_dir() else []
+        found = [] if find is None else find(path)
     except TrackerError:
         # Opening it will say what is wrong.
         return [path]
