@@ -2,7 +2,8 @@
 
 `kills`: 200 trials on two processes, of which one is killed several times; then on two workers of a
 Dask cluster, of which one is killed. Every trial must have its result, written once, with the bytes
-of an undisturbed batch. `speed`: the same trials on one process and on two, each with one thread.
+of an undisturbed batch. `speed`: the same trials on one process and on two, each with one thread;
+`ratio_on_free_cores` is that of the CPU times, and leaves out that the start is not shared.
 """
 
 import argparse
@@ -10,6 +11,7 @@ import contextlib
 import json
 import os
 import random
+import resource
 import shutil
 import signal
 import subprocess
@@ -212,18 +214,29 @@ def speed(work: Path, count: int) -> dict[str, Any]:
     trials(work / "speed", "speed", count)
     ended(batch(work, "first", "speed", "--jobs", "1"))
     seconds: dict[int, list[float]] = {1: [], 2: []}
+    cpu: dict[int, list[float]] = {1: [], 2: []}
     for _ in range(2):
         for jobs, taken in seconds.items():
             shutil.rmtree(work / "timed", ignore_errors=True)
-            started = time.perf_counter()
+            started, before = time.perf_counter(), cpu_seconds()
             ended(batch(work, "timed", "speed", "--jobs", str(jobs)))
             taken.append(time.perf_counter() - started)
+            cpu[jobs].append(cpu_seconds() - before)
     return {
         "trials": count,
         "one_process_s": [round(value, 1) for value in seconds[1]],
         "two_processes_s": [round(value, 1) for value in seconds[2]],
+        "one_process_cpu_s": [round(value, 1) for value in cpu[1]],
+        "two_processes_cpu_s": [round(value, 1) for value in cpu[2]],
         "ratio": round(min(seconds[1]) / min(seconds[2]), 2),
+        "ratio_on_free_cores": round(2.0 * min(cpu[1]) / min(cpu[2]), 2),
     }
+
+
+def cpu_seconds() -> float:
+    """CPU time of the processes that have ended, s: it hardly depends on what else is running."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def main() -> None:
