@@ -31,13 +31,14 @@ RENDERED = 60
 BLOCK = bytes(1 << 20)
 FPS = 60.0
 _VERB = """
-import sys
+import sys, time
 from markerless_tracker.cli.main import main
 status = main(sys.argv[1:])
+print(time.process_time(), file=sys.stderr)
 print([line for line in open("/proc/self/status") if "VmHWM" in line][0].strip(), file=sys.stderr)
 sys.exit(status)
 """
-"""A verb, and the most memory it had as the last line on standard error."""
+"""A verb; the last lines on standard error are its CPU time and the most memory it had."""
 
 
 class InMemory(Recording):
@@ -101,11 +102,12 @@ def converted(videos: Path, bag: Path, options: list[str]) -> dict[str, Any]:
         sys.exit(done.stderr)
     summary = json.loads(done.stdout)
     # The figure of `wait4` would count this process's memory at the start of the other, too.
-    peak_kb = int(done.stderr.splitlines()[-1].split()[1])
+    cpu_s, peak_kb = float(done.stderr.splitlines()[-2]), int(done.stderr.split()[-2])
     return {
         "frames": summary["frames"],
         "bytes": summary["bytes"],
         "seconds": summary["seconds"] + force(bag),
+        "cpu_s": cpu_s,
         "peak_mb": peak_kb * 1024 / 1e6,
     }
 
@@ -139,6 +141,7 @@ def measured(
         "options": " ".join(options),
         "mb": runs[0]["bytes"] / 1e6,
         "sets_per_s": median(run["frames"] / run["seconds"] for run in runs),
+        "cpu_ms_per_set": median(1000.0 * run["cpu_s"] / run["frames"] for run in runs),
         "of_plain_write": median(ratios),
         "writing_of_plain_write": median(alone),
         "peak_mb": max(run["peak_mb"] for run in runs),
@@ -168,14 +171,15 @@ def main() -> None:
             shutil.rmtree(work)
     table = Table("place", "options")
     headings = (
-        "sets", "MB", "sets/s", "convert / plain write", "writing / plain write", "peak MB",
+        "sets", "MB", "sets/s", "CPU ms/set", "convert / plain write", "writing / plain write", "peak MB",
     )  # fmt: skip
     for heading in headings:
         table.add_column(heading, justify="right")
     for row in rows:
         table.add_row(
             row["place"], row["options"], str(row["sets"]), f"{row['mb']:.0f}",
-            f"{row['sets_per_s']:.0f}", f"{row['of_plain_write']:.2f}",
+            f"{row['sets_per_s']:.0f}", f"{row['cpu_ms_per_set']:.1f}",
+            f"{row['of_plain_write']:.2f}",
             f"{row['writing_of_plain_write']:.2f}", f"{row['peak_mb']:.0f}",
         )  # fmt: skip
     Console(width=140).print(table)

@@ -3,7 +3,7 @@
 `kills`: 200 trials on two processes, of which one is killed several times; then on two workers of a
 Dask cluster, of which one is killed. Every trial must have its result, written once, with the bytes
 of an undisturbed batch. `speed`: the same trials on one process and on two, each with one thread;
-`ratio_on_free_cores` is that of the CPU times, and leaves out that the start is not shared.
+`ratio_on_free_cores` follows from the CPU times, for trials that divide evenly on two free cores.
 """
 
 import argparse
