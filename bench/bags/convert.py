@@ -171,7 +171,8 @@ def main() -> None:
             shutil.rmtree(work)
     table = Table("place", "options")
     headings = (
-        "sets", "MB", "sets/s", "CPU ms/set", "convert / plain write", "writing / plain write", "peak MB",
+        "sets", "MB", "sets/s", "CPU ms/set", "convert / plain write", "writing / plain write",
+        "peak MB",
     )  # fmt: skip
     for heading in headings:
         table.add_column(heading, justify="right")
