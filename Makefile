@@ -6,6 +6,7 @@ PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
 DOCS_VENV := .venv-docs
 DOCS_READY := $(DOCS_VENV)/.ready
+PEER := .venv-peer
 WORKERS ?= 2
 
 # Variables of another ROS environment would mix its libraries with those of .venv.
@@ -13,7 +14,7 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME AM
 unexport RMW_IMPLEMENTATION
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-long lint format docs demo bench lock clean
+.PHONY: help setup test test-long lint format docs demo bench peer lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 20
@@ -52,6 +53,14 @@ demo: $(READY) ## track a person in a real recording, live over ROS 2 (5 minutes
 bench: $(READY) ## measure the published figures (an hour)
 	@set -e; for script in bench/*.py; do echo "$$script"; $(PY) "$$script" $(ARGS); done
 
+peer: $(READY) $(PEER)/.ready ## measure MediaPipe with triangulation and this tracker (15 minutes)
+	$(PY) bench/peer/run.py $(ARGS)
+
+$(PEER)/.ready: requirements/peer.txt
+	$(PYTHON) -m venv $(PEER)
+	$(PEER)/bin/python -m pip install -q --disable-pip-version-check -r $<
+	@touch $@
+
 lock: ## pin the newest versions of requirements/direct.txt and docs-direct.txt
 	rm -rf $(VENV)-lock $(DOCS_VENV)-lock
 	$(PYTHON) -m venv $(VENV)-lock
@@ -63,5 +72,5 @@ lock: ## pin the newest versions of requirements/direct.txt and docs-direct.txt
 	rm -rf $(VENV)-lock $(DOCS_VENV)-lock
 
 clean: ## remove everything that the targets make
-	rm -rf $(VENV) $(DOCS_VENV) site build install log dist demo out .hypothesis .mypy_cache .ruff_cache *.egg-info
+	rm -rf $(VENV) $(DOCS_VENV) $(PEER) site build install log dist demo out .hypothesis .mypy_cache .ruff_cache *.egg-info
 	find . -name __pycache__ -prune -exec rm -rf {} +

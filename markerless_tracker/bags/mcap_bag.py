@@ -11,7 +11,7 @@ import yaml
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
-from markerless_tracker.bags.messages import typestore
+from markerless_tracker.bags.messages import definition, typestore
 from markerless_tracker.errors import DatasetError
 
 LAST_SECOND = 2**31 - 1
@@ -75,8 +75,8 @@ class BagWriter:
     def topic(self, name: str, kind: str, *, latched: bool = False) -> Topic:
         """Declare a topic of a message type."""
         if kind not in self._schemas:
-            text, _ = typestore().generate_msgdef(kind, ros_version=2)
-            self._schemas[kind] = self._mcap.register_schema(kind, "ros2msg", text.encode())
+            text = definition(kind).encode()
+            self._schemas[kind] = self._mcap.register_schema(kind, "ros2msg", text)
         digest = typestore().hash_rihs01(kind)
         about = {
             "offered_qos_profiles": _dump([_qos(latched)]).rstrip("\n"),

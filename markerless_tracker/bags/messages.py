@@ -22,11 +22,23 @@ _FORMS = {
     "png": (".png", [cv2.IMWRITE_PNG_COMPRESSION, 1]),
 }
 
+_PLAIN_QUATERNION = "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
+_QUATERNION = "MSG: geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n"
+
 
 @cache
 def typestore() -> Any:
     """The message types of Jazzy."""
     return get_typestore(Stores.ROS2_JAZZY)
+
+
+def definition(kind: str) -> str:
+    """The definition of a message type and of those in it, as rosbag2 stores it.
+
+    rosbags leaves out default values; of the types that are written, one has some.
+    """
+    text, _ = typestore().generate_msgdef(kind, ros_version=2)
+    return str(text).replace(_PLAIN_QUATERNION, _QUATERNION)
 
 
 def message_type(name: str) -> Any:

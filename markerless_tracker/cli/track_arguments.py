@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from markerless_tracker.datasets import FORMATS
+from markerless_tracker.datasets.standing import PERSON
 from markerless_tracker.datasets.upright import AXES, UNITS
 from markerless_tracker.results.smooth import CUTOFF_HZ
 from markerless_tracker.tracking import OPTIMIZERS, PRESETS
@@ -113,11 +114,11 @@ def add_world(group: "argparse._ActionsContainer") -> None:
     """Declare what turns the world of a calibration upright."""
     group.add_argument(
         "--up",
-        choices=AXES,
+        choices=(*AXES, PERSON),
         default="z",
         metavar="AXIS",
         help="axis of the calibration's world that is up: x, y, z, or -x, -y, -z as --up=-y "
-        "(default z)",
+        "(default z); person: up as level cameras have it, the floor under the person",
     )
     group.add_argument(
         "--units",

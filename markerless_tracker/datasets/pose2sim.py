@@ -34,7 +34,7 @@ class Pose2SimRecording(VideoRecording):
         if folder is None:
             raise DatasetError(f"{path}: no calibration folder, expected {path / 'calibration'}")
         rig = _read_rig(folder)
-        sources, notes = _match(path / "videos", rig)
+        sources, notes = match_videos(path / "videos", rig)
         cameras = []
         for camera in rig:
             stream = open_stream(sources[camera.name], input_fps=input_fps)
@@ -97,7 +97,12 @@ def _read_rig(folder: Path) -> CameraRig:
     raise DatasetError(f"{folder}: no calibration, expected a *.toml or a Qualisys *.qca.txt")
 
 
-def _match(folder: Path, rig: CameraRig) -> tuple[Mapping[str, Path], list[str]]:
+def match_videos(folder: Path, rig: CameraRig) -> tuple[Mapping[str, Path], list[str]]:
+    """Camera -> its video in a folder, by name, else all in order with a note that says so.
+
+    Raises:
+        DatasetError: names differ, and so does the number of videos.
+    """
     videos = sorted(
         entry
         for entry in (folder.iterdir() if folder.is_dir() else ())

@@ -5,14 +5,26 @@ from pathlib import Path
 from types import MappingProxyType
 
 from markerless_tracker.datasets.folder import CALIBRATION, FolderRecording
+from markerless_tracker.datasets.formats import anipose, caliscope, human36m, humaneva, totalcapture
 from markerless_tracker.datasets.formats.anipose import AniposeRecording, is_anipose
 from markerless_tracker.datasets.formats.bodytrack import BodytrackRecording, is_bodytrack
+from markerless_tracker.datasets.formats.caliscope import CaliscopeRecording, is_caliscope
+from markerless_tracker.datasets.formats.freemocap import FreeMoCapRecording, is_freemocap
+from markerless_tracker.datasets.formats.human36m import Human36mRecording, is_human36m
 from markerless_tracker.datasets.formats.humaneva import HumanEvaRecording, is_humaneva
+from markerless_tracker.datasets.formats.mpi_inf_3dhp import MpiInf3dhpRecording, is_mpi_inf_3dhp
 from markerless_tracker.datasets.formats.opencv import OpenCVRecording, is_opencv
-from markerless_tracker.datasets.pose2sim import Pose2SimRecording, is_pose2sim
+from markerless_tracker.datasets.formats.panoptic import PanopticRecording, is_panoptic
+from markerless_tracker.datasets.formats.totalcapture import TotalCaptureRecording, is_totalcapture
+from markerless_tracker.datasets.pose2sim import (
+    Pose2SimRecording,
+    calibration_folder,
+    is_pose2sim,
+)
 from markerless_tracker.datasets.recording import Recording
+from markerless_tracker.datasets.standing import PERSON, standing
 from markerless_tracker.datasets.upright import upright
-from markerless_tracker.errors import DatasetError
+from markerless_tracker.errors import DatasetError, TrackerError
 
 _READERS: Mapping[str, Callable[..., Recording]] = MappingProxyType(
     {
@@ -21,6 +33,12 @@ _READERS: Mapping[str, Callable[..., Recording]] = MappingProxyType(
         "humaneva": HumanEvaRecording,
         "bodytrack": BodytrackRecording,
         "anipose": AniposeRecording,
+        "panoptic": PanopticRecording,
+        "totalcapture": TotalCaptureRecording,
+        "mpi_inf_3dhp": MpiInf3dhpRecording,
+        "human36m": Human36mRecording,
+        "freemocap": FreeMoCapRecording,
+        "caliscope": CaliscopeRecording,
         "opencv": OpenCVRecording,
     }
 )
@@ -31,11 +49,22 @@ _SIGNS: Mapping[str, Callable[[Path], bool]] = MappingProxyType(
         "humaneva": is_humaneva,
         "bodytrack": is_bodytrack,
         "anipose": is_anipose,
+        "panoptic": is_panoptic,
+        "totalcapture": is_totalcapture,
+        "mpi_inf_3dhp": is_mpi_inf_3dhp,
+        "human36m": is_human36m,
+        "freemocap": is_freemocap,
+        "caliscope": is_caliscope,
         "pose2sim": is_pose2sim,
         "opencv": is_opencv,
     }
 )
 """Whether a path has a format; the first that fits counts."""
+
+_TRIALS: Mapping[str, Callable[[Path], list[Path]]] = MappingProxyType(
+    {"humaneva": humaneva.trials, "anipose": anipose.trials, "human36m": human36m.trials}
+)
+"""Formats whose folders hold several trials: a source for each."""
 
 FORMATS = (*_READERS, "bag")
 
@@ -56,7 +85,8 @@ def open_recording(
         scale: factor for all images and cameras, in (0, 1].
         format: one of `FORMATS`; None detects it.
         input_fps: rate of numbered images (and, if given, of videos), 1/s.
-        up: axis of the calibration's world that is up, such as `-y`; it becomes z.
+        up: axis of the calibration's world that is up, such as `-y`; it becomes z. `person` finds
+            it from the cameras and the person: see `standing`.
         units: of the calibration's lengths: m, cm or mm.
 
     Raises:
@@ -82,8 +112,38 @@ def open_recording(
             f"{path}: no recording; expected a folder with {CALIBRATION} and videos, a bag (folder "
             f"or .mcap), or one of the formats {', '.join(_READERS)}"
         )
-    recording.rig = upright(recording.rig, up=up, units=units)
+    recording.rig = upright(recording.rig, up="z" if up == PERSON else up, units=units)
+    if up == PERSON:
+        recording.rig = standing(recording)
     return recording
+
+
+def trials_at(path: Path) -> list[Path]:
+    """The sources of the trials at a path that has a format: itself, unless there are several."""
+    find = _TRIALS.get(detect_format(path) or "") if path.is_dir() else None
+    try:
+        found = [] if find is None else find(path)
+    except TrackerError:
+        # Opening it will say what is wrong.
+        return [path]
+    return found if len(found) > 1 else [path]
+
+
+def calibration_beside(path: Path) -> Path | None:
+    """A calibration outside of a recording's folder that it uses, file or folder; None without."""
+    kind = detect_format(path)
+    session = path.parent.parent if path.is_file() else path
+    if kind == "anipose":
+        return anipose.calibration_file(session)
+    if kind == "humaneva":
+        return session / humaneva.CALIBRATION
+    if kind == "human36m":
+        return human36m.metadata_file(session)
+    if kind == "totalcapture":
+        return totalcapture.calibration_file(path)
+    if kind == "caliscope":
+        return caliscope.calibration_file(path)
+    return calibration_folder(path) if kind == "pose2sim" else None
 
 
 def detect_format(path: Path) -> str | None:

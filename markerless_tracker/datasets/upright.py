@@ -55,6 +55,11 @@ def upright(rig: CameraRig, *, up: str = "z", units: str = "m") -> CameraRig:
     return CameraRig(tuple(cameras))
 
 
+def upright_points(points: FloatArray, *, up: str = "z", units: str = "m") -> FloatArray:
+    """Points (..., 3) of the old world in m in the new one; arguments as in `upright`."""
+    return np.asarray(points @ rotation_to(up).T * UNITS[units])
+
+
 def rotation_to(up: str) -> FloatArray:
     """(3, 3) rotation that takes the old world to the new one, in which the axis `up` is z."""
     return np.array(_ROTATIONS[up], dtype=np.float64)

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from markerless_tracker.datasets import detect_format, open_recording
+from markerless_tracker.datasets.source import calibration_beside, trials_at
 from markerless_tracker.errors import DatasetError
 
 
@@ -29,3 +30,19 @@ def test_formats_are_detected(tmp_path: Path, make_recording) -> None:
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "x.mcap").write_bytes(b"")
     assert detect_format(tmp_path / "bag") == detect_format(tmp_path / "bag" / "x.mcap") == "bag"
+
+
+def test_calibrations_outside_of_a_recording_are_known(tmp_path: Path) -> None:
+    take = tmp_path / "video" / "S1" / "acting1"
+    take.mkdir(parents=True)
+    (take / "TC_S1_acting1_cam1.mp4").write_bytes(b"")
+    assert calibration_beside(take) is None
+    (tmp_path / "calibration.cal").write_bytes(b"")
+    assert calibration_beside(take) == tmp_path / "calibration.cal"
+    session = tmp_path / "project" / "day"
+    (session / "videos-raw").mkdir(parents=True)
+    (session.parent / "calibration").mkdir()
+    (session.parent / "calibration" / "calibration.toml").write_text("", encoding="utf-8")
+    assert calibration_beside(session) == session.parent / "calibration" / "calibration.toml"
+    # Its calibration has no camera: that is told by opening it.
+    assert trials_at(session) == [session]

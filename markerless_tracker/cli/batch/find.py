@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from markerless_tracker.datasets import detect_format
+from markerless_tracker.datasets.source import trials_at
 from markerless_tracker.errors import DatasetError
 
 
@@ -14,8 +15,9 @@ def find_recordings(source: Path) -> dict[str, Path]:
     A folder is searched to any depth; what lies in a recording is not searched, nor are hidden
     folders. A list is a text file with one path per line, relative to the list's folder; blank
     lines and lines that begin with # are left out, and so are repeated paths. What a list names is
-    a recording, whether it exists or not. A name is the path below the folder (below the longest
-    common folder of a list), without the suffix `.mcap`.
+    a recording, whether it exists or not. Of a data set's folder with several trials each is found.
+    A name is the path below the folder (below the longest common folder of a list), that of a file
+    without its suffix.
 
     Raises:
         DatasetError: there is no such folder or list, or no recording in it.
@@ -46,7 +48,7 @@ def _below(folder: Path, seen: set[str]) -> Iterator[Path]:
         # Without a description the files belong to different recordings.
         yield from loose
     elif detect_format(folder) is not None:
-        yield folder
+        yield from trials_at(folder)
         return
     try:
         entries = sorted(folder.iterdir())
@@ -78,6 +80,6 @@ def _named(paths: Sequence[Path], base: Path) -> dict[str, Path]:
     names: dict[str, Path] = {}
     for path in paths:
         whole = path.relative_to(base).as_posix()
-        short = whole.removesuffix(".mcap")
+        short = whole.removesuffix(path.suffix) if path.is_file() else whole
         names[whole if short in names else short] = path
     return names

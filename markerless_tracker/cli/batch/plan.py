@@ -10,7 +10,7 @@ from markerless_tracker.benchmarks.tables.fingerprint import file_key, recording
 from markerless_tracker.cli.batch.trial import Trial
 from markerless_tracker.cli.track import given_settings, read_config
 from markerless_tracker.datasets.folder import CALIBRATION
-from markerless_tracker.datasets.pose2sim import calibration_folder
+from markerless_tracker.datasets.source import calibration_beside
 from markerless_tracker.errors import ConfigError
 
 NOT_OF_TRACK = ("source", "out", "json", "force", "jobs", "scheduler")
@@ -84,7 +84,7 @@ def _recording(source: Path) -> list[str]:
     """Keys of a recording and of the calibrations that may lie beside it."""
     try:
         keys = [recording_key(source), file_key(source.parent / CALIBRATION)]
-        shared = calibration_folder(source)
+        shared = calibration_beside(source)
         return [*keys, recording_key(shared)] if shared is not None else keys
     except OSError:
         # Its trial will say what is wrong with it.

@@ -22,7 +22,7 @@ class AniposeRecording(VideoRecording):
 
     The videos are in `videos-raw/` (or `videos/`). Which part of a name is the camera's says
     `triangulation.cam_regex` of the project's `config.toml`; without it the names end with the
-    camera's. The world is that of the calibration: see `UprightRecording`.
+    camera's. The world is that of the calibration.
 
     Args:
         path: the session's folder, or one video of the trial.
@@ -36,7 +36,7 @@ class AniposeRecording(VideoRecording):
 
     def __init__(self, path: Path, *, scale: float = 1.0, input_fps: float | None = None) -> None:
         session = path.parent.parent if path.is_file() else path
-        rig = read_calibration(_calibration(session))
+        rig = read_calibration(calibration_file(session))
         trials = _trials(session, rig)
         if path.is_file():
             chosen = [name for name, videos in trials.items() if path in videos.values()]
@@ -66,10 +66,21 @@ def is_anipose(path: Path) -> bool:
             return False
         path = path.parent.parent
     videos = any((path / folder).is_dir() for folder in _FOLDERS[:1])
-    return videos and _calibration(path).is_file()
+    return videos and calibration_file(path).is_file()
 
 
-def _calibration(session: Path) -> Path:
+def trials(path: Path) -> list[Path]:
+    """One video of each trial of a session.
+
+    Raises:
+        CalibrationError, DatasetError: as `AniposeRecording` does.
+    """
+    found = _trials(path, read_calibration(calibration_file(path)))
+    return [next(iter(videos.values())) for videos in found.values()]
+
+
+def calibration_file(session: Path) -> Path:
+    """The calibration of a session: its own, or that beside it; whether it exists or not."""
     own = session / _CALIBRATION / CALIBRATION
     return own if own.is_file() else session.parent / _CALIBRATION / CALIBRATION
 

@@ -22,7 +22,8 @@ from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image, scale_image
 
 FPS = 60.0
-_IMAGES, _CALIBRATION, _SYNC, _MOCAP = "Image_Data", "Calibration_Data", "Sync_Data", "Mocap_Data"
+CALIBRATION = "Calibration_Data"
+_IMAGES, _SYNC, _MOCAP = "Image_Data", "Sync_Data", "Mocap_Data"
 _BACKGROUND = "Background"
 _NAME = re.compile(r"(?P<trial>.+)_\((?P<camera>[A-Za-z]+\d+)\)")
 
@@ -56,7 +57,7 @@ class HumanEvaRecording(VideoRecording):
         sources = {view.camera: view.path for view in _views(subject) if view.trial == trial}
         sizes = image_sizes(sources)
         cameras = [
-            read_cal(subject / _CALIBRATION / f"{name}.cal", name, sizes[name]) for name in sources
+            read_cal(subject / CALIBRATION / f"{name}.cal", name, sizes[name]) for name in sources
         ]
         rig = CameraRig(tuple(cameras))
         super().__init__(subject, sources, rig, scale=scale, input_fps=input_fps or FPS)
@@ -120,7 +121,12 @@ def is_humaneva(path: Path) -> bool:
     """Whether a path is a subject's folder, or the images of a camera in it."""
     if path.parent.name == _IMAGES and _NAME.fullmatch(_stem(path)):
         path = path.parent.parent
-    return (path / _IMAGES).is_dir() and (path / _CALIBRATION).is_dir()
+    return (path / _IMAGES).is_dir() and (path / CALIBRATION).is_dir()
+
+
+def trials(path: Path) -> list[Path]:
+    """Images of one camera of each trial of a subject."""
+    return list({view.trial: view.path for view in reversed(_views(path))}.values())[::-1]
 
 
 def _chosen(path: Path) -> tuple[Path, str]:

@@ -75,3 +75,27 @@ def test_trials_of_a_session_share_its_calibration(tmp_path: Path) -> None:
     for name in ("calibration", "Trial_1/videos", "Trial_2/videos"):
         (session / name).mkdir(parents=True)
     assert find_recordings(session) == {name: session / name for name in ("Trial_1", "Trial_2")}
+
+
+def test_each_trial_of_a_subject_is_found(tmp_path: Path) -> None:
+    subject = tmp_path / "HumanEva_2" / "S2"
+    (subject / "Calibration_Data").mkdir(parents=True)
+    for trial in ("Combo_1", "Walking_1"):
+        for camera in ("C1", "C2"):
+            images = subject / "Image_Data" / f"{trial}_({camera})"
+            images.mkdir(parents=True)
+            (images / "0001.png").write_bytes(b"")
+    images = subject / "Image_Data"
+    assert find_recordings(tmp_path) == {
+        f"HumanEva_2/S2/Image_Data/{trial}_(C1)": images / f"{trial}_(C1)"
+        for trial in ("Combo_1", "Walking_1")
+    }
+    videos = tmp_path / "h36m" / "S1" / "Videos"
+    videos.mkdir(parents=True)
+    (tmp_path / "h36m" / "metadata.xml").write_bytes(b"")
+    (videos / "Eating.54138969.mp4").write_bytes(b"")
+    assert find_recordings(tmp_path / "h36m") == {"S1": videos.parent}
+    (videos / "Eating 1.54138969.mp4").write_bytes(b"")
+    assert list(find_recordings(tmp_path / "h36m")) == [
+        "S1/Videos/Eating 1.54138969", "S1/Videos/Eating.54138969",
+    ]  # fmt: skip

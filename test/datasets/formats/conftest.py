@@ -9,10 +9,13 @@ import pytest
 
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets import Recording
+from markerless_tracker.datasets.upright import UNITS, rotation_to
 from markerless_tracker.geometry import rodrigues_from_rotation, rotation_from_rodrigues, transform
 
 SIZE = (32, 24)
 FRAMES = 3
+TRUTH_M = np.random.default_rng(6).uniform([-1.0, -1.0, 0.0], [1.0, 1.0, 1.8], (FRAMES, 28, 3))
+"""Joints of the frames, world frame; a data set has some of the 28."""
 
 
 def camera(name: str, turn: float) -> CameraModel:
@@ -90,3 +93,35 @@ def cal_numbers(model: CameraModel, *, vector: bool = False) -> str:
         *([rodrigues_from_rotation(T[:3, :3])] if vector else []),
     ]
     return "".join(" ".join(f"{value:.17g}" for value in row) + "\n" for row in rows)
+
+
+def in_world_of(rig: CameraRig, *, up: str = "z", units: str = "m") -> CameraRig:
+    """The rig as a data set states it whose world has another axis up and other units."""
+    cameras = []
+    for one in rig:
+        T = one.T_cam_world
+        stated = transform(T[:3, :3] @ rotation_to(up), T[:3, 3] / UNITS[units])
+        cameras.append(CameraModel(one.name, one.size_px, one.matrix, one.distortion, stated))
+    return CameraRig(tuple(cameras))
+
+
+def points_of(points: np.ndarray, *, up: str = "z", units: str = "m") -> np.ndarray:
+    """Points as such a data set states them."""
+    return points @ rotation_to(up) / UNITS[units]
+
+
+def with_lens(rig: CameraRig, distortion: list[float]) -> CameraRig:
+    """The rig with other lenses."""
+    return CameraRig(
+        tuple(
+            CameraModel(c.name, c.size_px, c.matrix, np.array(distortion), c.T_cam_world)
+            for c in rig
+        )
+    )
+
+
+def changed(path: Path, old: str, new: str) -> None:
+    """Change every place of a text in a file."""
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")

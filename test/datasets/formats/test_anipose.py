@@ -1,5 +1,6 @@
 """Anipose sessions, and worlds turned upright."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -7,10 +8,10 @@ import pytest
 
 from markerless_tracker.camera import CameraModel, CameraRig, write_calibration
 from markerless_tracker.cli.main import main
-from markerless_tracker.datasets import detect_format, open_recording
+from markerless_tracker.datasets import detect_format, open_recording, write_image
 from markerless_tracker.datasets.upright import AXES, rotation_to, upright
 from markerless_tracker.errors import CalibrationError, ConfigError, DatasetError
-from markerless_tracker.geometry import apply
+from markerless_tracker.geometry import apply, rotation_from_rodrigues, transform
 
 NAMES = ("A", "B")
 
@@ -123,3 +124,62 @@ def test_unknown_axes_and_units(session: Path) -> None:
         open_recording(session, up="w")
     with pytest.raises(ConfigError, match="units 'inch': expected one of m, cm, mm"):
         open_recording(session, units="inch")
+
+
+def test_level_cameras_and_the_person_turn_the_world(walk, tmp_path: Path) -> None:
+    true = open_recording(walk).rig
+    turn = transform(rotation_from_rodrigues([0.7, -1.1, 0.4]), [3.0, -2.0, 5.0])
+    in_cm = CameraRig(
+        tuple(
+            CameraModel(c.name, c.size_px, c.matrix, c.distortion, _stated(c.T_cam_world @ turn))
+            for c in true
+        )
+    )
+    folder = tmp_path / "walk"
+    shutil.copytree(walk, folder)
+    write_calibration(folder / "calibration.toml", in_cm)
+    recording = open_recording(folder, up="person", units="cm")
+    moves = [
+        new.T_world_cam @ old.T_cam_world for new, old in zip(recording.rig, true, strict=True)
+    ]
+    for move in moves:
+        # From the true world: about z, by less than 1 degree aside, the floor kept within 8 cm.
+        assert move[2, 2] > np.cos(np.deg2rad(1.0)) and abs(move[2, 3]) < 0.08
+        np.testing.assert_allclose(move, moves[0], atol=1e-9)
+    assert recording.warnings == ()
+
+
+def _stated(T_cam_world: np.ndarray) -> np.ndarray:
+    changed = T_cam_world.copy()
+    changed[:3, 3] /= 0.01
+    return changed
+
+
+def test_a_world_that_nothing_turns(walk, tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="no moving person in 24 sets"):
+        open_recording(_still(walk, tmp_path / "still"), up="person", input_fps=30.0)
+    folder = tmp_path / "rolled"
+    shutil.copytree(walk, folder)
+    rig = open_recording(walk).rig
+    rolled = [
+        CameraModel(c.name, c.size_px, c.matrix, c.distortion, roll @ c.T_cam_world)
+        for c, roll in zip(rig, [_roll(0.0), _roll(180.0), _roll(0.0), _roll(180.0)], strict=True)
+    ]
+    write_calibration(folder / "calibration.toml", CameraRig(tuple(rolled)))
+    with pytest.raises(DatasetError, match="rolled: the cameras look from above, or are rolled"):
+        open_recording(folder, up="person")
+
+
+def _still(walk: Path, folder: Path) -> Path:
+    """The recording without its person."""
+    shutil.copytree(walk, folder)
+    recording = open_recording(walk)
+    for name, images in recording.background_frames().items():
+        (folder / f"{name}.mkv").unlink()
+        for index in range(3):
+            write_image(folder / name / f"{index}.png", images[0])
+    return folder
+
+
+def _roll(angle_deg: float) -> np.ndarray:
+    return transform(rotation_from_rodrigues([0.0, 0.0, np.deg2rad(angle_deg)]), np.zeros(3))
