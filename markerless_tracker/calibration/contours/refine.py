@@ -41,7 +41,8 @@ class CameraRefinement:
         change: (7,) see `contours.cameras`; zeros if the camera is right.
         sd: (7,) standard deviations; zeros if it is right, or where it is held.
         held: names of changes that the contours do not determine.
-        before_px, after_px: (u, v) of the silhouettes beside the body, at full size.
+        before_px, after_px: (u, v) of the silhouettes beside the body, at full size; NaN if the
+            camera was never compared.
         displaced_m: how far the change displaces the person in the image, at the body.
         corrected: whether it is changed at all.
     """
@@ -59,8 +60,8 @@ class CameraRefinement:
         return {
             "corrected": self.corrected,
             "shift_px": {
-                "before": [round(value, 2) for value in self.before_px],
-                "after": [round(value, 2) for value in self.after_px],
+                "before": _pixels(self.before_px),
+                "after": _pixels(self.after_px),
             },
             "displaced_mm": round(1000.0 * self.displaced_m, 1),
             "rotation_deg": _rounded(np.degrees(self.change[ROTATION])),
@@ -133,7 +134,8 @@ def refine_cameras(
         scale: factor from full-size images to those tracked.
 
     Raises:
-        CalibrationError: too few cameras, no tracked frame, or a person that hardly moves.
+        CalibrationError: too few cameras see the person, no frame was tracked, or the person hardly
+            moves.
     """
     independent, extent = _checked(rig, frames)
     start = ContourAdjustment(
@@ -180,13 +182,14 @@ def refine_cameras(
 
 def _checked(rig: CameraRig, frames: Sequence[SeenFrame]) -> tuple[float, FloatArray]:
     """Effective number of independent frames and the motion's extent (3,), if they suffice."""
-    if len(rig) < LEAST_CAMERAS:
-        raise CalibrationError(
-            f"{len(rig)} cameras: either may be wrong where two disagree, expected "
-            f"{LEAST_CAMERAS} or more"
-        )
     if not frames:
         raise CalibrationError("no frame was tracked in two views, expected a tracked person")
+    seeing = {name for frame in frames for name in frame.observations} & set(rig.names)
+    if len(seeing) < LEAST_CAMERAS:
+        raise CalibrationError(
+            f"{len(seeing)} cameras see the person: either may be wrong where two disagree, "
+            f"expected {LEAST_CAMERAS} or more"
+        )
     independent, extent = float(independence(frames).sum()), extent_m(frames)
     if independent < LEAST_INDEPENDENT:
         across = " x ".join(f"{value:.2f}" for value in extent)
@@ -208,6 +211,10 @@ def _deviations(adjustment: ContourAdjustment) -> FloatArray:
         matrix = scale_of(now) * now.information + np.diag(prior)
         out[free] = np.sqrt(np.diag(np.linalg.inv(matrix[np.ix_(free, free)])))
     return out.reshape(adjustment.free.shape)
+
+
+def _pixels(values: tuple[float, float]) -> list[float] | None:
+    return [round(value, 2) for value in values] if np.isfinite(values).all() else None
 
 
 def _pair(values: FloatArray) -> tuple[float, float]:

@@ -14,9 +14,13 @@ def describe_refinement(refinement: Refinement) -> list[str]:
         for name, one in refinement.cameras.items()
         if one.corrected
     ]
-    agree = [name for name, one in refinement.cameras.items() if not one.corrected]
+    rest = {name: one for name, one in refinement.cameras.items() if not one.corrected}
+    agree = [name for name, one in rest.items() if np.isfinite(one.before_px).all()]
     if agree:
         lines.append(f"{', '.join(agree)}: agree and stay as they are")
+    unseen = [name for name in rest if name not in agree]
+    if unseen:
+        lines.append(f"{', '.join(unseen)}: never compared, since they do not see the person")
     if not refinement.anchored:
         lines.append(
             "fewer than two cameras agree: the world stays where the cameras are on average"

@@ -105,7 +105,16 @@ def test_two_cameras_or_no_frame_are_refused(walk) -> None:
     scene, frames = walk
     two = scene.rig.selected(["cam01", "cam02"])
     only = [replace(f, observations={n: f.observations[n] for n in two.names}) for f in frames]
-    with pytest.raises(CalibrationError, match="2 cameras: either may be wrong"):
+    with pytest.raises(CalibrationError, match="2 cameras see the person: either may be wrong"):
         refine_cameras(two, scene.body, CONFIG, only)
     with pytest.raises(CalibrationError, match="no frame was tracked"):
         refine_cameras(scene.rig, scene.body, CONFIG, [])
+
+
+def test_a_camera_that_sees_nobody_is_not_judged(walk) -> None:
+    scene, frames = walk
+    three = ("cam01", "cam02", "cam03")
+    only = [replace(f, observations={n: f.observations[n] for n in three}) for f in frames[::2]]
+    found = refine_cameras(scene.rig, scene.body, CONFIG, only)
+    assert describe_refinement(found)[1].startswith("cam04: never compared")
+    assert found.as_mapping()["cameras"]["cam04"]["shift_px"]["before"] is None
