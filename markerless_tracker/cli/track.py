@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -68,8 +67,7 @@ def run(args: argparse.Namespace) -> int:
         warn(console, warning)
     verdict = finished.outcome.verdict
     if args.json:
-        json.dump(finished.summary, sys.stdout, indent=2)
-        sys.stdout.write("\n")
+        print(json.dumps(finished.summary, indent=2))
     else:
         print(
             f"{finished.outcome.trc_path}: {verdict.counts}, "
@@ -167,8 +165,9 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     if smoothing is not None and verdict.tracked:
         filled = smooth_result(args.name, smoothing)
     if choice is not None:
-        notices.begin("refining the calibration")
+        notices.begin("refining the calibration", 1)
         refined = _refined(args, setup, config, choice)
+        notices.step(1)
     late = [*recording.warnings, *describe(outcome.shifts)]
     if verdict.frames_with_warnings:
         late.append(
