@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -14,6 +13,9 @@ import yaml
 from rich.console import Console
 
 from markerless_tracker.body import load_description
+from markerless_tracker.calibration.contours.frames import FrameChoice
+from markerless_tracker.calibration.contours.refine import Refinement, refine_cameras
+from markerless_tracker.calibration.contours.report import describe_refinement
 from markerless_tracker.camera.calibration import write_calibration
 from markerless_tracker.camera.doubts import calibration_doubts
 from markerless_tracker.cli.terminal.bars import tell, warn
@@ -23,7 +25,7 @@ from markerless_tracker.compiled import compilation
 from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
 from markerless_tracker.datasets.silhouettes import SilhouetteRecording
-from markerless_tracker.errors import ConfigError
+from markerless_tracker.errors import CalibrationError, ConfigError
 from markerless_tracker.results.result import ResultWriter, check_target
 from markerless_tracker.results.run import recording_backgrounds, track_recording
 from markerless_tracker.results.smooth import Smoothing, smooth_result
@@ -34,7 +36,7 @@ from markerless_tracker.tracking import (
     TrackerSetup,
     build_tracker,
 )
-from markerless_tracker.tracking.camera_check import CameraCheck, Shift, corrected, describe
+from markerless_tracker.tracking.camera_check import CameraCheck, Shift, describe
 from markerless_tracker.viewing.debug_images import DebugImages
 
 HELP = (
@@ -54,7 +56,11 @@ _KEYS = ("optimizer", "body", "evaluations", "seed", "threads")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Track; returns 0, or 3 if no person was found."""
+    """Track; returns 0, or 3 if no person was found.
+
+    Raises:
+        CalibrationError: the calibration was to be refined and cannot be; the result is complete.
+    """
     console = Console(stderr=True)
     with Bars(console) as bars:
         finished = track_source(args, bars)
@@ -62,8 +68,7 @@ def run(args: argparse.Namespace) -> int:
         warn(console, warning)
     verdict = finished.outcome.verdict
     if args.json:
-        json.dump(finished.summary, sys.stdout, indent=2)
-        sys.stdout.write("\n")
+        print(json.dumps(finished.summary, indent=2))
     else:
         print(
             f"{finished.outcome.trc_path}: {verdict.counts}, "
@@ -72,7 +77,15 @@ def run(args: argparse.Namespace) -> int:
         )
         for line in verdict.lines():
             print(line)
+        if isinstance(finished.refined, Refinement):
+            print(f"{args.refine_calibration}:")
+            for line in describe_refinement(finished.refined):
+                print(f"  {line}")
     if verdict.tracked:
+        if isinstance(finished.refined, CalibrationError):
+            raise CalibrationError(
+                f"{args.refine_calibration}: not written: {finished.refined}"
+            ) from finished.refined
         return 0
     tell(
         console,
@@ -89,12 +102,14 @@ class Finished:
     Attributes:
         outcome: what the frames gave.
         filled: interpolated frames, None without smoothing.
+        refined: the refined calibration or why there is none; None if it was not asked for.
         late_warnings: warnings known at the end only, one line each.
         summary: all of it, for JSON.
     """
 
     outcome: "Outcome"
     filled: int | None
+    refined: Refinement | CalibrationError | None
     late_warnings: tuple[str, ...]
     summary: Mapping[str, Any]
 
@@ -144,14 +159,16 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
         with compilation(lambda _, done, most: notices.step(done, most)):
             setup.tracker.warm_up()
         notices.begin(f"tracking {recording.name}", _total(recording, setup, args.fps))
-        outcome = _track(args, recording, setup, config, doubts, notices)
-    filled = None
+        choice = None if args.refine_calibration is None else FrameChoice()
+        outcome = _track(args, recording, setup, config, doubts, notices, choice)
+    filled = refined = None
     verdict = outcome.verdict
     if smoothing is not None and verdict.tracked:
         filled = smooth_result(args.name, smoothing)
-    if args.refine_calibration is not None:
-        full = _opened(args, 1.0).rig
-        write_calibration(args.refine_calibration, corrected(full, outcome.shifts, args.scale))
+    if choice is not None:
+        notices.begin("refining the calibration", 1)
+        refined = _refined(args, setup, config, choice)
+        notices.step(1)
     late = [*recording.warnings, *describe(outcome.shifts)]
     if verdict.frames_with_warnings:
         late.append(
@@ -161,7 +178,26 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     summary = _summary(args, recording, outcome)
     if filled is not None:
         summary["filled"] = filled
-    return Finished(outcome, filled, tuple(late), summary)
+    if isinstance(refined, Refinement):
+        summary["calibration"] = {"path": str(args.refine_calibration), **refined.as_mapping()}
+    elif refined is not None:
+        summary["calibration"] = {"path": None, "refused": str(refined)}
+    return Finished(outcome, filled, refined, tuple(late), summary)
+
+
+def _refined(
+    args: argparse.Namespace, setup: TrackerSetup, config: TrackerConfig, choice: FrameChoice
+) -> Refinement | CalibrationError:
+    """Refine the calibration and write it; returns why it was not refined where it was not."""
+    tracker = setup.tracker
+    try:
+        refinement = refine_cameras(
+            tracker.rig, tracker.body, config, choice.chosen(), scale=args.scale
+        )
+    except CalibrationError as error:
+        return error
+    write_calibration(args.refine_calibration, refinement.applied(_opened(args, 1.0).rig))
+    return refinement
 
 
 @dataclass(frozen=True)
@@ -206,6 +242,7 @@ def _track(
     config: TrackerConfig,
     doubts: Sequence[str],
     notices: Notices,
+    choice: FrameChoice | None,
 ) -> Outcome:
     """Track all frames and write the result and the debug images."""
     tracker = setup.tracker
@@ -227,6 +264,8 @@ def _track(
             writer.add(result)
             writer.body = body
             check.add(result, body)
+            if choice is not None:
+                choice.add(result)
             for kind in record.add(result, body, tracked.images.index):
                 notices.warn(f"frame {kind.first_frame}: {kind.text}")
             if debug:

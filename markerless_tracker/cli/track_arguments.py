@@ -197,5 +197,6 @@ def _files(group: argparse._ArgumentGroup) -> None:
         "--refine-calibration",
         type=Path,
         metavar="OUT.toml",
-        help="write the calibration with the pose of disagreeing cameras corrected",
+        help="write the calibration with pose and focal length of disagreeing cameras corrected by "
+        "the contours of the whole run; refused if the person hardly moves",
     )

@@ -6,7 +6,7 @@ persists over a run is neither motion nor segmentation: the calibration of the c
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -125,26 +125,6 @@ class CameraCheck:
         for name in self._found:
             if name not in self._suspects:
                 self._found[name] = []
-
-
-def corrected(rig: CameraRig, shifts: Mapping[str, Shift], scale: float) -> CameraRig:
-    """The rig with the principal points of the cameras that disagree moved by their shifts.
-
-    Args:
-        rig: the cameras of the full-size images.
-        shifts: at the scale of the images tracked.
-        scale: factor from the full size to those.
-    """
-    cameras = []
-    for camera in rig:
-        shift = shifts.get(camera.name)
-        if shift is not None and shift.disagrees:
-            matrix = camera.matrix.copy()
-            matrix[0, 2] += shift.px[0] / scale
-            matrix[1, 2] += shift.px[1] / scale
-            camera = replace(camera, matrix=matrix)
-        cameras.append(camera)
-    return CameraRig(tuple(cameras))
 
 
 def describe(shifts: Mapping[str, Shift]) -> list[str]:

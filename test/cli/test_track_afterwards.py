@@ -1,4 +1,7 @@
-"""Verb `track`: existing results, lost frames, silhouettes made elsewhere, offsets, smoothing."""
+"""Verb `track`: existing results, lost frames, silhouettes made elsewhere, offsets, smoothing.
+
+Also the refinement of the calibration.
+"""
 
 import json
 from pathlib import Path
@@ -99,3 +102,16 @@ def test_smoothing_and_offsets(track, tmp_path: Path) -> None:
     status, _, err = track("--time-offsets", "cam02=-0.0333", "--force")
     assert status == 0 and len(read_trc(tmp_path / "out.trc")) == 5
     assert read_result(tmp_path / "out").summary["time_offsets_s"] == {"cam02": -0.0333}
+
+
+def test_a_calibration_is_not_refined_by_a_person_who_hardly_moves(track, tmp_path: Path) -> None:
+    status, out, err = track("--refine-calibration", tmp_path / "new.toml")
+    assert status == 1 and "6 tracked" in out
+    assert "new.toml: not written: the person hardly moves: 6 frames are as good as 1." in err
+    assert "walks through the whole volume" in err and "Traceback" not in err
+    assert not (tmp_path / "new.toml").exists()
+    assert len(read_trc(tmp_path / "out.trc").stamps_ns) == 6
+    status, out, _ = track("--force", "--json", "--refine-calibration", tmp_path / "new.toml")
+    assert status == 1
+    assert json.loads(out)["calibration"]["path"] is None
+    assert "hardly moves" in json.loads(out)["calibration"]["refused"]

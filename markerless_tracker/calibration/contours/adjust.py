@@ -1,0 +1,306 @@
+"""Least squares of contours: changes of the cameras, one body and the pose of every frame.
+
+Poses are eliminated first (Schur complement), as in the fit of a body alone (`fitness.shape`).
+"""
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body.sizes import Sizes
+from markerless_tracker.calibration.contours.body_unknowns import BodyUnknowns
+from markerless_tracker.calibration.contours.cameras import (
+    CHANGES,
+    change_between,
+    change_slopes,
+    moved,
+    put,
+    shift_slopes,
+)
+from markerless_tracker.calibration.contours.frames import SeenFrame, independence
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.camera.model import project_camera
+from markerless_tracker.fitness.arrays import lay_out_views
+from markerless_tracker.fitness.contour import (
+    ContourFrame,
+    OutlineRows,
+    eliminated,
+    normal_equations,
+    outline_rows,
+    pose_slopes,
+    solved,
+    surface,
+)
+from markerless_tracker.fitness.shape import CORRELATION_M
+from markerless_tracker.fitness.shape.body_fit import ALONG
+from markerless_tracker.fitness.shape.section_fit import RESIDUAL_SIGMA_M
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.search import pixels_per_m
+
+PRIOR_SD = np.array([*np.deg2rad([2.0, 2.0, 2.0]), 0.03, 0.03, 0.03, 0.01])
+"""Standard deviation (7,) of the change of a camera that is wrong: a camera that was touched turns
+more than it moves. What the contours do not determine stays near its value."""
+FIRST_REACH_M = 0.2
+"""Residuals beyond it are outliers in the first iteration."""
+LAST_REACH_M = 0.05
+"""The same in the last iterations."""
+_SCALE = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG)
+_DAMPING = 1e-6
+_HELD = 1e12
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The equations of the cameras' changes at a state; body and poses are eliminated.
+
+    Attributes:
+        cost: -log p of all contours and priors.
+        information: (7 c, 7 c) of the contours alone.
+        slope: (7 c,) of the contours alone.
+        residual_m: root mean square residual, by represented length of outline.
+    """
+
+    cost: float
+    information: FloatArray
+    slope: FloatArray
+    residual_m: float
+
+
+@dataclass(eq=False)
+class _Frame:
+    contours: ContourFrame
+    pose: FloatArray
+    weight: float
+
+
+class _Sums:
+    """Equations of cameras and body, summed over frames."""
+
+    def __init__(self, size: int) -> None:
+        self.hessian, self.slope = np.zeros((size, size)), np.zeros(size)
+        self.parts: list[FloatArray] = []
+        self.cost = self.squares = self.weight = 0.0
+
+
+class ContourAdjustment:
+    """Cameras, body and poses that fit the contours of all frames together.
+
+    Args:
+        rig: the cameras to begin with.
+        body: the body that was tracked.
+        sizes: makes the body of other lengths.
+        frames: the frames.
+        limits: (2, p) of the poses.
+        step_px: see `ContourFrame`.
+
+    Attributes:
+        cameras: the cameras so far, in the rig's order.
+        free: (c, 7) changes that are not held.
+    """
+
+    def __init__(
+        self,
+        rig: CameraRig,
+        body: BodyModel,
+        sizes: Sizes,
+        frames: Sequence[SeenFrame],
+        limits: FloatArray,
+        *,
+        step_px: float,
+    ) -> None:
+        self._first = rig.cameras
+        self._limits = limits
+        self._body = BodyUnknowns(body, sizes)
+        self.cameras = list(rig.cameras)
+        self.free = np.zeros((len(rig), CHANGES), dtype=np.bool_)
+        self._frames = [
+            _Frame(self._contours(frame, step_px), np.array(frame.pose), float(weight))
+            for frame, weight in zip(frames, independence(frames), strict=True)
+        ]
+
+    def copy(self) -> "ContourAdjustment":
+        """The same state, to go on from independently; evidence is shared."""
+        other = copy.copy(self)
+        other.cameras, other.free = list(self.cameras), self.free.copy()
+        other._body = copy.copy(self._body)
+        other._frames = [replace(frame, pose=frame.pose.copy()) for frame in self._frames]
+        return other
+
+    @property
+    def changes(self) -> FloatArray:
+        """(c, 7) from the first cameras to those so far."""
+        return np.array(
+            [change_between(a, b) for a, b in zip(self._first, self.cameras, strict=True)]
+        )
+
+    @property
+    def body(self) -> BodyModel:
+        """The body so far."""
+        return self._body.body
+
+    @property
+    def poses(self) -> FloatArray:
+        """(n, p) the frames' poses so far."""
+        return np.array([frame.pose for frame in self._frames])
+
+    def hold(self, held: NDArray[np.bool_]) -> None:
+        """Hold changes (c, 7) at zero from now on, all others are free."""
+        self.free = ~held
+        changes = np.where(held, 0.0, self.changes)
+        self.cameras = [moved(c, one) for c, one in zip(self._first, changes, strict=True)]
+
+    def run(self, iterations: int, first_m: float = FIRST_REACH_M) -> None:
+        """Damped Gauss-Newton steps; the truncation shrinks, the last third has the last one.
+
+        Args:
+            iterations: number of steps.
+            first_m: residuals beyond this distance are outliers in the first.
+        """
+        shrinking = max(1, iterations - iterations // 3 - 1)
+        for i in range(iterations):
+            share = min(i / shrinking, 1.0)
+            self._iterate(first_m * (LAST_REACH_M / first_m) ** share)
+
+    def evaluation(self) -> Evaluation:
+        """The equations at the state so far."""
+        sums = self._summed(LAST_REACH_M)
+        count = CHANGES * len(self.cameras)
+        cross = sums.hessian[:count, count:]
+        both = np.column_stack([cross.T, sums.slope[count:]])
+        rest = np.linalg.solve(sums.hessian[count:, count:], both)
+        strain = float(np.sum((self.changes / PRIOR_SD) ** 2))
+        return Evaluation(
+            sums.cost + self._body.strain + 0.5 * strain,
+            sums.hessian[:count, :count] - cross @ rest[:, :-1],
+            sums.slope[:count] - cross @ rest[:, -1],
+            float(np.sqrt(sums.squares / sums.weight)),
+        )
+
+    def shifts_px(self) -> FloatArray:
+        """How far (c, 2) px the silhouettes of each camera lie beside the body; NaN if unknown."""
+        count = len(self.cameras)
+        normal, slope = np.zeros((count, 2, 2)), np.zeros((count, 2))
+        for frame in self._frames:
+            rows = self._collect(frame, LAST_REACH_M)
+            points = surface(self.body, frame.pose, rows)
+            for number, part in self._parts(frame):
+                along = shift_slopes(self.cameras[number], points[part], rows.gradient[part])
+                weighted = along * (frame.weight * rows.weight[part])[:, None]
+                normal[number] += weighted.T @ along
+                slope[number] += weighted.T @ rows.value[part]
+        out = np.full((count, 2), np.nan)
+        for number in range(count):
+            if np.linalg.matrix_rank(normal[number]) == 2:
+                out[number] = -np.linalg.solve(normal[number], slope[number])
+        return out
+
+    def moved_px(self) -> FloatArray:
+        """Mean shift (c, 2) px of the person's image by the changes."""
+        return np.array([pixels.mean(axis=0) for pixels, _ in self._displaced()])
+
+    def displacements_m(self) -> FloatArray:
+        """Root mean square displacement (c,) of the person in the image, in m at the body."""
+        return np.array(
+            [np.sqrt(((pixels * metres[:, None]) ** 2).sum(axis=1).mean())
+             for pixels, metres in self._displaced()]
+        )  # fmt: skip
+
+    def _displaced(self) -> list[tuple[FloatArray, FloatArray]]:
+        """By camera: displacements (n, 2) px of the joints' images, and m per px (n,) there."""
+        points = np.concatenate([markers(self.body, frame.pose) for frame in self._frames])
+        out = []
+        for first, camera in zip(self._first, self.cameras, strict=True):
+            pixels = project_camera(points, camera) - project_camera(points, first)
+            depth = points @ first.T_cam_world[2, :3] + first.T_cam_world[2, 3]
+            seen = np.isfinite(pixels).all(axis=1)
+            out.append((pixels[seen], depth[seen] / first.matrix[0, 0]))
+        return out
+
+    def _iterate(self, reach_m: float) -> None:
+        """One step; equations that cannot be solved change nothing."""
+        sums = self._summed(reach_m)
+        count = CHANGES * len(self.cameras)
+        first, free = np.arange(count), self.free.ravel()
+        precision = np.tile(1.0 / PRIOR_SD**2, len(self.cameras))
+        sums.hessian[first, first] += np.where(free, precision, _HELD)
+        sums.slope[:count] += precision * self.changes.ravel()
+        sums.slope[:count] *= free
+        sums.hessian[np.diag_indices_from(sums.hessian)] *= 1.0 + _DAMPING
+        step = solved(sums.hessian, sums.slope)
+        if not np.isfinite(step).all():
+            return
+        step[:count] *= free
+        step[count:] = self._body.take(step[count:])
+        changes = step[:count].reshape(-1, CHANGES)
+        self.cameras = [moved(c, one) for c, one in zip(self.cameras, changes, strict=True)]
+        for frame, part in zip(self._frames, sums.parts, strict=True):
+            frame.pose = np.clip(frame.pose - part @ np.append(step, 1.0), *self._limits)
+
+    def _summed(self, reach_m: float) -> _Sums:
+        """Equations of cameras and body, poses eliminated; the cameras' priors are not in them."""
+        sums = _Sums(CHANGES * len(self.cameras) + self._body.size)
+        self._body.add_priors(sums.hessian, sums.slope)
+        longer, body = self._body.longer(), self.body
+        for frame in self._frames:
+            rows = self._collect(frame, reach_m)
+            points = surface(body, frame.pose, rows)
+            by_camera = np.zeros((len(points), CHANGES * len(self.cameras)))
+            for number, part in self._parts(frame):
+                columns = slice(CHANGES * number, CHANGES * (number + 1))
+                by_camera[part, columns] = change_slopes(
+                    self.cameras[number], points[part], rows.gradient[part]
+                )
+            slopes = np.column_stack(
+                [
+                    pose_slopes(body, frame.pose, rows),
+                    by_camera,
+                    self._body.slopes(longer, frame.pose, rows, points),
+                ]
+            )
+            own, pull = normal_equations(slopes, frame.weight * _SCALE * rows.weight, rows.value)
+            off = (frame.pose - body.prior_mean) / body.prior_sd
+            pose = np.arange(body.size)
+            own[pose, pose] += frame.weight / body.prior_sd**2 + 1e-9
+            own[pose, pose] *= 1.0 + _DAMPING
+            pull[pose] += frame.weight * off / body.prior_sd
+            sums.parts.append(eliminated(own, pull, body.size, sums.hessian, sums.slope))
+            residuals = float(frame.contours.residuals.cost.sum())
+            sums.cost += frame.weight * (_SCALE * residuals + 0.5 * float(off @ off))
+            sums.squares += frame.weight * float(rows.weight @ rows.value**2)
+            sums.weight += frame.weight * float(rows.weight.sum())
+        return sums
+
+    def _collect(self, frame: _Frame, reach_m: float) -> OutlineRows:
+        """The residuals of a frame with the cameras, body and pose so far."""
+        by_name = {camera.name: camera for camera in self.cameras}
+        views = frame.contours.views
+        for view, name in enumerate(views.names):
+            put(views.arrays, view, by_name[name])
+        frame.contours.collect(frame.pose, reach_m, self.body)
+        return outline_rows(frame.contours)
+
+    def _parts(self, frame: _Frame) -> list[tuple[int, slice]]:
+        """Number of the camera and rows of each view, after `_collect`."""
+        names = [camera.name for camera in self.cameras]
+        ends = np.cumsum([0, *frame.contours.residuals.count])
+        return [
+            (names.index(name), slice(int(ends[view]), int(ends[view + 1])))
+            for view, name in enumerate(frame.contours.views.names)
+        ]
+
+    def _contours(self, frame: SeenFrame, step_px: float) -> ContourFrame:
+        cameras = {c.name: c for c in self._first if c.name in frame.observations}
+        centre = np.nanmean(frame.markers_m, axis=0)
+        return ContourFrame(
+            self.body,
+            cameras,
+            frame.observations,
+            lay_out_views(list(cameras.values()), frame.observations),
+            pixels_per_m={name: pixels_per_m(c, centre) for name, c in cameras.items()},
+            step_px=step_px,
+            reach_m=FIRST_REACH_M,
+        )

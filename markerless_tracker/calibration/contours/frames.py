@@ -1,0 +1,101 @@
+"""Tracked frames that a calibration is refined with: few, and as different as possible."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation, TrackResult, TrackState
+
+MOST = 28
+"""Frames that are used."""
+MOST_KEPT = 4 * MOST
+"""Frames that are kept to choose from."""
+APART_M = 0.15
+"""Frames whose markers differ by less, as root mean square, repeat each other: the errors of the
+body's shape and of the segmentation are the same in them."""
+_LEAST_VIEWS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class SeenFrame:
+    """A tracked frame.
+
+    Attributes:
+        stamp_ns: time.
+        pose: (p,) as tracked.
+        markers_m: (m, 3) world.
+        observations: evidence of the views that show the person.
+    """
+
+    stamp_ns: int
+    pose: FloatArray
+    markers_m: FloatArray
+    observations: Mapping[str, Observation]
+
+
+class FrameChoice:
+    """Keeps frames of a run of any length, evenly spread over it."""
+
+    def __init__(self) -> None:
+        self._kept: list[SeenFrame] = []
+        self._every = 1
+        self._tracked = 0
+
+    def add(self, result: TrackResult) -> None:
+        """Take a frame; those that are not tracked are passed over."""
+        if result.state is not TrackState.TRACKING or result.pose is None:
+            return
+        if result.markers_m is None:
+            return
+        seen = {n: o for n, o in result.observations.items() if o.mask_words.any()}
+        if len(seen) < _LEAST_VIEWS:
+            return
+        self._tracked += 1
+        if (self._tracked - 1) % self._every:
+            return
+        without = {name: replace(one, edges=_no_edges(one)) for name, one in seen.items()}
+        self._kept.append(SeenFrame(result.stamp_ns, result.pose, result.markers_m, without))
+        if len(self._kept) >= MOST_KEPT:
+            self._kept, self._every = self._kept[::2], 2 * self._every
+
+    def chosen(self) -> list[SeenFrame]:
+        """At most `MOST` frames, each as far as possible from those before it in the list."""
+        if not self._kept:
+            return []
+        markers = np.array([frame.markers_m for frame in self._kept])
+        order = [len(self._kept) // 2]
+        nearest = _distances_m(markers, markers[order[0]])
+        while len(order) < min(MOST, len(self._kept)):
+            order.append(int(np.argmax(nearest)))
+            nearest = np.minimum(nearest, _distances_m(markers, markers[order[-1]]))
+        return [self._kept[i] for i in order]
+
+
+def independence(frames: Sequence[SeenFrame]) -> FloatArray:
+    """Weight (n,) of each frame: 1 if no other is like it, 1/k if k frames are the same.
+
+    The sum is the effective number of independent frames.
+    """
+    markers = np.array([frame.markers_m for frame in frames])
+    apart = np.array([_distances_m(markers, one) for one in markers])
+    return np.asarray(1.0 / np.exp(-0.5 * (apart / APART_M) ** 2).sum(axis=1))
+
+
+def extent_m(frames: Sequence[SeenFrame]) -> FloatArray:
+    """How far (3,) the person's centre moves along the world's axes."""
+    centres = np.array([np.nanmean(frame.markers_m, axis=0) for frame in frames])
+    return np.asarray(np.ptp(centres, axis=0))
+
+
+def _distances_m(markers: FloatArray, one: FloatArray) -> FloatArray:
+    """Root mean square distance (n,) of markers (n, m, 3) from those of one frame (m, 3)."""
+    squares = ((markers - one) ** 2).sum(axis=2)
+    return np.asarray(np.sqrt(np.nanmean(squares, axis=1)))
+
+
+def _no_edges(observation: Observation) -> NDArray[np.uint8]:
+    """An edge map without edges, which needs no memory of its own."""
+    return np.broadcast_to(np.uint8(0), observation.edges.shape)
