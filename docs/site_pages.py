@@ -16,7 +16,10 @@ from mkdocs.structure.pages import Page
 ROOT = Path(__file__).resolve().parent.parent
 FIRST = "README.md"
 """The first page."""
-ALWAYS = ("CONTRIBUTING.md", "CHANGELOG.md", "bench/README.md", "bags/README.md")
+ALWAYS = (
+    "CONTRIBUTING.md", "CHANGELOG.md", "QUALITY_DECLARATION.md", "bench/README.md",
+    "bags/README.md",
+)  # fmt: skip
 """Pages of the navigation that lie outside docs/."""
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".xml": "xml", ".json": "json"}
 LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
@@ -62,8 +65,12 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
 
 
 def _target(link: str, path: str) -> str:
-    """Path in the repository of a link in the file `path`."""
-    return normpath(f"{PurePosixPath(path).parent}/{link}")
+    """Path in the repository of a link in the file `path`; of a folder, that of its first page."""
+    target = normpath(f"{PurePosixPath(path).parent}/{link}")
+    if target == "docs":
+        return FIRST
+    page = f"{target}/README.md"
+    return page if (ROOT / page).is_file() else target
 
 
 def _uri(path: str) -> str:

@@ -226,13 +226,9 @@ class Outcome:
 
 def _opened(args: argparse.Namespace, scale: float) -> Recording:
     return open_recording(
-        args.source,
-        scale=scale,
-        format=args.format,
-        input_fps=args.input_fps,
-        up=args.up,
+        args.source, scale=scale, format=args.format, input_fps=args.input_fps, up=args.up,
         units=args.units,
-    )
+    )  # fmt: skip
 
 
 def _track(

@@ -11,7 +11,7 @@ import pytest
 
 from markerless_tracker.cli.main import PROGRAM, VERBS, parser_of
 
-EXECUTABLES = {"tracker", "player"}
+EXECUTABLES = {"tracker", "player", "segmenter"}
 """Entry points of the nodes (setup.py)."""
 parser = cache(parser_of)
 
@@ -82,9 +82,14 @@ def test_targets_of_make_exist(markdown, project_root: Path) -> None:
 def test_parameters_of_the_nodes_exist(markdown, project_root: Path) -> None:
     pytest.importorskip("rclpy", reason="ROS 2 is not installed")
     from markerless_tracker.node.player.parameters import descriptions
+    from markerless_tracker.node.segmenter.parameters import known_parameters
     from markerless_tracker.node.tracker.parameters import parameter_names
 
-    known = {"tracker": set(parameter_names()), "player": set(descriptions())}
+    known = {
+        "tracker": set(parameter_names()),
+        "player": set(descriptions()),
+        "segmenter": set(known_parameters()),
+    }
     launch = "".join(path.read_text() for path in (project_root / "launch").glob("*.xml"))
     arguments = set(re.findall(r'<arg name="(\w+)"', launch))
     wrong = []

@@ -5,15 +5,13 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
-
 from markerless_tracker.camera import CameraRig, read_calibration
 from markerless_tracker.camera.doubts import calibration_doubts
 from markerless_tracker.checks.finding import GREEN, RED, YELLOW, Finding
 from markerless_tracker.checks.machine import check_machine
 from markerless_tracker.checks.stream import CameraStream, check_streams
 from markerless_tracker.cli.check import print_findings
+from markerless_tracker.cli.terminal.bars import seconds_bar
 from markerless_tracker.datasets.background import read_background, read_background_models
 from markerless_tracker.errors import TrackerError
 from markerless_tracker.imaging import Image
@@ -109,7 +107,7 @@ def _cameras(
     # ROS is imported here alone.
     from markerless_tracker.node.doctor.listen import image_topics, listen
 
-    bars = Progress(TextColumn("{task.description}"), BarColumn(), console=Console(stderr=True))
+    bars = seconds_bar()
     try:
         with StopSignals() as stop, bars:
             names = names or image_topics()

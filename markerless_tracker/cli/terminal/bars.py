@@ -41,6 +41,15 @@ def progress_bars(console: Console | None = None) -> Progress:
     )  # fmt: skip
 
 
+def seconds_bar() -> Progress:
+    """A bar of a time that was asked for, on standard error; nothing where that is no terminal."""
+    console = Console(stderr=True)
+    return Progress(
+        TextColumn("{task.description}"), BarColumn(_BAR_WIDTH), TimeRemainingColumn(),
+        console=console, disable=not console.is_terminal,
+    )  # fmt: skip
+
+
 def tell(console: Console, text: str) -> None:
     """Print a line as it is, whatever the width."""
     console.print(text, markup=False, highlight=False, soft_wrap=True)
