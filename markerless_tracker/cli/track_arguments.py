@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from markerless_tracker.datasets import FORMATS
-from markerless_tracker.datasets.standing import PERSON
-from markerless_tracker.datasets.upright import AXES, UNITS
+from markerless_tracker.datasets.upright.axes import AXES, UNITS
+from markerless_tracker.datasets.upright.standing import PERSON
 from markerless_tracker.results.smooth import CUTOFF_HZ
 from markerless_tracker.tracking import OPTIMIZERS, PRESETS
 

@@ -22,8 +22,8 @@ from markerless_tracker.datasets.pose2sim import (
     is_pose2sim,
 )
 from markerless_tracker.datasets.recording import Recording
-from markerless_tracker.datasets.standing import PERSON, standing
-from markerless_tracker.datasets.upright import upright
+from markerless_tracker.datasets.upright.axes import upright
+from markerless_tracker.datasets.upright.standing import PERSON, standing
 from markerless_tracker.errors import DatasetError, TrackerError
 
 _READERS: Mapping[str, Callable[..., Recording]] = MappingProxyType(

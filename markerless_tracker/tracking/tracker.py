@@ -215,16 +215,15 @@ class Tracker:
                 observation; cameras may be missing. Or what `prepare` made of them.
             stamp_ns: time of the images; the search widens with the time since the last step.
             effort: fraction of the frames, 0 to 1, in which swarms and searches for limbs may run
-                beside the refinement. Less than 1 where images come faster than they are tracked.
-                Frames more than 45 ms apart are all searched, unless it is 0.
+                beside the refinement. Unless it is 0, frames over 45 ms apart are all searched.
 
         Raises:
-            ConfigError: the effort is no such fraction.
-            ImageError, CalibrationError: no view, one of an unknown camera, or one that does not
-                fit its calibration or background; names the camera.
+            ConfigError: no such effort.
+            ImageError, CalibrationError: no view, an unknown camera's, or one that does not fit its
+                calibration or background; names the camera.
         """
-        since_s = self._motion.since_s(stamp_ns)
-        self._effort.begin(effort, doubt=bool(self._assessor.limbs.lost), since_s=since_s)
+        doubt, since_s = bool(self._assessor.limbs.lost), self._motion.since_s(stamp_ns)
+        self._effort.begin(effort, doubt=doubt, since_s=since_s)
         outlook = self._lookahead.begin(views if isinstance(views, Prepared) else None)
         latest = None
         try:
@@ -257,7 +256,7 @@ class Tracker:
         else:
             result = self._assessor.found(found, self.body, self._body.limits)
             self._learn(found)
-        exposure = {name: v.exposure for name, v in evidence.items() if v.exposure is not None}
+        exposure = {n: v.exposure for n, v in evidence.items() if v.exposure is not None}
         return replace(result, exposure=exposure)
 
     def _observe(

@@ -12,7 +12,7 @@ from markerless_tracker.camera import CameraModel, CameraRig, read_calibration
 from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.formats.numbers import read_json
 from markerless_tracker.datasets.pose2sim import match_videos
-from markerless_tracker.datasets.upright import upright
+from markerless_tracker.datasets.upright.axes import upright
 from markerless_tracker.datasets.video.rates import tidy_fps
 from markerless_tracker.errors import CalibrationError, DatasetError
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.formats.numbers import image_sizes
-from markerless_tracker.datasets.upright import upright
+from markerless_tracker.datasets.upright.axes import upright
 from markerless_tracker.datasets.video.images import VIDEO_SUFFIXES
 from markerless_tracker.errors import CalibrationError, DatasetError
 from markerless_tracker.geometry import FloatArray, transform

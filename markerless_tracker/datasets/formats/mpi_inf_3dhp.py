@@ -10,7 +10,7 @@ from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.formats.numbers import array_of
 from markerless_tracker.datasets.markers.track import MarkerTrack
-from markerless_tracker.datasets.upright import upright, upright_points
+from markerless_tracker.datasets.upright.axes import upright, upright_points
 from markerless_tracker.datasets.video.images import find_stream
 from markerless_tracker.datasets.video.rates import stamp_of
 from markerless_tracker.errors import CalibrationError, DatasetError

@@ -11,7 +11,7 @@ from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.formats.numbers import array_of, read_json
 from markerless_tracker.datasets.markers.track import MarkerTrack
-from markerless_tracker.datasets.upright import upright, upright_points
+from markerless_tracker.datasets.upright.axes import upright, upright_points
 from markerless_tracker.datasets.video.images import find_stream, numbered_files
 from markerless_tracker.datasets.video.rates import stamp_of, tidy_fps
 from markerless_tracker.errors import CalibrationError, DatasetError

@@ -8,7 +8,7 @@ import numpy as np
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.markers.track import MarkerTrack
-from markerless_tracker.datasets.upright import upright, upright_points
+from markerless_tracker.datasets.upright.axes import upright, upright_points
 from markerless_tracker.datasets.video.images import VIDEO_SUFFIXES
 from markerless_tracker.datasets.video.rates import stamp_of
 from markerless_tracker.errors import CalibrationError, DatasetError

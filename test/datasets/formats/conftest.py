@@ -9,7 +9,7 @@ import pytest
 
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets import Recording
-from markerless_tracker.datasets.upright import UNITS, rotation_to
+from markerless_tracker.datasets.upright.axes import UNITS, rotation_to
 from markerless_tracker.geometry import rodrigues_from_rotation, rotation_from_rodrigues, transform
 
 SIZE = (32, 24)

@@ -9,7 +9,7 @@ import pytest
 from markerless_tracker.camera import CameraModel, CameraRig, write_calibration
 from markerless_tracker.cli.main import main
 from markerless_tracker.datasets import detect_format, open_recording, write_image
-from markerless_tracker.datasets.upright import AXES, rotation_to, upright
+from markerless_tracker.datasets.upright.axes import AXES, rotation_to, upright
 from markerless_tracker.errors import CalibrationError, ConfigError, DatasetError
 from markerless_tracker.geometry import apply, rotation_from_rodrigues, transform
 
