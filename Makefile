@@ -25,7 +25,7 @@ $(READY): requirements/lock.txt requirements/venv.sh setup.py setup.cfg
 
 setup: $(READY) ## make .venv (the other targets do it, too)
 
-test: $(READY) ## run the tests (under 10 minutes on two cores)
+test: $(READY) ## run the tests (a quarter of an hour on two cores)
 	$(PY) -m pytest -n $(WORKERS) $(ARGS)
 
 test-long: $(READY) ## run the tests that take minutes each: soak, many fuzzed messages
