@@ -34,7 +34,7 @@ def published_mm(readme: str, name: str, fps: int) -> float:
 
 def published_automatic_mm(readme: str, name: str) -> float:
     """README's figure of a recording without a start."""
-    row = re.search(rf"^\| `{name}`(?:[^|]*\|){{3}} ([\d.]+) mm \|", readme, re.MULTILINE)
+    row = re.search(rf"^\| `{name}`(?:[^|]*\|){{3}} ([\d.]+) mm ", readme, re.MULTILINE)
     assert row is not None, f"README has no figure of {name} without a start"
     return float(row[1])
 
