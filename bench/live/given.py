@@ -61,9 +61,16 @@ def messages(recording: MadeUp, backgrounds: Any) -> tuple[list[Any], list[Any],
 
 
 def run_given(
-    bag: Path, recording: MadeUp, rate: float, sets: list[Any], out: Path, *, split: bool
+    bag: Path,
+    recording: MadeUp,
+    rate: float,
+    sets: list[Any],
+    out: Path,
+    count: int,
+    *,
+    split: bool,
 ) -> dict[str, Any]:
-    """Publish the sets once; returns a row of the table."""
+    """Publish that many sets, to and fro; returns a row of the table."""
     out.mkdir(parents=True)
     names = recording.rig.names
     listener = Listener(names[0])
@@ -87,7 +94,10 @@ def run_given(
         for camera in recording.rig:
             infos[camera.name].publish(info_of(camera, 0))
         began_s = time.monotonic()
-        for number, found in enumerate(sets):
+        last = len(sets) - 1
+        for number in range(count):
+            at = number % (2 * last)
+            found = sets[min(at, 2 * last - at)]
             while (left_s := began_s + number / rate - time.monotonic()) > 0.0:
                 listener.executor.spin_once(timeout_sec=left_s)
             stamp_ns = recording.scene.stamp_ns(number)
@@ -99,6 +109,7 @@ def run_given(
     return {
         **row(listener, recording, rate, split=split),
         "graph": "evidence" if split else "images",
+        "sets": count,
     }
 
 
@@ -106,7 +117,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--cameras", type=numbers(int), default=[4, 8])
     parser.add_argument("--rates", type=numbers(float), default=[60.0, 30.0])
-    parser.add_argument("--sets", type=int, default=180)
+    parser.add_argument("--sets", type=int, default=60, help="different sets of images")
+    parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--size", type=lambda t: tuple(map(int, t.split("x"))), default=(656, 490))
     args = parser.parse_args()
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 101))
@@ -124,7 +136,8 @@ def main() -> None:
             for rate in args.rates:
                 for split, sets in ((False, images), (True, evidence)):
                     out = Path(folder) / f"{cameras}_{rate:g}_{split}"
-                    found = run_given(bag, recording, rate, sets, out, split=split)
+                    count = round(args.seconds * rate)
+                    found = run_given(bag, recording, rate, sets, out, count, split=split)
                     found["bandwidth_share"] = share if split else 1.0
                     print(json.dumps(found), flush=True)
 
