@@ -13,6 +13,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 def test_a_run_from_ready_to_the_result(tmp_path: Path, begin: Any, scenes: Any) -> None:
     live = begin(result_file=tmp_path / "walk")
+    live.until(lambda: "ready, " in live.process.output, "ready in the log")
     log = live.process.output
     assert re.search(r"ready, waiting for images; \d+ kernels compiled, \d+\.\d s", log), log
     live.track()
@@ -69,6 +70,7 @@ def test_a_doubtful_calibration_is_said_before_the_run(
         encoding="utf-8",
     )
     live = begin(calibration_file=path)
+    live.until(lambda: "ready, " in live.process.output, "ready in the log")
     log = live.process.output
     assert log.count("are the translations in millimetres instead of metres?") == 1
     assert log.index("millimetres") < log.index("ready, ")
