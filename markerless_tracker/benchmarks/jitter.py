@@ -137,9 +137,12 @@ def lag_frames(points: Points, reference: Points) -> float:
         gap = flat - behind(kept - shift)
         return float(((gap - gap.mean(axis=0)) ** 2).sum())
 
+    # Noise has many minima.
+    whole = np.arange(-int(MAX_LAG_FRAMES), int(MAX_LAG_FRAMES) + 1)
+    near = float(min(whole, key=lambda shift: residual(float(shift))))
     found = minimize_scalar(
         residual,
-        bounds=(-MAX_LAG_FRAMES, MAX_LAG_FRAMES),
+        bounds=(max(near - 1.0, -MAX_LAG_FRAMES), min(near + 1.0, MAX_LAG_FRAMES)),
         method="bounded",
         options={"xatol": 1e-3},
     )

@@ -212,7 +212,7 @@ class RegionSettings(SettingsGroup):
         30,
         "while the person is tracked, images are processed around the predicted body only, and "
         "with background.follow_s each camera's whole image once in this many frames (the pose is "
-        "the same); 1 = whole images always",
+        "the same, but for specks of silhouette away from the body); 1 = whole images always",
         least=1,
         most=100000,
     )

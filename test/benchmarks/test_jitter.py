@@ -57,6 +57,12 @@ def test_the_lag_of_a_shifted_sine(shift) -> None:
     assert lag_frames(late, sine(0.0)) == pytest.approx(shift, abs=0.02)
 
 
+def test_the_lag_of_noise_behind_itself_is_none() -> None:
+    for seed in range(5):
+        noise = np.random.default_rng(seed).standard_normal((40, 1, 3))
+        assert lag_frames(noise, noise) == pytest.approx(0.0, abs=0.01)
+
+
 def test_the_longest_run() -> None:
     flags = np.array([1, 1, 0, 1, 1, 1, 0, 1], bool)
     assert longest_true_run(flags) == slice(3, 6)

@@ -17,6 +17,9 @@ from markerless_tracker.tracking.evidence.selection import (
     place_cones,
 )
 
+SPECKS_PX = 12
+"""A hand covers about 40 pixels here."""
+
 
 def with_things(frames, scene):
     """The frames with a patch beside the person, touching the edge of any region, and a far one."""
@@ -57,7 +60,9 @@ def test_the_pose_is_that_of_whole_images(
                     o.in_full_frame(o.not_background) for o in (seen, a.observations[name])
                 )
                 np.testing.assert_array_equal(one[cut], other[cut])
-            assert a.observations[name].mask.sum() == seen.mask.sum()
+            # Specks among undecided pixels do not ask for a wider region.
+            beyond = int(a.observations[name].mask.sum()) - int(seen.mask.sum())
+            assert 0 <= beyond <= (SPECKS_PX if undecided else 0)
         sizes.append([seen.edges.size for seen in b.observations.values()])
     moved_m = np.linalg.norm(b.markers_m - frames[0].markers_m, axis=1).mean()
     assert moved_m > 0.03, "the start pose itself would pass"
