@@ -54,7 +54,7 @@ class InMemory(Recording):
             yield FrameSet(index, stamp_of(index, self.fps), images)
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
-        raise NotImplementedError
+        raise NotImplementedError("these sets are read in order alone")
 
 
 def source(folder: Path, sets: int) -> Path:

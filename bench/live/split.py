@@ -54,7 +54,7 @@ class MadeUp(Recording):
             yield FrameSet(index, self.scene.stamp_ns(index), self.scene.frame(index)[0])
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
-        raise NotImplementedError
+        raise NotImplementedError("these sets are read in order alone")
 
 
 @dataclass

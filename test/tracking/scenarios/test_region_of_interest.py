@@ -1,4 +1,4 @@
-"""Looking only around the predicted body gives what the whole images give."""
+"""Looking only around the predicted body gives what the whole images give, but for specks."""
 
 from dataclasses import replace
 
