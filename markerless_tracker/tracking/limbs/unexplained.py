@@ -31,12 +31,17 @@ class Unexplained:
     """Silhouette that the body does not cover.
 
     Attributes:
-        limbs: that may belong there, the likeliest first.
+        areas_m2: of the regions that each limb may belong to, the likeliest limb first.
         regions: by camera with such a region, the pixels (h, w) of its frame.
     """
 
-    limbs: tuple[str, ...]
+    areas_m2: Mapping[str, float]
     regions: Mapping[str, NDArray[np.bool_]]
+
+    @property
+    def limbs(self) -> tuple[str, ...]:
+        """The limbs that may belong there, the likeliest first."""
+        return tuple(self.areas_m2)
 
 
 def limbs_unexplained(
@@ -67,7 +72,7 @@ def look_unexplained(
 ) -> Unexplained:
     """As `limbs_unexplained`, with the regions."""
     if not body.limbs:
-        return Unexplained((), {})
+        return Unexplained({}, {})
     axes = _axes(body, pose)
     reach = {name: _reach(points) for name, points in axes.items()}
     middle = np.concatenate(list(axes.values())).mean(axis=0)
@@ -83,7 +88,8 @@ def look_unexplained(
         for area_px, centre in left_over:
             for rank, limb in enumerate(_within_reach(axes, reach, camera, centre, scale)):
                 areas[limb] = areas.get(limb, 0.0) + area_px / scale**2 / (1 + rank)
-    return Unexplained(tuple(sorted(areas, key=lambda limb: -areas[limb])), regions)
+    likeliest = sorted(areas, key=lambda limb: -areas[limb])
+    return Unexplained({limb: areas[limb] for limb in likeliest}, regions)
 
 
 def _left_over(

@@ -5,6 +5,7 @@ all limbs are searched elsewhere in rotation.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -35,8 +36,31 @@ WAIT_NS = 16_000_000
 """Time before a limb near unexplained silhouette is searched again, after a search without gain."""
 _DOUBLINGS = 4
 """That time doubles with each search without gain, so often."""
+_GROWN = 2.0
+"""Where so many times as much silhouette is unexplained, an earlier search tells nothing."""
 _NONE = locked(np.empty((0, 0), dtype=np.uint64), np.uint64)
 _ALONG = np.linspace(0.1, 0.9, 5)
+
+
+@dataclass(frozen=True)
+class _Wait:
+    """A limb was searched without gain.
+
+    Attributes:
+        fruitless: so often in a row.
+        searched_ns: at last.
+        area_m2: of the unexplained silhouette then.
+    """
+
+    fruitless: int
+    searched_ns: int
+    area_m2: float
+
+    def over(self, stamp_ns: int, area_m2: float) -> bool:
+        """Whether the limb is worth another search at a time, with so much unexplained."""
+        since_ns = stamp_ns - self.searched_ns
+        grown = area_m2 > _GROWN * self.area_m2
+        return grown or not 0 <= since_ns < WAIT_NS * 2**self.fruitless
 
 
 class LimbWatch:
@@ -56,7 +80,7 @@ class LimbWatch:
         self._next = 0
         self._unexplained = 0
         self._rotated_ns: int | None = None
-        self._waits: dict[str, tuple[int, int]] = {}
+        self._waits: dict[str, _Wait] = {}
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -108,7 +132,7 @@ class LimbWatch:
         unexplained = look_unexplained(body, pose, observations, self._rig)
         if not unexplained.limbs:
             self._waits.clear()
-        due = self._due(body, stamp_ns, unexplained.limbs)
+        due = self._due(body, stamp_ns, unexplained.areas_m2)
         if not due:
             return pose, ()
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
@@ -129,42 +153,42 @@ class LimbWatch:
                 found.append(name)
                 self._waits.pop(name, None)
             else:
-                fruitless = min(self._waits.get(name, (0, 0))[0] + 1, 1 + _DOUBLINGS)
-                self._waits[name] = (fruitless, stamp_ns)
+                self._searched_in_vain(name, stamp_ns, unexplained.areas_m2.get(name, 0.0))
         return pose, tuple(found)
 
-    def _due(self, body: BodyModel, stamp_ns: int, unexplained: tuple[str, ...]) -> list[str]:
+    def _searched_in_vain(self, name: str, stamp_ns: int, area_m2: float) -> None:
+        fruitless = 1
+        before = self._waits.get(name)
+        if before is not None and area_m2 <= _GROWN * before.area_m2:
+            fruitless = min(before.fruitless + 1, 1 + _DOUBLINGS)
+        self._waits[name] = _Wait(fruitless, stamp_ns, area_m2)
+
+    def _due(self, body: BodyModel, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
         """Limbs to search: lost, near unexplained silhouette, and at times the next in rotation."""
         if not body.limbs:
             return []
-        lost = [
-            *self.lost,
-            *(
-                name
-                for name in self._suspects(unexplained)
-                if name not in self.lost and not self._waiting(name, stamp_ns)
-            ),
-        ]
+        lost = self.lost
+        due = [*lost, *(n for n in self._suspects(stamp_ns, areas_m2) if n not in lost)]
         if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < ROTATION_NS:
-            return lost
+            return due
         self._rotated_ns = stamp_ns
         name = body.limbs[self._next % len(body.limbs)]
         self._next += 1
-        return lost if name in lost else [*lost, name]
+        return due if name in due else [*due, name]
 
-    def _waiting(self, name: str, stamp_ns: int) -> bool:
-        fruitless, searched_ns = self._waits.get(name, (0, 0))
-        since_ns = stamp_ns - searched_ns
-        return fruitless > 0 and 0 <= since_ns < WAIT_NS * 2**fruitless
+    def _suspects(self, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
+        """The likeliest limb, and the others in rotation while silhouette stays unexplained.
 
-    def _suspects(self, unexplained: tuple[str, ...]) -> list[str]:
-        """The likeliest limb, and the others in rotation while silhouette stays unexplained."""
-        if not unexplained:
+        Those of them that were searched in vain shortly before are left out.
+        """
+        if not areas_m2:
             self._unexplained = 0
             return []
         self._unexplained += 1
-        first, *others = unexplained
-        return [first, *others[(self._unexplained - 1) % len(others) :][:1]] if others else [first]
+        first, *others = areas_m2
+        names = [first, *others[(self._unexplained - 1) % len(others) :][:1]] if others else [first]
+        waits = self._waits
+        return [n for n in names if n not in waits or waits[n].over(stamp_ns, areas_m2[n])]
 
 
 def inside_fractions(

@@ -137,7 +137,7 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
 def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch) -> None:
     scene, seen, _, hidden = balancing
     explained = "markerless_tracker.tracking.limbs.watch.look_unexplained"
-    monkeypatch.setattr(explained, lambda *_: Unexplained((), {}))
+    monkeypatch.setattr(explained, lambda *_: Unexplained({}, {}))
 
     def found(stamps, threads=1):
         searcher = searcher_of(scene, threads)
@@ -166,7 +166,7 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
     scene, seen, pose, _ = balancing
     limbs = ("r_leg", "l_leg", "r_arm", "l_arm")
     for name, value in (
-        ("look_unexplained", lambda *_: Unexplained(limbs, {})),
+        ("look_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})),
         ("other_limb", lambda _f, _r, at, limb, *_: searched.append(limb.tobytes()) or (at, 9.0)),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.watch.{name}", value)
@@ -186,7 +186,7 @@ def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monk
     scene, seen, pose, _ = balancing
     searched: list[int] = []
     for name, value in (
-        ("look_unexplained", lambda *_: Unexplained(("r_leg",), {})),
+        ("look_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})),
         ("other_limb", lambda _f, _r, at, limb, *_: searched.append(now) or (at, 9.0)),
         ("ROTATION_NS", 10**12),
     ):
@@ -198,6 +198,38 @@ def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monk
     # Once more at first: the next limb in rotation.
     frames = sorted({at // WAIT_NS for at in searched})
     assert frames == [0, 2, 6, 14, 30]
+
+
+def test_a_limb_does_not_wait_where_more_silhouette_is_unexplained_than_before(
+    balancing, monkeypatch
+) -> None:
+    """An arm that was searched in vain while it was hidden comes into view."""
+    scene, seen, pose, _ = balancing
+    areas: dict[str, float] = {"l_leg": 0.01}
+    searched: list[tuple[int, bytes]] = []
+    for name, value in (
+        ("look_unexplained", lambda *_: Unexplained(dict(areas), {})),
+        ("other_limb", lambda _f, _r, at, limb, *_: searched.append((now, limb)) or (at, 9.0)),
+    ):
+        monkeypatch.setattr(f"markerless_tracker.tracking.limbs.watch.{name}", value)
+    arm = scene.body.subspaces["l_arm"].tobytes()
+    searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
+    contours = contours_of(searcher, seen, pose)
+    for now in range(0, 20 * ROTATION_NS, ROTATION_NS):
+        watch.recover(searcher, contours, seen, now, pose)
+    assert scene.body.limbs[0] == "l_arm"
+    last = max(at for at, limb in searched if limb.tobytes() == arm)
+    for more_m2 in (0.011, 0.023):
+        searched.clear()
+        areas["l_arm"] = more_m2
+        now = last = last + 2
+        watch.recover(searcher, contours, seen, now, pose)
+        assert arm in [limb.tobytes() for _, limb in searched]
+    searched.clear()
+    areas["l_arm"] = 0.024
+    now = last + 2
+    watch.recover(searcher, contours, seen, now, pose)
+    assert arm not in [limb.tobytes() for _, limb in searched]
 
 
 def test_the_same_search_gives_the_same_bytes_with_any_number_of_threads(standing) -> None:
