@@ -1,5 +1,7 @@
 """ROS messages of a bag, from cameras and images (message types of rosbags, without ROS)."""
 
+import struct
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -8,6 +10,7 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
+from markerless_tracker.bags.chunks import Part
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.camera.ros_fields import camera_info_fields
 from markerless_tracker.errors import DatasetError
@@ -21,6 +24,8 @@ _FORMS = {
     "jpeg": (".jpg", [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]),
     "png": (".png", [cv2.IMWRITE_PNG_COMPRESSION, 1]),
 }
+_IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+_NO_DATA = np.empty(0, np.uint8)
 
 _PLAIN_QUATERNION = "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
 _QUATERNION = "MSG: geometry_msgs/Quaternion\nfloat64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n"
@@ -44,6 +49,15 @@ def definition(kind: str) -> str:
 def message_type(name: str) -> Any:
     """A message type by its name, such as std_msgs/msg/Header."""
     return typestore().types[name]
+
+
+def serialized(message: Any, kind: str) -> tuple[Part, ...]:
+    """CDR of a message (of rosbags' types) in pieces; the data of an image are not copied."""
+    if kind not in _IMAGES or message.data.dtype != np.uint8:
+        return (typestore().serialize_cdr(message, kind),)
+    # The data are the last field: their number, then they.
+    start = typestore().serialize_cdr(replace(message, data=_NO_DATA), kind)
+    return bytes(start[:-4]) + struct.pack("=I", message.data.size), memoryview(message.data)
 
 
 def optical_frame(camera_name: str) -> str:

@@ -7,6 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.calibration.charuco import CharucoFinder
+from markerless_tracker.calibration.print_fit import TEXELS, Print, plane_of
 from markerless_tracker.camera.board import CHARUCO, Board, charuco_board, rotations
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image
@@ -44,8 +46,8 @@ class BoardFinder:
     """Finds one board in images.
 
     Checkerboards are located by OpenCV's sector based search, in images enlarged or shrunk to about
-    1300 px, and their corners refined in the image itself: the search alone is up to 1 px off in
-    oblique views. The colours of all squares must be those of the board, which also tells its top.
+    1300 px; the search alone is up to 1 px off in oblique views. The colours of all squares must be
+    those of the board, which also tells its top. The print then tells the exact places.
 
     Args:
         board: the board.
@@ -55,6 +57,7 @@ class BoardFinder:
         self.board = board
         self._orders = rotations(board)
         self._charuco = _charuco_finders(board) if board.kind == CHARUCO else []
+        self._print = _checkerboard_print(board)
 
     def find(self, image: Image) -> Seen | None:
         """The corners in an image (h, w) or (h, w, 3) BGR; None if the board is not found."""
@@ -98,19 +101,24 @@ class BoardFinder:
         for order, _ in self._orders:
             ordered = exact.reshape(-1, 2)[order].reshape(down, across, 2)
             if _colours_agree(grey, ordered):
-                return Seen(np.arange(across * down), ordered.reshape(-1, 2))
+                return Seen(np.arange(across * down), self._exact(grey, ordered.reshape(-1, 2)))
         return None
+
+    def _exact(self, grey: Image, pixels: FloatArray) -> FloatArray:
+        """Corners (n, 2) as the print tells them; as they are unless it tells all of them."""
+        plane = plane_of(self._print.corners, pixels)
+        found = None if plane is None else self._print.measured(grey, plane, pixels)
+        return pixels if found is None or len(found[0]) < len(pixels) else found[1]
 
     def _find_charuco(self, grey: Image) -> Seen | None:
         best: Seen | None = None
         for finder in self._charuco:
-            corners, ids = finder(grey)
-            if ids is None or corners is None or len(ids) < LEAST_CORNERS:
+            found = finder(grey)
+            if found is None or len(found[0]) < LEAST_CORNERS:
                 continue
+            ids, corners = (np.asarray(each) for each in found)
             if best is None or len(ids) > len(best.ids):
-                best = Seen(
-                    np.asarray(ids).ravel(), np.asarray(corners, dtype=np.float64).reshape(-1, 2)
-                )
+                best = Seen(ids.ravel(), corners.reshape(-1, 2).astype(np.float64))
         # Corners of a single row determine no plane.
         if best is None or len(set(best.ids // self.board.inner[0])) < 2:
             return None
@@ -118,26 +126,30 @@ class BoardFinder:
 
 
 def _charuco_finders(board: Board) -> list[Any]:
-    """Functions from a grey image to corners and ids; both prints of a board with even rows."""
+    """Functions from a grey image to ids and corners; both prints of a board with even rows."""
     aruco: Any = cv2.aruco
     if not hasattr(aruco, "CharucoDetector"):  # OpenCV 4.6
         drawn = charuco_board(board)
 
-        def find(grey: Image) -> tuple[Any, Any]:
+        def find(grey: Image) -> tuple[Any, Any] | None:
             markers, names, _ = aruco.detectMarkers(grey, drawn.dictionary)
             if names is None or not len(names):
-                return None, None
+                return None
             _, corners, ids = aruco.interpolateCornersCharuco(markers, names, grey, drawn)
-            return corners, ids
+            return None if ids is None else (ids, corners)
 
         return [find]
-    boards = [charuco_board(board)]
-    if board.rows % 2 == 0:
-        # Before OpenCV 4.6 the top left square of such a board was white.
-        boards.append(charuco_board(board))
-        boards[-1].setLegacyPattern(True)
-    detectors = [aruco.CharucoDetector(each) for each in boards]
-    return [lambda grey, d=detector: d.detectBoard(grey)[:2] for detector in detectors]
+    # Before OpenCV 4.6 the top left square of a board with even rows was white.
+    prints = (False, True) if board.rows % 2 == 0 else (False,)
+    return [CharucoFinder(board, legacy=legacy).find for legacy in prints]
+
+
+def _checkerboard_print(board: Board) -> Print:
+    across, down = board.inner
+    x, y = np.meshgrid(np.arange(1.0, across + 1.0), np.arange(1.0, down + 1.0))
+    row, column = np.indices((board.rows * TEXELS, board.columns * TEXELS)) // TEXELS
+    picture = np.where((row + column) % 2 == 0, 0, 255).astype(np.uint8)
+    return Print(picture, np.column_stack([x.ravel(), y.ravel()]))
 
 
 def _grey(image: Image) -> Image:

@@ -21,6 +21,7 @@ _PAD_PX = 4
 _LEVELS = 6
 _OUTLINE = 12
 _ITERATIONS = 30
+_ALONG = 1e-9
 
 
 def board_print(board: Board) -> Picture:
@@ -109,6 +110,8 @@ class BoardView:
         a, b = cv2.split(plane)
         x, y, w = (float(p) * a + float(q) * b + float(r) for p, q, r in to_board)
         square = self._board.square_m
+        # Pixels that look along the board see it nowhere.
+        w = np.where(np.abs(w) < _ALONG, np.float32(_ALONG), w)
         across = x / w / square + (1.0 + MARGIN)
         down = (self._board.rows - 1.0 + MARGIN) - y / w / square
         level = self._level(float(np.linalg.norm(T_cam_board[:3, 3])))

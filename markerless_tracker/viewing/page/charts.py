@@ -123,7 +123,7 @@ def line_chart(
         f'<figure class="chart"><figcaption>{heading}{_legend(known, marks)}</figcaption>'
         f'<div class="plot"><svg viewBox="0 0 {_SIDE:g} {_SIDE:g}" preserveAspectRatio="none" '
         f'role="img" aria-label="{escape(f"{title}. {says}")}">{"".join(lines)}</svg>'
-        f'{"".join(labels)}<span class="xu">{escape(x_unit)}</span></div></figure>'
+        f'{"".join(labels)}<span class="xu">{escape(x_unit)}</span></div>{_levels(levels)}</figure>'
     )
 
 
@@ -190,6 +190,17 @@ def _legend(curves: Sequence[Curve], marks: Sequence[Mark]) -> str:
         for (label, style), kind in entries.items()
     )
     return f'<ul class="legend">{items}</ul>'
+
+
+def _levels(levels: Sequence[Level]) -> str:
+    """The labels of levels as a list, for screens on which they would cover the curves."""
+    if not levels:
+        return ""
+    items = "".join(
+        f'<li><span class="key"></span>{escape(level.label)}</li>'
+        for level in sorted(levels, key=lambda level: -level.value)
+    )
+    return f'<ul class="legend levels">{items}</ul>'
 
 
 def _number(value: float, all_ticks: Sequence[float]) -> str:

@@ -50,6 +50,9 @@ figcaption { font-size: .875rem; font-weight: 600; }
 .xu { top: calc(100% - .35rem); left: calc(100% + .25rem); }
 .lt { right: 0; transform: translateY(-115%); background: var(--paper); padding: 1px 3px;
   opacity: .85; max-width: 100%; }
+.levels { display: none; }
+.levels .key { border-top: 2px dashed var(--dim); }
+@media (max-width: 40rem) { .lt { display: none; } .levels { display: flex; } }
 path { fill: none; vector-effect: non-scaling-stroke; stroke: var(--c); }
 .grid { stroke: var(--rule); stroke-width: 1; }
 .level { stroke: var(--dim); stroke-width: 1.5; stroke-dasharray: 6 4; }

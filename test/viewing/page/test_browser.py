@@ -8,6 +8,7 @@ import pytest
 from markerless_tracker.datasets import read_trc
 from markerless_tracker.results.read import read_result
 from markerless_tracker.viewing.images import ResultImages
+from markerless_tracker.viewing.page.charts import Level
 from markerless_tracker.viewing.page.embedded import embedded_film
 from markerless_tracker.viewing.page.page import write_page
 from markerless_tracker.viewing.page.report import make_report
@@ -57,7 +58,8 @@ def page_file(make_result, walk: Path, tmp_path: Path) -> Path:
         make_report("one", first, reference=truth, film=film),
         make_report("two", second, reference=truth, why_no_film="no images"),
     ]
-    write_page(tmp_path / "page.html", reports)
+    levels = [Level("what somebody else printed somewhere: 38 mm", 38.0)]
+    write_page(tmp_path / "page.html", reports, levels=levels)
     return tmp_path / "page.html"
 
 
@@ -79,6 +81,9 @@ def test_phone_and_desktop_light_and_dark_and_paper(browser, page_file: Path) ->
         widest, window = shown.evaluate(WIDEST)
         assert widest <= window == width, "nothing sticks out at the side"
         assert shown.evaluate(SMALLEST) >= 12.0
+        # Beside the lines there is room on a desktop only.
+        assert shown.locator(".lt").first.is_visible() == (width > 640)
+        assert shown.locator(".levels").first.is_visible() == (width <= 640)
         background[scheme] = shown.evaluate(LUMINANCE)
         assert not said
         assert all(url.startswith(("file:", "data:")) for url in asked)

@@ -45,6 +45,15 @@ def test_a_curve_lies_where_its_values_are() -> None:
     assert texts["xt"][0] == "0.0" and texts["xt"][-1] == "3.0"
 
 
+def test_levels_are_listed_for_narrow_screens() -> None:
+    levels = [Level("low: 5 mm", 5.0), Level("high: 9 mm", 9.0)]
+    chart = figure("Error", "mm", [Curve("", "s0", X, X)], levels=levels)
+    items = [item.find("span").tail for item in chart.find("ul").iter("li")]
+    assert chart.find("ul").get("class") == "legend levels"
+    assert items == ["high: 9 mm", "low: 5 mm"], "from top to bottom, as the lines"
+    assert figure("Error", "mm", [Curve("", "s0", X, X)]).find("ul") is None
+
+
 def test_gaps_interrupt_the_curve_and_marks_stand() -> None:
     y = np.where((X > 1.0) & (X < 2.0), np.nan, X)
     marks = [Mark("strike", "right", 1.5), Mark("", "right", 9.0)]
