@@ -91,3 +91,13 @@ def test_inverse_kinematics_runs_on_the_markers_at_once(exported, lost) -> None:
     rms_m = errors.getDependentColumn("marker_error_RMS").to_numpy()
     assert rms_m.max() < 0.001
     assert opensim.TimeSeriesTable(f"{name.name}.ik.mot").getNumRows() == 12 - len(lost)
+
+
+def test_inverse_kinematics_runs_on_other_marker_names(make_result, monkeypatch) -> None:
+    name = make_result(lost=[3])
+    assert main(["export", str(name), "--to", "osim", "--names", "plugin-gait"]) == 0
+    monkeypatch.chdir(name.parent)
+    assert opensim.InverseKinematicsTool(f"{name.name}.plugin-gait.ik.xml").run()
+    errors = opensim.TimeSeriesTable(f"{name.name}_plugin-gait_ik_marker_errors.sto")
+    assert errors.getNumRows() == 11
+    assert errors.getDependentColumn("marker_error_RMS").to_numpy().max() < 0.001
