@@ -22,6 +22,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.appended import not_written
 from markerless_tracker.results.journal import Journal, open_summary
+from markerless_tracker.results.pose_angles import PoseAngles
 from markerless_tracker.results.read import read_result
 from markerless_tracker.results.stored_result import StoredResult
 from markerless_tracker.results.trc_stream import TrcStream
@@ -163,6 +164,7 @@ def smooth_result(name: Path, smoothing: Smoothing) -> int:
 def smoothed(result: StoredResult, smoothing: Smoothing) -> tuple[StoredResult, NDArray[np.bool_]]:
     """A result with smoothed parameters, angles and positions, and which frames (n,) are filled."""
     body = result.body()
+    reader = PoseAngles(body)
     parameters, sd = np.array(result.parameters), np.array(result.parameters_sd)
     angles = np.array(result.angles_deg)
     positions, positions_sd = np.array(result.positions_m), np.array(result.positions_sd_m)
@@ -190,6 +192,8 @@ def smoothed(result: StoredResult, smoothing: Smoothing) -> tuple[StoredResult, 
                 0
             ][inside]
         for row in rows.tolist():
+            if result.angle_names == reader.names:
+                angles[row] = _angles_of(reader, parameters[row], angles[row])
             positions[row] = markers(body, parameters[row])
             if filled[row]:
                 positions_sd[row] = _markers_sd(body, parameters[row], sd[row])
@@ -204,6 +208,12 @@ def smoothed(result: StoredResult, smoothing: Smoothing) -> tuple[StoredResult, 
         ),
         filled,
     )
+
+
+def _angles_of(reader: PoseAngles, pose: FloatArray, smoothed_deg: FloatArray) -> FloatArray:
+    """Angles (k,) of a smoothed pose, degrees; at a singularity those smoothed by themselves."""
+    near = np.deg2rad(smoothed_deg)
+    return np.rad2deg(near + reader.apart(near) * (reader.read(pose, near) - near))
 
 
 def _runs(times_s: FloatArray, known: NDArray[np.bool_], gap_s: float) -> Iterator[slice]:

@@ -28,7 +28,7 @@ FEW = 4
 """Frames of most recordings: a start takes as long as many frames."""
 WHOLE = {
     "no background", "one background missing", "a chair that the backgrounds lack",
-    "one camera late by a third of a second",
+    "one camera late by a third of a second", "a subject a tenth too small",
 }  # fmt: skip
 """Mistakes that show over some time."""
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "mistakes.md"
@@ -154,6 +154,13 @@ def _subject(case: Case) -> None:
     case.words = ("--subject", path)
 
 
+def _small_subject(case: Case) -> None:
+    path = case.folder / "small.yaml"
+    lengths = {name: 0.9 * value for name, value in case.scene.body.lengths_m.items()}
+    write_subject(path, Subject("small", lengths))
+    case.words = ("--subject", path)
+
+
 def _start(case: Case, positions_m: np.ndarray) -> None:
     path = case.folder / "start.trc"
     write_trc(path, MarkerTrack(MARKER_NAMES, np.array([0]), positions_m[None]), FPS)
@@ -186,6 +193,8 @@ MISTAKES: Mapping[str, Callable[[Case], None]] = {
     ),
     "calibration with z down": lambda case: case.place(_turned(np.pi)),
     "origin of the world 1 m below the floor": lambda case: case.place(_raised(1.0)),
+    "origin of the world 0.2 m below the floor": lambda case: case.place(_raised(0.2)),
+    "origin of the world 0.15 m above the floor": lambda case: case.place(_raised(-0.15)),
     "origin of the world 3 m above the floor": lambda case: case.place(_raised(-3.0)),
     "camera poses from the camera to the world": _to_world,
     "checkerboard squares stated too small": lambda case: case.scale(0.6),
@@ -201,6 +210,7 @@ MISTAKES: Mapping[str, Callable[[Case], None]] = {
     ),
     "a chair that the backgrounds lack": _chair,
     "another person's subject": _subject,
+    "a subject a tenth too small": lambda case: _small_subject(case),
     "stature in centimetres": _set(words=("--stature", 172)),
     "start in millimetres": lambda case: _start(case, 1000.0 * case.scene.markers(0)),
     "start of another recording": lambda case: _start(case, case.scene.markers(0) + [0.7, 0.7, 0]),

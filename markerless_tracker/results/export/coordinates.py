@@ -1,10 +1,11 @@
 """The coordinates of a result as OpenSim names and measures them: degrees, metres, Y up.
 
 Those of a joint with reported angles (docs/joint-angles.md) are these angles, between the segments'
-anatomical axes; the translations of the pelvis follow the axes of the marker file. What has no
-reported angles has the body's own parameters. An arm's angles are relative to the thorax, but it
-hangs on a clavicle: an extra segment at the shoulder, which undoes the clavicle's rotation, carries
-it. Its coordinates `NAME_back` are the clavicle's with the sign reversed.
+anatomical axes, as the pose alone has them: they turn the model to it. The translations of the
+pelvis follow the axes of the marker file. What has no reported angles has the body's own
+parameters. An arm's angles are relative to the thorax, but it hangs on a clavicle: an extra segment
+at the shoulder, which undoes the clavicle's rotation, carries it. Its coordinates `NAME_back` are
+the clavicle's with the sign reversed.
 """
 
 from collections.abc import Sequence
@@ -14,11 +15,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body import BodyModel, transforms
-from markerless_tracker.body.angles import AngleReader
 from markerless_tracker.body.angles.segments import joint_frames, reported_joints
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.export.axes import FROM_WORLD, ROTATION_FILE_WORLD
 from markerless_tracker.results.export.skeleton import Skeleton, skeleton
+from markerless_tracker.results.pose_angles import PoseAngles
 from markerless_tracker.results.stored_result import StoredResult
 
 BACK = "_back"
@@ -80,7 +81,7 @@ class Coordinates:
         self._body = body
         self.bones: Skeleton = skeleton(body)
         self._frames = joint_frames(body)
-        self._reader = AngleReader(body)
+        self._reader = PoseAngles(body)
         self._between = reported_joints(body)
         self._own: dict[str, int] = {}
         self._unnamed: dict[str, tuple[int, int]] = {}
@@ -92,20 +93,27 @@ class Coordinates:
         self,
         parameters: FloatArray,
         names: Sequence[str] = (),
-        angles_rad: FloatArray | None = None,
+        near_rad: FloatArray | None = None,
     ) -> FloatArray:
         """Values (n, k) of the coordinates, m and rad, of poses (n, p); NaN where the pose is.
 
+        Angles go on from one row to the next where none are reported.
+
         Args:
             parameters: the poses.
-            names: of angles that are known already.
-            angles_rad: (n, len(names)) these angles; others are computed.
+            names: of reported angles.
+            near_rad: (n, len(names)) reported angles: of both solutions and full turns the nearest.
         """
         found = np.full((len(parameters), len(self.names)), np.nan)
+        columns = [names.index(name) if name in names else -1 for name in self._reader.names]
+        last = np.zeros(len(columns))
         for row in np.flatnonzero(np.isfinite(parameters).all(axis=1)):
-            at = dict(self._pose_values(parameters[row]))
-            if angles_rad is not None:
-                at.update(zip(names, angles_rad[row].tolist(), strict=True))
+            near = last
+            if near_rad is not None:
+                reported = np.append(near_rad[row], np.nan)[columns]
+                near = np.where(np.isfinite(reported), reported, last)
+            last = self._reader.read(parameters[row], near)
+            at = self._pose_values(parameters[row], last)
             found[row] = [
                 -at[name.removesuffix(BACK)] if name.endswith(BACK) else at[name]
                 for name in self.names
@@ -117,9 +125,8 @@ class Coordinates:
         rotates = [c.rotates for joint in self.joints for c in joint.coordinates]
         return np.where(rotates, np.rad2deg(1.0), 1.0)
 
-    def _pose_values(self, pose: FloatArray) -> dict[str, float]:
-        angles = self._reader.read(pose)
-        at = dict(zip(angles.names, angles.values_rad.tolist(), strict=True))
+    def _pose_values(self, pose: FloatArray, angles_rad: FloatArray) -> dict[str, float]:
+        at = dict(zip(self._reader.names, angles_rad.tolist(), strict=True))
         at.update({name: float(pose[index]) for name, index in self._own.items()})
         nodes = transforms(self._body, pose)
         if self._root >= 0:
@@ -237,7 +244,7 @@ def _euler(rotation: FloatArray, order: tuple[int, int, int]) -> FloatArray:
 def motion_columns(
     part: StoredResult, coordinates: Coordinates
 ) -> tuple[tuple[str, ...], FloatArray]:
-    """Columns of a `.mot`: the model's coordinates, the angles as the result has them.
+    """Columns of a `.mot`: the model's coordinates, the angles near those that the result has.
 
     Args:
         part: the frames, n of them.

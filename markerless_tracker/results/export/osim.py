@@ -223,7 +223,8 @@ def _add_offset(parent: Element, name: str, socket: str, place: FloatArray) -> E
 
 def _setup(model: Path, marker_file: str, names: tuple[str, ...], extent: _Extent) -> Element:
     document = Element("OpenSimDocument", Version=_VERSION)
-    tool = SubElement(document, "InverseKinematicsTool", name=model.stem)
+    # OpenSim names the file of marker errors after the tool, without its suffix after a dot.
+    tool = SubElement(document, "InverseKinematicsTool", name=model.stem.replace(".", "_"))
     for key, text in (
         ("model_file", model.name),
         ("constraint_weight", "Inf"),

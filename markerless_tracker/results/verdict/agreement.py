@@ -1,8 +1,9 @@
 """Whether silhouettes fit together by themselves, and which camera is wrong if they do not.
 
 Silhouettes of the cameras of one rig have a visual hull whose images fill them. If two cameras are
-exchanged, or one has another camera's background, the hull is small or nowhere. The rigs without
-one camera, and with two exchanged, are tried: what makes them fit names the fault.
+exchanged, all are numbered from another one on, or one has another camera's background, the hull is
+small or nowhere. The rigs without one camera, with two exchanged, and with all shifted along their
+order are tried: what makes them fit names the fault.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,10 +18,12 @@ from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.start.hull import FINE_M, Hull, find_hulls
 
-FITS = 0.90
-"""Fraction of the silhouettes that their hull fills, if cameras and silhouettes belong together."""
-GAIN = 0.10
-"""Least gain in that fraction by which a fault is named."""
+FITS = 0.95
+"""Fraction of the silhouettes that their hull fills, if cameras and silhouettes belong together; in
+recordings it is 0.985 or more."""
+GAIN, GAIN_OF_ORDER = 0.10, 0.05
+"""Least gain in that fraction by which a fault is named: without a camera, and with all in another
+order. Fewer cameras fit together more easily."""
 CERTAIN = 0.97
 """From this fraction on nothing else is tried."""
 MOST_CAMERAS = 8
@@ -39,17 +42,19 @@ class Fault:
         exchanged: two cameras to be exchanged; empty if none.
         left_out: a camera to be left out; empty if none.
         before, after: fraction of the silhouettes that their hull fills.
+        shifted: all cameras, each with the one whose calibration it has; empty if none.
     """
 
     exchanged: tuple[str, ...]
     left_out: str
     before: float
     after: float
+    shifted: tuple[tuple[str, str], ...] = ()
 
     @property
     def cameras(self) -> tuple[str, ...]:
         """The cameras at fault."""
-        return self.exchanged or (self.left_out,)
+        return self.exchanged or tuple(name for name, _ in self.shifted) or (self.left_out,)
 
     def describe(self) -> str:
         """The fault in one line."""
@@ -58,6 +63,12 @@ class Fault:
             return (
                 f"{a} and {b} seem to be exchanged: all silhouettes fit together to "
                 f"{self.after:.0%} then, instead of {self.before:.0%}"
+            )
+        if self.shifted:
+            listed = ", ".join(f"{name} has that of {other}" for name, other in self.shifted)
+            return (
+                f"the calibrations seem to be in another order: {listed}; all silhouettes fit "
+                f"together to {self.after:.0%} with each camera's own, instead of {self.before:.0%}"
             )
         return (
             f"{self.left_out} contradicts the other cameras: without it the silhouettes fit "
@@ -89,7 +100,8 @@ def find_fault(rig: CameraRig, frames: Sequence[Views]) -> Fault | None:
     if best is None:
         return None
     best = chosen.fault(frames, before)
-    if best.after < before + GAIN or best.after < 0.5 * (FITS + before):
+    gain = GAIN if best.left_out else GAIN_OF_ORDER
+    if best.after < before + gain or best.after < 0.5 * (FITS + before):
         return None
     return best
 
@@ -99,22 +111,37 @@ class _Trial:
     """A rig to try, and the cameras that are not those of the given one."""
 
     cameras: Mapping[str, CameraModel]
-    exchanged: tuple[str, ...]
-    left_out: str
+    exchanged: tuple[str, ...] = ()
+    left_out: str = ""
+    shifted: tuple[tuple[str, str], ...] = ()
 
     def fault(self, frames: Sequence[Views], before: float) -> Fault:
         used = [{n: v for n, v in views.items() if n in self.cameras} for views in frames]
-        return Fault(self.exchanged, self.left_out, before, _mean_fit(self.cameras, used))
+        after = _mean_fit(self.cameras, used)
+        return Fault(self.exchanged, self.left_out, before, after, self.shifted)
 
 
 def _trials(cameras: Mapping[str, CameraModel], names: Sequence[str]) -> Iterator[_Trial]:
     for a, b in combinations(names, 2):
         if cameras[a].size_px == cameras[b].size_px:
             swapped = {a: replace(cameras[b], name=a), b: replace(cameras[a], name=b)}
-            yield _Trial({**cameras, **swapped}, (a, b), "")
+            yield _Trial({**cameras, **swapped}, exchanged=(a, b))
+    yield from _shifts(cameras, names)
     if len(names) > _LEAST_LEFT:
         for name in names:
-            yield _Trial({n: c for n, c in cameras.items() if n != name}, (), name)
+            yield _Trial({n: c for n, c in cameras.items() if n != name}, left_out=name)
+
+
+def _shifts(cameras: Mapping[str, CameraModel], names: Sequence[str]) -> Iterator[_Trial]:
+    """All cameras numbered from another one on."""
+    count = len(names)
+    same_size = len({camera.size_px for camera in cameras.values()}) == 1
+    if count < 3 or count != len(cameras) or not same_size:
+        return
+    for by in range(1, count):
+        shifted = tuple((name, names[(k + by) % count]) for k, name in enumerate(names))
+        own = {other: replace(cameras[name], name=other) for name, other in shifted}
+        yield _Trial(own, shifted=shifted)
 
 
 def largest_hull(rig: CameraRig, views: Views) -> Hull | None:
@@ -124,7 +151,7 @@ def largest_hull(rig: CameraRig, views: Views) -> Hull | None:
 
 def _worth(fault: Fault) -> float:
     # Without a camera the others fit together more easily than with two exchanged.
-    return fault.after - (0.0 if fault.exchanged else 0.05)
+    return fault.after - (0.05 if fault.left_out else 0.0)
 
 
 def _mean_fit(cameras: Mapping[str, CameraModel], frames: Sequence[Views]) -> float:

@@ -21,8 +21,14 @@ USUAL_STATURES_M, USUAL_OVERLAP = (1.50, 2.00), 0.85
 """So are those outside of these where the overlap is below that: the scale may be wrong."""
 PROPORTION = 0.25
 """Largest deviation of a length, relative to the stature, from the body's description."""
-FLOOR_M = (-0.15, 0.50)
-"""Height of the lowest joint of a person on the floor, z = 0, or on a machine that stands on it."""
+FLOOR_M = (0.01, 0.20)
+"""Height of the lowest joint, an ankle, of a person who stands on the floor, z = 0: 0.06 to 0.10 m,
+and what a sole, a mat or a board adds. The person is higher on a machine, which is asked about."""
+_STANDING = 0.25
+"""Fraction of the frames, those with the lowest ankles, in which a foot stands."""
+BEYOND_M = 0.05
+"""Silhouettes reach so much farther than the body, up and down together, where it is too small;
+with the right sizes at most 0.02 m."""
 
 
 def stature_m(description: BodyDescription, body: BodyModel) -> float:
@@ -49,7 +55,8 @@ def doubts_about_fit(
     overlap = record.median_overlap
     mean = float(np.mean(list(overlap.values()))) if overlap else 1.0
     wrong = _contradicting(overlap)
-    found = []
+    found: list[str] = []
+    fault = None
     if search_faults and (wrong or mean < LEAST_OVERLAP):
         fault = find_fault(record.rig, record.samples)
         if fault is not None:
@@ -65,7 +72,9 @@ def doubts_about_fit(
     found += _unused(record)
     if record.body is not None:
         found += _sizes(record.body, description, mean)
-    return [*found, *_floor(record), *_static(record)]
+    if fault is None:
+        found += [*_too_small(record), *_floor(record)]
+    return [*found, *_static(record)]
 
 
 def doubts_about_start(record: RunRecord) -> list[str]:
@@ -201,12 +210,24 @@ def _static(record: RunRecord) -> list[str]:
     ]
 
 
+def _too_small(record: RunRecord) -> list[str]:
+    beyond = record.beyond.median_m
+    if not beyond > BEYOND_M:
+        return []
+    return [
+        f"the silhouettes reach {1000.0 * beyond:.0f} mm beyond the body, above and below "
+        "together: is the subject, or the stature given, this person's, and the scale of the "
+        "calibration right? (a hat reaches beyond it, too)"
+    ]
+
+
 def _floor(record: RunRecord) -> list[str]:
-    lowest = record.lowest_m.median
+    lowest = record.lowest_m.quantile(_STANDING)
     if not record.lowest_m.count or FLOOR_M[0] <= lowest <= FLOOR_M[1]:
         return []
-    where = "above" if lowest > 0.0 else "below"
+    low, high = FLOOR_M
+    also = "does the person stand on something" if lowest > high else "is the subject another's"
     return [
-        f"the lowest joint is {abs(lowest):.2f} m {where} z = 0 in most frames: is the floor of "
-        "the calibration's world at z = 0, and z up?"
+        f"the lowest joint of a standing person is at z = {lowest:.2f} m, expected {low:.2f} to "
+        f"{high:.2f} m: is the floor of the calibration's world at z = 0, and z up, or {also}?"
     ]

@@ -1,4 +1,4 @@
-"""A histogram for medians of a run: its memory does not grow with the frames."""
+"""A histogram for medians and quantiles of a run: its memory does not grow with the frames."""
 
 import math
 
@@ -33,7 +33,11 @@ class Histogram:
     @property
     def median(self) -> float:
         """The median, as the middle of its bin; NaN if there is no number."""
+        return self.quantile(0.5)
+
+    def quantile(self, fraction: float) -> float:
+        """The number that a fraction of them lies below, as the middle of its bin, or NaN."""
         if not self.count:
             return math.nan
-        place = int(np.searchsorted(np.cumsum(self._counts), 0.5 * self.count))
+        place = int(np.searchsorted(np.cumsum(self._counts), fraction * self.count))
         return self._low + (place + 0.5) * self._width

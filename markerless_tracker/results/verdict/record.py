@@ -8,6 +8,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.fitness.raster.bits import count_bits
 from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.results.verdict.beyond import Beyond
 from markerless_tracker.results.verdict.frame_warnings import FrameWarnings, WarningKind
 from markerless_tracker.results.verdict.histogram import Histogram
 from markerless_tracker.results.verdict.static_silhouette import StaticSilhouette
@@ -77,6 +78,7 @@ class RunRecord:
         warnings: of the frames.
         body: the body of the last tracked frame; None before the first.
         static: silhouette that never moves.
+        beyond: how far silhouettes reach beyond the body.
     """
 
     rig: CameraRig
@@ -84,7 +86,7 @@ class RunRecord:
     states: Counter[str] = field(default_factory=Counter)
     overlap: dict[str, Histogram] = field(default_factory=dict)
     lost_limbs: Counter[str] = field(default_factory=Counter)
-    lowest_m: Histogram = field(default_factory=lambda: Histogram(-5.0, 5.0, 1000))
+    lowest_m: Histogram = field(default_factory=lambda: Histogram(-5.0, 5.0, 2000))
     silhouettes: dict[str, Silhouettes] = field(default_factory=dict)
     samples: list[Mapping[str, Observation]] = field(default_factory=list)
     stretch: Stretch = field(default_factory=Stretch)
@@ -93,7 +95,7 @@ class RunRecord:
     body: BodyModel | None = None
 
     def __post_init__(self) -> None:
-        self.static = StaticSilhouette(self.rig)
+        self.static, self.beyond = StaticSilhouette(self.rig), Beyond()
         self._current = Stretch()
         self._sampled_ns = 0
 
@@ -118,7 +120,8 @@ class RunRecord:
                 self.overlap.setdefault(name, Histogram(0.0, 1.0, 200)).add(overlap)
         if result.state is TrackState.TRACKING:
             self.body = body
-            self.static.add(result, body)
+            for name, covered in self.static.add(result, body).items():
+                self.beyond.add(result, self.rig[name], covered)
             if result.markers_m is not None:
                 self.lowest_m.add(float(result.markers_m[:, 2].min()))
             for name, limb in result.limbs.items():

@@ -54,14 +54,14 @@ class StaticSilhouette:
         self._last_ns: int | None = None
         self._comparisons = 0
 
-    def add(self, result: TrackResult, body: BodyModel) -> None:
-        """Take a frame; most are passed over."""
+    def add(self, result: TrackResult, body: BodyModel) -> dict[str, NDArray[np.bool_]]:
+        """Take a frame; returns, by camera, what the body covers (h, w), empty if passed over."""
         if result.state is not TrackState.TRACKING or result.pose is None:
-            return
+            return {}
         every_ns = EVERY_NS if self._comparisons < MANY else LATER_EVERY_NS
         # Stamps may be set back.
         if self._last_ns is not None and abs(result.stamp_ns - self._last_ns) < every_ns:
-            return
+            return {}
         self._last_ns = result.stamp_ns
         self._comparisons += 1
         seen = [self._cameras[name] for name in result.observations]
@@ -71,6 +71,7 @@ class StaticSilhouette:
             self._compare(camera, result.observations[camera.name], covered[camera.name])
             view = self._views[camera.name]
             view.px_per_m += (pixels_per_m(camera, at) - view.px_per_m) / view.comparisons
+        return covered
 
     def found_m2(self) -> dict[str, float]:
         """Area of such silhouette by camera, where there is any, m2 at the person's distance."""

@@ -1,8 +1,10 @@
-"""Results of made-up motions, and an independent reader of BVH."""
+"""Results of made-up motions, and independent readers of exports."""
 
+import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -36,13 +38,21 @@ def motion(person: BodyModel) -> np.ndarray:
 
 @pytest.fixture
 def make_result(person: BodyModel, motion: np.ndarray, tmp_path: Path) -> Callable[..., Path]:
-    """`make_result(lost=, left_out=)`: NAME of a result; frames lost, stamps without a frame."""
+    """`make_result(lost=, left_out=, poses=)`: NAME of a result.
 
-    def make(lost: Sequence[int] = (), left_out: Sequence[int] = (), **options: bool) -> Path:
+    Frames lost, stamps without a frame, the poses (default: those of `motion`).
+    """
+
+    def make(
+        lost: Sequence[int] = (),
+        left_out: Sequence[int] = (),
+        poses: np.ndarray = motion,
+        **options: bool,
+    ) -> Path:
         name = tmp_path / "made" / "walk"
         config = TrackerConfig.from_mapping({"body": "person31"})
         with ResultWriter(name, person, config, fps=60.0, source="odd", **options) as writer:
-            for index, pose in enumerate(motion):
+            for index, pose in enumerate(poses):
                 if index in left_out:
                     continue
                 sd = np.full((15, 3), 0.01 * (1 + index))
@@ -63,80 +73,15 @@ def make_result(person: BodyModel, motion: np.ndarray, tmp_path: Path) -> Callab
     return make
 
 
-class Bvh:
-    """A BVH file, read by the format's description alone.
-
-    Attributes:
-        names: of the joints; the end of a joint is NAME_end.
-        period: s.
-        positions: (n, joints, 3).
-        angles: channel name of a joint -> (n,) values.
-    """
-
-    def __init__(self, path: Path) -> None:
-        words = path.read_text(encoding="utf-8").split()
-        joints: list[tuple[str, int]] = []
-        offsets: dict[int, np.ndarray] = {}
-        channels: dict[int, list[str]] = {}
-        stack: list[int] = []
-        i = 0
-        while words[i] != "MOTION":
-            word = words[i]
-            if word in ("ROOT", "JOINT", "End"):
-                parent = stack[-1] if stack else -1
-                name = f"{joints[parent][0]}_end" if word == "End" else words[i + 1]
-                joints.append((name, parent))
-                i += 2
-            elif word == "{":
-                stack.append(len(joints) - 1)
-                i += 1
-            elif word == "}":
-                stack.pop()
-                i += 1
-            elif word == "OFFSET":
-                offsets[stack[-1]] = np.array(words[i + 1 : i + 4], dtype=float)
-                i += 4
-            elif word == "CHANNELS":
-                count = int(words[i + 1])
-                channels[stack[-1]] = words[i + 2 : i + 2 + count]
-                i += 2 + count
-            else:
-                assert word == "HIERARCHY"
-                i += 1
-        assert words[i + 1] == "Frames:" and words[i + 3 : i + 5] == ["Frame", "Time:"]
-        count, self.period = int(words[i + 2]), float(words[i + 5])
-        rows = np.array(words[i + 6 :], dtype=float).reshape(count, -1)
-        self.names = [name for name, _ in joints]
-        self.positions = np.zeros((count, len(joints), 3))
-        turned = np.zeros((count, len(joints), 3, 3))
-        column = 0
-        for index, (_, parent) in enumerate(joints):
-            place, rotation = np.tile(offsets[index], (count, 1)), np.tile(np.eye(3), (count, 1, 1))
-            for channel in channels.get(index, []):
-                axis, value = "XYZ".index(channel[0]), rows[:, column]
-                column += 1
-                if channel.endswith("position"):
-                    place[:, axis] = value
-                else:
-                    rotation = rotation @ _rotations(axis, np.deg2rad(value))
-            if parent < 0:
-                self.positions[:, index], turned[:, index] = place, rotation
-                continue
-            self.positions[:, index] = self.positions[:, parent] + np.einsum(
-                "nij,nj->ni", turned[:, parent], place
-            )
-            turned[:, index] = turned[:, parent] @ rotation
-        assert column == rows.shape[1]
+@pytest.fixture
+def readers(project_root: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
+    """`readers(name)`: a module of `bench/results`."""
+    monkeypatch.syspath_prepend(project_root / "bench" / "results")
+    return importlib.import_module
 
 
-def _rotations(axis: int, angles: np.ndarray) -> np.ndarray:
-    found = np.tile(np.eye(3), (len(angles), 1, 1))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    found[:, i, i] = found[:, j, j] = np.cos(angles)
-    found[:, j, i], found[:, i, j] = np.sin(angles), -np.sin(angles)
+@pytest.fixture
+def read_bvh(readers: Callable[[str], ModuleType]) -> type:
+    """The class `Bvh`."""
+    found: type = readers("bvh_file").Bvh
     return found
-
-
-@pytest.fixture(scope="session")
-def read_bvh() -> type[Bvh]:
-    return Bvh

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.fitness.raster.silhouette import body_masks
+from markerless_tracker.geometry import inverse, rotation_from_rodrigues, transform
 from markerless_tracker.records import Observation
 from markerless_tracker.results.verdict.agreement import find_fault, largest_hull
 from markerless_tracker.synthesis import SyntheticScene
@@ -50,3 +52,33 @@ def test_a_camera_whose_silhouette_is_elsewhere_is_named(scene: SyntheticScene, 
     fault = find_fault(scene.rig, wrong)
     assert fault is not None and fault.left_out == "cam03" and fault.cameras == ("cam03",)
     assert fault.describe().startswith("cam03 contradicts the other cameras")
+
+
+def uneven(scene: SyntheticScene) -> CameraRig:
+    """The cameras of a scene, moved along their ring by different angles."""
+    cameras = []
+    for camera, degrees in zip(scene.rig, (0.0, 25.0, -10.0, 35.0), strict=True):
+        about_z = rotation_from_rodrigues(np.array([0.0, 0.0, np.deg2rad(degrees)]))
+        turned = transform(about_z, [0.0, 0.0, 0.0])
+        cameras.append(replace(camera, T_cam_world=camera.T_cam_world @ inverse(turned)))
+    return CameraRig(tuple(cameras))
+
+
+@pytest.mark.parametrize("by", [1, 2, 3])
+def test_cameras_numbered_from_another_one_on_are_named(scene: SyntheticScene, by: int) -> None:
+    rig = uneven(scene)
+    views = []
+    for index in (0, 9):
+        masks = body_masks(scene.body, scene.pose(index), rig.cameras)
+        views.append({
+            name: Observation.from_mask(name, 0, mask.view(np.uint8), 0 * mask.view(np.uint8))
+            for name, mask in masks.items()
+        })  # fmt: skip
+    assert find_fault(rig, views) is None
+    names = rig.names
+    wrong = [replace(rig.cameras[(k + by) % 4], name=name) for k, name in enumerate(names)]
+    fault = find_fault(CameraRig(tuple(wrong)), views)
+    assert fault is not None and set(fault.cameras) == set(names), fault
+    assert dict(fault.shifted) == {name: names[(k + by) % 4] for k, name in enumerate(names)}
+    assert fault.after > 0.95 and fault.before < 0.93
+    assert f"cam01 has that of {names[by]}" in fault.describe()

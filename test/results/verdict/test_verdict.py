@@ -1,6 +1,7 @@
 """The verdict of made-up runs."""
 
 import json
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -74,12 +75,36 @@ def test_what_was_known_before_stays_first(judge: Judge, result: Any) -> None:
     assert found.doubts[0] == "said before" and len(found.doubts) == 2
 
 
-@pytest.mark.parametrize(("raised_m", "words"), [(0.9, "0.96 m above"), (-0.4, "0.34 m below")])
-def test_a_person_where_no_floor_is(judge: Judge, result: Any, raised_m: float, words: str) -> None:
+@pytest.mark.parametrize(("raised_m", "at"), [(0.9, "0.97"), (0.2, "0.27"), (-0.09, "-0.02")])
+def test_a_person_where_no_floor_is(judge: Judge, result: Any, raised_m: float, at: str) -> None:
     (doubt,) = judge([result(index, raised_m=raised_m) for index in range(3)]).doubts
-    assert doubt.startswith("the lowest joint is ") and "z = 0 in most frames" in doubt
-    assert words.split()[-1] in doubt
-    assert judge([result(index, raised_m=0.3) for index in range(3)]).doubts == ()
+    assert doubt.startswith(
+        f"the lowest joint of a standing person is at z = {at} m, expected 0.01"
+    )
+    assert "is the floor of the calibration's world at z = 0, and z up, or " in doubt
+    asked = "does the person stand on something?" if raised_m > 0.0 else "is the subject another's?"
+    assert doubt.endswith(asked)
+
+
+@pytest.mark.parametrize("raised_m", [-0.04, 0.0, 0.1])
+def test_shoes_mats_and_jumps_are_no_doubt(judge: Judge, result: Any, raised_m: float) -> None:
+    results = [result(index, raised_m=raised_m) for index in range(6)]
+    results += [result(index, raised_m=raised_m + 0.5) for index in range(6, 10)]
+    assert judge(results).doubts == ()
+
+
+@pytest.mark.parametrize(("size", "doubted"), [(0.92, True), (1.0, False)])
+def test_silhouettes_that_reach_beyond_a_body_that_is_too_small(
+    judge: Judge, result: Any, scene: Any, size: float, doubted: bool
+) -> None:
+    lengths = {name: size * value for name, value in scene.body.lengths_m.items()}
+    body = load_body("person32", Subject("smaller", lengths))
+    found = judge([result(index) for index in range(8)], body)
+    assert bool(found.doubts) == doubted, found.doubts
+    if doubted:
+        assert re.match(r"the silhouettes reach \d+ mm beyond the body", found.doubts[0])
+        assert "is the subject, or the stature given, this person's" in found.doubts[0]
+    assert judge([result(index) for index in range(3)], body).doubts == ()
 
 
 def test_a_low_overlap(judge: Judge, result: Any) -> None:
