@@ -21,6 +21,8 @@ _WINDOWS_PX = (2, 11)
 _SUBPIXEL = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 60, 1e-4)
 _WRONG_CELLS = 1
 _SMALLEST = (3, 3)
+_CORNER_PX = 0.5
+"""OpenCV 4.6 gives corners of ChArUco boards from the corner of the first pixel, not its centre."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +130,7 @@ def _charuco_finders(board: Board) -> list[Any]:
             if names is None or not len(names):
                 return None, None
             _, corners, ids = aruco.interpolateCornersCharuco(markers, names, grey, drawn)
-            return corners, ids
+            return (None, None) if ids is None else (corners - _CORNER_PX, ids)
 
         return [find]
     boards = [charuco_board(board)]
