@@ -7,6 +7,8 @@ READY := $(VENV)/.ready
 DOCS_VENV := .venv-docs
 DOCS_READY := $(DOCS_VENV)/.ready
 PEER := .venv-peer
+JAZZY := .venv-jazzy
+JAZZY_PYTHON ?= $(shell command -v python3.12 || echo "$(PYTHON)")
 WORKERS ?= 2
 
 # Variables of another ROS environment would mix its libraries with those of .venv.
@@ -14,7 +16,7 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME AM
 unexport RMW_IMPLEMENTATION
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test test-long lint format docs demo bench peer lock clean
+.PHONY: help setup test test-jazzy test-long lint format docs demo bench peer lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 20
@@ -27,6 +29,15 @@ setup: $(READY) ## make .venv (the other targets do it, too)
 
 test: $(READY) ## run the tests (a quarter of an hour on two cores)
 	$(PY) -m pytest -n $(WORKERS) $(ARGS)
+
+test-jazzy: $(JAZZY)/.ready ## run the tests with the versions of Ubuntu 24.04, on Python 3.12 if it is there
+	$(JAZZY)/bin/python -m pytest -n $(WORKERS) $(ARGS)
+
+$(JAZZY)/.ready: requirements/jazzy.txt requirements/venv.sh setup.py setup.cfg
+	@sh requirements/venv.sh "$(JAZZY_PYTHON)" "$(JAZZY)" requirements/jazzy.txt
+	@$(JAZZY)/bin/python -m pip install -q --disable-pip-version-check \
+	    --no-deps --no-build-isolation --editable .
+	@touch $@
 
 test-long: $(READY) ## run the tests that take minutes each: soak, many fuzzed messages
 	$(PY) -m pytest -m long $(ARGS)
@@ -72,5 +83,5 @@ lock: ## pin the newest versions of requirements/direct.txt and docs-direct.txt
 	rm -rf $(VENV)-lock $(DOCS_VENV)-lock
 
 clean: ## remove everything that the targets make
-	rm -rf $(VENV) $(DOCS_VENV) $(PEER) site build install log dist demo out .hypothesis .mypy_cache .ruff_cache *.egg-info
+	rm -rf $(VENV) $(DOCS_VENV) $(PEER) $(JAZZY) site build install log dist demo out .hypothesis .mypy_cache .ruff_cache *.egg-info
 	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -23,6 +23,8 @@ _WINDOWS_PX = (2, 11)
 _SUBPIXEL = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 60, 1e-4)
 _WRONG_CELLS = 1
 _SMALLEST = (3, 3)
+_CORNER_PX = 0.5
+"""OpenCV 4.6 gives corners of ChArUco boards from the corner of the first pixel, not its centre."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +138,7 @@ def _charuco_finders(board: Board) -> list[Any]:
             if names is None or not len(names):
                 return None
             _, corners, ids = aruco.interpolateCornersCharuco(markers, names, grey, drawn)
-            return None if ids is None else (ids, corners)
+            return None if ids is None else (ids, corners - _CORNER_PX)
 
         return [find]
     # Before OpenCV 4.6 the top left square of a board with even rows was white.

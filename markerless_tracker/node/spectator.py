@@ -1,18 +1,14 @@
 """What a running tracker publishes, for a viewer in another process."""
 
-import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import Any
 
 import numpy as np
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
-from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import Image as ImageMessage
 from sensor_msgs.msg import JointState
 
@@ -20,7 +16,7 @@ from markerless_tracker.errors import ImageError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image
 from markerless_tracker.node.ros.images import decode_image
-from markerless_tracker.node.ros.process import init_context
+from markerless_tracker.node.ros.process import Listener
 from markerless_tracker.node.ros.qos import image_qos, latched_qos, output_qos
 from markerless_tracker.node.ros.stamps import stamp_of
 
@@ -50,38 +46,22 @@ class Heard:
     pictures: Mapping[str, Image] = field(default_factory=dict)
 
 
-class Spectator:
+class Spectator(Listener):
     """Subscribes to a tracker's outputs; a context manager.
 
     The cameras are those of `state`; the tracker draws their overlays while they are subscribed.
     """
 
     def __init__(self) -> None:
+        super().__init__("spectator")
         self._heard: deque[Heard] = deque()
         self._overlays: dict[str, Any] = {}
 
-    def __enter__(self) -> "Spectator":
-        self._context = init_context([])
-        self._node = rclpy.create_node(
-            f"spectator_{os.getpid()}", context=self._context, start_parameter_services=False
-        )
+    def _subscribe_all(self) -> None:
         create = self._node.create_subscription
         create(DiagnosticArray, "state", self._hear_state, latched_qos())
         create(PoseArray, "marker_poses", self._hear_markers, output_qos())
         create(JointState, "joint_states", self._hear_angles, output_qos())
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._executor.shutdown(timeout_sec=0)
-        self._node.destroy_node()
-        self._context.try_shutdown()
 
     @property
     def cameras(self) -> tuple[str, ...]:

@@ -1,13 +1,11 @@
 """Subscription to the `state` of a running tracker from another process."""
 
-import os
-from types import TracebackType
 from typing import Any
 
-from markerless_tracker.node.ros.process import require_ros
+from markerless_tracker.node.ros.process import Listener, require_ros
 
 
-class StateWatch:
+class StateWatch(Listener):
     """Receives the `state` of the tracker in one ROS domain; a context manager.
 
     Args:
@@ -19,35 +17,15 @@ class StateWatch:
 
     def __init__(self, domain_id: int) -> None:
         require_ros()
-        self._domain_id = domain_id
+        super().__init__("state_watch", domain_id)
         self._values: dict[str, str] = {}
 
-    def __enter__(self) -> "StateWatch":
-        import rclpy
+    def _subscribe_all(self) -> None:
         from diagnostic_msgs.msg import DiagnosticArray
-        from rclpy.executors import SingleThreadedExecutor
 
         from markerless_tracker.node.ros.qos import latched_qos
 
-        self._context = rclpy.Context()
-        rclpy.init(args=[], context=self._context, domain_id=self._domain_id)
-        self._node = rclpy.create_node(
-            f"state_watch_{os.getpid()}", context=self._context, start_parameter_services=False
-        )
         self._node.create_subscription(DiagnosticArray, "state", self._hear, latched_qos())
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._executor.shutdown(timeout_sec=0)
-        self._node.destroy_node()
-        self._context.try_shutdown()
 
     def listen(self, seconds: float) -> dict[str, str]:
         """Wait up to that many seconds for a message; the last values, {} before the first."""

@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging import Image
-from markerless_tracker.node.ros.process import StopSignals, init_context, require_ros
+from markerless_tracker.node.ros.process import StopSignals, require_ros, running
 from markerless_tracker.node.ros.profile import apply_profile
 
 KEPT = 9
@@ -122,20 +123,14 @@ class _Listening:
     def __enter__(self) -> "_Listening":
         apply_profile()
         require_ros()
-        from rclpy.executors import SingleThreadedExecutor
-
         from markerless_tracker.node.ros.declared import GivenNode
 
-        self._context = init_context([])
-        self._node = GivenNode("doctor", context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
+        self._running = running(partial(GivenNode, "doctor"))
+        self._node, self._executor = self._running.__enter__()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._executor.shutdown(timeout_sec=0)
-        self._node.destroy_node()
-        self._context.try_shutdown()
+    def __exit__(self, *error: Any) -> None:
+        self._running.__exit__(*error)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._node, name)

@@ -3,20 +3,17 @@
 import sys
 import time
 from collections.abc import Sequence
-from typing import Any
 
-from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.ros.process import (
+    NOTICE_S,
     StopSignals,
-    init_context,
     print_help,
     run_executable,
+    running,
 )
 
 _SUMMARY = "Plays a bag's images and camera infos to topics, with their own stamps."
 _EXAMPLE = "player --ros-args -p bag:=bag -p rate:=0.5 -p wait_for_subscribers:=true"
-# Longest time until a signal is noticed.
-_NOTICE_S = 0.1
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -34,41 +31,23 @@ def _run(argv: list[str], stop: StopSignals) -> int:
 
         print_help("player", _SUMMARY, _EXAMPLE, descriptions())
         return 0
-    context = init_context(argv)
-    try:
-        return _play(context, stop)
-    finally:
-        context.try_shutdown()
-
-
-def _play(context: Any, stop: StopSignals) -> int:
-    from rclpy.exceptions import ParameterException
-    from rclpy.executors import SingleThreadedExecutor
-
     from markerless_tracker.node.player.node import PlayerNode
 
-    try:
-        node = PlayerNode(context=context)
-    except ParameterException as error:
-        raise ConfigError(" ".join(str(error).split())) from error
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
+    with running(PlayerNode, argv) as (node, executor):
 
-    def spin(seconds: float) -> bool:
-        until_s = time.monotonic() + seconds
-        while not stop.asked:
-            left_s = until_s - time.monotonic()
-            executor.spin_once(timeout_sec=min(max(0.0, left_s), _NOTICE_S))
-            if left_s <= 0.0:
-                break
-        return not stop.asked
+        def spin(seconds: float) -> bool:
+            until_s = time.monotonic() + seconds
+            while not stop.asked:
+                left_s = until_s - time.monotonic()
+                executor.spin_once(timeout_sec=min(max(0.0, left_s), NOTICE_S))
+                if left_s <= 0.0:
+                    break
+            return not stop.asked
 
-    node.play(spin)
-    if not stop.asked:
-        node.finish(spin)
-    node.get_logger().info(_summary(node.sets_played, node.playing_s, node.cpu_s))
-    executor.shutdown(timeout_sec=0)
-    node.destroy_node()
+        node.play(spin)
+        if not stop.asked:
+            node.finish(spin)
+        node.get_logger().info(_summary(node.sets_played, node.playing_s, node.cpu_s))
     return 0
 
 

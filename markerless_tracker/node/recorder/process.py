@@ -2,15 +2,14 @@
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
-from markerless_tracker.node.ros.process import StopSignals, init_context, require_ros
+from markerless_tracker.node.ros.process import NOTICE_S, StopSignals, require_ros, running
 from markerless_tracker.node.ros.profile import apply_profile
 
 if TYPE_CHECKING:
     from markerless_tracker.node.recorder.node import Bag
-
-_NOTICE_S = 0.1
 
 
 def record(
@@ -37,26 +36,15 @@ def record(
         RosMissingError: ROS is not installed.
     """
     prepare()
-    from rclpy.executors import SingleThreadedExecutor
-
     from markerless_tracker.node.recorder.node import RecorderNode
 
-    context = init_context([])
-    try:
-        node = RecorderNode(writer, topics, context=context)
-        executor = SingleThreadedExecutor(context=context)
-        executor.add_node(node)
+    with running(partial(RecorderNode, writer, topics)) as (node, executor):
         until_s = None if seconds is None else time.monotonic() + seconds
         while not stop.asked and (until_s is None or time.monotonic() < until_s):
-            executor.spin_once(timeout_sec=_NOTICE_S)
+            executor.spin_once(timeout_sec=NOTICE_S)
             if progress is not None:
                 progress(writer.messages)
-        executor.shutdown(timeout_sec=0)
-        counts = dict(node.counts)
-        node.destroy_node()
-    finally:
-        context.try_shutdown()
-    return counts
+    return dict(node.counts)
 
 
 def prepare() -> None:

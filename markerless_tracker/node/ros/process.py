@@ -1,10 +1,14 @@
 """Starting and stopping an executable of this package in a ROS graph."""
 
+import os
 import signal
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 from markerless_tracker.errors import ConfigError, TrackerError
 from markerless_tracker.libraries import single_threaded
@@ -13,8 +17,8 @@ from markerless_tracker.node.ros.profile import apply_profile
 NOT_INSTALLED = (
     "ROS 2 is not installed: pip install 'markerless_tracker[ros]' or source a ROS 2 Jazzy setup"
 )
-
-
+NOTICE_S = 0.1
+"""Longest time until a signal is noticed."""
 _NEEDED = (
     "rclpy",
     "diagnostic_msgs.msg",
@@ -102,11 +106,12 @@ def print_help(name: str, summary: str, example: str, lines: Mapping[str, str]) 
     )
 
 
-def init_context(arguments: Sequence[str]) -> Any:
+def init_context(arguments: Sequence[str], domain_id: int | None = None) -> Any:
     """Initialise rclpy with a context of its own and ROS arguments.
 
     Args:
         arguments: e.g. ``["--ros-args", "-p", "seed:=1"]``.
+        domain_id: the ROS domain, 0..101; that of the environment if None.
 
     Returns:
         The ``rclpy.Context``; signals are left to the caller.
@@ -129,6 +134,7 @@ def init_context(arguments: Sequence[str]) -> Any:
         rclpy.init(
             args=list(arguments),
             context=context,
+            domain_id=domain_id,
             signal_handler_options=SignalHandlerOptions.NO,
         )
     except ConfigError:
@@ -136,3 +142,70 @@ def init_context(arguments: Sequence[str]) -> Any:
     except Exception as error:  # rclpy has no common base class for errors in arguments
         raise ConfigError(f"ROS arguments: {' '.join(str(error).split())}") from error
     return context
+
+
+@contextmanager
+def running(
+    kind: Callable[..., Any], arguments: Sequence[str] = (), domain_id: int | None = None
+) -> Iterator[tuple[Any, Any]]:
+    """A node and the executor that spins it, in a context of their own, until the block ends.
+
+    Args:
+        kind: makes the node; called with a `context`.
+        arguments, domain_id: as of `init_context`.
+
+    Raises:
+        ConfigError: ROS arguments or parameters that cannot be used.
+    """
+    context = init_context(arguments, domain_id)
+    try:
+        from rclpy.exceptions import ParameterException
+        from rclpy.executors import SingleThreadedExecutor
+
+        try:
+            node = kind(context=context)
+        except ParameterException as error:
+            raise ConfigError(" ".join(str(error).split())) from error
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        try:
+            yield node, executor
+        finally:
+            # Destroying the node removes the shared memory of the middleware.
+            executor.shutdown(timeout_sec=0)
+            node.destroy_node()
+    finally:
+        context.try_shutdown()
+
+
+class Listener:
+    """A node of a class's own while its context lasts, without parameters; see `running`.
+
+    Args:
+        name: the node's, before the number of the process.
+        domain_id: as of `init_context`.
+    """
+
+    def __init__(self, name: str, domain_id: int | None = None) -> None:
+        self._name, self._domain_id = name, domain_id
+
+    def __enter__(self) -> Self:
+        from rclpy.node import Node
+
+        name = f"{self._name}_{os.getpid()}"
+        kind = partial(Node, name, start_parameter_services=False)
+        self._running = running(kind, domain_id=self._domain_id)
+        self._node, self._executor = self._running.__enter__()
+        self._subscribe_all()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._running.__exit__(kind, error, trace)
+
+    def _subscribe_all(self) -> None:
+        """Subscribe `self._node` to what is listened to."""

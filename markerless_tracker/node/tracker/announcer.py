@@ -1,7 +1,10 @@
 """Log lines of a running tracker: one per event, in the words of `state` and the diagnostics."""
 
+from collections.abc import Mapping
+
 from markerless_tracker.node.health import NEWS, Health
 from markerless_tracker.node.ros.notices import Notices, kind_of
+from markerless_tracker.node.tracker.cameras.lateness import Lateness
 from markerless_tracker.records import TrackResult, TrackState
 
 
@@ -21,6 +24,7 @@ class Announcer:
         self._state = TrackState.SEARCHING
         self._found = False
         self._trouble = self._without = ""
+        self._late: set[str] = set()
 
     def result(self, result: TrackResult) -> None:
         """Log a change of state, and the warnings of a result."""
@@ -47,6 +51,31 @@ class Announcer:
             else:
                 self._news.say("images are tracked")
             self._trouble = health.trouble
+
+    def lateness(self, found: Mapping[str, Lateness], offsets_s: Mapping[str, float]) -> None:
+        """Log each camera once whose images are late for sure, with the parameter that corrects it.
+
+        Args:
+            found: how late the cameras are, with the offsets in effect.
+            offsets_s: those offsets, of all cameras in their order.
+        """
+        late = {n: one for n, one in found.items() if one.certain and n not in self._late}
+        if not late:
+            return
+        self._late |= set(late)
+        listed = ", ".join(
+            f"{name} by {one.offset_s * 1e3:+.0f} ms (sd {one.sd_s * 1e3:.1f} ms)"
+            for name, one in late.items()
+        )
+        right_s = {
+            name: given_s + (found[name].offset_s if name in self._late else 0.0)
+            for name, given_s in offsets_s.items()
+        }
+        values = ", ".join(f"{value:.3f}" for value in right_s.values())
+        self._notices.say(
+            f"images are late, by the person's motion: {listed}; "
+            f'stamp_offsets:="[{values}]" corrects it'
+        )
 
 
 def ready_line(activity: str, kernels: int, seconds: float) -> str:

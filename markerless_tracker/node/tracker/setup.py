@@ -73,6 +73,11 @@ class RigSource:
         """Time by which a camera's stamps are late."""
         return self._offsets_ns.get(camera, 0)
 
+    @property
+    def offsets_s(self) -> dict[str, float]:
+        """The same of all cameras, s, in their order."""
+        return {name: 1e-9 * self.offset_ns(name) for name in self.names}
+
     def listen(self, node: Any, report: Callable[[str], None]) -> None:
         """Subscribe to TF if that is needed.
 

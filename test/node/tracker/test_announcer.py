@@ -9,6 +9,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 from markerless_tracker.node.health import Health, Level
 from markerless_tracker.node.ros.notices import Notices
 from markerless_tracker.node.tracker.announcer import Announcer, ready_line
+from markerless_tracker.node.tracker.cameras.lateness import Lateness
 from markerless_tracker.records import TrackResult, TrackState
 
 TRACKING, LOST, SEARCHING = TrackState.TRACKING, TrackState.LOST, TrackState.SEARCHING
@@ -65,3 +66,17 @@ def test_a_camera_that_is_gone_and_back_is_said_once_each() -> None:
 def test_the_duration_of_the_compilation() -> None:
     line = ready_line("waiting for images", 12, 34.56)
     assert line == "ready, waiting for images; 12 kernels compiled, 34.6 s"
+
+
+def test_a_late_camera_is_said_once_with_the_offsets_that_correct_it() -> None:
+    log = Log()
+    given_s = {"cam01": 0.0, "cam02": 0.01, "cam03": 0.0}
+    sure, unsure = Lateness(0.02, 0.001), Lateness(0.02, 0.01)
+    log.announcer.lateness({"cam02": unsure, "cam03": Lateness(0.004, 0.0001)}, given_s)
+    assert log.warnings == []
+    for _ in range(3):
+        log.announcer.lateness({"cam01": unsure, "cam02": sure}, given_s)
+    assert log.warnings == [
+        "images are late, by the person's motion: cam02 by +20 ms (sd 1.0 ms); "
+        'stamp_offsets:="[0.000, 0.030, 0.000]" corrects it'
+    ]

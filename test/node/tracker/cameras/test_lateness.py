@@ -1,0 +1,78 @@
+"""Offsets of cameras from made-up silhouettes of a person whose pose is known."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import markers
+from markerless_tracker.node.tracker.cameras.lateness import LatenessEstimate
+from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.synthesis.scene import SyntheticScene
+
+FPS = 40.0
+NAMES = ("cam01", "cam02", "cam03", "cam04")
+
+
+def scene_of(motion: str) -> SyntheticScene:
+    return SyntheticScene(size_px=(328, 245), fps=FPS, samples=2, motion=motion)
+
+
+@pytest.fixture(scope="module")
+def walk() -> SyntheticScene:
+    return scene_of("walk")
+
+
+def seen(scene: SyntheticScene, index: int, late: Mapping[str, int]) -> dict[str, Observation]:
+    """The exact silhouettes, of some cameras those of earlier frames."""
+    found = {}
+    masks = {frames: scene.frame(index - frames)[1] for frames in {0, *late.values()}}
+    for name in scene.rig.names:
+        mask = masks[late.get(name, 0)][name]
+        edges = np.zeros(mask.shape, np.uint8)
+        stamp_ns = scene.stamp_ns(index)
+        found[name] = Observation.from_mask(name, stamp_ns, mask, edges)
+    return found
+
+
+def estimate(
+    scene: SyntheticScene,
+    late: Mapping[str, int],
+    frames: int,
+    state: TrackState = TrackState.TRACKING,
+) -> LatenessEstimate:
+    made = LatenessEstimate(scene.rig, step_px=2.0)
+    for index in range(2, 2 + frames):
+        pose = scene.pose(index)
+        result = TrackResult(
+            scene.stamp_ns(index), state, pose, markers(scene.body, pose), 1.0, {}, 0,
+            observations=seen(scene, index, late) if index % 3 == 0 else {},
+        )  # fmt: skip
+        made.add(result, scene.body)
+    return made
+
+
+def test_a_late_camera_is_found_with_its_offset(walk: SyntheticScene) -> None:
+    found = estimate(walk, {"cam02": 1}, 300).by_camera
+    assert tuple(found) == NAMES
+    assert found["cam02"].certain
+    assert found["cam02"].offset_s == pytest.approx(1.0 / FPS, rel=0.2)
+    others = [found[name] for name in NAMES if name != "cam02"]
+    assert not any(one.certain for one in others)
+    assert max(abs(one.offset_s) for one in others) < 0.004
+
+
+def test_an_early_camera_has_a_negative_offset(walk: SyntheticScene) -> None:
+    found = estimate(walk, {"cam02": -1}, 400).by_camera
+    assert found["cam02"].offset_s == pytest.approx(-1.0 / FPS, rel=0.2)
+
+
+def test_cameras_in_step_have_no_offset(walk: SyntheticScene) -> None:
+    found = estimate(walk, {}, 150).by_camera
+    assert max(abs(one.offset_s) for one in found.values()) < 0.003
+    assert not any(one.certain for one in found.values())
+
+
+def test_nothing_is_said_without_motion_or_track(walk: SyntheticScene) -> None:
+    assert not estimate(scene_of("stand"), {"cam02": 1}, 150).by_camera
+    assert not estimate(walk, {"cam02": 1}, 150, TrackState.LOST).by_camera
