@@ -28,7 +28,7 @@ FEW = 4
 """Frames of most recordings: a start takes as long as many frames."""
 WHOLE = {
     "no background", "one background missing", "a chair that the backgrounds lack",
-    "one camera late by a third of a second", "a subject a tenth too small",
+    "one camera late by a third of a second", "a subject a sixth too small",
 }  # fmt: skip
 """Mistakes that show over some time."""
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "mistakes.md"
@@ -156,7 +156,7 @@ def _subject(case: Case) -> None:
 
 def _small_subject(case: Case) -> None:
     path = case.folder / "small.yaml"
-    lengths = {name: 0.9 * value for name, value in case.scene.body.lengths_m.items()}
+    lengths = {name: 5 / 6 * value for name, value in case.scene.body.lengths_m.items()}
     write_subject(path, Subject("small", lengths))
     case.words = ("--subject", path)
 
@@ -210,7 +210,7 @@ MISTAKES: Mapping[str, Callable[[Case], None]] = {
     ),
     "a chair that the backgrounds lack": _chair,
     "another person's subject": _subject,
-    "a subject a tenth too small": lambda case: _small_subject(case),
+    "a subject a sixth too small": lambda case: _small_subject(case),
     "stature in centimetres": _set(words=("--stature", 172)),
     "start in millimetres": lambda case: _start(case, 1000.0 * case.scene.markers(0)),
     "start of another recording": lambda case: _start(case, case.scene.markers(0) + [0.7, 0.7, 0]),

@@ -117,7 +117,7 @@ def test_the_contours_cost_falls_to_the_true_shapes(case) -> None:
         frame.collect(view.pose, 0.1, body)
         costs.append(frame.residuals.cost.sum())
     generic, least, found, again = costs
-    assert found - least < 0.1 * (generic - least)
+    assert found - least < 0.15 * (generic - least)
     # The frame keeps its own, generic body.
     assert again == generic
 
