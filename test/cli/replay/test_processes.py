@@ -57,7 +57,9 @@ def test_a_process_ends_on_sigint(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     module = write_module(
         tmp_path,
         monkeypatch,
-        "import os, sys, time\n"
+        # As nodes do: a job in the background inherits that SIGINT is ignored.
+        "import os, signal, sys, time\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "try:\n"
         "    print('domain', os.environ['ROS_DOMAIN_ID'])\n"
         "    time.sleep(60)\n"
