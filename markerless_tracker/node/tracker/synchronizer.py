@@ -133,17 +133,6 @@ class Synchronizer(Generic[View]):
             return self._last_late_ns
 
     @property
-    def newer(self) -> int:
-        """Sets that became complete since the last one was taken."""
-        with self._changed:
-            return 0 if self._waiting is None else 1 + self._waiting.replaced
-
-    def note_skipped(self) -> None:
-        """Count a set that was taken, and then left out for a newer one."""
-        with self._changed:
-            self._counts["skipped"] += 1
-
-    @property
     def complete_s(self) -> float | None:
         """Time at which the last set became complete, late or not; None before the first."""
         with self._changed:

@@ -13,8 +13,6 @@ from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronize
 _RECENT = 5
 """Fits, and sets made ahead, by whose times the next set is taken."""
 _SPARE_S = 0.002
-STALE_S = 0.15
-"""Age from which on a set whose evidence is ready is left out, if a newer one is complete."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,8 @@ class Ahead:
     """Takes the newest set and makes its evidence, in a thread beside the one that fits.
 
     The set is taken as late as its evidence will be ready when the fit ends, so that it is the
-    newest. One that waited for longer than `STALE_S` is left out if a newer one is complete.
+    newest. One that waits for longer is fitted all the same: a newer one's evidence would make the
+    tracker later still.
 
     Args:
         sets: source of the complete sets.
@@ -67,11 +66,7 @@ class Ahead:
     def next(self) -> Taken | None:
         """The set to fit now; None if none came in time."""
         following, self._following = self._following, None
-        taken = self._take(0.0) if following is None else following.result()
-        if taken is not None and self._sets.newer and self._age_s(taken) >= STALE_S:
-            self._sets.note_skipped()
-            taken = self._take(0.0)
-        return taken
+        return self._take(0.0) if following is None else following.result()
 
     def fitting(self) -> None:
         """A fit begins: the next set is made beside it."""
@@ -85,9 +80,6 @@ class Ahead:
         """The fit ended."""
         self._fits_s.append(self._clock() - self._began_s)
         self._fitted.set()
-
-    def _age_s(self, taken: Taken) -> float:
-        return self._clock() - taken.matched.arrived_s
 
     def close(self) -> None:
         """Take no more sets."""
