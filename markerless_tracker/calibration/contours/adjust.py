@@ -21,13 +21,13 @@ from markerless_tracker.calibration.contours.cameras import (
     put,
     shift_slopes,
 )
-from markerless_tracker.calibration.contours.frames import SeenFrame, independence
+from markerless_tracker.calibration.contours.frames import SeenFrame, contours_of, independence
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.model import project_camera
-from markerless_tracker.fitness.arrays import lay_out_views
 from markerless_tracker.fitness.contour import (
     ContourFrame,
     OutlineRows,
+    add_pose_prior,
     eliminated,
     normal_equations,
     outline_rows,
@@ -39,7 +39,6 @@ from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.fitness.shape.body_fit import ALONG
 from markerless_tracker.fitness.shape.section_fit import RESIDUAL_SIGMA_M
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.search import pixels_per_m
 
 PRIOR_SD = np.array([*np.deg2rad([2.0, 2.0, 2.0]), 0.03, 0.03, 0.03, 0.01])
 """Standard deviation (7,) of the change of a camera that is wrong: a camera that was touched turns
@@ -117,10 +116,13 @@ class ContourAdjustment:
         self._body = BodyUnknowns(body, sizes)
         self.cameras = list(rig.cameras)
         self.free = np.zeros((len(rig), CHANGES), dtype=np.bool_)
-        self._frames = [
-            _Frame(self._contours(frame, step_px), np.array(frame.pose), float(weight))
-            for frame, weight in zip(frames, independence(frames), strict=True)
-        ]
+        self._frames = []
+        for frame, weight in zip(frames, independence(frames), strict=True):
+            contours = contours_of(
+                body, rig.cameras, frame.observations, frame.markers_m,
+                step_px=step_px, reach_m=FIRST_REACH_M,
+            )  # fmt: skip
+            self._frames.append(_Frame(contours, np.array(frame.pose), float(weight)))
 
     def copy(self) -> "ContourAdjustment":
         """The same state, to go on from independently; evidence is shared."""
@@ -262,14 +264,12 @@ class ContourAdjustment:
                 ]
             )
             own, pull = normal_equations(slopes, frame.weight * _SCALE * rows.weight, rows.value)
-            off = (frame.pose - body.prior_mean) / body.prior_sd
-            pose = np.arange(body.size)
-            own[pose, pose] += frame.weight / body.prior_sd**2 + 1e-9
-            own[pose, pose] *= 1.0 + _DAMPING
-            pull[pose] += frame.weight * off / body.prior_sd
+            precision = frame.weight / body.prior_sd**2
+            off = frame.pose - body.prior_mean
+            add_pose_prior(own, pull, precision, off, damping=_DAMPING)
             sums.parts.append(eliminated(own, pull, body.size, sums.hessian, sums.slope))
             residuals = float(frame.contours.residuals.cost.sum())
-            sums.cost += frame.weight * (_SCALE * residuals + 0.5 * float(off @ off))
+            sums.cost += frame.weight * _SCALE * residuals + 0.5 * float(precision @ off**2)
             sums.squares += frame.weight * float(rows.weight @ rows.value**2)
             sums.weight += frame.weight * float(rows.weight.sum())
         return sums
@@ -291,16 +291,3 @@ class ContourAdjustment:
             (names.index(name), slice(int(ends[view]), int(ends[view + 1])))
             for view, name in enumerate(frame.contours.views.names)
         ]
-
-    def _contours(self, frame: SeenFrame, step_px: float) -> ContourFrame:
-        cameras = {c.name: c for c in self._first if c.name in frame.observations}
-        centre = np.nanmean(frame.markers_m, axis=0)
-        return ContourFrame(
-            self.body,
-            cameras,
-            frame.observations,
-            lay_out_views(list(cameras.values()), frame.observations),
-            pixels_per_m={name: pixels_per_m(c, centre) for name, c in cameras.items()},
-            step_px=step_px,
-            reach_m=FIRST_REACH_M,
-        )

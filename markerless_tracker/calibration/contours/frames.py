@@ -6,8 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraModel
+from markerless_tracker.fitness.arrays import lay_out_views
+from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.tracking.search import pixels_per_m
 
 MOST = 28
 """Frames that are used."""
@@ -72,6 +77,36 @@ class FrameChoice:
             order.append(int(np.argmax(nearest)))
             nearest = np.minimum(nearest, _distances_m(markers, markers[order[-1]]))
         return [self._kept[i] for i in order]
+
+
+def contours_of(
+    body: BodyModel,
+    cameras: Sequence[CameraModel],
+    observations: Mapping[str, Observation],
+    markers_m: FloatArray,
+    *,
+    step_px: float,
+    reach_m: float,
+) -> ContourFrame:
+    """Contour evidence of the cameras that have an observation.
+
+    Args:
+        body, step_px, reach_m: as of `ContourFrame`.
+        cameras: the cameras; those without an observation are left out.
+        observations: by camera name.
+        markers_m: (m, 3) world, of the person; their centre sets the size of a metre in each view.
+    """
+    centre = np.nanmean(markers_m, axis=0)
+    seen = {camera.name: camera for camera in cameras if camera.name in observations}
+    return ContourFrame(
+        body,
+        seen,
+        observations,
+        lay_out_views(list(seen.values()), observations),
+        pixels_per_m={name: pixels_per_m(camera, centre) for name, camera in seen.items()},
+        step_px=step_px,
+        reach_m=reach_m,
+    )
 
 
 def independence(frames: Sequence[SeenFrame]) -> FloatArray:

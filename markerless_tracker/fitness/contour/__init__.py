@@ -10,13 +10,19 @@ from markerless_tracker.fitness.contour.outline_rows import (
     pose_slopes,
     surface,
 )
-from markerless_tracker.fitness.contour.row_kernels import eliminated, normal_equations, solved
+from markerless_tracker.fitness.contour.row_kernels import (
+    add_pose_prior,
+    eliminated,
+    normal_equations,
+    solved,
+)
 
 __all__ = [
     "REACH_M",
     "ContourFrame",
     "NormalEquations",
     "OutlineRows",
+    "add_pose_prior",
     "eliminated",
     "normal_equations",
     "outline_rows",

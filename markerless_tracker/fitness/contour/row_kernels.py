@@ -8,6 +8,9 @@ import numpy as np
 from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
 
+_LEAST_PRECISION = 1e-9
+"""Added to that of each parameter: one without prior and residuals stays as it is."""
+
 
 def normal_equations(
     slopes: FloatArray, weight: FloatArray, value: FloatArray
@@ -17,6 +20,27 @@ def normal_equations(
     used = np.empty(slopes.shape[1], dtype=np.int64)
     _accumulate(np.ascontiguousarray(slopes), weight, value, used, hessian, slope)
     return hessian, slope
+
+
+def add_pose_prior(
+    hessian: FloatArray,
+    slope: FloatArray,
+    precision: FloatArray,
+    off: FloatArray,
+    *,
+    damping: float,
+) -> None:
+    """Add a Gaussian prior of a pose, the first p unknowns, and damp their equations.
+
+    Args:
+        hessian, slope: (p + k, p + k) and (p + k,), changed.
+        precision: (p,) 1 / variance.
+        off: (p,) from the prior's mean to the pose.
+        damping: fraction of their diagonal that is added to it.
+    """
+    pose = np.arange(precision.size)
+    hessian[pose, pose] = (hessian[pose, pose] + precision + _LEAST_PRECISION) * (1.0 + damping)
+    slope[pose] += precision * off
 
 
 def eliminated(

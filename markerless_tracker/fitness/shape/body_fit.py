@@ -13,6 +13,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.body.sizes import LengthPrior, Sizes
 from markerless_tracker.fitness.contour import (
     ContourFrame,
+    add_pose_prior,
     eliminated,
     normal_equations,
     outline_rows,
@@ -138,8 +139,7 @@ class BodyFit:
         slopes = np.column_stack([by_pose, *by_length, by_section])
         weight = rows.weight / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG * AMONG)
         hessian, slope = normal_equations(slopes, weight, rows.value)
-        prior_precision = 1.0 / (AMONG * body.prior_sd**2)
-        pose = np.arange(body.size)
-        hessian[pose, pose] = (hessian[pose, pose] + prior_precision + 1e-9) * (1.0 + _DAMPING)
-        slope[pose] += prior_precision * (frame.pose - body.prior_mean)
+        precision = 1.0 / (AMONG * body.prior_sd**2)
+        off = frame.pose - body.prior_mean
+        add_pose_prior(hessian, slope, precision, off, damping=_DAMPING)
         return hessian, slope

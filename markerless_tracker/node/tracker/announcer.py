@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
+from markerless_tracker.calibration.contours.time_offset import TimeOffset
 from markerless_tracker.node.health import NEWS, Health
 from markerless_tracker.node.ros.notices import Notices, kind_of
-from markerless_tracker.node.tracker.cameras.lateness import Lateness
 from markerless_tracker.records import TrackResult, TrackState
 
 
@@ -52,12 +52,12 @@ class Announcer:
                 self._news.say("images are tracked")
             self._trouble = health.trouble
 
-    def lateness(self, found: Mapping[str, Lateness], offsets_s: Mapping[str, float]) -> None:
+    def time_offsets(self, found: Mapping[str, TimeOffset], given_s: Mapping[str, float]) -> None:
         """Log each camera once whose images are late for sure, with the parameter that corrects it.
 
         Args:
-            found: how late the cameras are, with the offsets in effect.
-            offsets_s: those offsets, of all cameras in their order.
+            found: the cameras' offsets that are left, by name.
+            given_s: the offsets in effect, of all cameras in their order.
         """
         late = {n: one for n, one in found.items() if one.certain and n not in self._late}
         if not late:
@@ -68,8 +68,8 @@ class Announcer:
             for name, one in late.items()
         )
         right_s = {
-            name: given_s + (found[name].offset_s if name in self._late else 0.0)
-            for name, given_s in offsets_s.items()
+            name: value_s + (found[name].offset_s if name in self._late else 0.0)
+            for name, value_s in given_s.items()
         }
         values = ", ".join(f"{value:.3f}" for value in right_s.values())
         self._notices.say(

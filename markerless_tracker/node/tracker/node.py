@@ -10,6 +10,7 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.calibration.contours.time_offset import TimeOffsetEstimate
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.node.health import QUIET_S, Facts, assess
 from markerless_tracker.node.ros import messages
@@ -19,7 +20,6 @@ from markerless_tracker.node.ros.qos import latched_qos
 from markerless_tracker.node.tracker import parameters
 from markerless_tracker.node.tracker.announcer import Announcer
 from markerless_tracker.node.tracker.cameras.build import make_inputs, view_reader
-from markerless_tracker.node.tracker.cameras.lateness import LatenessEstimate
 from markerless_tracker.node.tracker.changes import FIXED, LIVE, LiveSettings
 from markerless_tracker.node.tracker.publishing.files import Pictures, ResultFile
 from markerless_tracker.node.tracker.publishing.results import ResultPublishers
@@ -93,7 +93,7 @@ class TrackerNode(GivenNode):
             self._source.names, tolerance_ns=round(self._settings.sync_tolerance * 1e9)
         )
         self._tracker: Tracker | None = None
-        self._lateness: LatenessEstimate | None = None
+        self._time_offsets: TimeOffsetEstimate | None = None
         self._found = False
         self._handle: TrackerHandle | None = None
         self._missing: Sequence[str] = ()
@@ -225,7 +225,7 @@ class TrackerNode(GivenNode):
         self._results.describe(setup.tracker.body)
         self._tracker = setup.tracker
         step_px = self._settings.config.edges.step_px
-        self._lateness = LatenessEstimate(setup.tracker.rig, step_px=step_px)
+        self._time_offsets = TimeOffsetEstimate(setup.tracker.rig, step_px=step_px)
         self._status.add_cpu_of(lambda: setup.tracker.evidence.process_cpu_s)
         self._result_file.begin(setup.tracker)
         for doubt in self._report.begin(setup.tracker, rig):
@@ -240,7 +240,7 @@ class TrackerNode(GivenNode):
     # outputs
 
     def _publish(self, tracked: TrackedSet) -> None:
-        assert self._tracker is not None and self._lateness is not None
+        assert self._tracker is not None and self._time_offsets is not None
         self._result_file.add(tracked.result)
         self._report.add(tracked.result)
         self._announcer.result(tracked.result)
@@ -249,8 +249,8 @@ class TrackerNode(GivenNode):
             return
         self._results.publish(tracked.result, self._tracker.body)
         self._pictures.publish(tracked, self._tracker)
-        self._lateness.add(tracked.result, self._tracker.body)
-        self._announcer.lateness(self._lateness.by_camera, self._source.offsets_s)
+        self._time_offsets.add(tracked.result, self._tracker.body)
+        self._announcer.time_offsets(self._time_offsets.by_camera, self._source.offsets_s)
 
     def _dealt(self) -> None:
         if self.context.ok():
@@ -272,7 +272,7 @@ class TrackerNode(GivenNode):
                 self._missing,
                 now_s=now_s,
                 views=self._sets.camera_counts,
-                lateness={} if self._lateness is None else self._lateness.by_camera,
+                time_offsets={} if self._time_offsets is None else self._time_offsets.by_camera,
             )
             message = messages.state_message(
                 self.get_fully_qualified_name(), values, health, self._status.stamp_ns

@@ -8,8 +8,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from markerless_tracker.calibration.contours.time_offset import TimeOffset
 from markerless_tracker.node.tracker.cameras.counts import CameraCounts, SyncCounts
-from markerless_tracker.node.tracker.cameras.lateness import Lateness
 from markerless_tracker.records import LimbState, TrackResult, TrackState
 
 WINDOW = 300
@@ -153,7 +153,7 @@ class TrackerStatus:
         *,
         now_s: float | None = None,
         views: Mapping[str, CameraCounts] = MappingProxyType({}),
-        lateness: Mapping[str, Lateness] = MappingProxyType({}),
+        time_offsets: Mapping[str, TimeOffset] = MappingProxyType({}),
     ) -> dict[str, str]:
         """Everything as text, by key, in a fixed order.
 
@@ -167,7 +167,7 @@ class TrackerStatus:
             missing: topics or transforms that are missing.
             now_s: the time, for `fps` over the last `RATE_S`; None = over the last `WINDOW` frames.
             views: counts of the cameras' views; none are told of others.
-            lateness: how late the cameras are by the motion, as far as it is known.
+            time_offsets: of the cameras by the motion, by name, as far as they are known.
         """
         with self._lock:
             result = self._result
@@ -218,7 +218,7 @@ class TrackerStatus:
                 for what in ("received", "matched", "late", "dropped"):
                     values[f"{what}/{name}"] = str(getattr(count, what))
                 values[f"offset_ms/{name}"] = _number(count.offset_ms, 3)
-                late = lateness.get(name)
+                late = time_offsets.get(name)
                 values[f"late_ms/{name}"] = _number(
                     None if late is None else 1e3 * late.offset_s, 1
                 )

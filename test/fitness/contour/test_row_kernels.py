@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.fitness.contour.row_kernels import eliminated, normal_equations, solved
+from markerless_tracker.fitness.contour.row_kernels import (
+    add_pose_prior,
+    eliminated,
+    normal_equations,
+    solved,
+)
 
 
 @pytest.fixture
@@ -47,3 +52,12 @@ def test_the_reduced_equations_are_added(rows) -> None:
         eliminated(hessian, slope, 6, *twice)
     np.testing.assert_allclose(twice[0], 2.0 * once[0])
     np.testing.assert_allclose(twice[1], 2.0 * once[1])
+
+
+def test_a_pose_without_residuals_steps_to_its_prior(rows) -> None:
+    hessian, slope = normal_equations(rows[0] * (np.arange(14) >= 6), *rows[1:])
+    others = hessian[6:, 6:].copy()
+    off = np.linspace(-1.0, 1.0, 6)
+    add_pose_prior(hessian, slope, np.linspace(0.5, 3.0, 6), off, damping=0.25)
+    np.testing.assert_allclose(solved(hessian, slope)[:6], -off / 1.25, rtol=1e-6)
+    np.testing.assert_array_equal(hessian[6:, 6:], others)

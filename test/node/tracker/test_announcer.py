@@ -6,10 +6,10 @@ import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
+from markerless_tracker.calibration.contours.time_offset import TimeOffset
 from markerless_tracker.node.health import Health, Level
 from markerless_tracker.node.ros.notices import Notices
 from markerless_tracker.node.tracker.announcer import Announcer, ready_line
-from markerless_tracker.node.tracker.cameras.lateness import Lateness
 from markerless_tracker.records import TrackResult, TrackState
 
 TRACKING, LOST, SEARCHING = TrackState.TRACKING, TrackState.LOST, TrackState.SEARCHING
@@ -71,11 +71,11 @@ def test_the_duration_of_the_compilation() -> None:
 def test_a_late_camera_is_said_once_with_the_offsets_that_correct_it() -> None:
     log = Log()
     given_s = {"cam01": 0.0, "cam02": 0.01, "cam03": 0.0}
-    sure, unsure = Lateness(0.02, 0.001), Lateness(0.02, 0.01)
-    log.announcer.lateness({"cam02": unsure, "cam03": Lateness(0.004, 0.0001)}, given_s)
+    sure, unsure = TimeOffset(0.02, 0.001), TimeOffset(0.02, 0.01)
+    log.announcer.time_offsets({"cam02": unsure, "cam03": TimeOffset(0.004, 0.0001)}, given_s)
     assert log.warnings == []
     for _ in range(3):
-        log.announcer.lateness({"cam01": unsure, "cam02": sure}, given_s)
+        log.announcer.time_offsets({"cam01": unsure, "cam02": sure}, given_s)
     assert log.warnings == [
         "images are late, by the person's motion: cam02 by +20 ms (sd 1.0 ms); "
         'stamp_offsets:="[0.000, 0.030, 0.000]" corrects it'

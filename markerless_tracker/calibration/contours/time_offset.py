@@ -1,10 +1,10 @@
-"""How late each camera's stamps are, from the tracked motion.
+"""Time offsets of the cameras, from the tracked motion (temporal calibration).
 
-A camera that is late by d shows the body where it was d ago: the residuals of its outline grow
-with the outline's velocity. The pose of every frame that is used is unknown (and eliminated, as in
-`calibration.contours`), and so is a constant shift of each camera's image, which a wrong
-calibration causes. Equal offsets of all cameras cannot be told from none: offsets are relative to
-the median camera.
+A camera with a time offset d is late: it shows the body where it was d ago. The residuals of its
+outline grow with the outline's velocity. Unknown beside the offsets are the pose of every frame
+that is used, eliminated as in `ContourAdjustment`, and a constant shift of each camera's image,
+which a wrong calibration causes. Equal offsets of all cameras cannot be told from none: offsets are
+relative to the median camera.
 
 Large offsets come out too small, by a quarter or so: the tracked pose follows the late camera, too,
 and residuals are cut off.
@@ -18,10 +18,10 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.calibration.contours.cameras import shift_slopes
+from markerless_tracker.calibration.contours.frames import contours_of
 from markerless_tracker.camera import CameraModel, CameraRig
-from markerless_tracker.fitness.arrays import lay_out_views
 from markerless_tracker.fitness.contour import (
-    ContourFrame,
+    add_pose_prior,
     eliminated,
     normal_equations,
     outline_rows,
@@ -33,7 +33,6 @@ from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.fitness.shape.section_fit import RESIDUAL_SIGMA_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
-from markerless_tracker.tracking.search import pixels_per_m
 
 EVERY_NS = 60_000_000
 """Least time between two frames that are used,"""
@@ -60,7 +59,7 @@ _NUMBERS = 3
 
 
 @dataclass(frozen=True)
-class Lateness:
+class TimeOffset:
     """How late a camera's images are.
 
     Attributes:
@@ -77,20 +76,20 @@ class Lateness:
         return abs(self.offset_s) >= max(LEAST_OFFSET_S, CERTAIN * self.sd_s)
 
 
-class LatenessEstimate:
-    """Takes the results of a tracker, in order.
+class TimeOffsetEstimate:
+    """The cameras' time offsets; takes the results of a tracker, in order.
 
     Args:
         rig: the cameras of the images as the tracker gets them.
-        step_px: see `ContourFrame`.
+        step_px: as of `ContourFrame`.
 
     Attributes:
-        by_camera: how late each camera is; empty while too little motion was seen. Replaced as a
+        by_camera: each camera's time offset; empty while too little motion was seen. Replaced as a
             whole: other threads may read it.
     """
 
     def __init__(self, rig: CameraRig, *, step_px: float) -> None:
-        self.by_camera: Mapping[str, Lateness] = {}
+        self.by_camera: Mapping[str, TimeOffset] = {}
         self._cameras = tuple(rig)
         self._step_px = step_px
         self._last: deque[tuple[TrackResult, BodyModel]] = deque(maxlen=3)
@@ -143,7 +142,7 @@ class LatenessEstimate:
         count = len(without)
         sd_s = np.sqrt((count - 1) / count * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
         self.by_camera = {
-            camera.name: Lateness(float(offset_s), float(sd))
+            camera.name: TimeOffset(float(offset_s), float(sd))
             for camera, offset_s, sd in zip(self._cameras, offsets_s, sd_s, strict=True)
         }
 
@@ -169,8 +168,9 @@ class LatenessEstimate:
             slope[at] += pull
         if views < 2:
             return
-        pose = np.arange(body.size)
-        hessian[pose, pose] += 1.0 / body.prior_sd**2 + 1e-9
+        # The pose is the estimate: it is compared with nothing but the residuals.
+        precision = 1.0 / body.prior_sd**2
+        add_pose_prior(hessian, slope, precision, np.zeros(body.size), damping=0.0)
         eliminated(hessian, slope, body.size, *self._block)
         self._frames += 1
 
@@ -186,11 +186,8 @@ class LatenessEstimate:
         """Normal equations of one view."""
         near_s = self._near_s[number]
         shown = pose - near_s * velocity
-        seen = {camera.name: observation}
-        centre = np.nanmean(markers(body, shown), axis=0)
-        frame = ContourFrame(
-            body, {camera.name: camera}, seen, lay_out_views([camera], seen),
-            pixels_per_m={camera.name: pixels_per_m(camera, centre)},
+        frame = contours_of(
+            body, [camera], {camera.name: observation}, markers(body, shown),
             step_px=self._step_px, reach_m=_REACH_M,
         )  # fmt: skip
         frame.collect(shown, _REACH_M)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import markers
-from markerless_tracker.node.tracker.cameras.lateness import LatenessEstimate
+from markerless_tracker.calibration.contours.time_offset import TimeOffsetEstimate
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.synthesis.scene import SyntheticScene
 
@@ -40,8 +40,8 @@ def estimate(
     late: Mapping[str, int],
     frames: int,
     state: TrackState = TrackState.TRACKING,
-) -> LatenessEstimate:
-    made = LatenessEstimate(scene.rig, step_px=2.0)
+) -> TimeOffsetEstimate:
+    made = TimeOffsetEstimate(scene.rig, step_px=2.0)
     for index in range(2, 2 + frames):
         pose = scene.pose(index)
         result = TrackResult(
