@@ -35,9 +35,9 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
 
 EVERY_NS = 60_000_000
-"""Least time between two frames that are used,"""
-LATER_NS = 1_000_000_000
-"""and once the offsets are known."""
+"""Least time between two frames that are used; each takes some 7 ms of CPU time."""
+SELDOM_NS = 1_000_000_000
+"""The same once the offsets are known, and while sets come faster than they are tracked."""
 GAP_NS = 100_000_000
 """Greatest time between neighbouring frames whose difference is a velocity."""
 LEAST_SPEED_M_S = 0.15
@@ -102,7 +102,7 @@ class TimeOffsetEstimate:
     def add(self, result: TrackResult, body: BodyModel) -> None:
         """Take a frame and the body that was tracked in it."""
         self._last.append((result, body))
-        if len(self._last) < 3 or not self._due(self._last[1][0].stamp_ns):
+        if len(self._last) < 3 or not self._due(self._last[1][0].stamp_ns, result.effort):
             return
         (before, _), (here, own), (after, later) = self._last
         gaps_ns = (here.stamp_ns - before.stamp_ns, after.stamp_ns - here.stamp_ns)
@@ -124,10 +124,12 @@ class TimeOffsetEstimate:
             if len(self._blocks) >= LEAST_BLOCKS:
                 self._estimate()
 
-    def _due(self, stamp_ns: int) -> bool:
+    def _due(self, stamp_ns: int, effort: float) -> bool:
+        """Whether a frame may be used; the tracker's effort is below 1 while it is overloaded."""
         if self._used_ns is None or stamp_ns < self._used_ns:
             return True
-        return stamp_ns - self._used_ns >= (LATER_NS if self.by_camera else EVERY_NS)
+        seldom = bool(self.by_camera) or effort < 1.0
+        return stamp_ns - self._used_ns >= (SELDOM_NS if seldom else EVERY_NS)
 
     def _estimate(self) -> None:
         """Estimate the offsets; if they are far from where outlines were compared, begin again."""

@@ -1,12 +1,13 @@
 """Offsets of cameras from made-up silhouettes of a person whose pose is known."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 
 from markerless_tracker.body import markers
-from markerless_tracker.calibration.contours.time_offset import TimeOffsetEstimate
+from markerless_tracker.calibration.contours.time_offset import SELDOM_NS, TimeOffsetEstimate
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.synthesis.scene import SyntheticScene
 
@@ -40,13 +41,14 @@ def estimate(
     late: Mapping[str, int],
     frames: int,
     state: TrackState = TrackState.TRACKING,
+    effort: float = 1.0,
 ) -> TimeOffsetEstimate:
     made = TimeOffsetEstimate(scene.rig, step_px=2.0)
     for index in range(2, 2 + frames):
         pose = scene.pose(index)
         result = TrackResult(
             scene.stamp_ns(index), state, pose, markers(scene.body, pose), 1.0, {}, 0,
-            observations=seen(scene, index, late) if index % 3 == 0 else {},
+            observations=seen(scene, index, late) if index % 3 == 0 else {}, effort=effort,
         )  # fmt: skip
         made.add(result, scene.body)
     return made
@@ -76,3 +78,21 @@ def test_cameras_in_step_have_no_offset(walk: SyntheticScene) -> None:
 def test_nothing_is_said_without_motion_or_track(walk: SyntheticScene) -> None:
     assert not estimate(scene_of("stand"), {"cam02": 1}, 150).by_camera
     assert not estimate(walk, {"cam02": 1}, 150, TrackState.LOST).by_camera
+
+
+def test_frames_are_used_seldom_while_the_tracker_is_overloaded(
+    walk: SyntheticScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    used_ns: list[int] = []
+    take = TimeOffsetEstimate._take
+
+    def noted(self: TimeOffsetEstimate, result: TrackResult, *rest: Any) -> None:
+        used_ns.append(result.stamp_ns)
+        take(self, result, *rest)
+
+    monkeypatch.setattr(TimeOffsetEstimate, "_take", noted)
+    estimate(walk, {}, 100)
+    assert len(used_ns) > 30
+    used_ns.clear()
+    estimate(walk, {}, 100, effort=0.8)
+    assert len(used_ns) == 3 and min(np.diff(used_ns)) >= SELDOM_NS
