@@ -12,13 +12,6 @@ from markerless_tracker.datasets import read_trc
 from markerless_tracker.results.read import read_result
 
 START_NS, PERIOD_NS = 1_500_000_000, 16_666_667
-JOINTS = {
-    "Hips": "Pelvis", "Neck": "Neck", "Neck_end": "Head", "LeftArm": "LShoulder",
-    "LeftForeArm": "LElbow", "LeftForeArm_end": "LWrist", "RightArm": "RShoulder",
-    "RightForeArm": "RElbow", "RightForeArm_end": "RWrist", "LeftUpLeg": "LHip",
-    "LeftLeg": "LKnee", "LeftLeg_end": "LAnkle", "RightUpLeg": "RHip", "RightLeg": "RKnee",
-    "RightLeg_end": "RAnkle",
-}  # fmt: skip
 
 
 @pytest.fixture
@@ -38,13 +31,13 @@ def in_file_axes(person, motion) -> np.ndarray:
     return np.array([markers(person, pose) for pose in motion])[:, :, [1, 2, 0]]
 
 
-def test_bvh(make_result, export, read_bvh, person, motion) -> None:
+def test_bvh(make_result, export, readers, read_bvh, person, motion) -> None:
     (path,), warnings = export(make_result(), "--to", "bvh")
     found = read_bvh(path)
     assert path.name == "walk.bvh" and not warnings
     assert found.period == pytest.approx(1 / 60, abs=1e-8)
     truth = in_file_axes(person, motion)
-    for joint, marker in JOINTS.items():
+    for joint, marker in readers("bvh_file").MARKERS.items():
         column = read_trc(path.with_suffix(".trc")).names.index(marker)
         error = found.positions[:, found.names.index(joint)] / 100.0 - truth[:, column]
         assert np.abs(error).max() < 1e-5, joint
