@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ KEPT = 9
 PATIENCE_S = 10.0
 """Longest wait for the first image, or the first topic: discovery takes a few seconds."""
 _TICK_S = 0.25
+_SPIN_S = 0.05
 _LOOK_S = 1.0
 
 
@@ -80,10 +82,10 @@ def image_topics() -> tuple[str, ...]:
         RosMissingError: ROS is not installed.
     """
     names: set[str] = set()
-    with _Listening() as node:
+    with _own_node() as (node, executor):
         end_s = time.monotonic() + PATIENCE_S
         while time.monotonic() < end_s:
-            node.spin()
+            executor.spin_once(timeout_sec=_SPIN_S)
             for topic, _ in node.get_topic_names_and_types():
                 stem = topic.removesuffix("/compressed")
                 if stem.endswith("/image_raw") and node.count_publishers(topic):
@@ -113,41 +115,7 @@ def listen(
     Raises:
         RosMissingError: ROS is not installed.
     """
-    with _Listening() as node:
-        return node.receive(cameras, seconds, image_topic, stop, progress)
-
-
-class _Listening:
-    """A node of its own, while the context lasts."""
-
-    def __enter__(self) -> "_Listening":
-        apply_profile()
-        require_ros()
-        from markerless_tracker.node.ros.declared import GivenNode
-
-        self._running = running(partial(GivenNode, "doctor"))
-        self._node, self._executor = self._running.__enter__()
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._running.__exit__(*error)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._node, name)
-
-    def spin(self) -> None:
-        """Handle what comes within a moment."""
-        self._executor.spin_once(timeout_sec=0.05)
-
-    def receive(
-        self,
-        cameras: Sequence[str],
-        seconds: float,
-        image_topic: str,
-        stop: StopSignals,
-        progress: Callable[[float], None],
-    ) -> dict[str, Received]:
-        """As `listen`."""
+    with _own_node() as (node, executor):
         from markerless_tracker.node.tracker.inputs import CameraInput
         from markerless_tracker.node.tracker.topics import CameraTopics
 
@@ -159,10 +127,10 @@ class _Listening:
             )
             for name, sink in sinks.items()
         ]  # fmt: skip
-        topics = CameraTopics(self._node, inputs, transport="auto", clock=time.monotonic)
+        topics = CameraTopics(node, inputs, transport="auto", clock=time.monotonic)
         begun_s = ticked_s = time.monotonic()
         while not stop.asked:
-            self.spin()
+            executor.spin_once(timeout_sec=_SPIN_S)
             now_s = time.monotonic()
             first = [sink.arrivals_s[0] for sink in sinks.values() if sink.arrivals_s]
             least_s = now_s - min(first) if first else now_s - begun_s - PATIENCE_S
@@ -173,6 +141,15 @@ class _Listening:
                 topics.tick()
                 progress(now_s - begun_s)
         return {entry.name: _received(entry.image_topic, sinks[entry.name]) for entry in inputs}
+
+
+def _own_node() -> AbstractContextManager[tuple[Any, Any]]:
+    """A node and its executor; see `running`."""
+    apply_profile()
+    require_ros()
+    from markerless_tracker.node.ros.declared import GivenNode
+
+    return running(partial(GivenNode, "doctor"))
 
 
 def _received(topic: str, sink: _Sink) -> Received:

@@ -3,11 +3,11 @@
 import os
 import signal
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from importlib import import_module
-from types import TracebackType
 from typing import Any, Self
 
 from markerless_tracker.errors import ConfigError, TrackerError
@@ -178,7 +178,7 @@ def running(
         context.try_shutdown()
 
 
-class Listener:
+class Listener(ABC):
     """A node of a class's own while its context lasts, without parameters; see `running`.
 
     Args:
@@ -194,18 +194,16 @@ class Listener:
 
         name = f"{self._name}_{os.getpid()}"
         kind = partial(Node, name, start_parameter_services=False)
-        self._running = running(kind, domain_id=self._domain_id)
-        self._node, self._executor = self._running.__enter__()
-        self._subscribe_all()
+        with ExitStack() as stack:
+            node_and_executor = running(kind, domain_id=self._domain_id)
+            self._node, self._executor = stack.enter_context(node_and_executor)
+            self._subscribe_all()
+            self._running = stack.pop_all()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._running.__exit__(kind, error, trace)
+    def __exit__(self, *_: object) -> None:
+        self._running.close()
 
+    @abstractmethod
     def _subscribe_all(self) -> None:
         """Subscribe `self._node` to what is listened to."""
