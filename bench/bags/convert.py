@@ -54,6 +54,7 @@ class InMemory(Recording):
             yield FrameSet(index, stamp_of(index, self.fps), images)
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
+        # Recording asks for it; writing a bag reads from the first set on.
         raise NotImplementedError("these sets are read in order alone")
 
 

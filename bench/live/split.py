@@ -54,6 +54,7 @@ class MadeUp(Recording):
             yield FrameSet(index, self.scene.stamp_ns(index), self.scene.frame(index)[0])
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
+        # Recording asks for it; writing a bag reads from the first set on.
         raise NotImplementedError("these sets are read in order alone")
 
 

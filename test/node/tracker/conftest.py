@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -75,6 +76,12 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> World:
     return World(folder, scene)
 
 
+@lru_cache(maxsize=4)
+def pictures(scene: Any, index: int) -> dict[str, Any]:
+    """A scene's images of a frame, by camera; rendered once for all cameras."""
+    return dict(scene.frame(index)[0])
+
+
 class Camera:
     """Publishes the images of a scene as cameras would.
 
@@ -110,7 +117,7 @@ class Camera:
     def message(self, name: str, index: int, stamp_ns: int | None = None) -> Any:
         """One camera's image, at another time if wanted."""
         stamp_ns = self.scene.stamp_ns(index) if stamp_ns is None else stamp_ns
-        head, picture = header(stamp_ns, optical_frame(name)), self.scene.frame(index)[0][name]
+        head, picture = header(stamp_ns, optical_frame(name)), pictures(self.scene, index)[name]
         if self.compressed:
             data = cv2.imencode(".png", picture)[1].tobytes()
             return CompressedImage(header=head, format="bgr8; png compressed bgr8", data=data)

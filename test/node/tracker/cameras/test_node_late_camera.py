@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,6 @@ def walking(
     scene = SyntheticScene(
         body=world.scene.body, size_px=(328, 245), fps=FPS, samples=2, motion="walk"
     )
-    scene.frame = lru_cache(maxsize=4)(scene.frame)  # type: ignore[method-assign]
     write_pose(tmp_path / "walk.yaml", scene.body, scene.pose(1))
 
     def begun(**parameters: Any) -> Any:
