@@ -49,7 +49,7 @@ setup(
     ],
     install_requires=[
         "PyYAML>=6",
-        "mcap>=1.1",
+        "mcap>=1.5",
         "numba>=0.58",
         "numpy>=1.26",
         "opencv-python-headless>=4.6",

@@ -9,8 +9,8 @@ from typing import Any, Self
 
 import yaml
 
-from markerless_tracker.bags.chunks import ChunkedFile, Part
 from markerless_tracker.bags.messages import definition, serialized, typestore
+from markerless_tracker.bags.pieces import Piece, PieceWriter
 from markerless_tracker.errors import DatasetError
 
 LAST_SECOND = 2**31 - 1
@@ -59,9 +59,8 @@ class BagWriter:
         self._folder = folder
         self._path = folder / f"{folder.name}.mcap"
         self._file = self._path.open("xb")
-        self._mcap = ChunkedFile(
-            self._file, library="markerless_tracker", zstd=zstd, chunk_bytes=chunk_bytes
-        )
+        self._mcap = PieceWriter(self._file, zstd=zstd, chunk_bytes=chunk_bytes)
+        self._mcap.start("ros2", "markerless_tracker")
         self._schemas: dict[str, int] = {}
         self._topics: list[Topic] = []
         self._counts: Counter[int] = Counter()
@@ -72,13 +71,13 @@ class BagWriter:
         """Declare a topic of a message type."""
         if kind not in self._schemas:
             text = definition(kind).encode()
-            self._schemas[kind] = self._mcap.schema(kind, "ros2msg", text)
+            self._schemas[kind] = self._mcap.register_schema(kind, "ros2msg", text)
         digest = typestore().hash_rihs01(kind)
         about = {
             "offered_qos_profiles": _dump([_qos(latched)]).rstrip("\n"),
             "topic_type_hash": digest,
         }
-        number = self._mcap.channel(name, "cdr", self._schemas[kind], about)
+        number = self._mcap.register_channel(name, "cdr", self._schemas[kind], about)
         self._topics.append(Topic(name, kind, number, latched, digest))
         return self._topics[-1]
 
@@ -92,15 +91,15 @@ class BagWriter:
         """
         self._write(topic, stamp_ns, serialized(message, topic.kind))
 
-    def write_serialized(self, topic: Topic, stamp_ns: int, data: Part) -> None:
+    def write_serialized(self, topic: Topic, stamp_ns: int, data: Piece) -> None:
         """Write a message that is serialised already; as `write`."""
         self._write(topic, stamp_ns, (data,))
 
-    def _write(self, topic: Topic, stamp_ns: int, parts: Sequence[Part]) -> None:
+    def _write(self, topic: Topic, stamp_ns: int, pieces: Sequence[Piece]) -> None:
         if not 0 <= stamp_ns < LAST_SECOND * 10**9:
             raise DatasetError(f"{topic.name}: stamp {stamp_ns} ns cannot be written to a bag")
         number = self._counts[topic.number]
-        self._mcap.message(topic.number, stamp_ns, number, parts)
+        self._mcap.add_message(topic.number, stamp_ns, pieces, stamp_ns, number)
         self._counts[topic.number] += 1
         self._first_ns = stamp_ns if self._first_ns is None else min(self._first_ns, stamp_ns)
         self._last_ns = max(self._last_ns, stamp_ns)
@@ -127,7 +126,7 @@ class BagWriter:
             if kind is not None:
                 return
             about = self._metadata()
-            self._mcap.metadata("rosbag2", {"serialized_metadata": _dump(about).rstrip("\n")})
+            self._mcap.add_metadata("rosbag2", {"serialized_metadata": _dump(about).rstrip("\n")})
             self._mcap.finish()
         text = _dump({"rosbag2_bagfile_information": about})
         (self._folder / "metadata.yaml").write_text(text, encoding="utf-8")

@@ -10,7 +10,7 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from markerless_tracker.bags.chunks import Part
+from markerless_tracker.bags.pieces import Piece
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.camera.ros_fields import camera_info_fields
 from markerless_tracker.errors import DatasetError
@@ -51,7 +51,7 @@ def message_type(name: str) -> Any:
     return typestore().types[name]
 
 
-def serialized(message: Any, kind: str) -> tuple[Part, ...]:
+def serialized(message: Any, kind: str) -> tuple[Piece, ...]:
     """CDR of a message (of rosbags' types) in pieces; the data of an image are not copied."""
     if kind not in _IMAGES or message.data.dtype != np.uint8:
         return (typestore().serialize_cdr(message, kind),)

@@ -1,27 +1,26 @@
 """The bytes of bags are those of the writer of the mcap library and of rosbags."""
 
 import io
+from array import array
+from typing import Any
 
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 
-from markerless_tracker.bags.chunks import ChunkedFile
 from markerless_tracker.bags.messages import (
     encoded_message,
     image_message,
     serialized,
     typestore,
 )
+from markerless_tracker.bags.pieces import PieceWriter
 from markerless_tracker.synthesis import SyntheticScene
 
 CHUNK = 5000
 
 
-def by_the_library(*, zstd: bool, messages: list[tuple[int, int, bytes]]) -> bytes:
-    file = io.BytesIO()
-    kind = CompressionType.ZSTD if zstd else CompressionType.NONE
-    writer = Writer(file, chunk_size=CHUNK, compression=kind)
+def written(writer: Writer, file: io.BytesIO, messages: list[tuple[int, int, Any]]) -> bytes:
     writer.start(profile="ros2", library="tested")
     schema = writer.register_schema("a/b", "ros2msg", b"float64 x\n")
     first = writer.register_channel("/first", "cdr", schema, {"key": "välue"})
@@ -38,24 +37,19 @@ def by_the_library(*, zstd: bool, messages: list[tuple[int, int, bytes]]) -> byt
     return file.getvalue()
 
 
-def by_us(*, zstd: bool, messages: list[tuple[int, int, bytes]]) -> bytes:
+def by_the_library(messages: list[tuple[int, int, bytes]], *, zstd: bool) -> bytes:
+    kind = CompressionType.ZSTD if zstd else CompressionType.NONE
     file = io.BytesIO()
-    writer = ChunkedFile(file, library="tested", zstd=zstd, chunk_bytes=CHUNK)
-    schema = writer.schema("a/b", "ros2msg", b"float64 x\n")
-    first = writer.channel("/first", "cdr", schema, {"key": "välue"})
-    for place, (channel, stamp, data) in enumerate(messages):
-        if place == len(messages) // 2:
-            writer.schema("c/d", "ros2msg", bytes(CHUNK))
-            writer.channel("/late", "cdr", 2, {})
-            writer.metadata("between", {"a": "b"})
-        if place == len(messages) // 3:
-            writer.flush()
-        cut = len(data) // 3
-        parts = [data[:cut], memoryview(np.frombuffer(data[cut:], np.uint8))]
-        writer.message(first + channel, stamp, place, parts)
-    writer.metadata("last", {})
-    writer.finish()
-    return file.getvalue()
+    return written(Writer(file, chunk_size=CHUNK, compression=kind), file, messages)
+
+
+def in_pieces(messages: list[tuple[int, int, bytes]], *, zstd: bool) -> bytes:
+    cut = [
+        (channel, stamp, (data[: len(data) // 3], memoryview(array("B", data[len(data) // 3 :]))))
+        for channel, stamp, data in messages
+    ]
+    file = io.BytesIO()
+    return written(PieceWriter(file, zstd=zstd, chunk_bytes=CHUNK), file, cut)
 
 
 @pytest.mark.parametrize("zstd", [False, True], ids=["plain", "zstd"])
@@ -68,8 +62,7 @@ def test_the_file_is_that_of_the_library(zstd: bool, count: int) -> None:
         # Stamps in any order, messages from nothing to more than a chunk.
         stamp = int(rng.integers(10**12))
         messages.append((channel, stamp, rng.bytes(int(rng.choice([0, 7, 900, 2 * CHUNK])))))
-    ours = by_us(zstd=zstd, messages=messages)
-    assert ours == by_the_library(zstd=zstd, messages=messages)
+    assert in_pieces(messages, zstd=zstd) == by_the_library(messages, zstd=zstd)
 
 
 @pytest.mark.parametrize("channels", [1, 3], ids=["mono8", "bgr8"])
