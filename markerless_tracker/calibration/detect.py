@@ -49,7 +49,7 @@ class BoardFinder:
 
     Checkerboards are located by OpenCV's sector based search, in images enlarged or shrunk to about
     1300 px; the search alone is up to 1 px off in oblique views. The colours of all squares must be
-    those of the board, which also tells its top. The print then tells the exact places.
+    those of the board, which also shows its top. The exact places are those of the print.
 
     Args:
         board: the board.
@@ -107,7 +107,7 @@ class BoardFinder:
         return None
 
     def _exact(self, grey: Image, pixels: FloatArray) -> FloatArray:
-        """Corners (n, 2) as the print tells them; as they are unless it tells all of them."""
+        """Corners (n, 2) by the print around them; unchanged unless all of them look like it."""
         plane = plane_of(self._print.corners, pixels)
         found = None if plane is None else self._print.measured(grey, plane, pixels)
         return pixels if found is None or len(found[0]) < len(pixels) else found[1]

@@ -1,7 +1,7 @@
 """Exact places of a board's corners: the image compared with the print around each of them.
 
 The search for the saddle of a corner alone is drawn to whatever else is in its window, such as the
-markers of a ChArUco board (1 px at squares of 12 px); here everything around it tells the place.
+markers of a ChArUco board (1 px at squares of 12 px); here everything around it is used.
 """
 
 from typing import Any
@@ -50,8 +50,8 @@ class Print:
         Args:
             grey: (h, w) the image.
             plane: (3, 3) homography from the print, in squares, to pixels; lenses may bend it.
-            pixels: (n, 2) where the corners are expected, NaN for those of which only the
-                homography tells it.
+            pixels: (n, 2) where the corners are expected, NaN for those that only the homography
+                determines.
 
         Returns:
             Numbers (m,) and pixels (m, 2) of the corners that look like those of the print; None
@@ -64,24 +64,9 @@ class Print:
             picture, low = self._picture(plane, grey)
             again = np.full_like(found, np.nan)
             for number in np.flatnonzero(inside(expected, grey) & inside(found, grey)):
-                beside = found[number] - expected[number]
-                off = np.rint(beside).astype(int)
-                half = int(np.clip(_PATCH * spacing[number], *_PATCH_PX))
-                middle = np.rint(expected[number]).astype(int)
-                # Inside the picture, and moved by `off` inside the image.
-                first = np.maximum(np.maximum(middle - half, low), -off)
-                last = np.minimum(middle + half + 1, low + picture.shape[::-1])
-                last = np.minimum(last, np.array(grey.shape[::-1]) - off)
-                here, there = _part(first + off, last + off), _part(first - low, last - low)
-                if min(picture[there].shape) < 3 or grey[here].shape != picture[there].shape:
-                    continue
-                # A lens bends the print: the picture there is that of the homography, moved.
-                moved = _shift(
-                    grey[here], shift(picture[there], (beside - off)[::-1], mode="nearest")
+                again[number] = found[number] + _correction(
+                    grey, picture, low, expected[number], found[number], float(spacing[number])
                 )
-                if moved is None or np.linalg.norm(moved) > _MOST_MOVED * spacing[number]:
-                    continue
-                again[number] = found[number] + moved
             known = np.isfinite(again).all(axis=1)
             new = plane_of(self.corners[known], again[known]) if known.sum() >= _FEWEST else None
             if new is None:
@@ -154,6 +139,45 @@ def correlation(a: NDArray[Any], b: NDArray[Any]) -> float:
     """Correlation of two arrays of one shape."""
     a, b = a - a.mean(), b - b.mean()
     return float((a * b).sum() / np.sqrt((a * a).sum() * (b * b).sum() + 1e-12))
+
+
+def _correction(
+    grey: Image,
+    picture: FloatArray,
+    low: NDArray[np.int_],
+    expected: FloatArray,
+    found: FloatArray,
+    spacing: float,
+) -> FloatArray:
+    """Step (2,) px from where a corner was found to where the print around it lies in the image.
+
+    Args:
+        grey: (h, w) the image.
+        picture, low: of `Print._picture`.
+        expected: (2,) px by the homography.
+        found: (2,) px, so far.
+        spacing: side of a square, px.
+
+    Returns:
+        The step; NaN if the corner is too far away, or does not look like that of the print.
+    """
+    unknown = np.full(2, np.nan)
+    beside = found - expected
+    off = np.rint(beside).astype(int)
+    half = int(np.clip(_PATCH * spacing, *_PATCH_PX))
+    middle = np.rint(expected).astype(int)
+    # Inside the picture, and moved by `off` inside the image.
+    first = np.maximum(np.maximum(middle - half, low), -off)
+    last = np.minimum(middle + half + 1, low + picture.shape[::-1])
+    last = np.minimum(last, np.array(grey.shape[::-1]) - off)
+    here, there = _part(first + off, last + off), _part(first - low, last - low)
+    if min(picture[there].shape) < 3 or grey[here].shape != picture[there].shape:
+        return unknown
+    # A lens bends the print: the picture there is that of the homography, moved.
+    moved = _shift(grey[here], shift(picture[there], (beside - off)[::-1], mode="nearest"))
+    if moved is None or np.linalg.norm(moved) > _MOST_MOVED * spacing:
+        return unknown
+    return moved
 
 
 def _part(first: NDArray[np.int_], last: NDArray[np.int_]) -> tuple[slice, slice]:
