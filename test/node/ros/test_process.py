@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.node.ros.process import StopSignals, run_executable
+from markerless_tracker.node.ros.process import Listener, StopSignals, run_executable
 
 WITHOUT_ROS = """
 import sys
@@ -94,3 +94,19 @@ def test_help_lists_the_parameters(
     text = capsys.readouterr().out
     assert "example:" in text
     assert all(f"\n  {name} " in text for name in parameters)
+
+
+class Deaf(Listener):
+    """Cannot subscribe."""
+
+    def _subscribe_all(self) -> None:
+        assert self._node.context.ok()
+        raise ValueError("no such topic")
+
+
+def test_a_listener_that_cannot_subscribe_leaves_no_node() -> None:
+    pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    listener = Deaf("deaf", domain_id=77)
+    with pytest.raises(ValueError, match="no such topic"), listener:
+        pass
+    assert not listener._node.context.ok()
