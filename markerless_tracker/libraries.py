@@ -20,6 +20,14 @@ def single_threaded() -> None:
         os.environ.setdefault(name, "1")
 
 
+def quiet_decoders() -> None:
+    """No lines of FFmpeg on standard error, unless the environment asks for them.
+
+    For programs, before they open a video: the package's own error names the file.
+    """
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+
 def usable_cores() -> int:
     """Cores that this process may run on."""
     if hasattr(os, "sched_getaffinity"):

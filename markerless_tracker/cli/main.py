@@ -21,7 +21,7 @@ from typing import NoReturn
 
 from markerless_tracker import __version__
 from markerless_tracker.errors import TrackerError
-from markerless_tracker.libraries import single_threaded
+from markerless_tracker.libraries import quiet_decoders, single_threaded
 
 PROGRAM = "markerless_tracker"
 
@@ -111,6 +111,7 @@ def parser_of(verb: str) -> argparse.ArgumentParser:
 
 def _run(verb: str, words: Sequence[str]) -> int:
     single_threaded()
+    quiet_decoders()
     parser = parser_of(verb)
     module = importlib.import_module(f"markerless_tracker.cli.{verb}")
     status = int(module.run(parser.parse_args(words)))

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -172,6 +173,20 @@ def test_a_closed_pipe_is_no_error() -> None:
     assert (done.returncode, done.stderr) == (141, "")
 
 
+@pytest.mark.parametrize("content", [b"", b"I am a text"])
+def test_a_file_that_is_no_video_is_one_line(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "board").mkdir()
+    (tmp_path / "board" / "cam01.mp4").write_bytes(content)
+    words = ["calibrate", "board", "-o", "out.toml"]
+    done = subprocess.run(
+        [sys.executable, "-m", "markerless_tracker", *words],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 1 and "cam01.mp4: cannot be read as a video" in line
+    assert line.endswith(f"({len(content)} bytes)")
+
+
 def test_module_runs_as_a_command() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "markerless_tracker", "nonsense"], capture_output=True, text=True
@@ -189,3 +204,15 @@ def test_each_verb_has_help_with_an_example(name: str, capsys: pytest.CaptureFix
         cli.main([name, "--help"])
     assert stop.value.code == 0
     assert module.EXAMPLE in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("compile", "search algorithms, some of sppso"),
+        ("doctor", "listened to (default 3)"),
+        ("track", "seed of all random draws (default 0)"),
+    ],
+)
+def test_help_names_defaults(name: str, expected: str) -> None:
+    assert expected in " ".join(cli.parser_of(name).format_help().split())

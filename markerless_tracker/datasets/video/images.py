@@ -58,7 +58,10 @@ class VideoStream(ImageStream):
         got, first = self._capture.read() if self._capture.isOpened() else (False, None)
         if not got or first is None:
             self._capture.release()
-            raise DatasetError(f"{path}: cannot be read as a video, or holds no image")
+            size = path.stat().st_size
+            raise DatasetError(
+                f"{path}: cannot be read as a video, or holds no image ({size} bytes)"
+            )
         self._first: Image | None = np.asarray(first, dtype=np.uint8)
         self.size_px = (int(first.shape[1]), int(first.shape[0]))
         rate = float(self._capture.get(cv2.CAP_PROP_FPS))
