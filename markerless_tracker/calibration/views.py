@@ -69,8 +69,12 @@ def find_views(
         progress: called with the number of sets searched and their expected number.
 
     Raises:
-        CalibrationError: a camera never saw the board, or none did at `floor_frame`.
+        CalibrationError: a camera never saw the board, none did at `floor_frame`, or there is no
+            such frame.
     """
+    frames = recording.frame_count
+    if floor_frame is not None and not 0 <= floor_frame < (frames or floor_frame + 1):
+        raise _no_frame(recording, floor_frame)
     finder = BoardFinder(board)
     every = max(1, -(-(recording.frame_count or 1) // most_sets))
     total = None if recording.frame_count is None else -(-recording.frame_count // every)
@@ -93,8 +97,10 @@ def find_views(
             if progress is not None:
                 progress(searched, total)
         if floor_frame is not None:
-            frame = next(recording.frames(start=floor_frame))
-            seen = search(frame)
+            on_floor = next(recording.frames(start=floor_frame), None)
+            if on_floor is None:
+                raise _no_frame(recording, floor_frame)
+            seen = search(on_floor)
             if not seen:
                 raise CalibrationError(
                     f"{recording.name}: no camera sees the board in frame {floor_frame}, expected "
@@ -105,6 +111,12 @@ def find_views(
     _check_all_saw(recording, finder, found, kept, searched)
     first = 0 if floor_frame is None else [i for i, _ in found].index(floor_frame)
     return _with_floor(recording, board, found, first, searched)
+
+
+def _no_frame(recording: Recording, number: int) -> CalibrationError:
+    frames = recording.frame_count
+    expected = "one of the recording's" if frames is None else f"0 to {frames - 1}"
+    return CalibrationError(f"{recording.name}: no frame {number}, expected {expected}")
 
 
 def _with_floor(
@@ -193,12 +205,15 @@ def _check_all_saw(
             f"{recording.name}: {', '.join(blind)} saw no board in {searched} images, the other "
             f"cameras did; expected a {board.describe()} in view of every camera"
         )
+    wanted = f"{board.columns}x{board.rows}; count the squares, not the corners between them"
+    hint = ""
+    if board.kind == CHARUCO:
+        hint = " (is it printed with these markers, not mirrored, and no checkerboard?)"
+        wanted = f"a {board.describe()}{hint}"
     for size in _other_sizes(finder, kept):
         raise CalibrationError(
-            f"{recording.name}: found a board of {size[0]}x{size[1]} squares, expected "
-            f"{board.columns}x{board.rows}; count the squares, not the corners between them"
+            f"{recording.name}: found a board of {size[0]}x{size[1]} squares, expected {wanted}"
         )
-    hint = "" if board.kind != CHARUCO else " (is it printed with these markers, not mirrored?)"
     raise CalibrationError(
         f"{recording.name}: no camera saw a board in {searched} sets of images, expected a "
         f"{board.describe()}{hint}"

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from markerless_tracker.calibration.calibrate import Calibration, calibrate
+from markerless_tracker.calibration.intrinsics import LEAST_VIEWS
 from markerless_tracker.calibration.pictures import coverage_picture, layout_picture
 from markerless_tracker.calibration.views import MOST_SETS
 from markerless_tracker.camera import write_calibration
@@ -98,8 +99,8 @@ def run(args: argparse.Namespace) -> int:
     console = Console(stderr=True)
     if args.out.exists() and not args.force:
         raise DatasetError(f"{args.out}: exists already, expected a new name or --force")
-    if args.sets < 1:
-        raise ConfigError(f"sets is {args.sets}, expected 1 or more")
+    if args.sets < LEAST_VIEWS:
+        raise ConfigError(f"sets is {args.sets}, expected {LEAST_VIEWS} or more")
     if not 0.0 <= args.thickness <= 1.0:
         raise ConfigError(f"thickness is {args.thickness:g} m, expected 0 to 1")
     recording = open_uncalibrated(args.recording)

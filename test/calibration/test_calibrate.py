@@ -10,6 +10,7 @@ from markerless_tracker.calibration.pictures import coverage_picture, layout_pic
 from markerless_tracker.camera import CameraRig, project_camera
 from markerless_tracker.camera.board import Board
 from markerless_tracker.camera.model import nominal_camera
+from markerless_tracker.cli.main import main
 from markerless_tracker.datasets import FrameSet, Recording
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import apply
@@ -102,6 +103,27 @@ def test_pictures_show_corners_and_cameras(found, scene) -> None:
 def test_a_board_of_another_size_is_named(stills, tmp_path) -> None:
     with pytest.raises(CalibrationError, match="found a board of 10x7 squares, expected 9x6"):
         calibrate(Stills(tmp_path, stills[:6]), Board("checkerboard", 9, 6, 0.16))
+
+
+def test_a_checkerboard_instead_of_a_charuco_board_is_named(stills, tmp_path) -> None:
+    wanted = Board("charuco", 10, 7, 0.16, 0.12, "4x4_50")
+    with pytest.raises(CalibrationError, match=r"squares, expected a charuco .* no checkerboard"):
+        calibrate(Stills(tmp_path, stills[:6]), wanted)
+
+
+@pytest.mark.parametrize("number", [-1, 3, 99999])
+def test_a_floor_frame_that_is_not_there_is_refused_at_once(stills, tmp_path, number) -> None:
+    def searched(done, total):
+        raise AssertionError("nothing was to be searched")
+
+    with pytest.raises(CalibrationError, match=rf"no frame {number}, expected 0 to 2"):
+        calibrate(Stills(tmp_path, stills[:3]), BOARD, floor_frame=number, progress=searched)
+
+
+def test_fewer_sets_than_a_camera_needs_views_are_refused(tmp_path, capsys) -> None:
+    words = ["calibrate", str(tmp_path), "-o", str(tmp_path / "out.toml"), "--sets", "5"]
+    assert main(words) == 1
+    assert "sets is 5, expected 6 or more" in capsys.readouterr().err
 
 
 def test_a_camera_without_a_board_is_named(stills, tmp_path) -> None:
