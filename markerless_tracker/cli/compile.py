@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=list_of(_optimizer),
         default=OPTIMIZERS,
         metavar="LIST",
-        help=f"default: all, {', '.join(OPTIMIZERS)}",
+        help=f"search algorithms, some of {', '.join(OPTIMIZERS)} (default: all of them)",
     )
     parser.add_argument("--body", metavar="NAME", help="body model (default: the settings')")
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")

@@ -148,7 +148,7 @@ def _search(group: argparse._ArgumentGroup) -> None:
         metavar="N",
         help="fitness evaluations per frame (default: depends on the optimizer)",
     )
-    group.add_argument("--seed", type=int, metavar="N", help="seed of all random draws")
+    group.add_argument("--seed", type=int, metavar="N", help="seed of all random draws (default 0)")
     group.add_argument(
         "--threads", type=int, metavar="N", help="number of threads; 0 (default): one per core"
     )

@@ -13,7 +13,7 @@ from markerless_tracker.checks.stream import CameraStream, check_streams
 from markerless_tracker.cli.check import print_findings
 from markerless_tracker.cli.terminal.bars import seconds_bar
 from markerless_tracker.datasets.background import read_background, read_background_models
-from markerless_tracker.errors import TrackerError
+from markerless_tracker.errors import ConfigError, TrackerError
 from markerless_tracker.imaging import Image
 from markerless_tracker.node.ros.process import RosMissingError, StopSignals
 from markerless_tracker.node.ros.profile import USERS_OWN, profile_file
@@ -25,6 +25,8 @@ HELP = (
     "say what to do; exit status 3 if there is one."
 )
 EXAMPLE = "markerless_tracker doctor --calibration calibration.toml --background background"
+MOST_SECONDS = 3600.0
+"""Longest time for which cameras are listened to."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,13 +45,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--seconds", type=float, default=3.0, metavar="S",
-        help="how long the cameras are listened to; 0: not at all",
+        help="how long the cameras are listened to (default 3); 0: not at all",
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check; returns 0, or 3 if something is red."""
+    """Check; returns 0, or 3 if something is red.
+
+    Raises:
+        ConfigError: arguments are impossible, or contradict each other.
+    """
+    if not 0.0 <= args.seconds <= MOST_SECONDS:
+        raise ConfigError(f"seconds is {args.seconds:g}, expected 0 to {MOST_SECONDS:g}")
+    if args.background is not None and args.calibration is None:
+        raise ConfigError("--background needs --calibration, whose cameras it is compared with")
     # The environment as the user set it: listening applies the shipped profile.
     found = check_machine(dict(os.environ), profiles=USERS_OWN, shipped=profile_file())
     rig, calibrated = _calibration(args.calibration)

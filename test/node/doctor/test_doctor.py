@@ -96,6 +96,22 @@ def test_without_a_calibration_it_finds_the_cameras_that_send(
     assert lines[-1].startswith("doctor: ")
 
 
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--seconds", "-1"], "seconds is -1, expected 0 to 3600"),
+        (["--seconds", "nan"], "seconds is nan, expected 0 to 3600"),
+        (["--seconds", "0", "--background", "empty"], "--background needs --calibration"),
+    ],
+)
+def test_arguments_that_would_check_nothing_are_refused(
+    capsys: pytest.CaptureFixture[str], words: list[str], expected: str
+) -> None:
+    assert main(["doctor", *words]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert expected in line
+
+
 def test_a_calibration_that_cannot_be_read_is_a_red_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
