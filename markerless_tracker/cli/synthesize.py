@@ -119,6 +119,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the recording; returns the exit status."""
+    if args.checkerboard and args.charuco:
+        raise ConfigError("--checkerboard and --charuco are two boards, expected one of them")
     is_board = args.checkerboard or args.charuco
     default_s, default_fps = _RATES["board" if is_board else "person"]
     args.seconds = default_s if args.seconds is None else args.seconds

@@ -105,6 +105,7 @@ def test_videos_are_lossless_only_on_request(tmp_path: Path, capsys) -> None:
         (["--seed", "-1"], "seed is -1"),
         (["--body", "spider"], "body 'spider' is unknown"),
         (["--shadow", "2"], "shadow is 2, expected 0 to 1"),
+        (["--checkerboard", "--charuco"], "--checkerboard and --charuco are two boards"),
     ],
 )
 def test_impossible_arguments_fail_in_one_line_without_a_folder(
