@@ -60,7 +60,10 @@ class InStepRecording(Recording):
             )
         frames = {name: offsets_s.get(name, 0.0) * recording.fps for name in recording.rig.names}
         if not max(frames.values()) - min(frames.values()) <= MOST_OFFSET_S * recording.fps:
-            raise ConfigError(f"time offsets differ by more than {MOST_OFFSET_S:g} s")
+            listed = ", ".join(f"{name} {offset:g}" for name, offset in offsets_s.items())
+            raise ConfigError(
+                f"time offsets in s: {listed}; expected differences of at most {MOST_OFFSET_S:g}"
+            )
         self._inner = recording
         self._shifts = {name: round(value) for name, value in frames.items()}
         self._first = max(0, *self._shifts.values())

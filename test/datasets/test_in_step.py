@@ -55,7 +55,7 @@ def test_impossible_offsets(make_recording, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="no camera cam07, expected cam01, cam02"):
         InStepRecording(stored, {"cam07": 0.1})
     for wrong in (100.0, float("nan")):
-        with pytest.raises(ConfigError):
+        with pytest.raises(ConfigError, match=f"cam01 {wrong:g}; expected differences of at most"):
             InStepRecording(stored, {"cam01": wrong})
     assert read_time_offsets("cam01=0.5,cam02=-0.1") == {"cam01": 0.5, "cam02": -0.1}
     path = tmp_path / "offsets.yaml"

@@ -112,7 +112,10 @@ class TrcRows:
         path = self._path
         lines = [line.rstrip("\r\n") for line in islice(self._lines(), 5)]
         if not lines or not lines[0].startswith("PathFileType"):
-            raise DatasetError(f"{path}: line 1: not a marker file, expected PathFileType")
+            came = repr(lines[0][:20]) if lines else "nothing"
+            raise DatasetError(
+                f"{path}: no TRC marker file: line 1 begins with {came}, expected 'PathFileType'"
+            )
         if len(lines) < 5:
             raise DatasetError(f"{path}: ends after line {len(lines)}, expected 5 lines of header")
         self.names = _names(path, lines[3])

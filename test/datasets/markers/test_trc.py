@@ -58,7 +58,7 @@ def test_a_blank_row_is_kept(tmp_path: Path, row: str) -> None:
     ("text", "reported"),
     [
         ("", "line 1"),
-        ("hello\n" + HEADER, "line 1"),
+        ("hello\n" + HEADER, "no TRC marker file: line 1 begins with 'hello'"),
         ("\n".join(HEADER.splitlines()[:3]), "ends after line 3"),
         (HEADER.replace("\tm\t", "\tfurlong\t"), "line 3.*furlong"),
         (HEADER.replace("Frame#", "Number"), "line 4"),
