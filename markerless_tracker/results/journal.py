@@ -112,7 +112,7 @@ def open_summary(name: Path) -> tuple[dict[str, Any], Iterator[dict[str, Any]]]:
     with _no_result(path):
         head = _composed_head(path)
         if head is not None:
-            return head, _parsed(path, _lines(path), f"  {_FRAME}")
+            return head, _parsed(path, _whole(path), f"  {_FRAME}")
         content = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(content, dict) or not isinstance(content.get("frames"), list):
         raise DatasetError(f"{path}: no result of a tracker (it has no `frames`)")
@@ -162,6 +162,19 @@ def _head(path: Path) -> dict[str, Any]:
         if not line.startswith(_FRAME):
             head.update(json.loads(line))
     return head
+
+
+def _whole(path: Path) -> Iterator[str]:
+    """The lines of a file as `Journal.compose` writes it.
+
+    Raises:
+        ValueError: its end is missing.
+    """
+    line = ""
+    for line in _lines(path):
+        yield line
+    if line != "}":
+        raise ValueError("the file is cut off, expected all of it")
 
 
 def _lines(path: Path) -> Iterator[str]:

@@ -127,6 +127,18 @@ def test_a_line_cut_by_the_end_of_the_process_is_left_out(tmp_path, body, config
     assert [frame["stamp_ns"] for frame in read_summary(tmp_path / "out")["frames"]] == [0]
 
 
+@pytest.mark.parametrize("missing", [3, 60, 2000])
+def test_a_result_that_was_cut_off_is_refused(tmp_path, body, config, missing):
+    with ResultWriter(tmp_path / "out", body, config, fps=60.0) as writer:
+        for number in range(20):
+            writer.add(result(number))
+    summary = tmp_path / "out.json"
+    assert len(read_summary(tmp_path / "out")["frames"]) == 20
+    summary.write_bytes(summary.read_bytes()[:-missing])
+    with pytest.raises(DatasetError, match=r"out\.json: no result of a tracker \(.*cut off"):
+        read_summary(tmp_path / "out")
+
+
 def test_time_that_runs_backwards_begins_a_new_segment(tmp_path, body, config):
     stamps = [10, 20, 30, 20, 40, 40, 50]
     with ResultWriter(tmp_path / "out", body, config, fps=60.0) as writer:
