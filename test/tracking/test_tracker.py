@@ -256,17 +256,17 @@ class TestViews:
         result = make_tracker(swarm_settings).step(views, 0)
         assert result.observations["cam03"] is views["cam03"]
 
-    def test_a_blob_away_from_the_body_is_left_out_and_told(
-        self, make_tracker, frames, swarm_settings
-    ):
+    @pytest.mark.parametrize(("side_px", "told"), [(10, True), (3, False)])
+    def test_blobs_are_left_out(self, make_tracker, frames, swarm_settings, side_px, told):
         frame = frames[0]
         views = frame.observations
         mask = views["cam01"].mask.copy()
         assert not mask[:14, :14].any()
-        mask[2:12, 2:12] = True
+        mask[2 : 2 + side_px, 2 : 2 + side_px] = True
         views["cam01"] = Observation.from_mask("cam01", 0, mask, views["cam01"].edges)
         result = make_tracker(swarm_settings).step(views, 0)
-        assert result.warnings == ("cam01: 100 px of silhouette away from the body left out",)
+        said = [text for text in result.warnings if f"cam01: {side_px**2} px of silh" in text]
+        assert len(result.warnings) == len(said) == told
         clean = make_tracker(swarm_settings).step(frame.observations, 0)
         assert clean.warnings == ()
         assert result.pose.tobytes() == clean.pose.tobytes()

@@ -26,6 +26,8 @@ from markerless_tracker.tracking.evidence.selection import (
 
 WIDE_MARGIN_M = 0.5
 """Margin around the predicted body that is segmented where the first region cuts the person off."""
+_TOLD_PX = 16
+"""Smaller silhouettes that are left out are specks of noise: nothing is said about them."""
 
 
 class EvidenceMaker:
@@ -308,10 +310,10 @@ class EvidenceMaker:
 def _kept(
     parts: Mapping[str, tuple[Observation, int]],
 ) -> tuple[dict[str, Observation], tuple[str, ...]]:
-    """What is kept of each view, and a line for each of which something was left out."""
+    """What is kept of each view, and a line for each of which more than specks were left out."""
     warnings = tuple(
         f"{name}: {left_out} px of silhouette away from the body left out"
         for name, (_, left_out) in parts.items()
-        if left_out
+        if left_out >= _TOLD_PX
     )
     return {name: kept for name, (kept, _) in parts.items()}, warnings
