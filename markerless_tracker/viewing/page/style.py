@@ -31,6 +31,7 @@ table { border-collapse: collapse; font-size: .875rem; font-variant-numeric: tab
 th, td { padding: .2rem .7rem .2rem 0; text-align: right; border-bottom: 1px solid var(--rule);
   white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; }
+.words td:last-child { white-space: normal; overflow-wrap: anywhere; }
 th { color: var(--dim); font-weight: 600; }
 .charts { grid-template-columns: repeat(auto-fill, minmax(min(100%, 20rem), 1fr)); }
 .chart { margin: 0 0 1rem; min-width: 0; break-inside: avoid; }

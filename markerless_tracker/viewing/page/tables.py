@@ -11,14 +11,14 @@ from markerless_tracker.results.gait import Parameter
 from markerless_tracker.viewing.page.report import Report
 
 
-def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table; its first column is text, the others are numbers."""
+def table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, kind: str = "wide") -> str:
+    """A table; its first column is text, the others are numbers, or words if `kind` says so."""
     head = "".join(f"<th>{escape(text)}</th>" for text in headings)
     body = "".join(
         "<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows
     )
     return (
-        f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
+        f'<div class="{kind}"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
         "</div>"
     )
 
@@ -73,7 +73,8 @@ def gait_table(parameters: Sequence[Parameter]) -> str:
 
 def mapping_table(heading: tuple[str, str], values: Mapping[str, Any]) -> str:
     """Names and values; nested mappings have dotted names."""
-    return table(heading, [[name, str(value)] for name, value in dotted(values).items()])
+    rows = [[name, str(value)] for name, value in dotted(values).items()]
+    return table(heading, rows, kind="wide words")
 
 
 def dotted(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

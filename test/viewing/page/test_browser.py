@@ -25,6 +25,10 @@ SMALLEST = """
 () => Math.min(...[...document.querySelectorAll('span, td, p')].map(
   e => parseFloat(getComputedStyle(e).fontSize)))
 """
+CUT_OFF = """
+() => [...document.querySelectorAll('.words')].filter(
+  e => e.clientWidth > 0 && e.scrollWidth > e.clientWidth).length
+"""
 PLAYABLE = """
 async () => {
   const film = document.querySelector('video');
@@ -81,6 +85,7 @@ def test_phone_and_desktop_light_and_dark_and_paper(browser, page_file: Path) ->
         widest, window = shown.evaluate(WIDEST)
         assert widest <= window == width, "nothing sticks out at the side"
         assert shown.evaluate(SMALLEST) >= 12.0
+        assert shown.locator(".words").count() >= 4 and shown.evaluate(CUT_OFF) == 0
         # Beside the lines there is room on a desktop only.
         assert shown.locator(".lt").first.is_visible() == (width > 640)
         assert shown.locator(".levels").first.is_visible() == (width <= 640)
