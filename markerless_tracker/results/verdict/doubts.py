@@ -72,7 +72,8 @@ def doubts_about_fit(
     found += _unused(record)
     if record.body is not None:
         found += _sizes(record.body, description, mean)
-    if fault is None:
+    # What ends at the ankles stands on nothing and cannot fill silhouettes down to the floor.
+    if fault is None and record.body is not None and _has_feet(record.body):
         found += [*_too_small(record), *_floor(record)]
     return [*found, *_static(record)]
 
@@ -208,6 +209,10 @@ def _static(record: RunRecord) -> list[str]:
         f"{listed}: silhouette beside the body that never moves: furniture or a machine that the "
         "empty scene does not show; limbs near it may be wrong"
     ]
+
+
+def _has_feet(body: BodyModel) -> bool:
+    return any(name.endswith("foot") for name in body.cone_names)
 
 
 def _too_small(record: RunRecord) -> list[str]:

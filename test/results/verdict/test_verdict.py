@@ -20,13 +20,15 @@ Judge = Callable[..., Verdict]
 
 @pytest.fixture
 def judge(scene: Any) -> Judge:
-    """`judge(results, body=, **options)`: their verdict."""
+    """`judge(results, body=, of=, **options)`: the verdict; `of` names the body's description."""
 
-    def make(results: list[TrackResult], body: Any = None, **options: Any) -> Verdict:
+    def make(
+        results: list[TrackResult], body: Any = None, *, of: str = "person32", **options: Any
+    ) -> Verdict:
         record = RunRecord(scene.rig)
         for result in results:
             record.add(result, body or scene.body)
-        return verdict_of(record, load_description("person32"), **options)
+        return verdict_of(record, load_description(of), **options)
 
     return make
 
@@ -105,6 +107,12 @@ def test_silhouettes_that_reach_beyond_a_body_that_is_too_small(
         assert re.match(r"the silhouettes reach \d+ mm beyond the body", found.doubts[0])
         assert "is the subject, or the stature given, this person's" in found.doubts[0]
     assert judge([result(index) for index in range(3)], body).doubts == ()
+
+
+def test_a_body_without_feet_stands_on_nothing(judge: Judge, result: Any) -> None:
+    sunk = [result(index, raised_m=-0.2) for index in range(3)]
+    assert judge(sunk, load_body("balan31"), of="balan31").doubts == ()
+    assert judge(sunk).doubts != ()
 
 
 def test_a_low_overlap(judge: Judge, result: Any) -> None:
