@@ -19,7 +19,7 @@ _MARGIN = 3.0
 
 def usable_threads(wanted: int) -> int:
     """At least one thread, at most as many as the machine has cores."""
-    return max(1, min(wanted, os.cpu_count() or 1))
+    return 1 if wanted <= 1 else min(wanted, os.cpu_count() or 1)
 
 
 def side_by_side(work: Callable[[int], object], threads: int) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel
-from markerless_tracker.body.kinematics import moving_nodes, node_transforms
+from markerless_tracker.body.kinematics import moving_nodes, node_transform
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.lens import pixel
@@ -36,12 +36,14 @@ def most_aimed(
         regions: by camera, the unexplained pixels (h, w) of its frame.
         rig: the cameras.
     """
-    cones = np.flatnonzero(moving_nodes(body, limb)[body.cone_node])
+    moving = moving_nodes(body, limb)
+    cones = np.flatnonzero(moving[body.cone_node])
     points = np.empty((len(poses), len(cones) * ALONG.size, 3))
     _limb_points(
         np.ascontiguousarray(poses), body.node_parent, body.node_fixed, body.node_kind,
-        body.node_sign, body.node_parameter, body.cone_node[cones], body.cone_fixed[cones],
-        body.cone_length[cones], ALONG, np.empty((body.node_parent.size, 3, 4)), points,
+        body.node_sign, body.node_parameter, moving, body.cone_node[cones],
+        body.cone_fixed[cones], body.cone_length[cones], ALONG,
+        np.empty((body.node_parent.size, 3, 4)), points,
     )  # fmt: skip
     hits = np.zeros(len(poses), dtype=np.int64)
     for name, region in regions.items():
@@ -66,11 +68,17 @@ def _count_hits(points, to_camera, matrix, distortion, region, hits):  # type: i
 
 @kernel
 def _limb_points(  # type: ignore[no-untyped-def]
-    poses, parent, fixed, kind, sign, parameter, cone_node, cone_fixed, length, along, nodes, points
-):
-    """Fill points (n, c * k, 3) at k places along the axes of c cones, of each of n poses."""
+    poses, parent, fixed, kind, sign, parameter, moving, cone_node, cone_fixed, length, along,
+    nodes, points,
+):  # fmt: skip
+    """Fill points (n, c * k, 3) at k places along the axes of c cones, of each of n poses.
+
+    Only the `moving` nodes (m,) differ between the poses.
+    """
     for i in range(poses.shape[0]):
-        node_transforms(poses[i], parent, fixed, kind, sign, parameter, nodes)
+        for n in range(parent.size):
+            if i == 0 or moving[n]:
+                node_transform(n, poses[i], parent, fixed, kind, sign, parameter, nodes)
         for c in range(cone_node.size):
             at = nodes[cone_node[c]]
             for k in range(along.size):
