@@ -18,6 +18,7 @@ from markerless_tracker.calibration.contours.refine import Refinement, refine_ca
 from markerless_tracker.calibration.contours.report import describe_refinement
 from markerless_tracker.camera.calibration import write_calibration
 from markerless_tracker.camera.doubts import calibration_doubts
+from markerless_tracker.cli.passes.first import set_up
 from markerless_tracker.cli.terminal.bars import tell, warn
 from markerless_tracker.cli.terminal.notices import COMPILING, Bars, Notices
 from markerless_tracker.cli.track_arguments import add_arguments
@@ -27,15 +28,11 @@ from markerless_tracker.datasets.in_step import InStepRecording, read_time_offse
 from markerless_tracker.datasets.silhouettes import SilhouetteRecording
 from markerless_tracker.errors import CalibrationError, ConfigError
 from markerless_tracker.results.result import ResultWriter, check_target
-from markerless_tracker.results.run import recording_backgrounds, track_recording
+from markerless_tracker.results.run import track_recording
 from markerless_tracker.results.smooth import Smoothing, smooth_result
 from markerless_tracker.results.verdict.record import RunRecord
 from markerless_tracker.results.verdict.verdict import Verdict, verdict_of
-from markerless_tracker.tracking import (
-    TrackerConfig,
-    TrackerSetup,
-    build_tracker,
-)
+from markerless_tracker.tracking import TrackerConfig, TrackerSetup
 from markerless_tracker.tracking.camera_check import CameraCheck, Shift, describe
 from markerless_tracker.viewing.debug_images import DebugImages
 
@@ -140,19 +137,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     for doubt in doubts:
         notices.warn(doubt)
     notices.begin("background")
-    setup = build_tracker(
-        recording.rig,
-        config,
-        backgrounds=(
-            recording_backgrounds(recording, config, args.background)
-            if args.masks is None
-            else None
-        ),
-        start_file=args.start,
-        subject_file=args.subject,
-        subject_from=args.subject_from,
-        stature=args.stature,
-    )
+    setup = set_up(args, recording, config, notices)
     with closing(setup.tracker.evidence) as evidence:
         evidence.start_process()
         notices.begin(COMPILING)

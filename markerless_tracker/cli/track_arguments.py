@@ -148,6 +148,14 @@ def _search(group: argparse._ArgumentGroup) -> None:
         metavar="N",
         help="fitness evaluations per frame (default: depends on the optimizer)",
     )
+    group.add_argument(
+        "--passes",
+        type=int,
+        choices=(1, 2),
+        default=1,
+        help="2: go through the recording twice; the first pass fits the body to frames in poses "
+        "as different as possible, where no subject is given (default 1)",
+    )
     group.add_argument("--seed", type=int, metavar="N", help="seed of all random draws (default 0)")
     group.add_argument(
         "--threads", type=int, metavar="N", help="number of threads; 0 (default): one per core"

@@ -34,10 +34,14 @@ from markerless_tracker.tracking.tracker import Tracker
 
 @dataclass(frozen=True)
 class TrackerSetup:
-    """A tracker and the time its start pose is meant for; None = the first frame that comes."""
+    """A tracker and the time its start pose is meant for; None = the first frame that comes.
+
+    `person`: what is known of a person whose lengths were not measured; None if they were.
+    """
 
     tracker: Tracker
     start_stamp_ns: int | None
+    person: Unmeasured | None = None
 
 
 @dataclass(frozen=True)
@@ -122,7 +126,7 @@ def build_tracker(
         ),
         person=person,
     )
-    return TrackerSetup(tracker, None if start is None else start.stamp_ns)
+    return TrackerSetup(tracker, None if start is None else start.stamp_ns, person)
 
 
 def first_row(path: Path) -> _MarkerRow:

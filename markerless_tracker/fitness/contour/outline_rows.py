@@ -20,6 +20,7 @@ class OutlineRows:
     """The n residuals of all views of a frame.
 
     Attributes:
+        view: (n,) index of the residual's view, ascending.
         cone: (n,) index of the cone of the residual's outline point.
         place: (n, 5) the point on the cone, as `Samples.shape`.
         gradient: (n, 3) of the residual with respect to that world point.
@@ -27,6 +28,7 @@ class OutlineRows:
         weight: (n,) represented length of outline, m, times the robust weight.
     """
 
+    view: IntArray
     cone: IntArray
     place: FloatArray
     gradient: FloatArray
@@ -40,6 +42,7 @@ def outline_rows(frame: ContourFrame) -> OutlineRows:
     used = [slice(int(n)) for n in r.count]
     sample = [r.sample[v, rows] for v, rows in enumerate(used)]
     return OutlineRows(
+        view=np.repeat(np.arange(len(r.count)), r.count),
         cone=np.concatenate([samples.cone[v, s] for v, s in enumerate(sample)]),
         place=np.concatenate([samples.shape[v, s] for v, s in enumerate(sample)]),
         gradient=np.concatenate([r.gradient[v, rows] for v, rows in enumerate(used)]),

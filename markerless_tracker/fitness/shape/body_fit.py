@@ -5,6 +5,7 @@ chest like a trunk farther back. Priors separate them: lengths and sections vary
 of one stature. The outlines therefore get a small weight. All frames share one body.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.body.sizes import LengthPrior, Sizes
 from markerless_tracker.fitness.contour import (
     ContourFrame,
+    OutlineRows,
     add_pose_prior,
     eliminated,
     normal_equations,
@@ -29,11 +31,20 @@ ALONG = 9.0
 """Number of pieces of outline with correlated residuals: sections are wrong along a whole limb."""
 AMONG = 3.0
 """Number of frames that count as one independent frame."""
+LIMB_OFFSET_SD_RATIO = 0.12
+"""Standard deviation of offsets of limbs among people, relative to the generic radius there, where
+poses are fitted, too. Wider, the flesh of thighs, calves and feet would lie beside the line of the
+joints, and bent knees be found too straight."""
+AGREEING_SD_M = 0.007
+"""Standard deviation of a view's residuals up to which all views count alike. Those of a camera
+that is calibrated worse, or whose silhouettes are, are larger: it counts less."""
 _STEP = 1e-4
 """Change of a log length in the finite differences."""
 _LONGEST_STEP = 0.1
 """Largest change of a log length in one iteration."""
 _DAMPING = 1e-3
+_MEDIAN_TO_SD = 1.4826
+"""Standard deviation over median absolute value, of Gaussian residuals."""
 
 
 @dataclass(eq=False)
@@ -50,19 +61,30 @@ class BodyFit:
         body: the initial body; the prior of the sections is the generic one of its lengths.
         belief: prior of the lengths.
         limits: (2, p) of the poses.
+        varied: whether the frames show many poses of the person: limbs' flesh then keeps nearer to
+            the line of their joints (`LIMB_OFFSET_SD_RATIO`), and cameras whose outlines disagree
+            with the body count less (`AGREEING_SD_M`).
     """
 
     def __init__(
-        self, sizes: Sizes, body: BodyModel, belief: LengthPrior, limits: FloatArray
+        self,
+        sizes: Sizes,
+        body: BodyModel,
+        belief: LengthPrior,
+        limits: FloatArray,
+        *,
+        varied: bool = False,
     ) -> None:
         self._sizes = sizes
         self._belief = belief
         self._limits = limits
         self._lengths = np.log(sizes.of(body))
         self._like = sizes.body(np.exp(self._lengths))
-        self._sections = Sections(self._like)
+        self._varied = varied
+        self._sections = Sections(self._like, LIMB_OFFSET_SD_RATIO if varied else None)
         self._numbers = self._sections.generic
         self._frames: list[_Frame] = []
+        self._view_sd_m: dict[str, float] = {}
 
     @property
     def body(self) -> BodyModel:
@@ -91,9 +113,11 @@ class BodyFit:
         longer = [self._made(self._lengths + step) for step in _STEP * np.eye(len(self._lengths))]
         hessian, slope = self._prior()
         parts = []
+        spreads: dict[str, list[float]] = {}
         for frame in self._frames:
-            own, pull = self._equations(frame, body, longer, truncation_m)
+            own, pull = self._equations(frame, body, longer, truncation_m, spreads)
             parts.append(eliminated(own, pull, body.size, hessian, slope))
+        self._view_sd_m = {name: float(np.mean(values)) for name, values in spreads.items()}
         hessian[np.diag_indices_from(hessian)] *= 1.0 + _DAMPING
         step = solved(hessian, slope)
         if not np.isfinite(step).all():
@@ -124,9 +148,17 @@ class BodyFit:
         return hessian, slope
 
     def _equations(
-        self, frame: _Frame, body: BodyModel, longer: list[BodyModel], truncation_m: float
+        self,
+        frame: _Frame,
+        body: BodyModel,
+        longer: list[BodyModel],
+        truncation_m: float,
+        spreads: dict[str, list[float]],
     ) -> tuple[FloatArray, FloatArray]:
-        """One frame's normal equations (p + k, p + k) and (p + k,): its pose, then the body."""
+        """One frame's normal equations (p + k, p + k) and (p + k,): its pose, then the body.
+
+        Adds the standard deviation of each view's residuals, m, to `spreads`.
+        """
         frame.contours.collect(frame.pose, truncation_m, body)
         rows = outline_rows(frame.contours)
         points = surface(body, frame.pose, rows)
@@ -137,9 +169,31 @@ class BodyFit:
         by_pose = pose_slopes(body, frame.pose, rows)
         by_section = self._sections.slopes(body, frame.pose, rows)
         slopes = np.column_stack([by_pose, *by_length, by_section])
-        weight = rows.weight / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG * AMONG)
+        trust = self._trust(rows, frame.contours.views.names, spreads)
+        weight = trust * rows.weight / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG * AMONG)
         hessian, slope = normal_equations(slopes, weight, rows.value)
         precision = 1.0 / (AMONG * body.prior_sd**2)
         off = frame.pose - body.prior_mean
         add_pose_prior(hessian, slope, precision, off, damping=_DAMPING)
         return hessian, slope
+
+    def _trust(
+        self, rows: OutlineRows, names: Sequence[str], spreads: dict[str, list[float]]
+    ) -> FloatArray:
+        """Factor (n,) of each residual's weight: at most 1, less in views that disagree.
+
+        A view's deviation is that of all frames in the last step, in the first step that of the
+        frame; from the median, which few outliers do not change.
+        """
+        if not self._varied:
+            return np.ones(len(rows.view))
+        factor = np.ones(len(names))
+        for view, name in enumerate(names):
+            values = np.abs(rows.value[rows.view == view])
+            if values.size == 0:
+                continue
+            sd_m = _MEDIAN_TO_SD * float(np.median(values))
+            spreads.setdefault(name, []).append(sd_m)
+            sd_m = self._view_sd_m.get(name, sd_m)
+            factor[view] = (AGREEING_SD_M / max(sd_m, AGREEING_SD_M)) ** 2
+        return np.asarray(factor[rows.view])

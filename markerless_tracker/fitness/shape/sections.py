@@ -32,6 +32,9 @@ class Sections:
 
     Args:
         generic: the body with the sections of the prior.
+        limb_offset_sd_ratio: standard deviation of the limbs' offsets among people, relative to the
+            generic radius there; None: `OFFSET_SD_M`, as it is for trunk, head, and hands without
+            a joint of their own.
 
     Attributes:
         generic: (k,) prior mean.
@@ -39,12 +42,16 @@ class Sections:
         bounds: (2, k).
     """
 
-    def __init__(self, generic: BodyModel) -> None:
+    def __init__(self, generic: BodyModel, limb_offset_sd_ratio: float | None = None) -> None:
         self._index, self._sign, self._size = _tie(generic)
         self.generic = self.of(generic)
         radius = np.zeros(self._size, dtype=np.bool_)
         radius[self._index[:, :, :2].ravel()] = True
         self.prior_sd = np.where(radius, RADIUS_SD_RATIO * self.generic, OFFSET_SD_M)
+        if limb_offset_sd_ratio is not None:
+            for c in _limbs(generic):
+                radii = generic.cone_shape[c, :, :2].mean(axis=1, keepdims=True)
+                self.prior_sd[self._index[c, :, 2:]] = limb_offset_sd_ratio * radii
         self.bounds = np.where(
             radius,
             np.outer(RADIUS_RANGE, self.generic),
@@ -86,6 +93,15 @@ class Sections:
                 # No index occurs twice in a row: a row has one entry of each kind.
                 out[every[free], index[free]] += value[free]
         return out
+
+
+def _limbs(body: BodyModel) -> list[int]:
+    """The cones of limbs, without the hands that have no joint of their own."""
+    return [
+        c
+        for c, name in enumerate(body.cone_names)
+        if name[:2] in ("l_", "r_") and not _is_rigid_hand(body, name)
+    ]
 
 
 def _tie(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray, int]:

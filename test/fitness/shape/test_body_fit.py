@@ -8,8 +8,9 @@ import pytest
 from markerless_tracker.body import load_description, markers
 from markerless_tracker.body.anatomy import posture
 from markerless_tracker.body.sizes import PROPORTION_SD, Sizes
-from markerless_tracker.fitness.shape.body_fit import BodyFit
-from markerless_tracker.fitness.shape.sections import RADIUS_RANGE
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.fitness.shape.body_fit import LIMB_OFFSET_SD_RATIO, BodyFit
+from markerless_tracker.fitness.shape.sections import OFFSET_SD_M, RADIUS_RANGE, Sections
 from markerless_tracker.synthesis import ring_rig
 
 SIZES = Sizes(load_description("person31"))
@@ -139,3 +140,45 @@ def test_a_given_stature_restrains_the_lengths(contours_of) -> None:
         sizes.append(np.log(SIZES.of(fit.body)).mean())
     given = np.log(SIZES.of(SIZES.of_stature(1.60))).mean()
     assert given < sizes[0] < sizes[1] - 0.01
+
+
+def error_m(frames, contours_of, true, rig, *, varied):
+    """The mean distance of markers (m) after a fit; silhouettes are those of another rig."""
+    fit = BodyFit(SIZES, GENERIC, SIZES.prior(None), LIMITS, varied=varied)
+    for pose in frames:
+        seen = contours_of(true, pose, RIG, GENERIC)
+        seen.contours = contours_of(true, pose, rig, GENERIC).contours
+        fit.add(seen, pose)
+    for truncation_m in np.geomspace(0.10, 0.05, 8):
+        fit.iterate(truncation_m)
+    gaps = [
+        np.linalg.norm(markers(fit.body, found) - markers(true, pose), axis=1).mean()
+        for found, pose in zip(fit.poses, frames, strict=True)
+    ]
+    return float(np.mean(gaps))
+
+
+def test_a_camera_that_disagrees_counts_less_where_poses_vary(contours_of) -> None:
+    """One of four cameras is calibrated 6 px off, 45 mm at the body."""
+    first, *others = RIG.cameras
+    matrix = first.matrix.copy()
+    matrix[0, 2] += 6.0
+    wrong = CameraRig((replace(first, matrix=matrix), *others))
+    true, moves = person(0), poses(0)[:3]
+    alike, less = (
+        error_m(moves, contours_of, true, wrong, varied=varied) for varied in (False, True)
+    )
+    assert less < 0.7 * alike
+
+
+def test_flesh_of_limbs_keeps_nearer_to_their_joints() -> None:
+    """In proportion to the limb, but for hands, which lie where their wrists hold them."""
+    sections = Sections(GENERIC, LIMB_OFFSET_SD_RATIO)
+    sd = sections.put(GENERIC, sections.prior_sd).cone_shape
+    for c, name in enumerate(GENERIC.cone_names):
+        limb = name[:2] in ("l_", "r_") and not name.endswith("hand")
+        radii = GENERIC.cone_shape[c, :, :2].mean(axis=1)
+        expected = LIMB_OFFSET_SD_RATIO * radii if limb else np.full(2, OFFSET_SD_M)
+        np.testing.assert_allclose(sd[c, :, 2], expected, err_msg=name)
+    plain = Sections(GENERIC)
+    np.testing.assert_allclose(plain.put(GENERIC, plain.prior_sd).cone_shape[:, :, 2], OFFSET_SD_M)

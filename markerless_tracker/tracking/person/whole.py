@@ -1,0 +1,98 @@
+"""The body of a person from frames of a whole recording, in poses as different as possible.
+
+Bent and straight limbs, raised and hanging arms show where joints are: a body that is fitted to the
+first postures has them anywhere along limbs that keep their outline.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.fitness.shape import BodyFit
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.limits import joint_limits
+from markerless_tracker.tracking.person.body_fitting import TRUNCATION_M, Unmeasured
+from markerless_tracker.tracking.search import make_searcher
+
+MOST = 10
+"""Frames that the body is fitted to. With more the outlines outweigh the priors, which hold what
+outlines do not show."""
+MOST_KEPT = 8 * MOST
+"""Frames that are kept to choose from."""
+STEPS = 10
+"""Gauss-Newton steps."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    stamp_ns: int
+    pose: FloatArray
+    observations: Mapping[str, Observation]
+
+
+class WholeRecording:
+    """Keeps frames of a run of any length, evenly spread over it, and fits the body to some."""
+
+    def __init__(self) -> None:
+        self._kept: list[_Kept] = []
+        self._every = 1
+        self._tracked = 0
+
+    def add(self, result: TrackResult) -> None:
+        """Take a frame; those that are not tracked are passed over."""
+        if result.state is not TrackState.TRACKING or result.pose is None:
+            return
+        self._tracked += 1
+        if (self._tracked - 1) % self._every:
+            return
+        self._kept.append(_Kept(result.stamp_ns, result.pose, dict(result.observations)))
+        if len(self._kept) >= MOST_KEPT:
+            self._kept, self._every = self._kept[::2], 2 * self._every
+
+    def chosen(self, body: BodyModel) -> list[int]:
+        """At most `MOST` of the kept frames, ascending, each as far as possible from the others.
+
+        By the joints' angles, without the root's; the one in the middle of the run is among them.
+        """
+        if not self._kept:
+            return []
+        angles = np.setdiff1d(body.joints, body.root)
+        poses = np.array([frame.pose for frame in self._kept])[:, angles]
+        order = [len(poses) // 2]
+        nearest = np.linalg.norm(poses - poses[order[0]], axis=1)
+        while len(order) < min(MOST, len(poses)):
+            order.append(int(np.argmax(nearest)))
+            nearest = np.minimum(nearest, np.linalg.norm(poses - poses[order[-1]], axis=1))
+        return sorted(order)
+
+    def fitted(
+        self, rig: CameraRig, body: BodyModel, config: TrackerConfig, person: Unmeasured
+    ) -> BodyModel:
+        """The body fitted to the chosen frames; as it was without any.
+
+        Args:
+            rig: the cameras.
+            body: that was tracked last.
+            config: of the tracker.
+            person: what is known of the person.
+        """
+        limits = joint_limits(body, config)
+        prior = person.sizes.prior(person.stature_m)
+        fit = BodyFit(person.sizes, body, prior, limits, varied=True)
+        searcher = make_searcher(body, rig=rig, config=config, threads=1)
+        chosen = self.chosen(body)
+        for frame in (self._kept[i] for i in chosen):
+            search = searcher.frame(
+                frame.observations, frame.stamp_ns, frame.pose, reach_m=searcher.tracked_reach_m
+            )
+            fit.add(search.contours, frame.pose)
+        if not chosen:
+            return body
+        for truncation_m in np.geomspace(*TRUNCATION_M, STEPS):
+            fit.iterate(float(truncation_m))
+        return fit.body

@@ -1,0 +1,48 @@
+"""Two passes: the second one tracks with the body that fits the whole recording."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import load_description, read_subject
+from markerless_tracker.body.subject import subject_from_stature
+from markerless_tracker.cli.main import main
+from markerless_tracker.cli.synthesize import synthesize
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking.start.starter import SETTLING_FRAMES
+
+FRAMES = SETTLING_FRAMES + 3
+"""Too few for a fit of the lengths in one pass."""
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("made-up") / "walk"
+    scene = SyntheticScene(body="person31", motion="walk", size_px=(192, 144), seed=2, noise=2.0)
+    synthesize(folder, scene, frames=FRAMES, lossless=True)
+    return folder
+
+
+def track(source, name, *words) -> int:
+    given = ["track", source, "-o", name, "--body", "person31", "--threads", 1, *words]
+    return main([str(word) for word in given])
+
+
+def test_the_second_pass_has_fitted_lengths_from_its_first_frame_on(walk, tmp_path) -> None:
+    assert track(walk, tmp_path / "one", "--stature", 1.65) == 0
+    assert track(walk, tmp_path / "two", "--stature", 1.65, "--passes", 2) == 0
+    description = load_description("person31")
+    names = tuple(description.lengths)
+    generic, true = subject_from_stature(description, 1.65), read_subject(walk / "subject.yaml")
+    one, two = (read_subject(tmp_path / f"{name}.subject.yaml") for name in ("one", "two"))
+    lengths = [np.log([s.lengths_m[n] for n in names]) for s in (generic, one, two, true)]
+    np.testing.assert_allclose(lengths[1], lengths[0], rtol=1e-9)
+    off = [np.abs(each - lengths[3]).mean() for each in lengths[:3]]
+    assert off[2] < off[0]
+    assert not two.measured
+
+
+@pytest.mark.parametrize("given", ["--subject", "--start"])
+def test_a_known_person_is_refused(walk, tmp_path, capsys, given) -> None:
+    file = walk / ("subject.yaml" if given == "--subject" else "ground_truth.trc")
+    assert track(walk, tmp_path / "out", given, file, "--passes", 2) == 1
+    assert "--passes 2" in capsys.readouterr().err
