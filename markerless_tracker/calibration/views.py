@@ -12,7 +12,7 @@ from markerless_tracker.datasets import FrameSet, Recording
 from markerless_tracker.errors import CalibrationError
 
 MOST_SETS = 100
-"""Sets of images that are searched for the board, evenly spread, unless told otherwise."""
+"""Sets of images that are searched for the board, evenly spread, by default."""
 STILL = 0.0008
 """A board is still while its corners move by less than this from their first position, in image
 widths."""

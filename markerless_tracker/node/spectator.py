@@ -27,7 +27,7 @@ _OVERLAP = "iou/"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Heard:
-    """What one message told; what it did not is empty.
+    """The contents of one message; what it does not contain is empty.
 
     Attributes:
         stamp_ns: time of the images that it is about.

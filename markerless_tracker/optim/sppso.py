@@ -81,7 +81,7 @@ class Sppso(Optimizer):
     """SPPSO's swarm.
 
     Every attempt to satisfy the constraints restarts from the particle's saved position and
-    velocity with fresh draws. After the last failed one the particle moves all the same; it is
+    velocity with fresh draws. After the last failed one the particle moves nevertheless; it is
     evaluated and counted, but cannot become a best.
 
     Args:

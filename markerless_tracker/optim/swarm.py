@@ -40,7 +40,7 @@ class Swarm:
         """Move some particles, or all.
 
         A move that breaks a constraint is tried again from where the particle was, with fresh
-        draws, at most `ATTEMPTS` times; after the last it moves all the same and is infeasible.
+        draws, at most `ATTEMPTS` times; after the last it moves nevertheless and is infeasible.
 
         Args:
             problem: the search.

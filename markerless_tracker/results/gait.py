@@ -59,7 +59,7 @@ class Stride:
         side: "left" or "right".
         from_s, to_s: times of the strikes.
         length_m: distance of the ankle between them, on the floor.
-        speed_m_s: way of the pelvis on the floor by time.
+        speed_m_s: distance that the pelvis covers on the floor, by time.
         stance: fraction of the time until the foot is off; NaN if that was not seen.
     """
 

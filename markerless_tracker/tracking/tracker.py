@@ -123,7 +123,7 @@ class Tracker:
         self._lookahead.restart(self._outlook(-1), self._outlook(0))
 
     def configure(self, config: TrackerConfig) -> None:
-        """Use other `live_settings` from the next step on; the track goes on.
+        """Use other `live_settings` from the next step on; the track continues.
 
         Raises:
             ConfigError: the budget cannot be spent; all stays as it was.

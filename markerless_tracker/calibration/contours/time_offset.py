@@ -3,8 +3,8 @@
 A camera with a time offset d is late: it shows the body where it was d ago. The residuals of its
 outline grow with the outline's velocity. Unknown beside the offsets are the pose of every frame
 that is used, eliminated as in `ContourAdjustment`, and a constant shift of each camera's image,
-which a wrong calibration causes. Equal offsets of all cameras cannot be told from none: offsets are
-relative to the median camera.
+which a wrong calibration causes. Equal offsets of all cameras cannot be distinguished from none:
+offsets are relative to the median camera.
 
 Large offsets come out too small, by a quarter or so: the tracked pose follows the late camera, too,
 and residuals are cut off.

@@ -1,8 +1,8 @@
 """Free numbers of a body's sections: radii and offsets, equal on the left and on the right.
 
-A hand whose wrist is bent lies beside the line of its forearm, each hand its own way: that is
-posture, so the offsets of hands without a joint of their own are not equal. Otherwise the forearm
-would follow the hand, and the elbow be bent wrongly.
+A hand whose wrist is bent lies beside the line of its forearm, each hand in its own direction. That
+is posture, so the offsets of hands without a joint of their own are not equal. Otherwise the
+forearm would follow the hand, and the elbow be bent wrongly.
 """
 
 from dataclasses import replace

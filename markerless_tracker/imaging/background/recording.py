@@ -24,7 +24,7 @@ def learn_from_recording(
 
     The background is each pixel's steadiest value (see `steady.steady_image`). Where the person
     covers a pixel for most of the time, or stands motionless, the person is learned and the
-    silhouette has a hole. Of a person who never moves away little is found.
+    silhouette has a hole. A person that never moves away is hardly found.
 
     Args:
         frames: in temporal order, any number; read once, a few dozen are kept.

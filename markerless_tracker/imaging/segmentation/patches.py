@@ -1,7 +1,7 @@
 """Means of patches: they differ from the background where no single pixel does.
 
-The mean of a patch has less noise than a pixel: clothes nearly of the background's colour are found
-this way, and faint shadows.
+The mean of a patch has less noise than a pixel: it finds clothes
+nearly of the background's colour, and faint shadows.
 """
 
 import numpy as np

@@ -166,7 +166,7 @@ class TrackerStatus:
             cameras: names, in order.
             missing: topics or transforms that are missing.
             now_s: the time, for `fps` over the last `RATE_S`; None = over the last `WINDOW` frames.
-            views: counts of the cameras' views; none are told of others.
+            views: counts of the cameras' views; other cameras have no entries.
             time_offsets: of the cameras by the motion, by name, as far as they are known.
         """
         with self._lock:

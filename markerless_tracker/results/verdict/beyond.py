@@ -1,7 +1,7 @@
 """How far silhouettes reach beyond the body above and below: a body that is too small.
 
-A body of too little stature cannot fill the silhouettes: head or feet of the person stick out of
-it. One that is too large bends its knees and fills them all the same.
+A body of too little stature cannot fill the silhouettes: head or feet of the person lie outside of
+it. One that is too large fills them with bent knees.
 """
 
 import math

@@ -15,7 +15,7 @@ def chair(
 
     Args:
         seat_m: height of its seat.
-        place_m: where a person's hips are who sits on it.
+        place_m: position of the hips of a person that sits on it.
         heading: direction in which that person faces, rad.
     """
     boxes = [((-0.24, -0.21, seat_m - 0.035), (0.18, 0.21, seat_m))]

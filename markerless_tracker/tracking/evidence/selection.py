@@ -14,7 +14,7 @@ from markerless_tracker.records import Observation
 
 _POINTS_PER_CONE = 6
 HAND_M = 0.07
-"""Side of a square: smaller patches of person pixels are no limb that goes on elsewhere."""
+"""Side of a square: a smaller patch of person pixels is no limb that continues elsewhere."""
 
 
 class PlacedCones(NamedTuple):
@@ -94,12 +94,12 @@ def explained_in_region(
 ) -> tuple[Observation, int] | None:
     """`explained_part` of an observation of a region; None where the whole frame is needed.
 
-    That is so if no component with person pixels is near to the body, or if person pixels of one
-    that is come nearer than `clear_px` to a side of the region beyond which the frame goes on: the
-    person may go on there too. Undecided pixels at a side do not ask for more: shadows and faint
-    patches go on across the floor, and count neither way. Nor do specks of person pixels among
-    them, smaller than a hand. Components are those of the region: one that joins the body's
-    through undecided pixels outside of it is left out.
+    The whole frame is needed if no component with person pixels is near the body. It is also needed
+    if a component near the body has person pixels within `clear_px` of a side of the region that is
+    no side of the frame: the person may continue beyond it. Undecided pixels at a side do not
+    count, since shadows and faint patches continue across the floor; nor do specks of person pixels
+    that are smaller than a hand. Components are those of the region: one that is connected to the
+    body's through undecided pixels outside of the region only is left out.
     """
     count, labels = _components(observation)
     kept = _near(labels, count, observation, lines, margin_px)
@@ -109,15 +109,15 @@ def explained_in_region(
     mask = part.mask.view(np.uint8)
     if not mask.any():
         return None
-    if _goes_on(mask, observation, clear_px):
+    if _leaves_region(mask, observation, clear_px):
         hand_px = lines.px_m * HAND_M / float(np.median(lines.depths_m))
-        if _goes_on(_larger(mask, hand_px**2), observation, clear_px):
+        if _leaves_region(_larger(mask, hand_px**2), observation, clear_px):
             return None
     return part, left_out
 
 
-def _goes_on(mask: NDArray[np.uint8], observation: Observation, clear_px: int) -> bool:
-    """Whether a mask (h, w) comes near a side of the region beyond which the frame goes on."""
+def _leaves_region(mask: NDArray[np.uint8], observation: Observation, clear_px: int) -> bool:
+    """Whether a mask (h, w) comes near a side of the region that is no side of the frame."""
     left, top, width, height = cv2.boundingRect(mask)
     if width == 0:
         return False

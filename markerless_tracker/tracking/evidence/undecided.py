@@ -1,9 +1,9 @@
 """Undecided pixels that the predicted body explains become person; the others stay undecided.
 
-Three rules, the nearer to the body the less they ask for:
+Three rules; the nearer to the body, the less evidence they require:
 1. What the body covers is person, and so is the next pixel.
 2. Beside the body, a pixel that cannot be a shadow on the floor is person (`evidence.floor`).
-3. Beside the body, so is a patch that ends there: shadows go on.
+3. Beside the body, so is a patch that ends there: shadows continue.
 """
 
 from collections.abc import Mapping
@@ -155,10 +155,10 @@ def _going_on(undecided, beside, tested, away, open_rows, out):  # type: ignore[
 
 @kernel
 def _floor_pixels(near, tested, going_on, radius, width, pixels):  # type: ignore[no-untyped-def]
-    """Fill the pixels (n, 2) that the floor test is asked for; returns their number.
+    """Fill the pixels (n, 2) to which the floor test is applied; returns their number.
 
     One pixel of four stands for the others: the first of a block of two by two, from the corner of
-    what lies beside the body on, if any of the block's is of a patch that goes on.
+    what lies beside the body on, if any pixel of the block is of a patch that continues beyond it.
     """
     height, count = tested.shape
     left, top = width, height

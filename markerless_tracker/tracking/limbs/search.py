@@ -17,7 +17,7 @@ AIMED, AIMED_OF = 60, 1000
 LAYERS = (0.4, 0.2)
 """Then the best are varied, twice, by these fractions of the prior's standard deviations."""
 HOPELESS = 0.03
-"""The refinement of a limb that is so much worse than what is of use is spared."""
+"""A limb whose cost exceeds the largest useful cost by more than this is not refined."""
 _PARENTS, _CHILDREN = 6, 10
 _REFINE = (3, (LIMB_M, 0.035))
 """Iterations of the refinement of the best, and truncation (m) of the first and the last."""
@@ -43,7 +43,7 @@ def other_limb(
         pose: (p,) where the rest of the body is.
         limb: the limb's parameters.
         rng: draws.
-        most_cost: only a lower one is of use.
+        most_cost: largest useful cost; the result matters only below it.
         aim: keeps those poses, of many and at most so many, that reach where the limb may be; first
             draws are chosen by it, too.
     """

@@ -37,30 +37,30 @@ WAIT_NS = 16_000_000
 _DOUBLINGS = 4
 """That time doubles with each search without gain, so often."""
 _GROWN = 2.0
-"""Where so many times as much silhouette is unexplained, an earlier search tells nothing."""
+"""An earlier search does not count where the unexplained area has grown by this factor."""
 _NONE = locked(np.empty((0, 0), dtype=np.uint64), np.uint64)
 _ALONG = np.linspace(0.1, 0.9, 5)
 
 
 @dataclass(frozen=True)
 class _Wait:
-    """A limb was searched without gain.
+    """Searches of a limb that did not improve it.
 
     Attributes:
-        fruitless: so often in a row.
-        searched_ns: at last.
-        area_m2: of the unexplained silhouette then.
+        failures: number of such searches in a row.
+        searched_ns: time of the last one.
+        area_m2: of the unexplained silhouette at that time.
     """
 
-    fruitless: int
+    failures: int
     searched_ns: int
     area_m2: float
 
     def over(self, stamp_ns: int, area_m2: float) -> bool:
-        """Whether the limb is worth another search at a time, with so much unexplained."""
+        """Whether the limb may be searched again at a time, with that unexplained area."""
         since_ns = stamp_ns - self.searched_ns
         grown = area_m2 > _GROWN * self.area_m2
-        return grown or not 0 <= since_ns < WAIT_NS * 2**self.fruitless
+        return grown or not 0 <= since_ns < WAIT_NS * 2**self.failures
 
 
 class LimbWatch:
@@ -153,15 +153,15 @@ class LimbWatch:
                 found.append(name)
                 self._waits.pop(name, None)
             else:
-                self._searched_in_vain(name, stamp_ns, unexplained.areas_m2.get(name, 0.0))
+                self._search_failed(name, stamp_ns, unexplained.areas_m2.get(name, 0.0))
         return pose, tuple(found)
 
-    def _searched_in_vain(self, name: str, stamp_ns: int, area_m2: float) -> None:
-        fruitless = 1
+    def _search_failed(self, name: str, stamp_ns: int, area_m2: float) -> None:
+        failures = 1
         before = self._waits.get(name)
         if before is not None and area_m2 <= _GROWN * before.area_m2:
-            fruitless = min(before.fruitless + 1, 1 + _DOUBLINGS)
-        self._waits[name] = _Wait(fruitless, stamp_ns, area_m2)
+            failures = min(before.failures + 1, 1 + _DOUBLINGS)
+        self._waits[name] = _Wait(failures, stamp_ns, area_m2)
 
     def _due(self, body: BodyModel, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
         """Limbs to search: lost, near unexplained silhouette, and at times the next in rotation."""
@@ -179,7 +179,7 @@ class LimbWatch:
     def _suspects(self, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
         """The likeliest limb, and the others in rotation while silhouette stays unexplained.
 
-        Those of them that were searched in vain shortly before are left out.
+        Limbs whose search failed shortly before are left out.
         """
         if not areas_m2:
             self._unexplained = 0

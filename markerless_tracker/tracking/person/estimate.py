@@ -20,12 +20,12 @@ from markerless_tracker.tracking.person.varied import VariedFrames
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 
 START_FRAMES = 30
-"""Frames that may disagree with a given start pose before tracking goes on without a fit."""
+"""Frames that may disagree with a given start pose before tracking begins without a fit."""
 REVISION_STEPS = 4
 """Gauss-Newton steps of a revision, which begins with the sections so far."""
 PIECES = 2
-"""A revision goes on in each tracked frame by so many pieces: none takes much longer than others.
-A piece is one step's sums over one of the frames that are fitted to."""
+"""Pieces of a revision that are computed in each tracked frame, so that no frame takes much longer
+than others. A piece is one step's sums over one of the frames that are fitted to."""
 
 SearcherFor = Callable[[BodyModel], Searcher]
 

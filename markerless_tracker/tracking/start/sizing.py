@@ -56,7 +56,7 @@ def statures_m(hull: Hull) -> Iterator[float]:
     tried = {ratio * height_m for ratio in STATURES} | set(COMMON_STATURES_M)
     last = -np.inf
     for stature in sorted({float(np.clip(s, *_STATURE_RANGE_M)) for s in tried}):
-        # Those nearer to each other are told apart by the finer factors.
+        # The finer factors distinguish those nearer to each other.
         if stature - last >= _APART_M:
             last = stature
             yield stature

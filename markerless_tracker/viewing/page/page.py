@@ -206,8 +206,8 @@ def _gait(report: Report) -> str:
     return (
         f"<h3>Gait</h3>{gait_table(report.gait.parameters())}"
         f'<p class="dim">Events, s: {escape(listed)}.</p><p class="dim">{escape(METHOD)}. Stride '
-        "length: distance of an ankle between two of its strikes, on the floor. Speed: way of the "
-        "pelvis on the floor by the time of the stride.</p>"
+        "length: distance of an ankle between two of its strikes, on the floor. Speed: distance "
+        "that the pelvis covers on the floor, by the time of the stride.</p>"
     )
 
 

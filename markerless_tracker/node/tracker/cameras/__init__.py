@@ -1,4 +1,4 @@
 """What is counted of each camera.
 
-Filled by the synchronizer, told in `state`.
+Filled by the synchronizer, reported in `state`.
 """

@@ -34,8 +34,8 @@ class Ahead:
     """Takes the newest set and makes its evidence, in a thread beside the one that fits.
 
     The set is taken as late as its evidence will be ready when the fit ends, so that it is the
-    newest. One that waits for longer is fitted all the same: a newer one's evidence would make the
-    tracker later still.
+    newest. One that waits for longer is fitted, too: making the evidence of a newer one would delay
+    the tracker further.
 
     Args:
         sets: source of the complete sets.
