@@ -23,12 +23,12 @@ from markerless_tracker.cli.terminal.bars import tell, warn
 from markerless_tracker.cli.terminal.notices import COMPILING, Bars, Notices
 from markerless_tracker.cli.track_arguments import add_arguments
 from markerless_tracker.compiled import compilation
-from markerless_tracker.datasets import Recording, every_for_fps, open_recording
+from markerless_tracker.datasets import Recording, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
 from markerless_tracker.datasets.silhouettes import SilhouetteRecording
 from markerless_tracker.errors import CalibrationError, ConfigError
 from markerless_tracker.results.result import ResultWriter, check_target
-from markerless_tracker.results.run import track_recording
+from markerless_tracker.results.run import frames_to_track, track_recording
 from markerless_tracker.results.smooth import Smoothing, smooth_result
 from markerless_tracker.results.verdict.record import RunRecord
 from markerless_tracker.results.verdict.verdict import Verdict, verdict_of
@@ -143,7 +143,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
         notices.begin(COMPILING)
         with compilation(lambda _, done, most: notices.step(done, most)):
             setup.tracker.warm_up()
-        notices.begin(f"tracking {recording.name}", _total(recording, setup, args.fps))
+        notices.begin(f"tracking {recording.name}", frames_to_track(recording, setup, args.fps))
         choice = None if args.refine_calibration is None else FrameChoice()
         outcome = _track(args, recording, setup, config, doubts, notices, choice)
     filled = refined = None
@@ -322,11 +322,3 @@ def given_settings(args: argparse.Namespace) -> dict[str, Any]:
     """The settings among the arguments that were given."""
     named = {key: getattr(args, key) for key in (*_KEYS, "preset")}
     return {key: value for key, value in named.items() if value is not None}
-
-
-def _total(recording: Recording, setup: TrackerSetup, fps: float | None) -> int | None:
-    """Frames that will be tracked, None if unknown."""
-    if recording.frame_count is None:
-        return None
-    start = 0 if setup.start_stamp_ns is None else recording.start_index(setup.start_stamp_ns)
-    return -(-(recording.frame_count - start) // every_for_fps(recording.fps, fps))

@@ -40,6 +40,14 @@ def recording_backgrounds(
     }
 
 
+def frames_to_track(recording: Recording, setup: TrackerSetup, fps: float | None) -> int | None:
+    """Number of the frames that `track_recording` yields; None if it is unknown."""
+    if recording.frame_count is None:
+        return None
+    start = 0 if setup.start_stamp_ns is None else recording.start_index(setup.start_stamp_ns)
+    return -(-(recording.frame_count - start) // every_for_fps(recording.fps, fps))
+
+
 def track_recording(
     recording: Recording, setup: TrackerSetup, *, fps: float | None = None
 ) -> Iterator[TrackedFrame]:

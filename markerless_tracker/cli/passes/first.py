@@ -12,7 +12,11 @@ from markerless_tracker.cli.terminal.notices import COMPILING, Notices
 from markerless_tracker.compiled import compilation
 from markerless_tracker.datasets import Recording
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.results.run import recording_backgrounds, track_recording
+from markerless_tracker.results.run import (
+    frames_to_track,
+    recording_backgrounds,
+    track_recording,
+)
 from markerless_tracker.tracking import TrackerConfig, TrackerSetup, build_tracker
 from markerless_tracker.tracking.person.whole import WholeRecording
 
@@ -53,9 +57,11 @@ def _subject_of_first_pass(
         notices.begin(COMPILING)
         with compilation(lambda _, done, most: notices.step(done, most)):
             tracker.warm_up()
-        notices.begin("first pass")
-        for tracked in track_recording(recording, setup, fps=args.fps):
+        notices.begin("first pass", frames_to_track(recording, setup, args.fps))
+        for done, tracked in enumerate(track_recording(recording, setup, fps=args.fps), 1):
             whole.add(tracked.result)
+            notices.pose(tracked.result.state, tracked.result.iou.values())
+            notices.step(done)
     body = tracker.body
     if not whole.chosen(body):
         yield None

@@ -5,8 +5,10 @@ import pytest
 
 from markerless_tracker.body import load_description, read_subject
 from markerless_tracker.body.subject import subject_from_stature
-from markerless_tracker.cli.main import main
+from markerless_tracker.cli.main import main, parser_of
 from markerless_tracker.cli.synthesize import synthesize
+from markerless_tracker.cli.terminal.notices import Notices
+from markerless_tracker.cli.track import track_source
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking.start.starter import SETTLING_FRAMES
 
@@ -39,6 +41,27 @@ def test_the_second_pass_has_fitted_lengths_from_its_first_frame_on(walk, tmp_pa
     off = [np.abs(each - lengths[3]).mean() for each in lengths[:3]]
     assert off[2] < off[0]
     assert not two.measured
+
+
+class Seen(Notices):
+    """Keeps the total and the last step of each part."""
+
+    def __init__(self) -> None:
+        self.parts: dict[str, list[int | None]] = {}
+
+    def begin(self, part: str, total: int | None = None) -> None:
+        self.part = part
+        self.parts[part] = [total, 0]
+
+    def step(self, done: int, total: int | None = None) -> None:
+        self.parts[self.part][1] = done
+
+
+def test_both_passes_have_a_bar_with_their_frames(walk, tmp_path) -> None:
+    words = f"{walk} -o {tmp_path / 'out'} --body person31 --threads 1 --passes 2".split()
+    seen = Seen()
+    track_source(parser_of("track").parse_args(words), seen)
+    assert seen.parts["first pass"] == seen.parts["tracking walk"] == [FRAMES, FRAMES]
 
 
 @pytest.mark.parametrize("given", ["--subject", "--start"])
