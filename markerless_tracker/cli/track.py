@@ -158,7 +158,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     if verdict.frames_with_warnings:
         late.append(
             f"{verdict.frames_with_warnings} of {verdict.frames} frames have warnings, "
-            f"{verdict.warnings} kinds of them"
+            f"of {verdict.kinds}"
         )
     summary = _summary(args, recording, outcome)
     if filled is not None:

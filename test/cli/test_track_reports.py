@@ -53,7 +53,7 @@ def test_each_kind_of_warning_is_printed_once_with_its_first_frame(run: Run, war
     assert [line for line in err.splitlines() if line.startswith("warning: ")] == [
         "warning: frame 2: cam02: 2 px left out",
         "warning: frame 2: turned round",
-        "warning: 4 of 6 frames have warnings, 2 kinds of them",
+        "warning: 4 of 6 frames have warnings, of 2 kinds",
     ]
 
 
@@ -71,7 +71,7 @@ def test_the_verdict_follows_the_counts(run: Run, warned, walk, tmp_path) -> Non
     assert lines[0].startswith(f"{tmp_path / 'out.trc'}: 6 frames, 6 tracked, 0 lost, 0 searching")
     assert lines[1].startswith("overlap of body and silhouettes: cam01 0.")
     assert lines[2].startswith("stature 1.7") and lines[-1].startswith("next: ")
-    assert "warnings: 2 kinds in 4 frames" in lines
+    assert "warnings in 4 frames: 2 kinds" in lines
     _, out, _ = run(walk, "--start", walk / "ground_truth.trc", "--json", "--force")
     verdict = json.loads(out)["verdict"]
     assert verdict == json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))["verdict"]

@@ -59,6 +59,11 @@ class Verdict:
             f"{self.searching} searching"
         )
 
+    @property
+    def kinds(self) -> str:
+        """The number of kinds of warnings, in words."""
+        return f"{self.warnings} kind{'' if self.warnings == 1 else 's'}"
+
     def lines(self) -> list[str]:
         """Everything but the counts, one line each."""
         found = []
@@ -74,7 +79,7 @@ class Verdict:
                 "tracked frames"
             )
         if self.frames_with_warnings:
-            found.append(f"warnings: {self.warnings} kinds in {self.frames_with_warnings} frames")
+            found.append(f"warnings in {self.frames_with_warnings} frames: {self.kinds}")
         found += [f"doubt: {text}" for text in self.doubts]
         found += [f"likely cause: {text}" for text in self.causes]
         return [*found, f"next: {self.look}"]
