@@ -12,6 +12,7 @@ from markerless_tracker.fitness.arrays import lay_out_views
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.tracking.person.spread import EvenlySpread, most_different
 from markerless_tracker.tracking.search import pixels_per_m
 
 MOST = 28
@@ -45,38 +46,29 @@ class FrameChoice:
     """Keeps frames of a run of any length, evenly spread over it."""
 
     def __init__(self) -> None:
-        self._kept: list[SeenFrame] = []
-        self._every = 1
-        self._tracked = 0
+        self._kept: EvenlySpread[SeenFrame] = EvenlySpread(MOST_KEPT)
 
     def add(self, result: TrackResult) -> None:
         """Take a frame; those that are not tracked are passed over."""
-        if result.state is not TrackState.TRACKING or result.pose is None:
-            return
-        if result.markers_m is None:
+        pose, markers_m = result.pose, result.markers_m
+        if result.state is not TrackState.TRACKING or pose is None or markers_m is None:
             return
         seen = {n: o for n, o in result.observations.items() if o.mask_words.any()}
         if len(seen) < _LEAST_VIEWS:
             return
-        self._tracked += 1
-        if (self._tracked - 1) % self._every:
-            return
-        without = {name: replace(one, edges=_no_edges(one)) for name, one in seen.items()}
-        self._kept.append(SeenFrame(result.stamp_ns, result.pose, result.markers_m, without))
-        if len(self._kept) >= MOST_KEPT:
-            self._kept, self._every = self._kept[::2], 2 * self._every
+
+        def without_edges() -> SeenFrame:
+            views = {name: replace(one, edges=_no_edges(one)) for name, one in seen.items()}
+            return SeenFrame(result.stamp_ns, pose, markers_m, views)
+
+        self._kept.offer(without_edges)
 
     def chosen(self) -> list[SeenFrame]:
         """At most `MOST` frames, each as far as possible from those before it in the list."""
-        if not self._kept:
-            return []
-        markers = np.array([frame.markers_m for frame in self._kept])
-        order = [len(self._kept) // 2]
-        nearest = _distances_m(markers, markers[order[0]])
-        while len(order) < min(MOST, len(self._kept)):
-            order.append(int(np.argmax(nearest)))
-            nearest = np.minimum(nearest, _distances_m(markers, markers[order[-1]]))
-        return [self._kept[i] for i in order]
+        frames = self._kept.items
+        markers = np.array([frame.markers_m for frame in frames])
+        order = most_different(len(frames), MOST, lambda i: _distances_m(markers, markers[i]))
+        return [frames[i] for i in order]
 
 
 def contours_of(

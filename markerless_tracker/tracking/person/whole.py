@@ -17,6 +17,7 @@ from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.person.body_fitting import TRUNCATION_M, Unmeasured
+from markerless_tracker.tracking.person.spread import EvenlySpread, most_different
 from markerless_tracker.tracking.search import make_searcher
 
 MOST = 10
@@ -39,35 +40,25 @@ class WholeRecording:
     """Keeps frames of a run of any length, evenly spread over it, and fits the body to some."""
 
     def __init__(self) -> None:
-        self._kept: list[_Kept] = []
-        self._every = 1
-        self._tracked = 0
+        self._kept: EvenlySpread[_Kept] = EvenlySpread(MOST_KEPT)
 
     def add(self, result: TrackResult) -> None:
         """Take a frame; those that are not tracked are passed over."""
-        if result.state is not TrackState.TRACKING or result.pose is None:
-            return
-        self._tracked += 1
-        if (self._tracked - 1) % self._every:
-            return
-        self._kept.append(_Kept(result.stamp_ns, result.pose, dict(result.observations)))
-        if len(self._kept) >= MOST_KEPT:
-            self._kept, self._every = self._kept[::2], 2 * self._every
+        pose = result.pose
+        if result.state is TrackState.TRACKING and pose is not None:
+            self._kept.offer(lambda: _Kept(result.stamp_ns, pose, dict(result.observations)))
 
     def chosen(self, body: BodyModel) -> list[int]:
         """At most `MOST` of the kept frames, ascending, each as far as possible from the others.
 
         By the joints' angles, without the root's; the one in the middle of the run is among them.
         """
-        if not self._kept:
-            return []
+        frames = self._kept.items
         angles = np.setdiff1d(body.joints, body.root)
-        poses = np.array([frame.pose for frame in self._kept])[:, angles]
-        order = [len(poses) // 2]
-        nearest = np.linalg.norm(poses - poses[order[0]], axis=1)
-        while len(order) < min(MOST, len(poses)):
-            order.append(int(np.argmax(nearest)))
-            nearest = np.minimum(nearest, np.linalg.norm(poses - poses[order[-1]], axis=1))
+        poses = np.array([frame.pose[angles] for frame in frames])
+        order = most_different(
+            len(frames), MOST, lambda i: np.linalg.norm(poses - poses[i], axis=1)
+        )
         return sorted(order)
 
     def fitted(
@@ -86,7 +77,7 @@ class WholeRecording:
         fit = BodyFit(person.sizes, body, prior, limits, varied=True)
         searcher = make_searcher(body, rig=rig, config=config, threads=1)
         chosen = self.chosen(body)
-        for frame in (self._kept[i] for i in chosen):
+        for frame in (self._kept.items[i] for i in chosen):
             search = searcher.frame(
                 frame.observations, frame.stamp_ns, frame.pose, reach_m=searcher.tracked_reach_m
             )

@@ -88,7 +88,7 @@ def test_long_runs_are_kept_evenly_and_lost_frames_not() -> None:
     for number in range(5 * MOST_KEPT):
         whole.add(result(GENERIC.neutral, stamp_ns=number))
         whole.add(result(GENERIC.neutral, state=TrackState.LOST, stamp_ns=-1))
-    stamps = [frame.stamp_ns for frame in whole._kept]
+    stamps = [frame.stamp_ns for frame in whole._kept.items]
     assert len(stamps) < MOST_KEPT and len(set(np.diff(stamps))) == 1 and min(stamps) == 0
     assert max(stamps) > 4 * MOST_KEPT
 

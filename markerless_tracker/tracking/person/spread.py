@@ -1,0 +1,56 @@
+"""A few frames of a run of any length, evenly spread over it or as different as possible."""
+
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from markerless_tracker.geometry import FloatArray
+
+Item = TypeVar("Item")
+
+
+class EvenlySpread(Generic[Item]):
+    """Keeps every k-th of the items it is offered; k doubles when there are too many.
+
+    Args:
+        most: fewer than so many are kept.
+
+    Attributes:
+        items: what is kept, in the order in which it came.
+    """
+
+    def __init__(self, most: int) -> None:
+        self.items: list[Item] = []
+        self._most = most
+        self._every = 1
+        self._offered = 0
+
+    def offer(self, make: Callable[[], Item]) -> None:
+        """Take the next item or pass it over; `make` is called if it is kept."""
+        self._offered += 1
+        if (self._offered - 1) % self._every:
+            return
+        self.items.append(make())
+        if len(self.items) >= self._most:
+            self.items, self._every = self.items[::2], 2 * self._every
+
+
+def most_different(count: int, most: int, distances: Callable[[int], FloatArray]) -> list[int]:
+    """At most `most` of `count` items, each as far as possible from those before it in the list.
+
+    The first is the one in the middle.
+
+    Args:
+        count: number of the items.
+        most: number of those that are chosen.
+        distances: of an item's index, its distances (count,) to all.
+    """
+    if count == 0:
+        return []
+    order = [count // 2]
+    nearest = distances(order[0])
+    while len(order) < min(most, count):
+        order.append(int(np.argmax(nearest)))
+        nearest = np.minimum(nearest, distances(order[-1]))
+    return order
