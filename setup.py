@@ -59,7 +59,7 @@ setup(
     ],
     extras_require={
         "cluster": ["distributed>=2024.1"],
-        "formats": ["ezc3d>=1.5"],
+        "formats": ["cdflib>=1", "ezc3d>=1.5"],
         "plots": ["matplotlib>=3.8"],
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [

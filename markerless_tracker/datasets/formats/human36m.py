@@ -9,9 +9,17 @@ from scipy.spatial.transform import Rotation
 
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets.folder import VideoRecording
+from markerless_tracker.datasets.formats.human36m_joints import (
+    JOINTS,
+    SHIFTED,
+    joints_file,
+    read_joints,
+)
 from markerless_tracker.datasets.formats.numbers import image_sizes
-from markerless_tracker.datasets.upright.axes import upright
+from markerless_tracker.datasets.markers.track import MarkerTrack
+from markerless_tracker.datasets.upright.axes import upright, upright_points
 from markerless_tracker.datasets.video.images import VIDEO_SUFFIXES
+from markerless_tracker.datasets.video.rates import stamp_of
 from markerless_tracker.errors import CalibrationError, DatasetError
 from markerless_tracker.geometry import FloatArray, transform
 
@@ -27,8 +35,8 @@ _VIDEO = re.compile(rf"(?P<action>[^_].*)\.(?P<camera>{'|'.join(CAMERAS)})")
 class Human36mRecording(VideoRecording):
     """An action of a subject; cameras are named cam_54138969, ..., world in m with z up.
 
-    Read are the videos and `metadata.xml` (its element w0) in a folder above them or in
-    `Release-v*/` there. The joints are stored as CDF, which is not read.
+    Read are the videos, `metadata.xml` (its element w0) in a folder above them or in `Release-v*/`
+    there, and, where it exists, `S1/MyPoseFeatures/D3_Positions/ACTION.cdf` as reference markers.
 
     Args:
         path: the subject's folder with `Videos/`, or one video of the action in it.
@@ -66,6 +74,25 @@ class Human36mRecording(VideoRecording):
         rig = upright(CameraRig(tuple(cameras)), units=UNITS)
         super().__init__(subject, sources, rig, scale=scale, input_fps=input_fps)
         self.name = f"{subject.resolve().name}_{action}"
+        self._action = action
+
+    def ground_truth(self) -> MarkerTrack | None:
+        """Joints of the action; None without their file.
+
+        Raises:
+            DatasetError: the file is malformed, or cdflib is not installed.
+        """
+        file = joints_file(self.path, self._action)
+        if file is None:
+            return super().ground_truth()
+        positions = upright_points(read_joints(file), units=UNITS)
+        if self.name in SHIFTED:
+            self.warn(
+                f"{self.name}: the data set has the joints of this action 0.2 m too far along x; "
+                "they are left as they are"
+            )
+        stamps = np.array([stamp_of(frame, self.fps) for frame in range(len(positions))])
+        return MarkerTrack(tuple(JOINTS), stamps, positions)
 
 
 def is_human36m(path: Path) -> bool:

@@ -1,11 +1,10 @@
-"""TotalCapture, MPI-INF-3DHP and Human3.6M: small files of their formats."""
+"""TotalCapture and MPI-INF-3DHP: small files of their formats."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.io import savemat
-from scipy.spatial.transform import Rotation
 
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import detect_format, open_recording
@@ -162,65 +161,3 @@ def test_mpi_inf_3dhp_annotations_that_are_malformed(mpi: Path) -> None:
     (mpi / "annot.mat").write_bytes(b"broken")
     with pytest.raises(DatasetError, match="cannot be read as a MATLAB file"):
         recording.ground_truth()
-
-
-# --- Human3.6M
-
-
-@pytest.fixture
-def subject(make_rig, write_video, tmp_path: Path) -> Path:
-    folder = tmp_path / "h36m" / "S5"
-    rig = in_world_of(make_rig("cam_54138969", "cam_58860488"), units="mm")
-    poses, lenses = np.zeros((4, 11, 6)), np.zeros((4, 9))
-    for number, (row, camera) in enumerate(zip((0, 2), rig, strict=True)):
-        R, t = camera.T_cam_world[:3, :3], camera.T_cam_world[:3, 3]
-        poses[row, 4] = [*Rotation.from_matrix(R).as_euler("XYZ"), *(-R.T @ t)]
-        k1, k2, p1, p2, k3 = camera.distortion
-        K = camera.matrix
-        lenses[row] = [K[0, 0], K[1, 1], K[0, 2], K[1, 2], k1, k2, k3, p1, p2]
-        name = camera.name.removeprefix("cam_")
-        write_video(folder / "Videos" / f"Walking 1.{name}.avi", number)
-        write_video(folder / "Videos" / f"_ALL.{name}.avi", number)
-    numbers = " ".join(map(str, [*poses.ravel().tolist(), *lenses.ravel().tolist()]))
-    text = f"<metadata><w0>[{numbers}]</w0></metadata>"
-    (tmp_path / "h36m" / "Release-v1.2").mkdir()
-    (tmp_path / "h36m" / "Release-v1.2" / "metadata.xml").write_text(text, encoding="utf-8")
-    return folder
-
-
-def test_human36m_cameras_of_a_subject(subject: Path, write_video, make_rig, check) -> None:
-    rig = make_rig("cam_54138969", "cam_58860488")
-    assert detect_format(subject) == "human36m"
-    recording = open_recording(subject)
-    check(recording, rig)
-    assert recording.name == "S5_Walking 1" and recording.ground_truth() is None
-    for number, name in enumerate(("54138969", "58860488")):
-        write_video(subject / "Videos" / f"Phoning.{name}.avi", number)
-    with pytest.raises(DatasetError, match="actions Phoning, Walking 1, expected one"):
-        open_recording(subject)
-    video = subject / "Videos" / "Phoning.58860488.avi"
-    assert detect_format(video) == "human36m"
-    check(open_recording(video), rig)
-
-
-def test_human36m_metadata_that_is_malformed(subject: Path) -> None:
-    path = subject.parent / "Release-v1.2" / "metadata.xml"
-    whole = path.read_text(encoding="utf-8")
-    changed(path, "[0.", "[0. 0.")
-    with pytest.raises(CalibrationError, match="w0 has 301 numbers, expected 300"):
-        open_recording(subject)
-    path.write_text(whole.replace("w0", "w1"), encoding="utf-8")
-    with pytest.raises(CalibrationError, match="w0 has 0 numbers, expected 300"):
-        open_recording(subject)
-    path.write_text("no XML", encoding="utf-8")
-    with pytest.raises(CalibrationError, match="metadata.xml: cannot be read as XML"):
-        open_recording(subject)
-    path.write_text(whole.replace("40.0", "-40.0"), encoding="utf-8")
-    with pytest.raises(CalibrationError, match="w0: cam_54138969 of S5: .*focal lengths"):
-        open_recording(subject)
-    path.unlink()
-    assert detect_format(subject) is None
-    path.write_text(whole, encoding="utf-8")
-    subject.rename(subject.with_name("walks"))
-    with pytest.raises(DatasetError, match="walks: expected a subject's folder S1, ..., S11"):
-        open_recording(subject.with_name("walks"))
