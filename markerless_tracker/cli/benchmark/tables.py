@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.progress import Progress
 from rich.table import Table
 
 from markerless_tracker.benchmarks.machine import machine
@@ -125,8 +126,8 @@ def run(args: argparse.Namespace) -> int:
     )
     if args.out is not None:
         args.out.mkdir(parents=True, exist_ok=True)
-    with _Bars() as bars:
-        rows = accuracy.make_table(args.sources, plan, store=args.out, progress=bars)
+    with progress_bars() as bars:
+        rows = accuracy.make_table(args.sources, plan, store=args.out, progress=_Bars(bars))
     table = {
         "machine": machine(),
         "versions": versions(),
@@ -229,19 +230,12 @@ def _pieces(
 
 
 class _Bars(accuracy.Progress):
-    """Progress on standard error."""
+    """Progress on bars that the caller shows."""
 
-    def __init__(self) -> None:
-        self._bars = progress_bars()
+    def __init__(self, bars: Progress) -> None:
+        self._bars = bars
         self._runs = self._bars.add_task("runs", total=None)
         self._evidence = self._bars.add_task("evidence", total=None, visible=False)
-
-    def __enter__(self) -> "_Bars":
-        self._bars.__enter__()
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._bars.__exit__(*error)
 
     def observing(self, recording: str, done: int, total: int | None) -> None:
         self._bars.update(
