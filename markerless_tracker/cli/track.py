@@ -127,6 +127,8 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     if args.smooth is not None or args.fill_gaps is not None:
         smoothing = Smoothing(args.smooth, args.fill_gaps or 0.0)
     recording = _opened(args, args.scale)
+    if smoothing is not None:
+        smoothing.check_rate(args.fps or recording.fps)
     if args.time_offsets is not None:
         recording = InStepRecording(recording, read_time_offsets(args.time_offsets))
     if args.masks is not None:

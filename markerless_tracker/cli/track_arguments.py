@@ -6,7 +6,7 @@ from pathlib import Path
 from markerless_tracker.datasets import FORMATS
 from markerless_tracker.datasets.upright.axes import AXES, UNITS
 from markerless_tracker.datasets.upright.standing import PERSON
-from markerless_tracker.results.smooth import CUTOFF_HZ
+from markerless_tracker.results.smooth import CUTOFF_HZ, LEAST_CUTOFF_HZ
 from markerless_tracker.tracking import OPTIMIZERS, PRESETS
 
 
@@ -175,15 +175,16 @@ def _afterwards(group: argparse._ArgumentGroup) -> None:
         nargs="?",
         const=CUTOFF_HZ,
         metavar="HZ",
-        help="smooth the finished result without lag, with this cutoff frequency (default "
-        f"{CUTOFF_HZ:g}); NAME.json has velocities then",
+        help="smooth the finished result without lag, with this cutoff frequency, from "
+        f"{LEAST_CUTOFF_HZ:g} to half the frame rate (default {CUTOFF_HZ:g}); NAME.json has "
+        "velocities then",
     )
     group.add_argument(
         "--fill-gaps",
         type=float,
         metavar="S",
-        help="interpolate gaps of at most S seconds between tracked frames; the frames are marked "
-        "`filled` in NAME.json",
+        help="interpolate gaps of at most S seconds (up to 10) between tracked frames; the frames "
+        "are marked `filled` in NAME.json",
     )
 
 

@@ -29,6 +29,7 @@ from markerless_tracker.results.trc_stream import TrcStream
 
 CUTOFF_HZ = 6.0
 """Usual cutoff for joint positions in walking (Winter 2009)."""
+LEAST_CUTOFF_HZ = 0.1
 FILL_CUTOFF_HZ = 15.0
 """Cutoff where gaps are filled without smoothing: frames beside a gap stay nearly as they are."""
 _RUN_GAP_S = 0.3
@@ -55,10 +56,27 @@ class Smoothing:
     fill_s: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.cutoff_hz is not None and not 0.1 <= self.cutoff_hz <= 1000.0:
-            raise ConfigError(f"smooth is {self.cutoff_hz} Hz, expected from 0.1 to 1000")
+        if self.cutoff_hz is not None and not LEAST_CUTOFF_HZ <= self.cutoff_hz < np.inf:
+            raise ConfigError(
+                f"smooth is {self.cutoff_hz:g} Hz, expected from {LEAST_CUTOFF_HZ:g} to half the "
+                "rate of the frames"
+            )
         if not 0.0 <= self.fill_s <= 10.0:
             raise ConfigError(f"fill-gaps is {self.fill_s} s, expected from 0 to 10")
+
+    def check_rate(self, fps: float) -> None:
+        """Make sure that frames at a rate (1/s) have motion at the cutoff frequency.
+
+        Frames show no motion above half their rate (Nyquist): there nothing can be smoothed.
+
+        Raises:
+            ConfigError: the cutoff is above half the rate.
+        """
+        if self.cutoff_hz is not None and self.cutoff_hz > 0.5 * fps:
+            raise ConfigError(
+                f"smooth is {self.cutoff_hz:g} Hz, expected from {LEAST_CUTOFF_HZ:g} to "
+                f"{0.5 * fps:g}, half the rate of the frames ({fps:g} frames/s)"
+            )
 
 
 @kernel

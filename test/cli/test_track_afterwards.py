@@ -97,6 +97,9 @@ def test_smoothing_and_offsets(track, tmp_path: Path) -> None:
     assert status == 0 and json.loads(out)["filled"] == 0
     result = read_result(tmp_path / "out")
     assert result.summary["smoothing"]["cutoff_hz"] == 6.0
+    status, _, err = track("--smooth", "100", "--force")
+    assert status == 1 and "smooth is 100 Hz, expected from 0.1 to 15, half the rate" in err
+    assert read_result(tmp_path / "out").summary["smoothing"]["cutoff_hz"] == 6.0
     status, _, err = track("--time-offsets", "cam09=1", "--force")
     assert status == 1 and "no camera cam09" in err
     status, _, err = track("--time-offsets", "cam02=-0.0333", "--force")

@@ -157,3 +157,12 @@ def test_impossible_values() -> None:
     for wrong in ((0.0, 0.0), (-6.0, 0.0), (6.0, -1.0), (6.0, 100.0), (float("nan"), 0.0)):
         with pytest.raises(ConfigError, match="expected from"):
             Smoothing(*wrong)
+
+
+def test_a_cutoff_above_the_motion_that_frames_show() -> None:
+    for rate, cutoff in ((60.0, 30.0), (12.0, 6.0), (1.0, None)):
+        Smoothing(cutoff).check_rate(rate)
+    with pytest.raises(
+        ConfigError, match=r"smooth is 100 Hz, expected from 0.1 to 30, .* \(60 frames/s\)"
+    ):
+        Smoothing(100.0).check_rate(60.0)
