@@ -97,6 +97,7 @@ class Finished:
     """A finished run of `track_source`.
 
     Attributes:
+        recording: what was tracked.
         outcome: what the frames gave.
         filled: interpolated frames, None without smoothing.
         refined: the refined calibration or why there is none; None if it was not asked for.
@@ -104,6 +105,7 @@ class Finished:
         summary: all of it, for JSON.
     """
 
+    recording: Recording
     outcome: "Outcome"
     filled: int | None
     refined: Refinement | CalibrationError | None
@@ -169,7 +171,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
         summary["calibration"] = {"path": str(args.refine_calibration), **refined.as_mapping()}
     elif refined is not None:
         summary["calibration"] = {"path": None, "refused": str(refined)}
-    return Finished(outcome, filled, refined, tuple(late), summary)
+    return Finished(recording, outcome, filled, refined, tuple(late), summary)
 
 
 def _refined(

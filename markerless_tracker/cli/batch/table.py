@@ -12,32 +12,36 @@ from rich.table import Table
 Row = Mapping[str, Any]
 
 COLUMNS = (
-    "name", "status", "found", "frames", "tracked", "overlap", "disagree", "warnings", "seconds",
-    "error", "source",
+    "name", "status", "found", "frames", "tracked", "overlap", "mean_mm", "disagree", "warnings",
+    "seconds", "error", "reference_problem", "source",
 )  # fmt: skip
 CSV = "summary.csv"
 JSON = "summary.json"
 
 
 def text_table(rows: Sequence[Row]) -> Table:
-    """The rows for people."""
+    """The rows for people; with errors in mm if a recording has reference markers."""
+    measured = any(row["mean_mm"] is not None for row in rows)
     table = Table()
     table.add_column("recording", overflow="fold")
     table.add_column("found")
-    for heading in ("tracked", "overlap"):
+    for heading in ("tracked", "overlap", *(["error mm"] if measured else [])):
         table.add_column(heading, justify="right")
     table.add_column("cameras that disagree", overflow="fold")
     table.add_column("seconds", justify="right")
     for row in rows:
         seconds = "" if row["seconds"] is None else f"{row['seconds']:.1f}"
+        error_mm = "" if row["mean_mm"] is None else f"{row['mean_mm']:.1f}"
+        errors = [error_mm] if measured else []
         if row["status"] != "done":
-            table.add_row(row["name"], "failed", "", "", row["error"], seconds)
+            table.add_row(row["name"], "failed", "", "", *errors, row["error"], seconds)
             continue
         table.add_row(
             row["name"],
             "yes" if row["found"] else "no",
             f"{row['tracked']} of {row['frames']}",
             "" if row["overlap"] is None else f"{row['overlap']:.2f}",
+            *errors,
             ", ".join(row["disagree"]) or "none",
             seconds,
         )

@@ -19,8 +19,11 @@ from typing import Any, NamedTuple
 import cv2
 
 from markerless_tracker.cli.terminal.notices import COMPILING, Notices
-from markerless_tracker.cli.track import track_source
+from markerless_tracker.cli.track import Finished, track_source
+from markerless_tracker.datasets import read_trc
 from markerless_tracker.errors import TrackerError
+from markerless_tracker.results.score import score
+from markerless_tracker.results.stored import stored_frames
 
 RECORDS = ".batch"
 """Folder of the records, in that of the results."""
@@ -74,8 +77,10 @@ def do_trial(trial: Trial) -> dict[str, Any]:
 
     An error of the recording or of its processing is in the row, under `error`; nothing is written
     then. Keys: `name`, `source`, `status` (done or failed), `found`, `frames`, `tracked`,
-    `overlap` (mean over the cameras of the median overlap), `disagree` (names of cameras),
-    `warnings`, `seconds`, `error`. A trial that is done already is not done again.
+    `overlap` (mean over the cameras of the median overlap), `mean_mm` (error against the
+    recording's reference markers, None without any) and `reference_problem` (why it is None where
+    there are some), `disagree` (names of cameras), `warnings`, `seconds`, `error`. A trial that is
+    done already is not done again.
     """
     clock = _Clock()
     stored = trial.stored()
@@ -83,11 +88,12 @@ def do_trial(trial: Trial) -> dict[str, Any]:
         return stored.row
     cv2.setNumThreads(1)
     try:
-        summary, files = _track(trial, stored, clock)
+        finished, files = _track(trial, stored, clock)
     except Exception as error:  # a damaged recording may raise any exception: it costs its trial
         return failed(trial, _line(error), clock.seconds)
-    verdict = summary["verdict"]
-    overlap = list(verdict["overlap"].values())
+    seconds, summary = clock.seconds, finished.summary
+    mean_mm, problem = _mean_error(trial, finished) if summary["tracked"] else (None, None)
+    overlap = list(summary["verdict"]["overlap"].values())
     row = {
         "name": trial.name,
         "source": str(trial.source),
@@ -96,9 +102,11 @@ def do_trial(trial: Trial) -> dict[str, Any]:
         "frames": summary["frames"],
         "tracked": summary["tracked"],
         "overlap": round(fmean(overlap), 3) if overlap else None,
+        "mean_mm": mean_mm,
+        "reference_problem": problem,
         "disagree": [name for name, one in summary["cameras"].items() if one["disagrees"]],
         "warnings": len(summary["warnings"]) + len(summary["frame_warnings"]),
-        "seconds": round(clock.seconds, 2),
+        "seconds": round(seconds, 2),
         "error": None,
     }
     try:
@@ -110,7 +118,9 @@ def do_trial(trial: Trial) -> dict[str, Any]:
 
 def failed(trial: Trial, error: str, seconds: float | None = None) -> dict[str, Any]:
     """Row of a trial that failed with an error of one line, after so many seconds."""
-    nothing = dict.fromkeys(("found", "frames", "tracked", "overlap"))
+    nothing = dict.fromkeys(
+        ("found", "frames", "tracked", "overlap", "mean_mm", "reference_problem")
+    )
     return {
         "name": trial.name, "source": str(trial.source), "status": "failed", **nothing,
         "disagree": [], "warnings": 0,
@@ -137,10 +147,8 @@ class _Clock(Notices):
         return time.perf_counter() - self._from
 
 
-def _track(
-    trial: Trial, earlier: Record | None, clock: _Clock
-) -> tuple[Mapping[str, Any], list[str]]:
-    """Track and put the files in place; returns the summary of `track` and the files' names."""
+def _track(trial: Trial, earlier: Record | None, clock: _Clock) -> tuple[Finished, list[str]]:
+    """Track and put the files in place; returns what `track` did and the files' names."""
     target = trial.out / trial.name
     target.parent.mkdir(parents=True, exist_ok=True)
     trial.record.parent.mkdir(parents=True, exist_ok=True)
@@ -149,7 +157,7 @@ def _track(
         chosen = argparse.Namespace(
             **trial.arguments, source=trial.source, name=folder / target.name, force=False
         )
-        summary = track_source(chosen, clock).summary
+        finished = track_source(chosen, clock)
         files = sorted(file.name for file in folder.iterdir())
         # A record without a row: from here on neither result is complete.
         _write(trial.record, {"key": trial.key, "files": files})
@@ -157,9 +165,25 @@ def _track(
             (target.parent / name).unlink(missing_ok=True)
         for name in files:
             os.replace(folder / name, target.parent / name)
-        return summary, files
+        return finished, files
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _mean_error(trial: Trial, finished: Finished) -> tuple[float | None, str | None]:
+    """Mean error in mm as `evaluate` has it, and why there is none although there are markers."""
+    path = trial.out / f"{trial.name}.trc"
+    try:
+        reference = finished.recording.ground_truth()
+        if reference is None:
+            return None, None
+        track = read_trc(path)
+        stored = stored_frames(path, track)
+        found = score(track if stored is None else stored.track, reference)
+    except TrackerError as error:
+        # The result itself is complete.
+        return None, _line(error)
+    return round(found.mean_mm, 2), None
 
 
 def _write(path: Path, content: Mapping[str, Any]) -> None:

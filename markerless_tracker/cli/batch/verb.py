@@ -28,10 +28,11 @@ from markerless_tracker.libraries import usable_cores
 HELP = (
     "Track the person in every recording of a folder (at any depth) or of a list (a text file with "
     "one path per line). Writes NAME.trc, NAME.json and NAME.subject.yaml of every recording to "
-    "OUT, NAME being its path below the folder, and summary.csv and summary.json. A recording that "
-    "was done with the same settings is not done again; one that fails costs no other. {source} "
-    "and {name} in an option stand for each recording's path and name. Exit status 1: some "
-    "recordings failed; 3: no person was found in all recordings."
+    "OUT, NAME being its path below the folder, and summary.csv and summary.json; the table has "
+    "the mean error in mm of recordings with reference markers. A recording that was done with the "
+    "same settings is not done again; one that fails costs no other. {source} and {name} in an "
+    "option stand for each recording's path and name. Exit status 1: some recordings failed; 3: no "
+    "person was found in all recordings."
 )
 EXAMPLE = "markerless_tracker batch recordings -o out --start '{source}/ground_truth.trc'"
 
@@ -122,7 +123,9 @@ def _done(
         for trial, row in rows:
             if row["error"] is not None:
                 warn(bars.console, f"{trial.name} failed: {row['error']}")
-            elif row["overlap"] is not None:
+            elif row["reference_problem"] is not None:
+                warn(bars.console, f"{trial.name}: no error in mm: {row['reference_problem']}")
+            if row["overlap"] is not None:
                 bars.update(task, note=f"overlap {row['overlap']:.2f}")
             bars.advance(task)
             yield row

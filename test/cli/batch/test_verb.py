@@ -34,6 +34,13 @@ def test_results_and_table_of_every_recording(trials, options, walk, tmp_path, c
     for name in GOOD:
         assert (rows[name]["found"], rows[name]["tracked"]) == ("True", "6")
         assert float(rows[name]["overlap"]) > 0.5 and rows[name]["disagree"] == ""
+        assert (
+            main(["evaluate", "--json", f"{out / name}.trc", str(walk / "ground_truth.trc")]) == 0
+        )
+        error_mm = json.loads(capsys.readouterr().out)["mean_mm"]
+        assert float(rows[name]["mean_mm"]) == pytest.approx(error_mm, abs=0.006)
+        assert f"{error_mm:.1f}" in text and rows[name]["reference_problem"] == ""
+    assert "error mm" in text and rows["b/broken"]["mean_mm"] == ""
     assert sorted(p.name for p in (out / "b").iterdir()) == [
         "three.json", "three.subject.yaml", "three.trc",
     ]  # fmt: skip
@@ -63,6 +70,25 @@ def test_results_and_table_of_every_recording(trials, options, walk, tmp_path, c
     assert "one.json: exists already and is of other settings" in capsys.readouterr().err
     assert before == {name: (out / f"{name}.trc").stat().st_mtime_ns for name in GOOD}
     assert not list((out / ".batch").glob(".partial-*"))
+
+
+def test_errors_need_reference_markers(trials, options, walk, tmp_path, capsys) -> None:
+    shutil.rmtree(trials / "b")
+    (trials / "a" / "one" / "ground_truth.trc").unlink()
+    words = [trials, "-o", tmp_path / "out", *options[:2], "--start", walk / "ground_truth.trc"]
+    shutil.move(trials / "a" / "two", tmp_path / "two")
+    assert call(*words) == 0
+    assert "error mm" not in capsys.readouterr().out
+
+    shutil.move(tmp_path / "two", trials / "a" / "two")
+    (trials / "a" / "two" / "ground_truth.trc").write_text("broken", encoding="utf-8")
+    assert call(*words, "--json", "--force") == 0
+    out, err = capsys.readouterr()
+    rows = {row["name"]: row for row in json.loads(out)["trials"]}
+    assert rows["a/two"]["status"] == "done" and rows["a/two"]["tracked"] == 6
+    assert rows["a/two"]["mean_mm"] is None
+    assert "ground_truth.trc: " in rows["a/two"]["reference_problem"]
+    assert "a/two: no error in mm: " in err
 
 
 def test_a_batch_that_is_killed_goes_on_where_it_was(trials, options, tmp_path, capsys) -> None:
