@@ -8,7 +8,7 @@ Record a bag in one terminal, with tf2_msgs installed (part of every ROS install
 and track in others, until the person was found:
 
     markerless_tracker synthesize made_up --seconds 5 && markerless_tracker convert made_up walk_bag
-    ros2 run markerless_tracker tracker --ros-args -p stature:=1.75 \
+    ros2 run markerless_tracker tracker --ros-args -p stature:=1.72 \
         -p calibration_file:=walk_bag/calibration.toml -p background_dir:=walk_bag/background
     ros2 run markerless_tracker player --ros-args -p bag:=walk_bag -p lockstep:=true
 
