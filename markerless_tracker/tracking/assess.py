@@ -12,30 +12,12 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.confidence import confidence_of, slopes
 from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.loss import event_of, shared_overlap
 from markerless_tracker.tracking.search import FrameSearch
 from markerless_tracker.tracking.smoothing import OneEuro
 from markerless_tracker.tracking.states import Event, Track
-
-
-@dataclass(frozen=True, eq=False)
-class Seen:
-    """The evidence of one frame.
-
-    Attributes:
-        stamp_ns: its time.
-        observed: what each camera saw.
-        believed: the observations that are used.
-        notes: a line for each camera that is left out from now on, or used again.
-        left_out: a line for each camera of whose silhouette parts are left out.
-    """
-
-    stamp_ns: int
-    observed: Mapping[str, Observation]
-    believed: Mapping[str, Observation]
-    notes: tuple[str, ...] = ()
-    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +31,7 @@ class Found:
         warnings: what the user should know, one line each.
         anew: whether an automatic start found the pose: it does not continue the last one.
         settling: whether that start needs further frames.
+        turned: whether the body was turned round: it does not continue the last pose, either.
         jumped: parameters that were found elsewhere.
     """
 
@@ -58,6 +41,7 @@ class Found:
     warnings: tuple[str, ...] = ()
     anew: bool = False
     settling: bool = False
+    turned: bool = False
     jumped: IntArray | None = None
 
 
@@ -141,7 +125,7 @@ class Assessor:
         limbs = self.limbs.assess(body, search.pose, found.observations, search.particle_sd_ratio)
         warnings += tuple(f"{name}: lost" for name in self.limbs.lost if name not in lost)
         pose = search.pose
-        if found.anew:
+        if found.anew or found.turned:
             self.jump()
         if self._smooth is not None:
             pose = np.clip(self._smooth(pose, found.stamp_ns), *limits)

@@ -15,12 +15,14 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
 from markerless_tracker.libraries import usable_cores
 from markerless_tracker.records import Observation, TrackResult, TrackState
-from markerless_tracker.tracking.assess import Assessor, Found, Seen
+from markerless_tracker.tracking.assess import Assessor, Found
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
 from markerless_tracker.tracking.evidence.prepared import Lookahead, Outlook, Prepared, SeenView
+from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
+from markerless_tracker.tracking.limbs.watch import Recovered
 from markerless_tracker.tracking.limits import check_pose, joint_speeds
 from markerless_tracker.tracking.motion import MotionModel
 from markerless_tracker.tracking.partitions.effort import Effort
@@ -142,12 +144,12 @@ class Tracker:
         self._starter, self._assessor.track = None, Track(Phase.TRACKING)
         self.step(blank, 0)
         pose = self._motion.pose
-        seen = decide(blank, self._cameras, self.body, pose)
-        search = self._searcher.frame(seen, 0, pose)
+        seen = Seen(0, blank, decide(blank, self._cameras, self.body, pose), blank)
+        search = self._searcher.frame(seen.believed, 0, pose)
         search.run(frame_stages(self.body, self.config, pose, self.body.sigma))
         if self.config.refinement != "none":
-            self._assessor.limbs.recover(self._searcher, search.contours, seen, 0, pose)
-        self._assessor.warm_up(Found(search, 0, seen), self.body, self._body.limits)
+            self._assessor.limbs.recover(self._searcher, search.contours, seen, pose)
+        self._assessor.warm_up(Found(search, 0, seen.believed), self.body, self._body.limits)
         self.reset()
         self._body.warm_up(self._searcher_for, blank, self._motion.pose)
         self.reset()
@@ -266,13 +268,13 @@ class Tracker:
         if self._starter is not None:
             observed = self.evidence.whole(evidence, stamp_ns)
             believed, notes = self._views.sort(observed, self.body, None)
-            return Seen(stamp_ns, observed, believed, notes)
+            return Seen(stamp_ns, observed, believed, believed, notes)
         observed, left_out = self.evidence.gather(evidence, stamp_ns, self.body, predicted)
         expected = predicted if self.state is TrackState.TRACKING else None
-        believed, notes = self._views.sort(observed, self.body, expected)
-        if self.state is not TrackState.LOST:
-            believed = decide(believed, self._cameras, self.body, predicted)
-        return Seen(stamp_ns, observed, believed, notes, left_out)
+        imaged, notes = self._views.sort(observed, self.body, expected)
+        lost = self.state is TrackState.LOST
+        believed = imaged if lost else decide(imaged, self._cameras, self.body, predicted)
+        return Seen(stamp_ns, observed, believed, imaged, notes, left_out)
 
     def _outlook(self, number: int) -> Outlook:
         return Outlook(
@@ -319,19 +321,16 @@ class Tracker:
         )
         sigma = self.body.sigma * self._motion.widening(stamp_ns)
         self._effort.search(search, self.body, self.config, predicted, sigma)
-        names: tuple[str, ...] = ()
-        refined = self.config.refinement != "none"
-        if refined and self.config.search_again and self._effort.granted:
-            search.pose, names = self._assessor.limbs.recover(
-                self._searcher, search.contours, believed, stamp_ns, search.pose
-            )
-        notes = self._body.take_warnings() + tuple(f"{name}: found elsewhere" for name in names)
-        jumped = np.array([i for name in names for i in self.body.subspaces[name]], dtype=np.int64)
-        # A limb that is found elsewhere jumps; the rest of the body does not.
-        kept = np.clip(search.pose, *limits)
-        kept[jumped] = search.pose[jumped]
-        search.pose = kept
-        return Found(search, stamp_ns, believed, seen.notes + notes + seen.left_out, jumped=jumped)
+        recovered, limbs = Recovered(search.pose), self._assessor.limbs
+        again = self.config.refinement != "none" and self.config.search_again
+        if again and self._effort.granted:
+            recovered = limbs.recover(self._searcher, search.contours, seen, search.pose)
+        notes = seen.notes + self._body.take_warnings() + recovered.notes + seen.left_out
+        jumped = recovered.jumped(self.body)
+        # What is found elsewhere jumps; the rest of the body does not.
+        search.pose = np.clip(recovered.pose, *limits)
+        search.pose[jumped] = recovered.pose[jumped]
+        return Found(search, stamp_ns, believed, notes, turned=recovered.turned, jumped=jumped)
 
     def _learn(self, found: Found) -> None:
         """Take a frame into the motion and, while the body is tracked, into its fit."""
@@ -339,7 +338,8 @@ class Tracker:
         self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
         if not tracked or found.anew:
             return
-        if (moved := self._body.fit_tracked_frame(found.search)) is not None:
+        moved = self._body.turned() if found.turned else self._body.fit_tracked_frame(found.search)
+        if moved is not None:
             self._searcher = self._searcher_for(self.body)
             self._motion.shift(moved, self._body.limits)
 

@@ -1,12 +1,14 @@
-"""Search of one limb alone over its whole range, while the rest of the body stays."""
+"""Search of limbs over their whole range, while the rest of the body stays."""
 
 from collections.abc import Callable
 
 import numpy as np
 
+from markerless_tracker.body import markers
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.search import LIMB_M
+from markerless_tracker.tracking.start.own_evidence import OwnEvidence
 from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.recombination import Recombiner
 
@@ -18,9 +20,109 @@ LAYERS = (0.4, 0.2)
 """Then the best are varied, twice, by these fractions of the prior's standard deviations."""
 HOPELESS = 0.03
 """A limb whose cost exceeds the largest useful cost by more than this is not refined."""
+LEAST_GAIN = 0.003
+"""Least rise of f_s between poses in evidence of their own, which differs a little by chance."""
+LEAST_M = 0.05
+"""Limbs nearer to where they were, at every marker, are not elsewhere."""
+CLOSE = 0.02
+"""What costs so much more in the evidence decided for the pose so far may be better in its own."""
 _PARENTS, _CHILDREN = 6, 10
 _REFINE = (3, (LIMB_M, 0.035))
 """Iterations of the refinement of the best, and truncation (m) of the first and the last."""
+_REFINE_FAR = (8, (0.15, 0.035))
+"""The same of a pose that nothing was drawn for."""
+
+Aim = Callable[[FloatArray, int], FloatArray]
+
+
+class LimbSearch:
+    """The searches of one frame for limbs that are elsewhere.
+
+    Args:
+        recombiner: draws limbs of the body.
+        frame: the evidence, decided near the predicted body.
+        own: the same for poses that decide it themselves.
+        pose: (p,) the estimate.
+        least_gain: rise of f_s from which on another pose is taken.
+
+    Attributes:
+        pose: (p,) the estimate so far.
+    """
+
+    def __init__(
+        self,
+        recombiner: Recombiner,
+        frame: FramePopulation,
+        own: OwnEvidence,
+        pose: FloatArray,
+        least_gain: float,
+    ) -> None:
+        self._recombiner = recombiner
+        self._frame = frame
+        self._own = own
+        self._least_gain = least_gain
+        self._take(pose, None)
+
+    def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
+        """Search a limb's parameters; whether it was found elsewhere. Arguments as `other_limb`."""
+        cost = float(self._frame.costs(self.pose[None])[0])
+        other, other_cost = other_limb(
+            self._frame, self._recombiner, self.pose, limb, rng, aim, cost
+        )
+        better = other_cost < cost - self._least_gain
+        if not self._own.differs:
+            if better:
+                self._take(other, other_cost)
+            return better
+        if better and self._own.cost(other) < self.own_cost:
+            self._take(other, None)
+            return True
+        if other_cost > cost + CLOSE or self._moved_m(other) < LEAST_M:
+            return False
+        return self._takes(other, LEAST_GAIN, CLOSE, _REFINE)
+
+    def takes(self, other: FloatArray, least_gain: float, close: float) -> bool:
+        """Refine another pose (p,), and take it if it is better, each in its own evidence.
+
+        Args:
+            other: the pose.
+            least_gain: rise of f_s from which on it is taken.
+            close: largest cost before the refinement, beyond that of the estimate.
+        """
+        return self._takes(other, least_gain, close, _REFINE_FAR)
+
+    def _takes(
+        self,
+        other: FloatArray,
+        least_gain: float,
+        close: float,
+        refine: tuple[int, tuple[float, float]],
+    ) -> bool:
+        if self._own.cost(other) > self.own_cost + close:
+            return False
+        found, cost = self._own.refined(other, *refine)
+        if self._own.differs and cost <= self.own_cost + HOPELESS:
+            # Once more, in what the refined body decides.
+            found, cost = self._own.refined(found, *_REFINE)
+        if cost >= self.own_cost - least_gain:
+            return False
+        self._take(found, cost)
+        return True
+
+    def _take(self, pose: FloatArray, cost: float | None) -> None:
+        self.pose = pose
+        self._known_cost = cost
+
+    @property
+    def own_cost(self) -> float:
+        """1 - f_s of the estimate in its own evidence."""
+        if self._known_cost is None:
+            self._known_cost = self._own.cost(self.pose)
+        return self._known_cost
+
+    def _moved_m(self, other: FloatArray) -> float:
+        body = self._own.body
+        return float(np.linalg.norm(markers(body, other) - markers(body, self.pose), axis=1).max())
 
 
 def other_limb(
@@ -29,7 +131,7 @@ def other_limb(
     pose: FloatArray,
     limb: IntArray,
     rng: np.random.Generator,
-    aim: Callable[[FloatArray, int], FloatArray] | None = None,
+    aim: Aim | None = None,
     most_cost: float = np.inf,
 ) -> tuple[FloatArray, float]:
     """The best pose (p,) that is found with a limb elsewhere, and its cost 1 - f_s.

@@ -1,7 +1,7 @@
 """Lost limbs: detecting them, and searching for them while the rest of the body stays.
 
 A limb outside the silhouettes is detected. A wrong limb inside the silhouettes goes undetected, so
-all limbs are searched elsewhere in rotation.
+all limbs are searched elsewhere in rotation, and the legs are exchanged.
 """
 
 from collections.abc import Mapping
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
+from markerless_tracker.body.model import IntArray
 from markerless_tracker.body.parts import cones_of
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.lens import projected
@@ -22,11 +23,15 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.observation import locked
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import LimbState, Observation, TrackState
+from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.aimed import most_aimed
-from markerless_tracker.tracking.limbs.search import other_limb
+from markerless_tracker.tracking.limbs.exchange import CLOSE, LEAST_GAIN, LEGS, LegExchange
+from markerless_tracker.tracking.limbs.facing import FacingWatch
+from markerless_tracker.tracking.limbs.search import LimbSearch
 from markerless_tracker.tracking.limbs.unexplained import look_unexplained
 from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.start.own_evidence import OwnEvidence
 from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.recombination import Recombiner
 
@@ -40,6 +45,34 @@ _GROWN = 2.0
 """An earlier search does not count where the unexplained area has grown by this factor."""
 _NONE = locked(np.empty((0, 0), dtype=np.uint64), np.uint64)
 _ALONG = np.linspace(0.1, 0.9, 5)
+
+
+@dataclass(frozen=True, eq=False)
+class Recovered:
+    """What was found elsewhere in a frame.
+
+    Attributes:
+        pose: (p,) the estimate.
+        names: of the limbs that were taken from elsewhere; `legs` are exchanged.
+        turned: whether the person faces the other way; nothing of the body is where it was.
+    """
+
+    pose: FloatArray
+    names: tuple[str, ...] = ()
+    turned: bool = False
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know, one line each."""
+        if self.turned:
+            return ("the person faces the other way: turned round",)
+        return tuple(f"{name}: found elsewhere" for name in self.names)
+
+    def jumped(self, body: BodyModel) -> IntArray:
+        """Indices of the parameters that do not continue those of the last frame."""
+        if self.turned:
+            return np.arange(body.size)
+        return np.array([i for name in self.names for i in body.subspaces[name]], dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -81,6 +114,8 @@ class LimbWatch:
         self._unexplained = 0
         self._rotated_ns: int | None = None
         self._waits: dict[str, _Wait] = {}
+        self._exchange = LegExchange()
+        self._facing = FacingWatch()
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -113,48 +148,55 @@ class LimbWatch:
         return states
 
     def recover(
-        self,
-        searcher: Searcher,
-        contours: ContourFrame,
-        observations: Mapping[str, Observation],
-        stamp_ns: int,
-        pose: FloatArray,
-    ) -> tuple[FloatArray, tuple[str, ...]]:
+        self, searcher: Searcher, contours: ContourFrame, seen: Seen, pose: FloatArray
+    ) -> Recovered:
         """Search the limbs that `assess` found lost, and the next one in rotation.
 
         A limb is taken from elsewhere if f_s rises as clearly as a swarm's result must
-        (`min_improvement`).
+        (`min_improvement`), each pose in the evidence that it decides itself.
 
-        Returns:
-            The pose (p,), and the names of the limbs that were taken from elsewhere.
+        Args:
+            searcher: of the frame.
+            contours: the frame's contours.
+            seen: the frame's evidence.
+            pose: (p,) the estimate.
         """
-        body, config = searcher.body, searcher.config
+        body, stamp_ns, observations = searcher.body, seen.stamp_ns, seen.believed
+        if not body.limbs:
+            return Recovered(pose)
         unexplained = look_unexplained(body, pose, observations, self._rig)
         if not unexplained.limbs:
             self._waits.clear()
         due = self._due(body, stamp_ns, unexplained.areas_m2)
-        if not due:
-            return pose, ()
+        legs = self._exchange.due(body, pose, searcher.limits, stamp_ns)
+        facing = self._facing.due(stamp_ns)
+        if not due and legs is None and not facing:
+            return Recovered(pose)
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
+        own = OwnEvidence(searcher, seen.imaged, stamp_ns, frame)
         recombiner = Recombiner(body, searcher.limits)
-        cost = float(frame.costs(pose[None])[0])
+        search = LimbSearch(recombiner, frame, own, pose, searcher.config.min_improvement)
+        if facing:
+            turned = self._facing.compare(own, pose, search.own_cost, searcher.limits)
+            if turned is not None:
+                return Recovered(turned, turned=True)
         found = []
+        if legs is not None and search.takes(legs, LEAST_GAIN, CLOSE):
+            found.append(LEGS)
         for name in due:
-            rng = keyed_generator(config.seed, stamp_ns, f"{name} elsewhere")
+            rng = keyed_generator(searcher.config.seed, stamp_ns, f"{name} elsewhere")
             limb = body.subspaces[name]
             aim = None
             if unexplained.regions:
                 aim = partial(
                     most_aimed, body, limb=limb, regions=unexplained.regions, rig=self._rig
                 )
-            other, other_cost = other_limb(frame, recombiner, pose, limb, rng, aim, cost)
-            if other_cost < cost - config.min_improvement:
-                pose, cost = other, other_cost
+            if search.elsewhere(limb, rng, aim):
                 found.append(name)
                 self._waits.pop(name, None)
             else:
                 self._search_failed(name, stamp_ns, unexplained.areas_m2.get(name, 0.0))
-        return pose, tuple(found)
+        return Recovered(search.pose, tuple(found))
 
     def _search_failed(self, name: str, stamp_ns: int, area_m2: float) -> None:
         failures = 1
@@ -165,8 +207,6 @@ class LimbWatch:
 
     def _due(self, body: BodyModel, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
         """Limbs to search: lost, near unexplained silhouette, and at times the next in rotation."""
-        if not body.limbs:
-            return []
         lost = self.lost
         due = [*lost, *(n for n in self._suspects(stamp_ns, areas_m2) if n not in lost)]
         if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < ROTATION_NS:

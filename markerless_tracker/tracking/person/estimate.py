@@ -161,6 +161,20 @@ class BodyEstimate:
         self.body = fitted.body
         return fitted.moved
 
+    def turned(self) -> FloatArray | None:
+        """Fit an unmeasured body anew: so far it was fitted to poses that face the wrong way.
+
+        Returns:
+            As `fit_tracked_frame`.
+        """
+        if self._person is None or not self._fits_sections:
+            return None
+        sizes = self._person.sizes
+        self.body = sizes.body(sizes.of(self.body))
+        if self._config.fit_lengths:
+            self._lengths = BodyFitting(self._person, self.limits)
+        return np.zeros(self.body.size)
+
     def _revise_sections(self, search: FrameSearch) -> None:
         """Begin to fit the sections to this frame as well, if its pose shows something new."""
         if self._varied is None or not self._varied.takes(search.pose, self.body):

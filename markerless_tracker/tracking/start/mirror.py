@@ -1,4 +1,6 @@
-"""A pose with the limbs of both sides exchanged, as in a mirror."""
+"""A pose with the limbs of both sides exchanged: as in a mirror, or facing the other way."""
+
+from functools import lru_cache
 
 import numpy as np
 
@@ -15,6 +17,10 @@ _BENT = {
 """A posture in which every joint moves a marker."""
 _CHANGE_RAD = 0.2
 _OTHER = {"L": "R", "R": "L"}
+_IN_A_MIRROR = np.array([1.0, -1.0, 1.0])
+_FACING_THE_OTHER_WAY = np.array([-1.0, -1.0, 1.0])
+_TRUNK = [MARKER_NAMES.index(name) for name in ("Pelvis", "Neck")]
+"""Rows of the pelvis and the neck among the markers."""
 
 
 class Mirror:
@@ -28,33 +34,99 @@ class Mirror:
     """
 
     def __init__(self, body: BodyModel) -> None:
-        names = body.parameter_names
-        pairs = [
-            (body.index(name), body.index("r_" + name[2:]))
-            for name in names
-            if name.startswith("l_") and "r_" + name[2:] in names
-        ]
-        self._neutral = body.neutral
-        self._to = np.array([pair for both in pairs for pair in both], dtype=np.int64)
-        self._from = np.array([pair for both in pairs for pair in both[::-1]], dtype=np.int64)
-        bent = posture(body, _BENT)
-        rest = markers(body, bent)
-        signs = []
-        for left, right in pairs:
-            seen = _mirrored(_moved(body, bent, left, _CHANGE_RAD) - rest)
-            gaps = [
-                np.abs(_moved(body, bent, right, sign * _CHANGE_RAD) - rest - seen).sum()
-                for sign in (1.0, -1.0)
-            ]
-            signs += [1.0 if gaps[0] <= gaps[1] else -1.0] * 2
-        self._sign = np.array(signs)
+        self._exchange = _Exchange(body, posture(body, _BENT), _limb_pairs(body), _IN_A_MIRROR)
 
     def of(self, pose: FloatArray) -> FloatArray:
         """A pose (p,) with the limbs exchanged; root, trunk and head stay."""
+        return self._exchange.of(pose)
+
+
+class TurnedRound:
+    """Lets a person face the other way, with every joint near where it was.
+
+    What was bent forwards is then bent backwards, as far as the joints allow. Both poses give
+    nearly the same silhouettes.
+
+    Args:
+        body: the body; parameters `l_NAME` and `r_NAME` belong together.
+    """
+
+    def __init__(self, body: BodyModel) -> None:
+        self._body = body
+        self._yaw = body.index("pelvis_rz")
+        self._at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
+        alone = [
+            (i, i)
+            for i, name in enumerate(body.parameter_names)
+            if not name.startswith(("l_", "r_")) and i not in (*self._at, self._yaw)
+        ]
+        pairs = [*_limb_pairs(body), *alone]
+        self._exchange = _Exchange(body, body.neutral, pairs, _FACING_THE_OTHER_WAY)
+
+    def of(self, pose: FloatArray) -> FloatArray:
+        """A pose (p,), turned about the middle of its trunk; limits may be broken."""
+        out = self._exchange.of(pose)
+        out[self._yaw] += np.pi
+        moved_m = markers(self._body, out) - markers(self._body, pose)
+        out[self._at] -= moved_m[_TRUNK].mean(axis=0)
+        return out
+
+
+class _Exchange:
+    """Exchanges paired parameters; a change moves the markers as their change did, seen otherwise.
+
+    Args:
+        body: the body.
+        about: (p,) pose about which the changes are made.
+        pairs: indices of left and right parameters; of a parameter of the trunk twice the same.
+        seen: (3,) factors of a marker's movement forwards, to the left and upwards.
+    """
+
+    def __init__(
+        self, body: BodyModel, about: FloatArray, pairs: list[tuple[int, int]], seen: FloatArray
+    ) -> None:
+        self._neutral = body.neutral
+        both = [pair if pair[0] != pair[1] else pair[:1] for pair in pairs]
+        self._to = np.array([i for pair in both for i in pair], dtype=np.int64)
+        self._from = np.array([i for pair in both for i in pair[::-1]], dtype=np.int64)
+        rest = markers(body, about)
+        signs: list[float] = []
+        for pair in both:
+            wanted = _exchanged(_moved(body, about, pair[0], _CHANGE_RAD) - rest, seen)
+            gaps = [
+                np.abs(_moved(body, about, pair[-1], sign * _CHANGE_RAD) - rest - wanted).sum()
+                for sign in (1.0, -1.0)
+            ]
+            signs += [1.0 if gaps[0] <= gaps[1] else -1.0] * len(pair)
+        self._sign = np.array(signs)
+
+    def of(self, pose: FloatArray) -> FloatArray:
+        """A pose (p,) with the paired parameters exchanged; the others stay."""
         out = pose.copy()
         change = (pose - self._neutral)[self._from]
         out[self._to] = self._neutral[self._to] + self._sign * change
         return out
+
+
+@lru_cache(maxsize=4)
+def mirror_of(body: BodyModel) -> Mirror:
+    """The mirror of a body; bodies of other sizes have the same."""
+    return Mirror(body)
+
+
+@lru_cache(maxsize=4)
+def turned_round(body: BodyModel) -> TurnedRound:
+    """What turns a body round."""
+    return TurnedRound(body)
+
+
+def _limb_pairs(body: BodyModel) -> list[tuple[int, int]]:
+    names = body.parameter_names
+    return [
+        (body.index(name), body.index("r_" + name[2:]))
+        for name in names
+        if name.startswith("l_") and "r_" + name[2:] in names
+    ]
 
 
 def _moved(body: BodyModel, pose: FloatArray, index: int, change_rad: float) -> FloatArray:
@@ -63,8 +135,8 @@ def _moved(body: BodyModel, pose: FloatArray, index: int, change_rad: float) -> 
     return markers(body, moved)
 
 
-def _mirrored(change_m: FloatArray) -> FloatArray:
-    """Changes (15, 3) of the markers, seen in a mirror between left and right (y)."""
+def _exchanged(change_m: FloatArray, seen: FloatArray) -> FloatArray:
+    """Changes (15, 3) of the markers, those of left and right exchanged, times factors (3,)."""
     rows = [MARKER_NAMES.index(_OTHER.get(n[0], n[0]) + n[1:]) if n[1].isupper() else k
             for k, n in enumerate(MARKER_NAMES)]  # fmt: skip
-    return np.asarray(change_m[rows] * [1.0, -1.0, 1.0])
+    return np.asarray(change_m[rows] * seen)

@@ -4,14 +4,14 @@ A refinement converges to the nearest optimum, and a limb's optimum is far from 
 explains the same silhouette: so limbs change as wholes, and the good ones are refined.
 """
 
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.start.mirror import Mirror
+from markerless_tracker.tracking.start.mirror import Mirror, mirror_of
 from markerless_tracker.tracking.start.postures import joint_sd, postures
 
 _ONE_LIMB, _KNOWN = 0.35, 0.3
@@ -61,7 +61,7 @@ class Recombiner:
 
     @cached_property
     def _mirror(self) -> Mirror:
-        return _mirror(self._body)
+        return mirror_of(self._body)
 
     def children(self, parents: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
         """Children (count, p) of poses (n, p), the best parent first."""
@@ -129,8 +129,3 @@ class Recombiner:
         if rng.random() < _TURNED:
             child[self._yaw] += _YAW_RAD * rng.standard_normal()
             child[self._tilt] += _TILT_RAD * rng.standard_normal(2)
-
-
-@lru_cache(maxsize=4)
-def _mirror(body: BodyModel) -> Mirror:
-    return Mirror(body)

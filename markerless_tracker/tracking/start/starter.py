@@ -16,6 +16,7 @@ from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull, find_hulls
+from markerless_tracker.tracking.start.own_evidence import OwnEvidence
 from markerless_tracker.tracking.start.population import FramePopulation, Population
 from markerless_tracker.tracking.start.postures import put_at
 from markerless_tracker.tracking.start.rejections import Rejections
@@ -75,7 +76,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """One frame as the best pose of one heading explains it."""
+    """One frame as the best pose of one heading explains it, in evidence of its own."""
 
     contours: ContourFrame
     pose: FloatArray
@@ -142,9 +143,10 @@ class Starter:
             return self._begin(observed, stamp_ns)
         population = self._population
         best = self._best(population).poses[0]
-        observations, notes = self._select(observed, self._searcher.body, best)
-        if any(seen.undecided_words is not None for seen in observations.values()):
-            observations = self._decide(observations, best)
+        imaged, notes = self._select(observed, self._searcher.body, best)
+        observations = imaged
+        if any(seen.undecided_words is not None for seen in imaged.values()):
+            observations = self._decide(imaged, best)
         frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
         population = frame.propagated(population)
         if len(self._seen[0]) == 1:
@@ -156,7 +158,7 @@ class Starter:
             self.reset()
             return None
         self._population = population
-        self._note(frame, population)
+        self._note(OwnEvidence(self._searcher, imaged, stamp_ns, frame), frame, population)
         notes += self._check_heading(stamp_ns)
         settled = len(self._seen[0]) >= SETTLING_FRAMES
         pose = self._best(population).poses[0]
@@ -187,7 +189,8 @@ class Starter:
             self._population = population
             self._heading = float(population.headings[0])
             self._begun_ns = stamp_ns
-            self._note(frame, population)
+            own = OwnEvidence(self._searcher, observations, stamp_ns, frame)
+            self._note(own, frame, population)
             self._from_m = self._trunk(population.poses[0])
             return Found(self._searcher, population.poses[0], observations, False)
         return None
@@ -267,14 +270,11 @@ class Starter:
         _, self._searcher, frame, population = min(tried, key=lambda one: one[0])
         return frame, population
 
-    def _note(self, frame: FramePopulation, population: Population) -> None:
+    def _note(self, own: OwnEvidence, frame: FramePopulation, population: Population) -> None:
         for side, seen in enumerate(self._seen):
             facing = population.facing(self._heading + side * np.pi)
-            seen.append(
-                _Seen(frame.contours, facing.poses[0], float(facing.costs[0]))
-                if len(facing)
-                else None
-            )
+            best = facing.poses[0] if len(facing) else None
+            seen.append(None if best is None else _Seen(frame.contours, best, own.cost(best)))
 
     def _check_heading(self, stamp_ns: int) -> tuple[str, ...]:
         """Change to the opposite heading, at most once, if it explains the frames better."""

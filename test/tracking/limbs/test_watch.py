@@ -9,6 +9,7 @@ from markerless_tracker.body import MARKER_NAMES, markers
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
+from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import (
     ROTATION_NS,
@@ -39,6 +40,12 @@ def searcher_of(scene, threads=1, **changes):
 
 def contours_of(searcher, seen, pose):
     return searcher.frame(seen, 0, pose).contours
+
+
+def recover(watch, searcher, contours, seen, stamp_ns, pose):
+    """What `recover` finds: the pose and the names."""
+    found = watch.recover(searcher, contours, Seen(stamp_ns, seen, seen, seen), pose)
+    return found.pose, found.names
 
 
 def gaps(body, pose, true):
@@ -93,7 +100,7 @@ def test_a_lost_arm_is_found_alone(standing) -> None:
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
     watch.assess(scene.body, raised, seen, np.full(scene.body.size, np.nan))
-    found, names = watch.recover(searcher, contours_of(searcher, seen, raised), seen, 0, raised)
+    found, names = recover(watch, searcher, contours_of(searcher, seen, raised), seen, 0, raised)
     assert names == ("l_arm",)
     assert gaps(scene.body, raised, pose)[ARM].min() > 0.3
     assert gaps(scene.body, found, pose)[ARM].max() < 0.13
@@ -109,7 +116,7 @@ def test_a_wrong_arm_inside_the_silhouettes_is_found_in_rotation(balancing) -> N
     assert states["l_arm"].state is TRACKING
     at, taken = hidden, []
     for stamp_ns in range(0, 8 * ROTATION_NS, ROTATION_NS):
-        at, names = watch.recover(searcher, contours_of(searcher, seen, at), seen, stamp_ns, at)
+        at, names = recover(watch, searcher, contours_of(searcher, seen, at), seen, stamp_ns, at)
         taken += names
     assert taken[0] == "l_arm"
     assert gaps(body, at, pose)[ARM].max() < 0.08
@@ -121,7 +128,7 @@ def test_limbs_in_their_place_are_left_alone(balancing) -> None:
     watch = LimbWatch(scene.rig)
     for stamp_ns in range(0, 4 * ROTATION_NS, ROTATION_NS):
         contours = contours_of(searcher, seen, pose)
-        assert watch.recover(searcher, contours, seen, stamp_ns, pose) == (pose, ())
+        assert recover(watch, searcher, contours, seen, stamp_ns, pose) == (pose, ())
 
 
 def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
@@ -131,7 +138,7 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
     watch = LimbWatch(scene.rig)
     assert watch.assess(body, pose, seen, np.zeros(body.size)) == {}
     contours = contours_of(searcher, seen, pose)
-    assert watch.recover(searcher, contours, seen, 0, pose) == (pose, ())
+    assert recover(watch, searcher, contours, seen, 0, pose) == (pose, ())
 
 
 def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch) -> None:
@@ -143,7 +150,7 @@ def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch)
         searcher = searcher_of(scene, threads)
         watch = LimbWatch(scene.rig)
         contours = contours_of(searcher, seen, hidden)
-        return [watch.recover(searcher, contours, seen, stamp, hidden)[1] for stamp in stamps]
+        return [recover(watch, searcher, contours, seen, stamp, hidden)[1] for stamp in stamps]
 
     # The arm is the first in rotation, and no limb comes again so soon.
     assert found([0, 1, ROTATION_NS - 1]) == [("l_arm",), (), ()]
@@ -157,7 +164,7 @@ def test_a_limb_near_unexplained_silhouette_is_searched_in_every_frame(balancing
     watch = LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, hidden)
     for stamp_ns in (0, 1, ROTATION_NS - 1):
-        names = watch.recover(searcher, contours, seen, stamp_ns, hidden)[1]
+        names = recover(watch, searcher, contours, seen, stamp_ns, hidden)[1]
         assert "l_arm" in names
 
 
@@ -166,17 +173,20 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
     scene, seen, pose, _ = balancing
     limbs = ("r_leg", "l_leg", "r_arm", "l_arm")
     for name, value in (
-        ("look_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})),
-        ("other_limb", lambda _f, _r, at, limb, *_: searched.append(limb.tobytes()) or (at, 9.0)),
+        ("watch.look_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})),
+        (
+            "search.other_limb",
+            lambda _f, _r, at, limb, *_: searched.append(limb.tobytes()) or (at, 9.0),
+        ),
     ):
-        monkeypatch.setattr(f"markerless_tracker.tracking.limbs.watch.{name}", value)
+        monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
     monkeypatch.setattr("markerless_tracker.tracking.limbs.watch.WAIT_NS", 0)
     searcher, watch, searched = searcher_of(scene), LimbWatch(scene.rig), []
     contours = contours_of(searcher, seen, pose)
-    watch.recover(searcher, contours, seen, 0, pose)
+    recover(watch, searcher, contours, seen, 0, pose)
     searched.clear()
     for stamp_ns in (1, 2, 3):
-        watch.recover(searcher, contours, seen, stamp_ns, pose)
+        recover(watch, searcher, contours, seen, stamp_ns, pose)
     name_of = {scene.body.subspaces[name].tobytes(): name for name in limbs}
     names = [name_of[limb] for limb in searched]
     assert names[::2] == ["r_leg"] * 3 and set(names[1::2]) == {"l_leg", "r_arm", "l_arm"}
@@ -186,15 +196,15 @@ def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monk
     scene, seen, pose, _ = balancing
     searched: list[int] = []
     for name, value in (
-        ("look_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})),
-        ("other_limb", lambda _f, _r, at, limb, *_: searched.append(now) or (at, 9.0)),
-        ("ROTATION_NS", 10**12),
+        ("watch.look_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})),
+        ("search.other_limb", lambda _f, _r, at, limb, *_: searched.append(now) or (at, 9.0)),
+        ("watch.ROTATION_NS", 10**12),
     ):
-        monkeypatch.setattr(f"markerless_tracker.tracking.limbs.watch.{name}", value)
+        monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, pose)
     for now in range(0, 40 * WAIT_NS, WAIT_NS):
-        watch.recover(searcher, contours, seen, now, pose)
+        recover(watch, searcher, contours, seen, now, pose)
     # Once more at first: the next limb in rotation.
     frames = sorted({at // WAIT_NS for at in searched})
     assert frames == [0, 2, 6, 14, 30]
@@ -208,27 +218,30 @@ def test_a_limb_does_not_wait_where_more_silhouette_is_unexplained_than_before(
     areas: dict[str, float] = {"l_leg": 0.01}
     searched: list[tuple[int, bytes]] = []
     for name, value in (
-        ("look_unexplained", lambda *_: Unexplained(dict(areas), {})),
-        ("other_limb", lambda _f, _r, at, limb, *_: searched.append((now, limb)) or (at, 9.0)),
+        ("watch.look_unexplained", lambda *_: Unexplained(dict(areas), {})),
+        (
+            "search.other_limb",
+            lambda _f, _r, at, limb, *_: searched.append((now, limb)) or (at, 9.0),
+        ),
     ):
-        monkeypatch.setattr(f"markerless_tracker.tracking.limbs.watch.{name}", value)
+        monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
     arm = scene.body.subspaces["l_arm"].tobytes()
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, pose)
     for now in range(0, 20 * ROTATION_NS, ROTATION_NS):
-        watch.recover(searcher, contours, seen, now, pose)
+        recover(watch, searcher, contours, seen, now, pose)
     assert scene.body.limbs[0] == "l_arm"
     last = max(at for at, limb in searched if limb.tobytes() == arm)
     for more_m2 in (0.011, 0.023):
         searched.clear()
         areas["l_arm"] = more_m2
         now = last = last + 2
-        watch.recover(searcher, contours, seen, now, pose)
+        recover(watch, searcher, contours, seen, now, pose)
         assert arm in [limb.tobytes() for _, limb in searched]
     searched.clear()
     areas["l_arm"] = 0.024
     now = last + 2
-    watch.recover(searcher, contours, seen, now, pose)
+    recover(watch, searcher, contours, seen, now, pose)
     assert arm not in [limb.tobytes() for _, limb in searched]
 
 
@@ -238,7 +251,8 @@ def test_the_same_search_gives_the_same_bytes_with_any_number_of_threads(standin
     for threads in (1, 2):
         searcher = searcher_of(scene, threads)
         contours = contours_of(searcher, seen, raised)
-        poses.append(LimbWatch(scene.rig).recover(searcher, contours, seen, 0, raised)[0].tobytes())
+        found, _ = recover(LimbWatch(scene.rig), searcher, contours, seen, 0, raised)
+        poses.append(found.tobytes())
     assert poses[0] == poses[1]
 
 

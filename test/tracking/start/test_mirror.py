@@ -1,10 +1,10 @@
-"""Limbs exchanged as in a mirror."""
+"""Limbs exchanged as in a mirror; a body turned round."""
 
 import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, load_body, markers
-from markerless_tracker.tracking.start.mirror import Mirror
+from markerless_tracker.tracking.start.mirror import Mirror, TurnedRound
 
 
 @pytest.mark.parametrize("name", ["person31", "balan31", "humaneva34"])
@@ -26,3 +26,48 @@ def test_root_trunk_and_head_stay() -> None:
     pose = body.neutral + 0.1
     fixed = [i for i, n in enumerate(body.parameter_names) if n[:2] not in ("l_", "r_")]
     np.testing.assert_array_equal(Mirror(body).of(pose)[fixed], pose[fixed])
+
+
+OTHER = [
+    MARKER_NAMES.index({"L": "R", "R": "L"}[name[0]] + name[1:]) if name[1].isupper() else k
+    for k, name in enumerate(MARKER_NAMES)
+]
+"""Row of the marker of the other side, for each marker."""
+
+
+@pytest.mark.parametrize("name", ["balan31", "humaneva34"])
+def test_a_body_turned_round_has_its_joints_where_those_of_the_other_side_were(name) -> None:
+    body = load_body(name, 1.7)
+    rng = np.random.default_rng(4)
+    pose = body.neutral.copy()
+    for angle in ("hip_y", "shoulder_y", "knee"):
+        for side in "lr":
+            pose[body.index(f"{side}_{angle}")] += 0.3 * rng.standard_normal()
+    pose[[body.index(f"pelvis_{i}") for i in ("tx", "ty", "rz", "ry")]] = 0.4, -0.2, 2.0, 0.2
+    turned = TurnedRound(body).of(pose)
+    before, after = markers(body, pose), markers(body, turned)
+    np.testing.assert_allclose(after[OTHER], before, atol=0.002)
+
+
+@pytest.mark.parametrize("name", ["person31", "person32", "person34"])
+def test_legs_and_trunk_of_other_bodies_stay_near_where_they_were(name) -> None:
+    body = load_body(name, 1.7)
+    pose = body.neutral.copy()
+    pose[[body.index("l_hip_y"), body.index("r_hip_y")]] += 0.3, -0.2
+    before, after = markers(body, pose), markers(body, TurnedRound(body).of(pose))
+    rows = [
+        k
+        for k, marker in enumerate(MARKER_NAMES)
+        if "Elbow" not in marker and "Wrist" not in marker
+    ]
+    gaps_m = np.linalg.norm(after[OTHER] - before, axis=1)
+    assert gaps_m[rows].max() < 0.05
+
+
+def test_turning_twice_changes_nothing() -> None:
+    body = load_body("person32", 1.7)
+    rng = np.random.default_rng(5)
+    pose = body.neutral + 0.1 * rng.standard_normal(body.size)
+    again = TurnedRound(body).of(TurnedRound(body).of(pose))
+    again[body.index("pelvis_rz")] -= 2.0 * np.pi
+    np.testing.assert_allclose(again, pose, atol=1e-9)

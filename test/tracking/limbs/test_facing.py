@@ -1,0 +1,75 @@
+"""A person that is tracked facing the wrong way is turned round."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import markers
+from markerless_tracker.body.anatomy import heading, heading_difference
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import Tracker, TrackerConfig
+from markerless_tracker.tracking.limbs.facing import EVERY_NS, LEAST_COMPARISONS, FacingWatch
+from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.start.mirror import TurnedRound
+from markerless_tracker.tracking.start.own_evidence import OwnEvidence
+from markerless_tracker.tracking.start.population import FramePopulation
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=3)
+
+
+def observed(scene, frame):
+    _, masks, pose = scene.frame(frame)
+    seen = {
+        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+    }
+    return seen, pose
+
+
+def turned_away(body, pose):
+    return np.clip(TurnedRound(body).of(pose), *body.limits)
+
+
+def compared(scene, pose_of, count):
+    """What so many comparisons give, one after another."""
+    body, config = scene.body, TrackerConfig(threads=1)
+    searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
+    watch, found = FacingWatch(), []
+    for number in range(count):
+        seen, true = observed(scene, 15 * number)
+        pose, stamp_ns = pose_of(true), number * EVERY_NS
+        assert watch.due(stamp_ns) and not watch.due(stamp_ns + EVERY_NS - 1)
+        frame = FramePopulation(searcher, seen, stamp_ns, pose)
+        own = OwnEvidence(searcher, seen, stamp_ns, frame)
+        found.append(watch.compare(own, pose, own.cost(pose), body.limits))
+    return found
+
+
+def test_many_comparisons_turn_a_person_who_faces_the_wrong_way(scene) -> None:
+    found = compared(scene, lambda true: turned_away(scene.body, true), 4)
+    assert found[: LEAST_COMPARISONS - 1] == [None] * (LEAST_COMPARISONS - 1)
+    first = next(k for k, pose in enumerate(found) if pose is not None)
+    true = scene.frame(15 * first)[2]
+    ways = [heading(markers(scene.body, pose)) for pose in (found[first], true)]
+    assert heading_difference(*ways) < 0.4
+
+
+def test_a_person_who_faces_the_right_way_stays(scene) -> None:
+    assert compared(scene, lambda true: true, 4) == [None] * 4
+
+
+def test_a_tracker_that_starts_the_wrong_way_turns_the_person_and_fits_the_body_anew(scene) -> None:
+    body = scene.body
+    start = turned_away(body, scene.frame(0)[2])
+    tracker = Tracker(scene.rig, body, TrackerConfig(threads=1), start_pose=start, shape_known=True)
+    warnings = []
+    for frame in range(0, 90, 3):
+        seen, true = observed(scene, frame)
+        result = tracker.step(seen, round(frame * 1e9 / 60))
+        warnings += result.warnings
+    assert "the person faces the other way: turned round" in warnings
+    ways = [heading(markers(body, pose)) for pose in (result.pose, true)]
+    assert heading_difference(*ways) < 0.4

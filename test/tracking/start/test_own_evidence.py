@@ -1,0 +1,71 @@
+"""Poses compared each in the evidence that its body decides."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.fitness.raster.silhouette import body_masks
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.evidence.undecided import decide
+from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.start.own_evidence import OwnEvidence
+from markerless_tracker.tracking.start.population import FramePopulation
+
+
+@pytest.fixture(scope="module")
+def legs_undecided():
+    """A person whose legs are undecided, with as much floor around them, and a bent left knee."""
+    scene = SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=3)
+    _, masks, pose = scene.frame(0)
+    wrong = pose.copy()
+    wrong[[scene.body.index("l_hip_y"), scene.body.index("l_knee")]] += -0.5, 0.9
+    covered = body_masks(scene.body, wrong, list(scene.rig))
+    seen = {}
+    for name, mask in masks.items():
+        low = np.arange(len(mask))[:, None] > 0.6 * np.flatnonzero(mask.any(axis=1)).max()
+        undecided = low & (mask | covered[name])
+        edges = np.zeros(mask.shape, np.uint8)
+        seen[name] = Observation.from_mask(name, 0, mask & ~undecided, edges, undecided=undecided)
+    body, config = scene.body, TrackerConfig(threads=1)
+    searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
+    return searcher, seen, pose, wrong
+
+
+def own_of(searcher, seen, at):
+    decided = decide(seen, searcher.cameras, searcher.body, at)
+    frame = FramePopulation(searcher, decided, 0, at)
+    return frame, OwnEvidence(searcher, seen, 0, frame)
+
+
+def test_evidence_decided_for_a_wrong_pose_speaks_against_the_true_one(legs_undecided) -> None:
+    searcher, seen, true, wrong = legs_undecided
+    frame, own = own_of(searcher, seen, wrong)
+    assert own.differs
+    shared = frame.costs(np.array([true, wrong]))
+    assert shared[0] > shared[1]
+    # A cost of its own does not depend on what was decided before.
+    assert own.cost(true) < own.cost(wrong) + 0.01
+    assert own.cost(true) == own_of(searcher, seen, true)[1].cost(true)
+
+
+def test_a_pose_is_refined_in_its_own_evidence(legs_undecided) -> None:
+    searcher, seen, true, wrong = legs_undecided
+    _, own = own_of(searcher, seen, wrong)
+    off = true.copy()
+    off[:3] += 0.03
+    found, cost = own.refined(off, 6, (0.12, 0.035))
+    assert cost < own.cost(off)
+    assert cost == own.cost(found)
+
+
+def test_without_undecided_pixels_all_poses_share_the_evidence(legs_undecided) -> None:
+    searcher, seen, true, wrong = legs_undecided
+    two_classes = decide(seen, searcher.cameras, searcher.body, true)
+    two_classes = {
+        name: Observation.from_mask(name, 0, one.mask, one.edges)
+        for name, one in two_classes.items()
+    }
+    frame, own = own_of(searcher, two_classes, true)
+    assert not own.differs
+    assert own.cost(wrong) == frame.costs(wrong[None])[0]
