@@ -21,6 +21,7 @@ from markerless_tracker.tracking.swarms.particles import (
     place,
     take_all,
 )
+from markerless_tracker.tracking.swarms.pso import propose
 from markerless_tracker.tracking.swarms.search import SwarmSearch
 
 
@@ -65,7 +66,7 @@ def _swarms(  # type: ignore[no-untyped-def]
     for k in range(inertias.size):
         left = take_all(particles, first, subs)
         for _ in range(ATTEMPTS):
-            _propose_subs(rng, particles, left, ends, inertias[k], c, sigma)
+            propose(rng, particles, left, ends, inertias[k], c, sigma)
             confine(particles, left, bounds)
             left = left_over(particles, left, constraints)
             if left == 0:
@@ -88,29 +89,8 @@ def _swarms(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _propose_subs(rng, particles, count, ends, w, c, sigma):  # type: ignore[no-untyped-def]
-    """Moves of the first `count` particles in `todo`, as `optim.pso.inertia_step`."""
-    d = sigma.size
-    draw(rng, particles, 2 * count * d)
-    x, best = particles.x, particles.best
-    swarm, first = -1, 0
-    for k in range(count):
-        n = particles.todo[k]
-        while n >= ends[swarm + 1]:
-            swarm += 1
-            first = leader(particles, ends[swarm], ends[swarm + 1])
-        for i in range(d):
-            r1, r2 = particles.draws[k * d + i], particles.draws[(count + k) * d + i]
-            speed = w * particles.v[n, i] + c * r1 * (best[n, i] - x[n, i])
-            speed += c * r2 * (best[first, i] - x[n, i])
-            speed = min(max(speed, -2.0 * sigma[i]), 2.0 * sigma[i])
-            particles.moved[n, i] = speed
-            particles.there[n, i] = x[n, i] + speed
-
-
-@kernel
 def _propose_master(rng, particles, count, subs, w, c, c_own, c_sub, sigma):  # type: ignore[no-untyped-def]
-    """The same of the master's, as `optim.mcpso.master_step`."""
+    """Moves of the master's first `count` particles in `todo`, as `optim.mcpso.master_step`."""
     d = sigma.size
     draw(rng, particles, 3 * count * d)
     x, best, draws = particles.x, particles.best, particles.draws

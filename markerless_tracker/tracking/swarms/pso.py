@@ -31,8 +31,9 @@ def run_pso(
     particles = search.particles()
     steps = range(2, search.iterations + 1)
     inertias = [inertia(k, search.iterations, inertia_max, inertia_min) for k in steps]
+    ends = np.array([0, search.count])
     _swarm(
-        search.rng, particles, np.array(inertias), acceleration, search.centre, search.sigma,
+        search.rng, particles, ends, np.array(inertias), acceleration, search.centre, search.sigma,
         search.bounds, search.constraints, search.objective,
     )  # fmt: skip
     return particles
@@ -40,15 +41,16 @@ def run_pso(
 
 @compiled(error_model="numpy")
 def _swarm(  # type: ignore[no-untyped-def]
-    rng, particles, inertias, c, centre, sigma, bounds, constraints, objective
+    rng, particles, ends, inertias, c, centre, sigma, bounds, constraints, objective
 ):
+    """ends: (2,) as of `propose`."""
     start, count = np.int64(0), particles.x.shape[0]
     begin(rng, particles, centre, sigma, bounds, True, constraints)
     for k in range(inertias.size + 1):
         if k > 0:
             left = take_all(particles, start, count)
             for _ in range(ATTEMPTS):
-                _propose(rng, particles, left, inertias[k - 1], c, sigma)
+                propose(rng, particles, left, ends, inertias[k - 1], c, sigma)
                 confine(particles, left, bounds)
                 left = left_over(particles, left, constraints)
                 if left == 0:
@@ -58,14 +60,20 @@ def _swarm(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _propose(rng, particles, count, w, c, sigma):  # type: ignore[no-untyped-def]
-    """Moves of the first `count` particles in `todo`, as `optim.pso.inertia_step`."""
+def propose(rng, particles, count, ends, w, c, sigma):  # type: ignore[no-untyped-def]
+    """Moves of the first `count` particles in `todo`, as `optim.pso.inertia_step`.
+
+    ends: (s + 1,) where each of s swarms begins, and the end; each follows a leader of its own.
+    """
     d = sigma.size
     draw(rng, particles, 2 * count * d)
     x, best = particles.x, particles.best
-    first = leader(particles, 0, x.shape[0])
+    swarm, first = -1, 0
     for k in range(count):
         n = particles.todo[k]
+        while n >= ends[swarm + 1]:
+            swarm += 1
+            first = leader(particles, ends[swarm], ends[swarm + 1])
         for i in range(d):
             r1, r2 = particles.draws[k * d + i], particles.draws[(count + k) * d + i]
             speed = w * particles.v[n, i] + c * r1 * (best[n, i] - x[n, i])
