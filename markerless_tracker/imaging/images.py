@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from markerless_tracker.errors import ImageError
 
 Image = NDArray[np.uint8]
-"""(h, w) grey or (h, w, 3) BGR."""
+"""(h, w) grey or (h, w, 3) BGR, grey levels."""
+FloatImage = NDArray[np.float32]
+"""(h, w) or (h, w, c): means, variances or weights of pixels."""
 
 
 def check_image(image: Any, what: str, *, size_px: tuple[int, int] | None = None) -> Image:

@@ -1,4 +1,4 @@
-"""Masks of an image, and the round element that widens or narrows them."""
+"""Masks of an image, and the structuring elements that dilate or erode them."""
 
 import cv2
 import numpy as np
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 Mask = NDArray[np.uint8]
 """(h, w), 0 or 255."""
 SOLID = np.ones((3, 3), dtype=np.uint8)
-"""The square element that reaches one pixel in every direction."""
+"""Square structuring element of 3 x 3 pixels."""
 
 
 def disc(side_px: int) -> Mask:

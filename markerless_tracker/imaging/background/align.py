@@ -4,9 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.imaging.images import Image, grey_of
-
-FloatImage = NDArray[np.float32]
+from markerless_tracker.imaging.images import FloatImage, Image, grey_of
 
 # Tiles along the longer side of the image, for each of which a shift is measured.
 _TILES = 6
@@ -53,6 +51,7 @@ def align_geometry(image: Image, reference: Image) -> Image:
 
 
 def _tile_shifts(image: Image, reference: Image) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Where tiles lie in the image, and their centres in the reference, (n, 2) px each."""
     height, width = reference.shape
     tile = max(32, 2 * max(height, width) // (_TILES + 1))
     first = cv2.Laplacian(image, cv2.CV_32F, ksize=3)

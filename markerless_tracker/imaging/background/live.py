@@ -2,30 +2,31 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.errors import ImageError
+from markerless_tracker.imaging.background.mixture import MEDIAN_TO_SD
 from markerless_tracker.imaging.background.model import (
     BackgroundModel,
     learn_background,
     model_from_moments,
 )
-from markerless_tracker.imaging.images import Image, check_image, grey_of
+from markerless_tracker.imaging.background.moments import Moments
+from markerless_tracker.imaging.images import FloatImage, Image, check_image, grey_of
+from markerless_tracker.imaging.masks import SOLID
 from markerless_tracker.imaging.settings import ImagingSettings
 
 MOVING_SHARE = 0.002
-"""Part of an image from which on something moves in it: 630 px of 644x488, where a person has some
-thousands; leaves and screens may have more, and an empty scene with them is refused."""
+"""Fraction of an image's pixels from which on something moves in it: 630 px of 644x488, where a
+person has some thousands. Leaves and screens may have more: an empty scene with them is refused."""
 
 SAMPLES = 20
-"""Images that are kept for a mixture: 0.5 GB of four 1080p cameras."""
+"""Images that are kept for a mixture: 0.5 GB for four 1080p cameras."""
 
+# Window over which images are averaged before they are compared.
 _BLUR_PX = (5, 5)
+# Least change of a pixel that moved: grey levels, and standard deviations of the noise.
 _LEAST_CHANGE = 10.0
 _NOISE_FACTOR = 6.0
-_SOLID = np.ones((3, 3), dtype=np.uint8)
-# A normal distribution's deviation beside its median deviation.
-_FROM_MEDIAN = 1.4826
 
 
 class LiveBackground:
@@ -46,8 +47,8 @@ class LiveBackground:
         self._shape: tuple[int, ...] = ()
         self._samples: list[Image] = []
         self._every = 1
-        self._mean = self._moment = np.zeros(0, dtype=np.float32)
-        self._first: NDArray[np.float32] | None = None
+        self._moments = Moments()
+        self._first: FloatImage | None = None
 
     def __len__(self) -> int:
         return self._count
@@ -56,7 +57,7 @@ class LiveBackground:
         """Take an image (h, w) or (h, w, 3).
 
         Returns:
-            The part of the image that moved since the first one.
+            The fraction of the pixels that differ from the first image by more than noise.
 
         Raises:
             ImageError: it differs from the first in size or channels.
@@ -85,33 +86,29 @@ class LiveBackground:
         note = f"learned live from {self._count} images"
         if self._settings.background.modes > 1 or not self._count:
             return learn_background(self._samples, self._settings, camera=self._camera, note=note)
-        return model_from_moments(self._mean, self._moment, self._count, self._settings, note=note)
+        moments = self._moments
+        return model_from_moments(
+            moments.mean, moments.squares, moments.count, self._settings, note=note
+        )
 
     def _learn_from(self, image: Image) -> None:
-        if self._settings.background.modes > 1:
-            if self._count % self._every == 0:
-                # The memory of a message may be used again.
-                self._samples.append(image.copy())
+        if self._settings.background.modes == 1:
+            self._moments.add(image)
+        elif self._count % self._every == 0:
+            # The memory of a message may be used again.
+            self._samples.append(image.copy())
             if len(self._samples) > SAMPLES:
                 self._samples, self._every = self._samples[::2], 2 * self._every
-            self._count += 1
-            return
-        value = image.reshape(*image.shape[:2], -1).astype(np.float32)
-        if self._count == 0:
-            self._mean, self._moment = np.zeros_like(value), np.zeros_like(value)
         self._count += 1
-        change = value - self._mean
-        self._mean += change / np.float32(self._count)
-        self._moment += change * (value - self._mean)
 
 
-def moved_share(before: NDArray[np.float32], now: NDArray[np.float32]) -> float:
-    """The part of a smoothed grey image (h, w) that differs from another by more than noise.
+def moved_share(before: FloatImage, now: FloatImage) -> float:
+    """The fraction of a smoothed grey image (h, w) that differs from another by more than noise.
 
-    A change of brightness of the whole image is none.
+    A change of brightness of the whole image does not count.
     """
     gain = float(np.median((now + 1.0) / (before + 1.0)))
     change = np.abs(now - gain * before)
-    noise = _FROM_MEDIAN * float(np.median(change))
+    noise = MEDIAN_TO_SD * float(np.median(change))
     moved = (change > max(_LEAST_CHANGE, _NOISE_FACTOR * noise)).astype(np.uint8)
-    return cv2.countNonZero(cv2.morphologyEx(moved, cv2.MORPH_OPEN, _SOLID)) / moved.size
+    return cv2.countNonZero(cv2.morphologyEx(moved, cv2.MORPH_OPEN, SOLID)) / moved.size

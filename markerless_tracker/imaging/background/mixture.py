@@ -4,12 +4,12 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.compiled import compiled
-from markerless_tracker.imaging.images import Image
+from markerless_tracker.imaging.images import FloatImage, Image
 
-FloatImage = NDArray[np.float32]
+MEDIAN_TO_SD = 1.4826
+"""Standard deviation over median absolute deviation, of a normal distribution."""
 
 # Values of one mode differ by at most so many standard deviations of the sensor's noise, or by
 # _LEAST_TOLERANCE grey levels if that is more.
@@ -79,7 +79,7 @@ def learn_modes(
     if second is not None:
         change = np.abs(second.astype(np.int16) - first.astype(np.int16))
         tolerance = max(
-            tolerance, _TOLERANCE_SIGMAS * 1.4826 / np.sqrt(2.0) * float(np.median(change))
+            tolerance, _TOLERANCE_SIGMAS * MEDIAN_TO_SD / np.sqrt(2.0) * float(np.median(change))
         )
     count = np.zeros((modes, *first.shape[:2]), dtype=np.float32)
     mean = np.zeros((modes, *first.shape), dtype=np.float32)

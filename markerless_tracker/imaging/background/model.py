@@ -6,15 +6,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging.background.mixture import learn_modes
-from markerless_tracker.imaging.images import Image, check_image
+from markerless_tracker.imaging.background.moments import Moments
+from markerless_tracker.imaging.images import FloatImage, Image, check_image
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.records import locked
-
-FloatImage = NDArray[np.float32]
 
 HUMANEVA_RISKS = {1: 80.0, 2: 60.0, 3: 30.0, 4: 80.0}
 """log10 of HumanEva's risk factors delta, by number of the camera."""
@@ -133,18 +131,10 @@ def learn_background(
     values = _checked(frames, camera)
     if settings.background.modes > 1:
         return _mixture(values, settings, note)
-    count = 0
-    mean = moment = np.zeros(0, dtype=np.float32)
+    moments = Moments()
     for frame in values:
-        value = frame.astype(np.float32)
-        if count == 0:
-            mean = np.zeros_like(value)
-            moment = np.zeros_like(value)
-        count += 1
-        change = value - mean
-        mean += change / np.float32(count)
-        moment += change * (value - mean)
-    return model_from_moments(mean, moment, count, settings, note=note)
+        moments.add(frame)
+    return model_from_moments(moments.mean, moments.squares, moments.count, settings, note=note)
 
 
 def _checked(frames: Iterable[Image], camera: str) -> Iterator[Image]:
@@ -188,7 +178,7 @@ def _mixture(
 
 def model_from_moments(
     mean: FloatImage,
-    moment: FloatImage,
+    squares: FloatImage,
     count: int,
     settings: ImagingSettings,
     *,
@@ -200,8 +190,8 @@ def model_from_moments(
         variance = np.full_like(mean, sigma**2)
         how = f"one still image; a sensor noise of {sigma:g} grey levels is assumed"
     else:
-        typical = np.median(moment, axis=(0, 1)) / (count - 1)
-        pooled = (moment + _PRIOR_FRAMES * typical) / (count - 1 + _PRIOR_FRAMES)
+        typical = np.median(squares, axis=(0, 1)) / (count - 1)
+        pooled = (squares + _PRIOR_FRAMES * typical) / (count - 1 + _PRIOR_FRAMES)
         variance = pooled.astype(np.float32)
         how = f"mean and variance of {count} frames"
     np.maximum(variance, settings.background.sigma_min**2, out=variance)

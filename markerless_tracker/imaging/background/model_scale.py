@@ -3,7 +3,8 @@
 import cv2
 import numpy as np
 
-from markerless_tracker.imaging.background.model import BackgroundModel, FloatImage, Mode
+from markerless_tracker.imaging.background.model import BackgroundModel, Mode
+from markerless_tracker.imaging.images import FloatImage
 
 
 def scale_background_model(model: BackgroundModel, size_px: tuple[int, int]) -> BackgroundModel:

@@ -16,10 +16,10 @@ from markerless_tracker.imaging.background.steady import (
     steady_image,
     thinned,
 )
-from markerless_tracker.imaging.images import Image, check_image
+from markerless_tracker.imaging.images import FloatImage, Image, check_image
+from markerless_tracker.imaging.masks import SOLID
 from markerless_tracker.records import locked
 
-FloatImage = NDArray[np.float32]
 BoolImage = NDArray[np.bool_]
 
 # Frames kept of all clips together: enough for a mode, within memory.
@@ -164,7 +164,7 @@ def _covered(
     """
     apart = np.abs(picture - steady).max(axis=2)
     differ = (apart > _TOLERANCE).astype(np.uint8)
-    differ = np.asarray(cv2.morphologyEx(differ, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)))
+    differ = np.asarray(cv2.morphologyEx(differ, cv2.MORPH_OPEN, SOLID))
     weight = differ.astype(np.float32)
     sigma = _WINDOW * max(differ.shape)
     restless = share * (jump > _ABRUPT) * weight
@@ -293,7 +293,7 @@ def _from_stills(stills: Sequence[Image]) -> Plate:
         return Plate(reference.copy(), apart, note)
     median = np.median(np.stack(aligned), axis=0).astype(np.float32)
     note = f"median of {len(stills)} stills: a person at one place in half of them remains"
-    return _finish(median, apart & False, reference, note)
+    return _finish(median, np.zeros_like(apart), reference, note)
 
 
 def _finish(filled: FloatImage, unsure: BoolImage, reference: Image, note: str) -> Plate:

@@ -5,11 +5,10 @@ import numpy as np
 
 from markerless_tracker.imaging.background.model import (
     BackgroundModel,
-    FloatImage,
     foreground_limit,
     risk_of,
 )
-from markerless_tracker.imaging.images import Image, grey_of
+from markerless_tracker.imaging.images import FloatImage, Image, grey_of
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.observation import locked
