@@ -53,33 +53,18 @@ def _same_until(values, words, u, value):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def flip_small(mask, part, need, target, least, connectivity, spared, unknown):  # type: ignore[no-untyped-def]
-    """Turn patches of ``target`` with fewer than ``least`` pixels into 255 - target, in place.
+def _join_runs(mask, part, target, touch, begin, end, parent, first):  # type: ignore[no-untyped-def]
+    """Fill the runs of ``target`` and join those that belong to one patch.
 
     Args:
-        mask: (h, w) uint8, 0 or 255.
-        part: (left, top, right, bottom) that is searched.
-        need: (left, top, right, bottom) where the result is needed.
-        target: 0 or 255.
-        least: least number of pixels of a patch that stays.
-        connectivity: 4 or 8.
-        spared: sides of the part; patches that touch them stay.
-        unknown: sides of the part beyond which patches may continue.
-
-    Returns:
-        Whether the size of a patch in ``need`` is unknown, as it may continue outside the part;
-        such a patch stays.
+        mask, part, target: as for `flip_small`.
+        touch: 1 if runs of neighbouring rows touch at a corner too, else 0.
+        begin, end: (n,) first column of each run, and the column after its last one; written.
+        parent: (n,) union-find forest of the runs, one tree a patch; written.
+        first: (rows + 1,) index of each row's first run; written.
     """
-    # Runs of neighbouring rows touch at a corner too if 8-connected.
-    touch = 1 if connectivity == 8 else 0
-    count = _count_runs(mask, part, target)
-    begin = np.empty(count, dtype=np.int32)
-    end = np.empty(count, dtype=np.int32)
-    parent = np.empty(count, dtype=np.int32)
-    rows = part[3] - part[1]
-    first = np.empty(rows + 1, dtype=np.int32)
+    rows, columns = part[3] - part[1], part[2] - part[0]
     n = 0
-    columns = part[2] - part[0]
     # Padded with the other value, so that every run ends before the padding.
     values = np.full((columns + 7) // 8 * 8, 255 - target, dtype=np.uint8)
     words = values.view(np.uint64)
@@ -108,9 +93,20 @@ def flip_small(mask, part, need, target, least, connectivity, spared, unknown): 
             else:
                 b += 1
     first[rows] = n
-    area = np.zeros(count, dtype=np.int64)
-    sides = np.zeros(count, dtype=np.uint8)
-    needed = np.zeros(count, dtype=np.bool_)
+
+
+@compiled()
+def _measure_patches(part, need, begin, end, parent, first, area, sides, needed):  # type: ignore[no-untyped-def]
+    """Add up each patch at its root run.
+
+    Args:
+        part, need: as for `flip_small`.
+        begin, end, parent, first: of `_join_runs`.
+        area: (n,) 0; becomes the number of pixels.
+        sides: (n,) 0; becomes the sides of the part that the patch touches.
+        needed: (n,) False; becomes whether a pixel of the patch is in ``need``.
+    """
+    rows = first.size - 1
     for i in range(rows):
         v = part[1] + i
         side = 0
@@ -129,6 +125,37 @@ def flip_small(mask, part, need, target, least, connectivity, spared, unknown): 
                 sides[root] |= RIGHT
             if inside and begin[r] < need[2] and end[r] > need[0]:
                 needed[root] = True
+
+
+@compiled()
+def flip_small(mask, part, need, target, least, connectivity, spared, unknown):  # type: ignore[no-untyped-def]
+    """Turn patches of ``target`` with fewer than ``least`` pixels into 255 - target, in place.
+
+    Args:
+        mask: (h, w) uint8, 0 or 255.
+        part: (left, top, right, bottom) that is searched.
+        need: (left, top, right, bottom) where the result is needed.
+        target: 0 or 255.
+        least: least number of pixels of a patch that stays.
+        connectivity: 4 or 8.
+        spared: sides of the part; patches that touch them stay.
+        unknown: sides of the part beyond which patches may continue.
+
+    Returns:
+        Whether the size of a patch in ``need`` is unknown, as it may continue outside the part;
+        such a patch stays.
+    """
+    count = _count_runs(mask, part, target)
+    begin = np.empty(count, dtype=np.int32)
+    end = np.empty(count, dtype=np.int32)
+    parent = np.empty(count, dtype=np.int32)
+    rows = part[3] - part[1]
+    first = np.empty(rows + 1, dtype=np.int32)
+    _join_runs(mask, part, target, 1 if connectivity == 8 else 0, begin, end, parent, first)
+    area = np.zeros(count, dtype=np.int64)
+    sides = np.zeros(count, dtype=np.uint8)
+    needed = np.zeros(count, dtype=np.bool_)
+    _measure_patches(part, need, begin, end, parent, first, area, sides, needed)
     open_question = False
     other = np.uint8(255 - target)
     for i in range(rows):
