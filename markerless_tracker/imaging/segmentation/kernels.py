@@ -12,7 +12,8 @@ from markerless_tracker.compiled import compiled
 FOREGROUND = 255
 SHADOW = 127
 WEAK = 64
-"""A pixel of a patch that differs from the background though no single pixel does."""
+"""Labels of pixels; 0 is background. The mean of the patch around a weak pixel differs from the
+background, though no single pixel does (`patches.mark_weak`)."""
 LEVELS = 256
 """Integer steps per grey level of the means in `coarse`."""
 
@@ -147,7 +148,7 @@ def label_colour(image, first, unit, mean, scale, gain, rule, left, top, planes,
                 mean_b = min(gain_b * level * np.float32(first[0, 0, v, left + j]), white)
                 mean_g = min(gain_g * level * np.float32(first[0, 1, v, left + j]), white)
                 mean_r = min(gain_r * level * np.float32(first[0, 2, v, left + j]), white)
-                label = 127 if is_shadow(b, g, r, mean_b, mean_g, mean_r, rule) else 255
+                label = SHADOW if is_shadow(b, g, r, mean_b, mean_g, mean_r, rule) else FOREGROUND
                 for k in range(1, modes):
                     mean_b = min(gain_b * mean[k, 0, v, left + j], white)
                     mean_g = min(gain_g * mean[k, 1, v, left + j], white)
@@ -158,8 +159,8 @@ def label_colour(image, first, unit, mean, scale, gain, rule, left, top, planes,
                     if x * x + y * y + z * z <= one:
                         label = 0
                         break
-                    if label == 255 and is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):
-                        label = 127
+                    if label == FOREGROUND and is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):
+                        label = SHADOW
                 row[j] = label
 
 
@@ -197,7 +198,7 @@ def label_grey(image, first, unit, mean, scale, gain, rule, left, top, labels): 
                 value = np.float32(pixel[j])
                 expected = min(gain_v * level * np.float32(first[0, 0, v, left + j]), white)
                 shaded = rule[0] * expected <= value and value <= rule[1] * expected
-                label = 127 if shaded else 255
+                label = SHADOW if shaded else FOREGROUND
                 for k in range(1, modes):
                     expected = min(gain_v * mean[k, 0, v, left + j], white)
                     x = (value - expected) * scale[k, 0, v, left + j]
@@ -205,5 +206,5 @@ def label_grey(image, first, unit, mean, scale, gain, rule, left, top, labels): 
                         label = 0
                         break
                     if rule[0] * expected <= value and value <= rule[1] * expected:
-                        label = 127
+                        label = SHADOW
                 row[j] = label

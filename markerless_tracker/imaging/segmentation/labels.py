@@ -1,4 +1,4 @@
-"""Label of each pixel of an image: background, background in shadow, or foreground."""
+"""Label of each pixel of an image: background, weak, background in shadow, or foreground."""
 
 import math
 
@@ -35,7 +35,7 @@ def patch_radius_px(settings: ImagingSettings) -> int:
 
 
 class PixelLabeller:
-    """Labels pixels of one camera's images: 0 background, 127 shadow, 255 foreground.
+    """Labels pixels of one camera's images: 0 background, 64 weak, 127 shadow, 255 foreground.
 
     A pixel's label depends on colours near it, not on the size or shape of patches.
 
@@ -45,7 +45,7 @@ class PixelLabeller:
         settings: of the foreground, shadow and texture tests.
 
     Attributes:
-        background: `mean` of it follows slow changes if `background.follow_s` says so.
+        background: the Gaussians. `background.follow_s` says whether `mean` follows slow changes.
         gain: (c,) float32, brightness of the last image relative to the background's.
     """
 
@@ -54,11 +54,11 @@ class PixelLabeller:
         self._settings = settings
         gaussians = self.background
         self._first = kernels.coarse(gaussians.mean[0], gaussians.scale[0])
-        # The same memory with channels last.
-        self._means_by_channel = gaussians.mean.transpose(0, 2, 3, 1)
-        self._scales_by_channel = gaussians.scale.transpose(0, 2, 3, 1)
+        # The same memory.
+        self._means_channels_last = gaussians.mean.transpose(0, 2, 3, 1)
+        self._scales_channels_last = gaussians.scale.transpose(0, 2, 3, 1)
         self.gain: NDArray[np.float32] = np.ones(gaussians.mean.shape[1], dtype=np.float32)
-        self._meter = ExposureMeter(self._means_by_channel[0])
+        self._meter = ExposureMeter(self._means_channels_last[0])
         self._adaptation = (
             Adaptation(settings.background.follow_s, settings.background.follow_margin_px)
             if settings.background.follow_s > 0.0
@@ -181,6 +181,6 @@ class PixelLabeller:
         values = grey_of(image) if self.background.is_grey else image
         self._adaptation.follow(
             values.reshape(*mask.shape, -1), mask, stamp_ns, self.gain,
-            self._means_by_channel, self._scales_by_channel,
+            self._means_channels_last, self._scales_channels_last,
         )  # fmt: skip
         self._first = kernels.coarse(self.background.mean[0], self.background.scale[0])

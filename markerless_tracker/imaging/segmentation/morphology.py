@@ -29,10 +29,10 @@ def shadow_patches(
     need: Region | None = None,
     unknown: int = 0,
 ) -> bool:
-    """Find the patches of pixels labelled shadow that are large enough to be shadows.
+    """Find the patches of pixels labelled shadow or weak that are large enough.
 
     Args:
-        labels: (h, w) uint8: 0 background, 127 shadow, 255 foreground.
+        labels: (h, w) uint8, as of `labels.PixelLabeller`.
         shadow: (h, w) uint8, written: 0 or 255.
         least_px: smaller patches (4-connected) are cleared; none are if it is 1 or less.
         opened: whether to open the patches first, by 3 px: pixels that the person covers in part

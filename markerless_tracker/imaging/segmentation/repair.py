@@ -34,7 +34,7 @@ def repair_mask(
     With three classes the mask holds shadows, too.
 
     Args:
-        labels: (h, w) uint8 of `zones.window`: 0 background, 127 shadow, 255 foreground.
+        labels: (h, w) uint8 of `zones.window`, as of `labels.PixelLabeller`.
         mask: (h, w) uint8, written: 0 or 255; correct within `zones.zone` alone.
         shadow: (h, w) uint8, written: 0 or 255, patches of shadow.
         zones: where the labels lie in the image, and where the mask is needed.

@@ -106,7 +106,9 @@ class Segmenter:
         return mask[inside], None if undecided is None else undecided[inside]
 
     def labels(self, image: Image) -> Mask:
-        """(h, w) uint8: 0 background, 127 shadow, 255 foreground, before any repair; for display.
+        """(h, w) uint8 before any repair, for display.
+
+        0 background, 64 weak, 127 shadow, 255 foreground, as of `labels.PixelLabeller`.
 
         Raises:
             ImageError: not an image of the background's size and channels; names the camera.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.region import Region
+from markerless_tracker.imaging.segmentation.kernels import FOREGROUND, SHADOW
 
 SHOWN_LEAST, HIDDEN_LEAST = 6.0, 6.0
 """Least variance of the pattern, relative to the noise's, to decide that it is shown, or hidden."""
@@ -254,7 +255,7 @@ def apply_light(  # type: ignore[no-untyped-def]
             if label == 0:
                 if not reveal or light[i, j] >= 0.0:
                     continue
-            elif looked_at[y, x] == 0 or (label == 127 and not protect):
+            elif looked_at[y, x] == 0 or (label == SHADOW and not protect):
                 continue
             explained = False
             if near_valid[i, j] != 0:
@@ -270,9 +271,9 @@ def apply_light(  # type: ignore[no-untyped-def]
                         break
             if explained:
                 if label != 0:
-                    labels[y, x] = 127
+                    labels[y, x] = SHADOW
             elif light[i, j] < 0.0 and protect:
-                labels[y, x] = 255
+                labels[y, x] = FOREGROUND
 
 
 def correction_radius_px(radius: int) -> int:
