@@ -34,9 +34,12 @@ from markerless_tracker.tracking.tracker import Tracker
 
 @dataclass(frozen=True)
 class TrackerSetup:
-    """A tracker and the time its start pose is meant for; None = the first frame that comes.
+    """A tracker, and how it was set up.
 
-    `person`: what is known of a person whose lengths were not measured; None if they were.
+    Attributes:
+        tracker: the tracker.
+        start_stamp_ns: time that the start pose is meant for; None = the first frame that comes.
+        person: what is known of a person whose lengths were not measured; None if they were.
     """
 
     tracker: Tracker
@@ -62,26 +65,27 @@ def build_tracker(
     subject_from: Path | None = None,
     stature: float | None = None,
 ) -> TrackerSetup:
-    """Build a tracker from a start (TRC or YAML) and a subject, from either or from neither.
+    """Build a tracker from a start and a subject, from either or from neither.
 
-    The subject is the file's, or measured on the first row of a TRC (`subject_from`), or a generic
-    person of a stature, or, when none is named, measured on the start's first row; if that row's
-    markers are noisy, the lengths measured on it are corrected in the first frame. Without a start
-    the tracker finds the person automatically, without a subject the stature, too.
+    At most one of the last three arguments names the subject. If none does, the lengths are
+    measured on the first row of a TRC start; noisy ones are corrected in the first frame. Without a
+    start the tracker finds the person automatically, and the stature, too.
+
+    Args:
+        rig: the cameras.
+        config: every setting.
+        backgrounds: the empty scene per camera, as `Tracker` takes it.
+        start_file: start pose: a TRC, whose first row is used, or a YAML.
+        subject_file: the person's lengths.
+        subject_from: a TRC; the lengths are measured on its first row.
+        stature: the person's height, m; the lengths are those of a generic person.
 
     Raises:
         ConfigError: more than one subject, or none and the start is no TRC.
         TrackerError: a file cannot be read or does not fit.
     """
-    named = [
-        name
-        for name, value in (
-            ("subject_file", subject_file),
-            ("subject_from", subject_from),
-            ("stature", stature),
-        )
-        if value is not None
-    ]
+    given = {"subject_file": subject_file, "subject_from": subject_from, "stature": stature}
+    named = [name for name, value in given.items() if value is not None]
     if len(named) > 1:
         raise ConfigError(f"{' and '.join(named)} both name a subject, expected one")
     description = load_description(config.body)
@@ -90,24 +94,13 @@ def build_tracker(
         if start_file is not None and start_file.suffix.lower() == ".trc"
         else None
     )
-    person: Unmeasured | None = None
-    if subject_file is not None:
-        subject = read_subject(subject_file)
-    elif stature is not None:
-        subject = subject_from_stature(description, stature)
-        person = Unmeasured(Sizes(description), stature)
-    elif subject_from is not None:
-        subject = subject_from_markers(description, first_row(subject_from).markers_m)
-    elif start is not None:
-        subject = subject_from_markers(description, start.markers_m)
-    elif start_file is None:
-        subject = subject_from_stature(description, MEAN_STATURE_M)
-        person = Unmeasured(Sizes(description), None)
-    else:
+    if start_file is not None and start is None and not named:
         raise ConfigError(
             f"{start_file} gives a pose but no subject: name one "
             "(--subject, --subject-from or --stature)"
         )
+    measured = start if subject_from is None else first_row(subject_from)
+    subject, person = _subject(description, subject_file, stature, measured)
     body = build_body(description, subject)
     pose: FloatArray | None = None
     if start is not None:
@@ -127,6 +120,24 @@ def build_tracker(
         person=person,
     )
     return TrackerSetup(tracker, None if start is None else start.stamp_ns, person)
+
+
+def _subject(
+    description: BodyDescription,
+    subject_file: Path | None,
+    stature_m: float | None,
+    measured: _MarkerRow | None,
+) -> tuple[Subject, Unmeasured | None]:
+    """The subject, and what is known of a person whose lengths were not measured.
+
+    From the file, else from the stature, else from the markers, else of mean stature.
+    """
+    if subject_file is not None:
+        return read_subject(subject_file), None
+    if stature_m is None and measured is not None:
+        return subject_from_markers(description, measured.markers_m), None
+    known = MEAN_STATURE_M if stature_m is None else stature_m
+    return subject_from_stature(description, known), Unmeasured(Sizes(description), stature_m)
 
 
 def first_row(path: Path) -> _MarkerRow:
@@ -150,7 +161,6 @@ def _start_markers(
 ) -> StartMarkers:
     missing = np.full(3, np.nan)
     known = complete_markers(start.markers_m)
-
     return StartMarkers(
         np.array([known.get(name, missing) for name in MARKER_NAMES]),
         start_noise_m(measured_lengths(description, start.markers_m)),
