@@ -18,7 +18,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
-from markerless_tracker.tracking.search import Searcher, pixels_per_m
+from markerless_tracker.tracking.search import Searcher, pixels_per_m, root_m
 
 DISAGREES_M = 0.030
 """A systematic shift of this much, at the body, is the calibration's."""
@@ -164,7 +164,7 @@ def _shift(
     so far, since residuals count the less the larger they are.
     """
     to_camera, name = camera.T_cam_world, camera.name
-    at = pose[[searcher.body.index(f"pelvis_t{axis}") for axis in "xyz"]]
+    at = root_m(searcher.body, pose)
     depth = float(to_camera[2, :3] @ at + to_camera[2, 3])
     if depth <= 0.0:
         return None

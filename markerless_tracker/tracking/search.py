@@ -281,7 +281,7 @@ class FrameSearch:
     def _pixels_per_m(self) -> dict[str, float]:
         """Size of a metre at the body in each view, px."""
         searcher = self._searcher
-        at = self.pose[[searcher.body.index(f"pelvis_t{axis}") for axis in "xyz"]]
+        at = root_m(searcher.body, self.pose)
         return {name: pixels_per_m(searcher.cameras[name], at) for name in self._views.names}
 
 
@@ -291,6 +291,11 @@ def _same_terms(one: Comparison, other: Comparison) -> bool:
     sampled = one.edge_weight == 0.0 or np.array_equal(one.edge_cones, other.edge_cones)
     drawn = np.array_equal(one.silhouette_cones, other.silhouette_cones)
     return weights[0] == weights[1] and sampled and drawn
+
+
+def root_m(body: BodyModel, pose: FloatArray) -> FloatArray:
+    """Where the root of a body at a pose (p,) is: (3,) m, world frame."""
+    return pose[[body.index(f"pelvis_t{axis}") for axis in "xyz"]]
 
 
 def pixels_per_m(camera: CameraModel, point_m: FloatArray) -> float:

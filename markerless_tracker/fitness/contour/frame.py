@@ -29,8 +29,6 @@ REACH_M = 0.3
 """Distance from a silhouette up to which outlines are compared, unless another is given, m."""
 _NO_BOUNDS = np.empty((2, 0))
 
-Mapper = Callable[..., "object"]
-
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:

@@ -75,9 +75,9 @@ class ContourViews(NamedTuple):
 def silhouette_contour(
     observation: Observation, spacing_px: float, margin_px: float = _LEAST_MARGIN_PX
 ) -> SilhouetteContour:
-    """Signed distances around a silhouette, and points along its edge.
+    """Signed distances around a silhouette, and points along its edge, about `spacing_px` apart.
 
-    The window is the silhouette's bounding box and that margin, at least 24 px. The edge
+    The window is the silhouette's bounding box and `margin_px`, at least 24 px. The edge
     runs midway between pixels inside and outside; where the silhouette leaves the frame, and
     around specks, there are no points. The border of person and undecided pixels is no edge: there
     are no points within `UNDECIDED_PX` of undecided pixels, and distances are very large where
@@ -101,17 +101,7 @@ def silhouette_contour(
         known, free = _without_undecided(
             distance, window, _window(observation, undecided.view(np.uint8), box), margin
         )
-    contours, _ = cv2.findContours(window, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    chains: list[NDArray[Any]] = [np.empty((0, 2), dtype=np.int32)]
-    spacing = [np.empty(0)]
-    for contour in contours:
-        if len(contour) < _SMALLEST_EDGE_PX:
-            continue
-        whole = cv2.arcLength(contour, closed=True)
-        kept = contour[:: max(1, round(spacing_px * len(contour) / whole)), 0]
-        chains.append(kept)
-        spacing.append(np.full(len(kept), whole / len(kept)))
-    chain = np.concatenate(chains)
+    chain, spacing = _edge_pixels(window, spacing_px)
     at = chain + (left, top)
     normal = np.empty(at.shape)
     steepest(distance, chain, normal)
@@ -126,8 +116,26 @@ def silhouette_contour(
         top,
         at[inner] + 0.5 * normal,
         normal,
-        np.concatenate(spacing)[inner],
+        spacing[inner],
     )
+
+
+def _edge_pixels(mask: NDArray[np.uint8], spacing_px: float) -> tuple[NDArray[Any], FloatArray]:
+    """Pixels (n, 2) along the edges of a mask (h, w) of 0 and 1; length of edge (n,) px of each.
+
+    Neighbours are about `spacing_px` apart; the edges of specks are left out.
+    """
+    chains: list[NDArray[Any]] = [np.empty((0, 2), dtype=np.int32)]
+    spacing = [np.empty(0)]
+    contours, _ = cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    for contour in contours:
+        if len(contour) < _SMALLEST_EDGE_PX:
+            continue
+        whole = cv2.arcLength(contour, closed=True)
+        kept = contour[:: max(1, round(spacing_px * len(contour) / whole)), 0]
+        chains.append(kept)
+        spacing.append(np.full(len(kept), whole / len(kept)))
+    return np.concatenate(chains), np.concatenate(spacing)
 
 
 def _window(

@@ -27,10 +27,8 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.observation import locked
 from markerless_tracker.records import MaskWords, Observation
 from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, lit_elsewhere
-from markerless_tracker.tracking.search import pixels_per_m
+from markerless_tracker.tracking.search import pixels_per_m, root_m
 
-NEAR_PX = 1
-"""Undecided pixels so near to the body belong to the person."""
 BESIDE_M = 0.06
 """Undecided pixels so near to the body belong to the person unless they may be a shadow's."""
 FLOOR_M = 3.0
@@ -52,11 +50,11 @@ def decide(
         return dict(observed)
     bodies = body_words(body, pose, [cameras[name] for name in observed])
     views = {name: _view(seen, cameras[name], bodies[name]) for name, seen in observed.items()}
-    root_m = pose[[body.index(f"pelvis_t{axis}") for axis in "xyz"]]
+    where_m = root_m(body, pose)
     decided = dict(observed)
     for name in open_:
         others = [view for other, view in views.items() if other != name]
-        person = _explained(views[name], others, root_m)
+        person = _explained(views[name], others, where_m)
         if person.any():
             seen, undecided = observed[name], views[name].undecided
             decided[name] = replace(
@@ -74,16 +72,16 @@ def _view(seen: Observation, camera: CameraModel, covered: MaskWords) -> FloorVi
     return FloorView(camera, seen.offset_px, seen.width, seen.mask_words, undecided, near)
 
 
-def _explained(view: FloorView, others: list[FloorView], root_m: FloatArray) -> MaskWords:
+def _explained(view: FloorView, others: list[FloorView], where_m: FloatArray) -> MaskWords:
     """The undecided pixels that are person, packed.
 
     Args:
         view: the view, `hidden` being what the body covers, and the next pixel.
         others: the other views.
-        root_m: (3,) where the body is, m.
+        where_m: (3,) where the body is, world frame.
     """
     person = view.undecided & view.hidden
-    radius = max(1, round(BESIDE_M * pixels_per_m(view.camera, root_m)))
+    radius = max(1, round(BESIDE_M * pixels_per_m(view.camera, where_m)))
     beside, tested, away, going_on = (np.empty_like(view.hidden) for _ in range(4))
     rows = np.empty(len(tested), dtype=np.bool_)
     if not _beside(view.undecided, view.hidden, radius, view.width, beside, tested):
@@ -95,7 +93,7 @@ def _explained(view: FloorView, others: list[FloorView], root_m: FloatArray) -> 
         count = _floor_pixels(view.hidden, tested, going_on, radius, width, pixels)
         pixels = pixels[:count]
         points = floor_points(pixels + view.offset_px, view.camera)
-        points[np.linalg.norm(points[:, :2] - root_m[:2], axis=1) > FLOOR_M] = np.nan
+        points[np.linalg.norm(points[:, :2] - where_m[:2], axis=1) > FLOOR_M] = np.nan
         found = pixels[lit_elsewhere(points, others)].astype(np.int64)
         _take(found, tested, person, width)
         _going_on(view.undecided, beside, tested, away, rows, going_on)

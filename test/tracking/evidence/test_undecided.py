@@ -7,7 +7,7 @@ import pytest
 from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.evidence.undecided import NEAR_PX, decide
+from markerless_tracker.tracking.evidence.undecided import decide
 
 
 @pytest.fixture
@@ -21,8 +21,9 @@ def observe(mask, undecided, **region) -> Observation:
 
 
 def near(covered):
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * NEAR_PX + 1, 2 * NEAR_PX + 1))
-    return cv2.dilate(covered.astype(np.uint8), disc) > 0
+    """What the body covers, and the next pixel."""
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    return cv2.dilate(covered.astype(np.uint8), cross) > 0
 
 
 def test_near_the_body_it_is_person_elsewhere_it_stays(body, camera, pose, covered) -> None:
