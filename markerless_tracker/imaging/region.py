@@ -40,12 +40,12 @@ class Region(NamedTuple):
             min(self.bottom + px, size_px[1]),
         )
 
-    def within(self, other: "Region") -> "Region":
-        """The same pixels, relative to the other region's top left corner."""
+    def relative_to(self, other: "Region") -> "Region":
+        """The same pixels, counted from the other region's top left corner."""
         return self.moved(-other.left, -other.top)
 
     def moved(self, right_px: int, down_px: int) -> "Region":
-        """Shifted."""
+        """Shifted by that many columns and rows."""
         return Region(
             self.left + right_px, self.top + down_px, self.right + right_px, self.bottom + down_px
         )

@@ -1,8 +1,8 @@
 """Whether a camera disagrees with the others: its silhouettes sit beside the tracked body.
 
-Now and then the pose is refined without one camera, and the shift of that camera's image is
-estimated that lays the body's outline over its silhouette. A shift that
-persists over a run is neither motion nor segmentation: the calibration of the camera is wrong.
+At intervals the pose is refined without one camera. Then the shift of that camera's image is
+estimated that lays the body's outline over its silhouette. A shift that persists over a run is
+neither motion nor segmentation: the calibration of the camera is wrong.
 """
 
 from collections.abc import Mapping
@@ -25,15 +25,16 @@ DISAGREES_M = 0.030
 EVERY_NS, LATER_EVERY_NS = 160_000_000, 800_000_000
 """Time between the first `MANY_CHECKS` checks, and between those after them."""
 MANY_CHECKS = 12
-"""Their median says already how large a lasting shift is; more of them need not come so often."""
+"""Number of checks whose median says how large a lasting shift is; later ones may be rarer."""
 LEAST_VIEWS = 3
-"""With two cameras that disagree, either may be wrong."""
+"""Least number of views: of two that disagree, either may be wrong."""
 _FIRST_NS = 300_000_000
+"""Time from the first tracked frame to the first check."""
 _LEAST_CHECKS = 3
-_ITERATIONS = 4
-_TRUNCATION_M = (0.10, 0.035)
-_WIDE_M = 0.10
-_SHIFTS = 3
+_ITERATIONS, _TRUNCATION_M = 4, (0.10, 0.035)
+"""Of the refinement without a camera, first and last truncation."""
+_SHIFTS, _WIDE_M = 3, 0.10
+"""Steps of a shift's estimate, and their truncation."""
 
 
 @dataclass(frozen=True)

@@ -125,7 +125,9 @@ class TrackerConfig(ImagingSettings):
         choices=("none", "one_euro"),
     )
     search_again: bool = setting(
-        True, "search the whole views for a body that has been lost for a tenth of a second"
+        True,
+        "search the whole views for a body that has been lost for a tenth of a second, and the "
+        "whole range of limbs that may be lost",
     )
     fit_shape: bool = setting(
         True,
@@ -159,8 +161,9 @@ class TrackerConfig(ImagingSettings):
     )
     cost: str = setting(
         "overlap",
-        "overlap: 1 - f for f = f_s + f_e; H-MCPSO's costs: one_sided: body pixels outside the "
-        "silhouette; bidirectional: these and silhouette pixels outside the body",
+        "overlap: sum of the weights - f for f = f_s + f_e; H-MCPSO's costs: one_sided: body "
+        "pixels outside the silhouette; bidirectional: these, and silhouette pixels outside the "
+        "body",
         choices=COSTS,
     )
     edge_weight: float = setting(0.0, "weight of f_e beside f_s", least=0.0, most=100.0)

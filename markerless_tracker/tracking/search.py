@@ -91,11 +91,7 @@ class Searcher:
         limits: FloatArray | None = None,
         reach_m: float = REACH_M,
     ) -> "FrameSearch":
-        """The search of one frame, around a predicted pose (p,).
-
-        Limits (2, p) may be narrower than those of the joints, as what can be reached in time.
-        Outlines farther than `reach_m` from the silhouettes are outliers in any case.
-        """
+        """The search of one frame; arguments as of `FrameSearch`."""
         return FrameSearch(self, observations, stamp_ns, predicted, limits, reach_m)
 
 
@@ -114,6 +110,16 @@ def make_searcher(
 
 class FrameSearch:
     """The search of one frame.
+
+    Args:
+        searcher: the body, the cameras and the settings.
+        observations: the evidence, by camera name.
+        stamp_ns: time of the frame; keys the draws, together with the seed.
+        predicted: (p,) pose around which is searched.
+        limits: (2, p), kept, and narrower than the joints' where these cannot be reached in the
+            time; None: the joints'.
+        reach_m: distance from a silhouette, at the body, beyond which outlines are outliers in any
+            case.
 
     Attributes:
         pose: (p,) the estimate so far.
@@ -223,7 +229,7 @@ class FrameSearch:
         particles = SWARMS[plan.algorithm](search, **plan.options)
         self._note(stage, plan.evaluations, particles.best.std(axis=0))
         pose = centre.copy()
-        # SPPSO keeps the body's limits, not those of what can be reached in the time.
+        # SPPSO keeps the joints' limits, not those of what can be reached in the time.
         pose[active] = np.clip(particles.found, *search.bounds)
         cost = float(particles.found_cost[0])
         same = np.array_equal(pose[active], particles.found)
@@ -256,7 +262,7 @@ class FrameSearch:
         return self._searcher.config.collision == "elliptic"
 
     def _note(self, stage: Stage, evaluations: int, sd: FloatArray) -> None:
-        """Take what a swarm spent, and the standard deviation (d,) of its particles."""
+        """Note what a swarm spent, and the standard deviation (d,) of its particles."""
         active = stage.comparison.active
         self.evaluations += evaluations
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -2,8 +2,8 @@
 
 One Euro filter (Casiez, Roussel and Vogel, CHI 2012): an exponential filter of each parameter whose
 cutoff rises with the parameter's speed. Ours rises with the whole body's motion, too: while a
-person walks, a joint at a point of reversal is not at rest. A parameter's own speed alone let the
-pelvis of a jogging person, whose angles change little, trail by a frame.
+person walks, a joint at a point of reversal is not at rest. With its own speed alone, the pelvis of
+a jogging person, whose angles change little, lags by a frame.
 """
 
 import numpy as np

@@ -113,4 +113,4 @@ def test_growing_stops_at_the_image() -> None:
     region = Region(5, 10, 20, 30)
     assert region.grown(8, (100, 35)) == Region(0, 2, 28, 35)
     assert (region.width, region.height) == (15, 20)
-    assert region.within(Region(5, 8, 50, 50)) == Region(0, 2, 15, 22)
+    assert region.relative_to(Region(5, 8, 50, 50)) == Region(0, 2, 15, 22)

@@ -99,16 +99,23 @@ def descend(  # type: ignore[no-untyped-def]
     scratch,
     outlines,
 ):  # fmt: skip
-    """Normal equations at each truncation (n,), the first steps of them taken by the pose (p,).
+    """Damped Gauss-Newton steps of a pose on one frame's contours, one per truncation.
 
-    The only compiled entry: without steps it fills the residuals and equations at the pose; with
-    as many as truncations it is `optim.refine`.
+    The only compiled entry: with 0 steps it fills the residuals and equations at the pose; with as
+    many steps as truncations it is `optim.refine`.
 
     Args:
-        pose: changed in place.
+        pose: (p,), changed in place.
+        steps: number of steps; the equations at the other truncations are filled only.
+        truncations: (n,) m, one after the other: residuals beyond it are outliers.
         precision: factor of the data's equations.
         prior_mean, prior_precision: (k, p) of Gaussian priors.
-        bounds: (2, p).
+        bounds: (2, p), kept.
+        body, views, contours: `BodyArrays`, `ViewArrays`, `ContourViews`.
+        spacing_m: distance of neighbouring outline points, at the body.
+        step_px: distance outward of an outline point at which no cone may cover the pixel.
+        samples, residuals: `Samples`, `Residuals`; those of the last truncation stay.
+        scratch, outlines: working memory.
     """
     hessian, slope, count = scratch.hessian, scratch.slope, views.size.shape[0]
     for i in range(truncations.size):

@@ -57,7 +57,7 @@ class ContourFrame:
         reach_m: distance from a silhouette, at the body, beyond which outlines are outliers in any
             case.
         step_px: distance outward of an outline point at which no cone may cover the pixel.
-        mapper: `map`, or a thread pool's.
+        mapper: `map`, or a thread pool's: for the views.
     """
 
     def __init__(
@@ -143,17 +143,17 @@ class ContourFrame:
         """
         mean = np.array([prior.mean for prior in priors]).reshape(-1, start.size)
         weight = np.array([prior.precision for prior in priors]).reshape(-1, start.size)
-        reach = truncations(*truncation_m, iterations)
+        truncations_m = truncations(*truncation_m, iterations)
         begin = np.clip(start, *bounds)
         return self._descend(
-            begin, iterations, reach, precision, mean, weight, bounds, self._arrays
+            begin, iterations, truncations_m, precision, mean, weight, bounds, self._arrays
         )
 
     def _descend(
         self,
         pose: FloatArray,
         steps: int,
-        reach: FloatArray,
+        truncations_m: FloatArray,
         precision: float,
         mean: FloatArray,
         weight: FloatArray,
@@ -161,9 +161,10 @@ class ContourFrame:
         arrays: BodyArrays,
     ) -> FloatArray:
         pose = np.array(pose, dtype=np.float64)
+        bounds = np.array(bounds, dtype=np.float64)
         descend(
-            pose, steps, reach, precision, mean, weight, np.array(bounds, dtype=np.float64), arrays,
-            self.views.arrays, self.contours, SPACING_M, self._step_px, self.samples,
-            self.residuals, self._scratch, self._outlines,
+            pose, steps, truncations_m, precision, mean, weight, bounds, arrays, self.views.arrays,
+            self.contours, SPACING_M, self._step_px, self.samples, self.residuals, self._scratch,
+            self._outlines,
         )  # fmt: skip
         return pose

@@ -199,7 +199,7 @@ def _without_undecided(
     columns, rows = person.shape[1], person.shape[0]
     patch = Region(left, top, left + width, top + height).grown(reach_px, (columns, rows))
     around = patch.grown(reach_px, (columns, rows))
-    wider = _signed_distance((person | undecided)[around.slices])[patch.within(around).slices]
+    wider = _signed_distance((person | undecided)[around.slices])[patch.relative_to(around).slices]
     same = np.abs(wider - distance[patch.slices]) < _SAME_PX
     free[patch.slices] = cv2.dilate(undecided[patch.slices], _NEAR_UNDECIDED) == 0
     same &= free[patch.slices]

@@ -73,7 +73,7 @@ class BackgroundGaussians:
         part = image[wide.slices]
         if self._smooth:
             part = np.asarray(cv2.GaussianBlur(part, _SMOOTH_PX, 0.0), dtype=np.uint8)
-            part = part[region.within(wide).slices]
+            part = part[region.relative_to(wide).slices]
         if self.is_grey:
             part = grey_of(part)
         # Kernels are compiled once for all images, also for those that may not be written.

@@ -145,7 +145,7 @@ class PixelLabeller:
             solid = cv2.threshold(labels, kernels.SHADOW, 255, cv2.THRESH_BINARY)[1]
             cv2.morphologyEx(solid, cv2.MORPH_OPEN, SOLID, dst=solid)
             looked_at = np.asarray(cv2.dilate(solid, SOLID), dtype=np.uint8)
-            part = occupied(looked_at, corrected.within(window)).moved(window.left, window.top)
+            part = occupied(looked_at, corrected.relative_to(window)).moved(window.left, window.top)
         if part.width <= 0:
             return
         seen = part.grown(correction_radius_px(options.texture.radius_px), self.background.size_px)

@@ -49,8 +49,8 @@ def repair_mask(
     opened = settings.shadow.undecided or (grey and least_shadow_px > 1.0)
     if shadow_patches(
         labels, shadow, least_shadow_px, opened=opened,
-        zone=zones.zone_before_repair.within(window),
-        need=zones.patches_before_repair.within(window), unknown=zones.open_sides,
+        zone=zones.zone_before_repair.relative_to(window),
+        need=zones.patches_before_repair.relative_to(window), unknown=zones.open_sides,
     ):  # fmt: skip
         return False
     # Weak pixels count in large patches only: small ones are noise.
@@ -61,7 +61,8 @@ def repair_mask(
         cv2.subtract(mask, shadow, dst=mask)
     # Outside of `zone_before_repair` the mask is wrong; opening and closing do not depend on that.
     open_and_close(mask, settings, frame_px)
-    zone, need, unknown = zones.zone.within(window), zones.patches.within(window), zones.open_sides
+    zone, need = zones.zone.relative_to(window), zones.patches.relative_to(window)
+    unknown = zones.open_sides
     least, largest = settings.mask.blob_share * frame_px, settings.mask.hole_share * frame_px
     if clear_small(mask, least, connectivity=8, zone=zone, need=need, unknown=unknown):
         return False
@@ -80,7 +81,7 @@ def fit_border(
         labeller: what labelled this image.
         settings: `mask.trim_px` and the group `level_set`.
     """
-    zone = zones.zone.within(zones.window)
+    zone = zones.zone.relative_to(zones.window)
     _trim(image, mask, zone, zones.window, labeller, settings.mask.trim_px)
     _refine(image, mask, zone, zones.window, labeller, settings)
 

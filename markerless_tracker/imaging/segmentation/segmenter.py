@@ -102,7 +102,7 @@ class Segmenter:
         self.check(image)
         region = region or self._whole
         mask, undecided, zone = self._silhouette(image, region, 0)
-        inside = region.within(zone).slices
+        inside = region.relative_to(zone).slices
         return mask[inside], None if undecided is None else undecided[inside]
 
     def labels(self, image: Image) -> Mask:
@@ -147,7 +147,7 @@ class Segmenter:
     def _observe(self, image: Image, stamp_ns: int, region: Region) -> Observation:
         radius_px = edge_radius_px(self.settings) if self._with_edges else 0
         mask, undecided, zone = self._silhouette(image, region, radius_px)
-        inside = region.within(zone).slices
+        inside = region.relative_to(zone).slices
         either = mask if undecided is None else mask | undecided
         if self._with_edges:
             edges = edge_map(image[zone.slices], either, self.settings)[inside]
@@ -211,7 +211,7 @@ class Segmenter:
         ):  # fmt: skip
             return None
         fit_border(image, mask, zones, self._labeller, self.settings)
-        inside = zones.zone.within(window).slices
+        inside = zones.zone.relative_to(window).slices
         if not self.settings.shadow.undecided:
             return mask[inside], None, zones.zone
         split_undecided(mask, shadow)

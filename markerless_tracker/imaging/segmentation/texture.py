@@ -327,5 +327,5 @@ def correct_labels(
     corner = (seen.left - window.left, seen.top - window.top)
     apply_light(
         grey, mean, one, np.float32(_AGREE * sigma), radius, protect, reveal, seen.left, seen.top,
-        found[1], near_valid, part.within(seen), corner, looked_at, labels,
+        found[1], near_valid, part.relative_to(seen), corner, looked_at, labels,
     )  # fmt: skip

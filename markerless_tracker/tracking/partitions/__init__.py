@@ -1,4 +1,7 @@
-"""The stages of a frame for each optimiser, one file each."""
+"""The stages of a frame: those of each optimiser, and the refinements around them.
+
+`frame` composes them; `budget` shares out the evaluations; `effort` decides what a frame needs.
+"""
 
 from collections.abc import Callable, Mapping
 
