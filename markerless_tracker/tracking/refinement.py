@@ -10,12 +10,6 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior
 from markerless_tracker.tracking.config import TrackerConfig
 
-
-def data_precision(config: TrackerConfig) -> float:
-    """Factor (1 / m³) from sums of squared residuals over outline length to -2 log p."""
-    return 1.0 / (CORRELATION_M * config.refine.sigma_m**2)
-
-
 STRAIGHT_TWIST_SD_RAD = 0.05
 """Standard deviation, in the refinement, of a straight limb's rotation about itself: near the usual
 value, whatever the outline's noise and the sections' error suggest. An arm bent by more than
@@ -32,6 +26,11 @@ _HEAD_TURN = "head_z"
 _ELBOWS = ("l_elbow", "r_elbow")
 _HIP = "hip"
 _LEAST = 1e-12
+
+
+def data_precision(config: TrackerConfig) -> float:
+    """Factor (1 / m³) from sums of squared residuals over outline length to -2 log p."""
+    return 1.0 / (CORRELATION_M * config.refine.sigma_m**2)
 
 
 def pose_prior(body: BodyModel, weight: float = 1.0, at: FloatArray | None = None) -> Prior:

@@ -145,7 +145,7 @@ def _shifts(cameras: Mapping[str, CameraModel], names: Sequence[str]) -> Iterato
 
 
 def largest_hull(rig: CameraRig, views: Views) -> Hull | None:
-    """The largest lump of the visual hull that may be a person; None if there is none."""
+    """The largest component of the visual hull that may be a person; None if there is none."""
     return next(find_hulls({camera.name: camera for camera in rig}, views), None)
 
 
@@ -159,7 +159,7 @@ def _mean_fit(cameras: Mapping[str, CameraModel], frames: Sequence[Views]) -> fl
 
 
 def _fit(cameras: Mapping[str, CameraModel], views: Views) -> float:
-    """Fraction of the silhouettes that the largest lump of their hull fills; 0 without one."""
+    """Fraction of the silhouettes that the largest component of their hull fills; 0 without one."""
     hull = next(find_hulls(cameras, views), None)
     if hull is None:
         return 0.0

@@ -1,4 +1,4 @@
-"""Draws of a limb that reach into unexplained regions of silhouette."""
+"""Draws of a limb that put it into unexplained regions of silhouette."""
 
 from collections.abc import Mapping
 
@@ -14,7 +14,7 @@ from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
 
 ALONG = np.array([0.3, 0.6, 0.9])
-"""Places along each cone of the limb, as shares of its length, that count."""
+"""Points that count along each cone of the limb, as fractions of its length."""
 
 
 def most_aimed(
@@ -31,7 +31,7 @@ def most_aimed(
     Args:
         body: the body.
         poses: differ in the limb alone.
-        count: how many are kept; fewer if fewer reach into a region in any view.
+        count: how many are kept; fewer if fewer lie in a region in any view.
         limb: the limb's parameters.
         regions: by camera, the unexplained pixels (h, w) of its frame.
         rig: the cameras.

@@ -15,9 +15,9 @@ from markerless_tracker.tracking.start.recombination import Recombiner
 DRAWS = 120
 """First draws of a limb: half from the pose prior, half uniform."""
 AIMED, AIMED_OF = 60, 1000
-"""Where silhouette is unexplained: further draws that reach there, the best of so many."""
+"""Where silhouette is unexplained: further draws of a limb that lies there, the best of so many."""
 LAYERS = (0.4, 0.2)
-"""Then the best are varied, twice, by these fractions of the prior's standard deviations."""
+"""Then the best are varied in layers, by these fractions of the prior's standard deviations."""
 HOPELESS = 0.03
 """A limb whose cost exceeds the largest useful cost by more than this is not refined."""
 LEAST_GAIN = 0.003
@@ -145,9 +145,9 @@ def other_limb(
         pose: (p,) where the rest of the body is.
         limb: the limb's parameters.
         rng: draws.
+        aim: of many poses (n, p) keeps at most so many, those whose limb lies where silhouette is
+            unexplained; None: no such draws.
         most_cost: largest useful cost; the result matters only below it.
-        aim: keeps those poses, of many and at most so many, that reach where the limb may be; first
-            draws are chosen by it, too.
     """
     half = DRAWS // 2
     poses = np.concatenate(

@@ -1,10 +1,10 @@
 """The person's resting posture of trunk, shoulders and head, from a measured start pose.
 
-Where a skeleton has the shoulders, the neck and the top of the head relative to the trunk is a
-matter of its definition and of the person: angles of clavicles, thorax and head at rest differ
-between people, and between systems that measure them, by more than they move. A measured start pose
-shows them, the posture of that moment included; of what differs from left to right, or exceeds
-what people differ by, the posture is the likelier cause.
+Where the shoulders, the neck and the top of the head lie relative to the trunk depends on the
+person and on the measuring system's definition of joint centres. At rest the angles of clavicles,
+thorax and head differ between people, and between systems, by more than they change in motion. A
+measured start pose shows them, but also the posture of that moment. Differences between left and
+right, and deviations larger than those among people, are taken for posture.
 """
 
 from dataclasses import replace
@@ -22,8 +22,8 @@ that is alike on both sides."""
 MOST_SD = 2.0
 """Largest shift of the resting posture, in standard deviations of the prior of poses."""
 NARROWER = 0.5
-"""Factor of the prior's standard deviation, of trunk and shoulders about the person's own posture:
-they move less than people, and definitions of joint centres, differ."""
+"""Factor of the prior's standard deviations of trunk and shoulders, about the person's own posture:
+one person's motion is smaller than the differences among people and definitions."""
 _NARROWED = (
     "thorax_x", "thorax_y", "thorax_z",
     "l_clavicle_x", "l_clavicle_y", "r_clavicle_x", "r_clavicle_y",

@@ -1,7 +1,7 @@
 """The body of a person from frames of a whole recording, in poses as different as possible.
 
-Bent and straight limbs, raised and hanging arms show where joints are: a body that is fitted to the
-first postures has them anywhere along limbs that keep their outline.
+Bent and straight limbs, raised and hanging arms show where joints are. A few similar postures do
+not: the outline stays the same when a joint is moved along its limb.
 """
 
 from collections.abc import Mapping

@@ -3,8 +3,8 @@
 The hull is what all silhouettes agree on: a point of the room belongs to it if no camera that looks
 there sees background (Laurentini 1994, on a grid of points). Undecided pixels never carve it, since
 legs may look like a shadow in some views. Shadows themselves lie on the floor: points near it count
-only where two cameras see a person. People are where the hull has a lump of a person's size, seen
-by two cameras at least.
+only where two cameras see a person. A person is where the hull has a connected component of a
+person's size that two cameras see.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ FINE_M = 0.03
 LEAST_VIEWS = 2
 """Cameras that must look at a point for it to count."""
 LEAST_HEIGHT_M = 0.45
-"""A lump with a smaller extent in every direction is no person."""
+"""A component with a smaller extent in every direction is no person."""
 LEAST_VOLUME_M3 = 0.015
 MOST_VOLUME_M3 = 1.5
 """A person of two metres with the slack of two views; more is a room, not a person."""
@@ -35,14 +35,14 @@ MOST_COARSE_M3 = 6.0
 FLOOR_M = 0.08
 """Below this height above the floor, z = 0, undecided pixels are taken for shadows."""
 LEAST_PERSON = 0.25
-"""Fraction of a lump's points that two cameras must see as person."""
+"""Fraction of a component's points that two cameras must see as person."""
 HIGH_M = 0.35
 """Shadows on the floor hardly make hulls higher than this: the trunk is looked for above it."""
 FOOT_M, SHIN_M = 0.22, 0.16
-"""Points lower than `SHIN_M` are feet only so near, across the floor, to higher ones of a leg."""
+"""Points lower than `SHIN_M` are feet only within `FOOT_M`, horizontally, of a leg above."""
 ASIDE_M = 0.45
-"""So far aside of the trunk, points lower than `HIGH_M` that no two cameras show as person, and
-those on the floor, are shadows."""
+"""Horizontal distance from the trunk. Beyond it, points on the floor are shadows, and so are points
+lower than `HIGH_M` that no two cameras show as person."""
 _RADIUS_M = 5.0
 _UP_M = 2.5
 _FAR_M = 4.0
@@ -51,11 +51,11 @@ _TRUNK_SHARE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Hull:
-    """One lump of the visual hull.
+    """One connected component of the visual hull.
 
     Attributes:
         points_m: (n, 3) points of a grid with spacing `FINE_M` that lie in it, world frame.
-        depth_m: (n,) how deep each lies in the lump.
+        depth_m: (n,) how deep each lies in the component.
         views: how many cameras see it.
         trunk_m: (m, 3) the thick part: points that lie at least half as deep as the deepest.
         sure_m: (k, 3) points that are no shadow: high enough, or person in two views and not at the
@@ -87,10 +87,10 @@ class Hull:
     def without_shadows(
         cls, points_m: FloatArray, depth_m: FloatArray, views: int, person: NDArray[np.bool_]
     ) -> "Hull":
-        """The lump without what lies on the floor beside the person.
+        """The component without what lies on the floor beside the person.
 
         Args:
-            points_m: (n, 3) points of the lump.
+            points_m: (n, 3) points of the component.
             depth_m: (n,) how deep each lies in it.
             views: how many cameras see it.
             person: (n,) whether two cameras show a point as person.
@@ -110,7 +110,7 @@ class Hull:
 def find_hulls(
     cameras: Mapping[str, CameraModel], observations: Mapping[str, Observation]
 ) -> Iterator[Hull]:
-    """The lumps of the visual hull that may be a person, the largest first; none without a person.
+    """Components of the visual hull that may be a person, the largest first.
 
     Args:
         cameras: cameras by name.
@@ -145,7 +145,7 @@ def _fine(
     low: FloatArray,
     views: "Sequence[_View]",
 ) -> Hull | None:
-    """A coarse lump on the fine grid; None if it is no person."""
+    """A component of the coarse grid on the fine one; None if it is no person."""
     cells = int((labels[box] == number).sum())
     if cells < 2 or COARSE_M**3 * cells > MOST_COARSE_M3:
         return None

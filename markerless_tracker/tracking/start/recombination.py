@@ -30,7 +30,7 @@ _FREE_RAD = 2.8
 _FEW = 0.3
 """A smaller prior standard deviation (rad) marks a joint that hardly moves: clavicles, thorax."""
 _RANK = 0.15
-"""Parents are drawn by rank; each is this much likelier to be taken than passed over."""
+"""Parents are drawn by rank: from the best on, each is taken with this probability."""
 
 
 class Recombiner:
