@@ -259,6 +259,7 @@ class FrameSearch:
 
     @property
     def _forgiving(self) -> bool:
+        """Whether collisions that the centre has already are allowed."""
         return self._searcher.config.collision == "elliptic"
 
     def _note(self, stage: Stage, evaluations: int, sd: FloatArray) -> None:
@@ -269,6 +270,7 @@ class FrameSearch:
             self.particle_sd_ratio[active] = sd / stage.plan.sigma[active]
 
     def _refine(self, plan: SearchPlan) -> FloatArray:
+        """The pose (p,) after a contour refinement from the estimate so far."""
         searcher, config = self._searcher, self._searcher.config
         self.refinements += plan.iterations
         return refined_on_contours(

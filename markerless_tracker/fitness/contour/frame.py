@@ -160,6 +160,7 @@ class ContourFrame:
         bounds: FloatArray,
         arrays: BodyArrays,
     ) -> FloatArray:
+        """The pose (p,) after `equations.descend`, to which the arguments go."""
         pose = np.array(pose, dtype=np.float64)
         bounds = np.array(bounds, dtype=np.float64)
         descend(

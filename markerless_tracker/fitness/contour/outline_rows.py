@@ -76,6 +76,7 @@ def pose_slopes(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatAr
 
 @kernel
 def _surface(placed, shape, length, cone, place, out):  # type: ignore[no-untyped-def]
+    """Fill out (n, 3) with the points at places (n, 5) on cones (n,) at transforms (c, 3, 4)."""
     for n in range(cone.size):
         c = cone[n]
         x = y = z = 0.0
@@ -93,6 +94,16 @@ def _surface(placed, shape, length, cone, place, out):  # type: ignore[no-untype
 def _pose_slopes(  # type: ignore[no-untyped-def]
     points, gradient, axes, origins, slides, parameter, hang, cone, out
 ):
+    """Add the derivatives of n residuals by p parameters to out (n, p).
+
+    Args:
+        points, gradient: (n, 3) the residuals' points and gradients.
+        axes, origins: (m, 3) of the joints' nodes, world frame.
+        slides: (m,) whether a node translates; else it rotates.
+        parameter: (m,) index of each node's parameter.
+        hang: (c, m) not 0 where a node moves a cone.
+        cone: (n,) the residuals' cones.
+    """
     for n in range(cone.size):
         gx, gy, gz = gradient[n, 0], gradient[n, 1], gradient[n, 2]
         for m in range(slides.size):

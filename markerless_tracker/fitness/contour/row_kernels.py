@@ -78,6 +78,7 @@ def solved(hessian: FloatArray, slope: FloatArray) -> FloatArray:
 
 @kernel
 def _accumulate(slopes, weight, value, used, hessian, slope):  # type: ignore[no-untyped-def]
+    """Add rows to hessian (k, k) and slope (k,), as `normal_equations`; used (k,) is scratch."""
     n, k = slopes.shape
     for i in range(n):
         count = 0

@@ -15,8 +15,10 @@ def fill_outline(c, count, out, width, height, bits, used):  # type: ignore[no-u
     """Set the pixels whose centres lie inside a convex polygon.
 
     Args:
-        c: index of the polygon in `out` (see `find_outlines`).
+        c: index of the polygon in `out`.
         count: number of its points.
+        out: one thread's `Outlines`, filled by `find_outlines`; its left and right are written.
+        width, height: of the frame, px.
         bits: (words * height,) frame.
         used: (words, 2) first and last row that hold bits in each column of words, widened.
     """

@@ -71,6 +71,7 @@ def _tile_shifts(image: Image, reference: Image) -> tuple[NDArray[np.float32], N
 
 
 def _starts(length: int, tile: int) -> list[int]:
+    """First pixels of tiles that cover a length and overlap by about half."""
     if length <= tile:
         return [0]
     count = -(-2 * (length - tile) // tile) + 1
@@ -100,6 +101,7 @@ def align_exposure(image: FloatImage, reference: FloatImage) -> FloatImage:
 
 
 def _robust_line(x: FloatImage, y: FloatImage) -> tuple[float, float]:
+    """Gain and offset of y = gain x + offset, two images (h, w); the gain is 1 if none is found."""
     step = max(1, x.size // 40000)
     a, b = x.ravel()[::step].astype(np.float64), y.ravel()[::step].astype(np.float64)
     # Clipped pixels carry no information about the gain.

@@ -157,6 +157,7 @@ def _checked(frames: Iterable[Image], camera: str) -> Iterator[Image]:
 def _mixture(
     frames: Iterator[Image], settings: ImagingSettings, note: str | None
 ) -> BackgroundModel:
+    """A mixture of `background.modes` Gaussians per pixel, from frames (h, w, c)."""
     total, counts, means, moments = learn_modes(frames, settings.background.modes)
     if total == 1:
         return model_from_moments(means[0], moments[0], 1, settings, note=note)

@@ -119,6 +119,7 @@ def background_plate(
 
 
 def _clip_frames(sequences: Sequence[Iterable[Image]], camera: str) -> list[list[Image]]:
+    """Some frames of each clip that has any, evenly spread; raises as `background_plate`."""
     frames: list[list[Image]] = []
     share = max(2, _FRAMES // max(1, len(sequences)))
     for number, sequence in enumerate(sequences):
@@ -138,6 +139,7 @@ def _clip_frames(sequences: Sequence[Iterable[Image]], camera: str) -> list[list
 
 
 def _float(image: Image) -> FloatImage:
+    """The image as (h, w, c) float32."""
     return image.reshape(image.shape[0], image.shape[1], -1).astype(np.float32)
 
 
@@ -277,6 +279,7 @@ def _mean(values: FloatImage, chosen: BoolImage) -> FloatImage:
 
 
 def _from_stills(stills: Sequence[Image]) -> Plate:
+    """The median of the stills; of two the first, with their differences marked as unsure."""
     reference = stills[0]
     base = _float(reference)
     if len(stills) == 1:

@@ -38,7 +38,8 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, su
 
     Args:
         image: (a, b, c) uint8, a part of an image.
-        mean: (c, h, w) float32, the background; gain (c,) brightness relative to it.
+        mean: (c, h, w) float32, the background.
+        gain: (c,) float32, brightness of the image relative to the background's.
         left, top: the part's first column and row in the image.
         mask: (a, b) uint8, 0 or 255.
         inner, deep: (a, b) the mask without its border, and without two layers.

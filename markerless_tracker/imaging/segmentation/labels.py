@@ -138,6 +138,7 @@ class PixelLabeller:
     def _correct_by_texture(
         self, image: Image, labels: Mask, window: Region, corrected: Region
     ) -> None:
+        """Correct the labels (h, w) of a window inside `corrected`, in place."""
         options, is_grey = self._settings, self.background.is_grey
         part, looked_at = window, labels
         if not is_grey:

@@ -35,12 +35,14 @@ _AGREE = 3.5
 # Loops over one row with few arrays each, which the compiler vectorises.
 @compiled()
 def _slide(total, came, gone):  # type: ignore[no-untyped-def]
+    """Column sums of a window that moves down by a row: one row enters, one leaves."""
     for j in range(came.size):
         total[j] += came[j] - gone[j]
 
 
 @compiled()
 def _slide_product(total, came_x, came_y, gone_x, gone_y):  # type: ignore[no-untyped-def]
+    """As `_slide`, of products of two images."""
     for j in range(came_x.size):
         total[j] += came_x[j] * came_y[j] - gone_x[j] * gone_y[j]
 
@@ -66,6 +68,14 @@ def _sum_across(part, side, total):  # type: ignore[no-untyped-def]
 # NumPy's error model: a test for division by zero would be a branch in the loop.
 @compiled(error_model="numpy")
 def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[no-untyped-def]
+    """Fill out (w,) with the light of a row of windows, as `window_light` describes it.
+
+    Args:
+        a, b: (w,) int32 sums over each window of the image and of the background.
+        aa, ab, bb: (w,) int32 sums of their products.
+        across, down: columns (w,) and rows of the windows.
+        noise: variance of the sensor's noise.
+    """
     for j in range(out.size):
         n = down * across[j]
         share = np.float32(1.0) / np.float32(n)
@@ -88,6 +98,7 @@ def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[
 
 @compiled()
 def _whole_levels(image, mean, gain, a, b):  # type: ignore[no-untyped-def]
+    """Fill a with a row of the image and b with that of the background, in whole grey levels."""
     for j in range(a.size):
         a[j] = np.int32(image[j])
     for j in range(b.size):
@@ -240,6 +251,8 @@ def apply_light(  # type: ignore[no-untyped-def]
         image, mean, gain, left, top, light: as in `window_light`; light is 0 where not valid,
             below 0 where covered.
         agree: largest difference with which a pixel agrees, grey levels.
+        radius: of the windows, px.
+        protect, reveal: as for `correct_labels`.
         near_valid: (a, b), not 0 where a window within the radius is valid.
         part: (left, top, right, bottom) of the light's array to correct.
         corner: column and row of the labels' array where that array begins.
