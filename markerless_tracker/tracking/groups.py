@@ -53,6 +53,13 @@ class RefineSettings(SettingsGroup):
     sigma_m: float = setting(
         0.01, "standard deviation of a silhouette's contour, for refinement", least=1e-4, most=1.0
     )
+    floor_sd_m: float = setting(
+        0.01,
+        "with refinement: standard deviation of how far the body reaches below the floor, which "
+        "is the plane z = 0; 0: no floor",
+        least=0.0,
+        most=1.0,
+    )
     prior: float = setting(
         4.0,
         "sigma of the prior about the predicted pose, as a factor of the published one",

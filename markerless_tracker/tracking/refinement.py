@@ -10,6 +10,12 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior
 from markerless_tracker.tracking.config import TrackerConfig
 
+
+def floor_precision(config: TrackerConfig) -> float:
+    """Precision (1 / m²) of the prior that no part of the body lies below z = 0; 0 = no floor."""
+    return 1.0 / config.refine.floor_sd_m**2 if config.refine.floor_sd_m > 0.0 else 0.0
+
+
 STRAIGHT_TWIST_SD_RAD = 0.05
 """Standard deviation, in the refinement, of a straight limb's rotation about itself: near the usual
 value, whatever the outline's noise and the sections' error suggest. An arm bent by more than
@@ -75,7 +81,7 @@ def refined_on_contours(
     Args:
         contours: the evidence.
         start: (p,) where to begin.
-        config: `refine.sigma_m`, the standard deviation of a residual.
+        config: `refine.sigma_m`, the standard deviation of a residual, and `refine.floor_sd_m`.
         priors: added to the data.
         limits: (2, p), kept.
         iterations: Gauss-Newton steps.
@@ -88,4 +94,5 @@ def refined_on_contours(
         bounds=limits,
         iterations=iterations,
         truncation_m=truncation_m,
+        floor_precision=floor_precision(config),
     )

@@ -6,6 +6,8 @@
 from markerless_tracker.fitness.contour.frame import REACH_M, ContourFrame, NormalEquations
 from markerless_tracker.fitness.contour.outline_rows import (
     OutlineRows,
+    floor_rows,
+    joined_rows,
     outline_rows,
     pose_slopes,
     surface,
@@ -24,6 +26,8 @@ __all__ = [
     "OutlineRows",
     "add_pose_prior",
     "eliminated",
+    "floor_rows",
+    "joined_rows",
     "normal_equations",
     "outline_rows",
     "pose_slopes",

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.compiled import compiled, inlined, kernel
 from markerless_tracker.fitness.contour.chain_kernels import SUMS, add_wrench, sum_chain
+from markerless_tracker.fitness.contour.floor import add_floor
 from markerless_tracker.fitness.contour.nearest import BAND_PX
 from markerless_tracker.fitness.contour.outline_samples import MAX_SAMPLES, sample_outline
 from markerless_tracker.fitness.contour.residuals import collect_residuals
@@ -89,6 +90,7 @@ def descend(  # type: ignore[no-untyped-def]
     prior_mean,
     prior_precision,
     bounds,
+    floor_precision,
     body,
     views,
     contours,
@@ -111,6 +113,7 @@ def descend(  # type: ignore[no-untyped-def]
         precision: factor of the data's equations.
         prior_mean, prior_precision: (k, p) of Gaussian priors.
         bounds: (2, p), kept.
+        floor_precision: 1 / m², of the prior that no part lies below the floor; 0 = none.
         body, views, contours: `BodyArrays`, `ViewArrays`, `ContourViews`.
         spacing_m: distance of neighbouring outline points, at the body.
         step_px: distance outward of an outline point at which no cone may cover the pixel.
@@ -136,6 +139,8 @@ def descend(  # type: ignore[no-untyped-def]
             for m in range(scratch.sums.shape[1]):
                 for k in range(SUMS):
                     scratch.sums[0, m, k] += scratch.sums[view, m, k]
+        if floor_precision > 0.0 and i < steps:
+            add_floor(body, scratch.world, floor_precision / precision, scratch.sums[0])
         sum_chain(body, scratch.nodes, scratch.sums[0], hessian, slope)
         if i >= steps:
             continue

@@ -121,7 +121,7 @@ class ContourFrame:
         """Fill `samples` and `residuals` at a pose (p,), of another body's shape if given."""
         arrays = self._arrays if body is None else body_arrays(body)
         none = np.empty((0, pose.size))
-        self._descend(pose, 0, np.array([truncation_m]), 1.0, none, none, _NO_BOUNDS, arrays)
+        self._descend(pose, 0, np.array([truncation_m]), 1.0, none, none, _NO_BOUNDS, 0.0, arrays)
 
     def refined(
         self,
@@ -132,6 +132,7 @@ class ContourFrame:
         bounds: FloatArray,
         iterations: int,
         truncation_m: tuple[float, float],
+        floor_precision: float = 0.0,
     ) -> FloatArray:
         """A pose (p,) refined as `optim.refine` does, in one compiled call.
 
@@ -140,14 +141,16 @@ class ContourFrame:
             precision: factor from these normal equations to those of -log p, 1 / m³.
             priors, bounds, iterations: as for `optim.refine`.
             truncation_m: residuals beyond it are outliers, in the first and in the last step.
+            floor_precision: of each part below z = 0 (`floor`), 1 / m²; 0 for no floor.
         """
         mean = np.array([prior.mean for prior in priors]).reshape(-1, start.size)
         weight = np.array([prior.precision for prior in priors]).reshape(-1, start.size)
         truncations_m = truncations(*truncation_m, iterations)
         begin = np.clip(start, *bounds)
         return self._descend(
-            begin, iterations, truncations_m, precision, mean, weight, bounds, self._arrays
-        )
+            begin, iterations, truncations_m, precision, mean, weight, bounds, floor_precision,
+            self._arrays,
+        )  # fmt: skip
 
     def _descend(
         self,
@@ -158,13 +161,15 @@ class ContourFrame:
         mean: FloatArray,
         weight: FloatArray,
         bounds: FloatArray,
+        floor_precision: float,
         arrays: BodyArrays,
     ) -> FloatArray:
         """The pose (p,) after `equations.descend`, to which the arguments go."""
         pose = np.array(pose, dtype=np.float64)
         bounds = np.array(bounds, dtype=np.float64)
         descend(
-            pose, steps, truncations_m, precision, mean, weight, bounds, arrays, self.views.arrays,
+            pose, steps, truncations_m, precision, mean, weight, bounds, floor_precision,
+            arrays, self.views.arrays,
             self.contours, SPACING_M, self._step_px, self.samples, self.residuals, self._scratch,
             self._outlines,
         )  # fmt: skip

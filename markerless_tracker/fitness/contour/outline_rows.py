@@ -3,7 +3,7 @@
 Contour refinement sums normal equations without rows. Fits of lengths and sections need rows.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from markerless_tracker.body import BodyModel, cone_transforms, transforms
 from markerless_tracker.body.kinematics import carried, move_axes
 from markerless_tracker.body.model import IntArray, is_translation
 from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.contour.floor import DEEPEST_M, SLACK_M
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.geometry import FloatArray
 
@@ -20,7 +21,7 @@ class OutlineRows:
     """The n residuals of all views of a frame.
 
     Attributes:
-        view: (n,) index of the residual's view, ascending.
+        view: (n,) index of the residual's view, ascending; -1 for the floor.
         cone: (n,) index of the cone of the residual's outline point.
         place: (n, 5) the point on the cone, as `Samples.shape`.
         gradient: (n, 3) of the residual with respect to that world point.
@@ -48,6 +49,46 @@ def outline_rows(frame: ContourFrame) -> OutlineRows:
         gradient=np.concatenate([r.gradient[v, rows] for v, rows in enumerate(used)]),
         value=np.concatenate([r.value[v, rows] for v, rows in enumerate(used)]),
         weight=np.concatenate([r.weight[v, rows] for v, rows in enumerate(used)]),
+    )
+
+
+def floor_rows(body: BodyModel, pose: FloatArray, weight: float) -> OutlineRows:
+    """The residuals of `add_floor` at a pose (p,): the lowest points of cones' ends below z = 0.
+
+    Args:
+        body: the body.
+        pose: its pose.
+        weight: of each residual.
+    """
+    placed, shape = cone_transforms(body, pose), body.cone_shape
+    down = -placed[:, None, 2, :2] * shape[:, :, :2]
+    drop = np.linalg.norm(down, axis=2)
+    round_ = np.divide(down, drop[:, :, None], out=np.zeros_like(down), where=drop[:, :, None] > 0)
+    ends = np.stack([np.zeros(len(shape)), body.cone_length], axis=1)
+    middle = (placed[:, None, 2, :2] * shape[:, :, 2:4]).sum(axis=2)
+    low = middle + placed[:, None, 2, 2] * ends + placed[:, None, 2, 3] - drop
+    cone, end = np.nonzero((-DEEPEST_M < low) & (low < -SLACK_M))
+    place = np.zeros((len(cone), 5))
+    place[np.arange(len(cone)), 2 * end] = round_[cone, end, 0]
+    place[np.arange(len(cone)), 2 * end + 1] = round_[cone, end, 1]
+    place[:, 4] = end
+    return OutlineRows(
+        view=np.full(len(cone), -1),
+        cone=cone,
+        place=place,
+        gradient=np.tile([0.0, 0.0, 1.0], (len(cone), 1)),
+        value=low[cone, end] + SLACK_M,
+        weight=np.full(len(cone), weight),
+    )
+
+
+def joined_rows(*parts: OutlineRows) -> OutlineRows:
+    """The rows of all parts, one part after the other."""
+    return OutlineRows(
+        *(
+            np.concatenate([getattr(part, field.name) for part in parts])
+            for field in fields(OutlineRows)
+        )
     )
 
 

@@ -6,7 +6,7 @@ of one stature. The outlines therefore get a small weight. All frames share one 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from markerless_tracker.fitness.contour import (
     OutlineRows,
     add_pose_prior,
     eliminated,
+    floor_rows,
+    joined_rows,
     normal_equations,
     outline_rows,
     pose_slopes,
@@ -64,6 +66,7 @@ class BodyFit:
         varied: whether the frames show many poses of the person: limbs' flesh then keeps nearer to
             the line of their joints (`LIMB_OFFSET_SD_RATIO`), and cameras whose outlines disagree
             with the body count less (`AGREEING_SD_M`).
+        floor_precision: of each part below z = 0 (`contour.floor`), 1 / m²; 0 for no floor.
     """
 
     def __init__(
@@ -74,6 +77,7 @@ class BodyFit:
         limits: FloatArray,
         *,
         varied: bool = False,
+        floor_precision: float = 0.0,
     ) -> None:
         self._sizes = sizes
         self._belief = belief
@@ -81,6 +85,7 @@ class BodyFit:
         self._lengths = np.log(sizes.of(body))
         self._like = sizes.body(np.exp(self._lengths))
         self._varied = varied
+        self._floor_precision = floor_precision
         self._sections = Sections(self._like, LIMB_OFFSET_SD_RATIO if varied else None)
         self._numbers = self._sections.generic
         self._frames: list[_Frame] = []
@@ -160,7 +165,11 @@ class BodyFit:
         Adds the standard deviation of each view's residuals, m, to `spreads`.
         """
         frame.contours.collect(frame.pose, truncation_m, body)
-        rows = outline_rows(frame.contours)
+        outline = outline_rows(frame.contours)
+        trust = self._trust(outline, frame.contours.views.names, spreads)
+        weight = trust * outline.weight / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG * AMONG)
+        floor = floor_rows(body, frame.pose, self._floor_precision / AMONG)
+        rows = joined_rows(replace(outline, weight=weight), floor)
         points = surface(body, frame.pose, rows)
         by_length = [
             np.einsum("ni,ni->n", rows.gradient, surface(other, frame.pose, rows) - points) / _STEP
@@ -169,9 +178,7 @@ class BodyFit:
         by_pose = pose_slopes(body, frame.pose, rows)
         by_section = self._sections.slopes(body, frame.pose, rows)
         slopes = np.column_stack([by_pose, *by_length, by_section])
-        trust = self._trust(rows, frame.contours.views.names, spreads)
-        weight = trust * rows.weight / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG * AMONG)
-        hessian, slope = normal_equations(slopes, weight, rows.value)
+        hessian, slope = normal_equations(slopes, rows.weight, rows.value)
         precision = 1.0 / (AMONG * body.prior_sd**2)
         off = frame.pose - body.prior_mean
         add_pose_prior(hessian, slope, precision, off, damping=_DAMPING)

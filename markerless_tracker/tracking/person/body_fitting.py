@@ -58,9 +58,13 @@ class BodyFitting:
     Args:
         person: what is known.
         limits: (2, p) of the poses.
+        floor_precision: as of `BodyFit`.
     """
 
-    def __init__(self, person: Unmeasured, limits: FloatArray) -> None:
+    def __init__(
+        self, person: Unmeasured, limits: FloatArray, floor_precision: float = 0.0
+    ) -> None:
+        self._floor_precision = floor_precision
         self._person = person
         self._limits = limits
         self._fit: BodyFit | None = None
@@ -78,7 +82,9 @@ class BodyFitting:
         if self._fit is None:
             sizes = self._person.sizes
             prior = sizes.prior(self._person.stature_m)
-            self._fit = BodyFit(sizes, body, prior, self._limits)
+            self._fit = BodyFit(
+                sizes, body, prior, self._limits, floor_precision=self._floor_precision
+            )
         self._seen += 1
         if self._seen <= EVERY * FRAMES:
             if self._seen % EVERY:

@@ -17,6 +17,7 @@ from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import BodyFitting, Unmeasured
 from markerless_tracker.tracking.person.first_frame import StartMarkers, shape_of_first_frame
 from markerless_tracker.tracking.person.varied import VariedFrames
+from markerless_tracker.tracking.refinement import floor_precision
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 
 START_FRAMES = 30
@@ -84,7 +85,7 @@ class BodyEstimate:
         self._reported = False
         self._lengths: BodyFitting | None = None
         if self._person is not None and self._fits_sections and self._config.fit_lengths:
-            self._lengths = BodyFitting(self._person, self.limits)
+            self._lengths = self._new_fitting(self._person)
 
     @property
     def awaits_first_frame(self) -> bool:
@@ -172,8 +173,11 @@ class BodyEstimate:
         sizes = self._person.sizes
         self.body = sizes.body(sizes.of(self.body))
         if self._config.fit_lengths:
-            self._lengths = BodyFitting(self._person, self.limits)
+            self._lengths = self._new_fitting(self._person)
         return np.zeros(self.body.size)
+
+    def _new_fitting(self, person: Unmeasured) -> BodyFitting:
+        return BodyFitting(person, self.limits, floor_precision(self._config))
 
     def _revise_sections(self, search: FrameSearch) -> None:
         """Begin to fit the sections to this frame as well, if its pose shows something new."""

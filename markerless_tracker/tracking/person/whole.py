@@ -18,6 +18,7 @@ from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.person.body_fitting import TRUNCATION_M, Unmeasured
 from markerless_tracker.tracking.person.spread import EvenlySpread, most_different
+from markerless_tracker.tracking.refinement import floor_precision
 from markerless_tracker.tracking.search import make_searcher
 
 MOST = 10
@@ -74,7 +75,9 @@ class WholeRecording:
         """
         limits = joint_limits(body, config)
         prior = person.sizes.prior(person.stature_m)
-        fit = BodyFit(person.sizes, body, prior, limits, varied=True)
+        fit = BodyFit(
+            person.sizes, body, prior, limits, varied=True, floor_precision=floor_precision(config)
+        )
         searcher = make_searcher(body, rig=rig, config=config, threads=1)
         chosen = self.chosen(body)
         for frame in (self._kept.items[i] for i in chosen):

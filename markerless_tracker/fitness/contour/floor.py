@@ -1,0 +1,37 @@
+"""The floor: no part of the body lies below the world's plane z = 0.
+
+Feet stand in their shadow, where silhouettes end nowhere: without a floor legs grow into it.
+"""
+
+import numpy as np
+
+from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.contour.chain_kernels import add_wrench
+from markerless_tracker.fitness.raster.outline_arrays import LANES
+
+SLACK_M = 0.01
+"""Soles may lie so far below the floor: calibrations and sections are not exact."""
+DEEPEST_M = 0.2
+"""What lies deeper does not count: the person stands on another floor than z = 0."""
+
+
+@kernel
+def add_floor(body, world, weight, sums):  # type: ignore[no-untyped-def]
+    """Add a residual for each end of a cone below the floor.
+
+    Args:
+        body: `BodyArrays`.
+        world: (18 * LANES,) the cones' ends, as `cone_ends` has them.
+        weight: of each residual.
+        sums: (m, SUMS) of the parts, changed.
+    """
+    for c in range(body.cone_node.size):
+        for end in range(2):
+            at = 9 * end * LANES + c
+            first, second = world[at + 5 * LANES], world[at + 8 * LANES]
+            low = world[at + 2 * LANES] - np.sqrt(first * first + second * second)
+            if -DEEPEST_M < low < -SLACK_M:
+                add_wrench(
+                    world[at], world[at + LANES], low, 0.0, 0.0, 1.0, weight, low + SLACK_M,
+                    sums, body.cone_node[c],
+                )  # fmt: skip

@@ -1,0 +1,120 @@
+"""No part of the body lies below the floor."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import cone_transforms, load_body, load_description
+from markerless_tracker.body.sizes import Sizes
+from markerless_tracker.fitness import Fitness
+from markerless_tracker.fitness.arrays import body_arrays
+from markerless_tracker.fitness.contour import ContourFrame, floor_rows, pose_slopes, surface
+from markerless_tracker.fitness.contour.chain_kernels import SUMS, sum_chain
+from markerless_tracker.fitness.contour.floor import DEEPEST_M, SLACK_M, add_floor
+from markerless_tracker.fitness.raster.kernels import cone_ends
+from markerless_tracker.fitness.raster.outline_arrays import LANES
+from markerless_tracker.fitness.shape import BodyFit
+from markerless_tracker.optim import Prior
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import ring_rig
+
+
+def lowest_m(body, pose):
+    """The lowest point of the body, by points around the ends of all cones."""
+    placed = cone_transforms(body, pose)
+    turn = np.linspace(0.0, 2.0 * np.pi, 721)
+    low = []
+    for at, shape, length in zip(placed, body.cone_shape, body.cone_length, strict=True):
+        for end, (rx, ry, ox, oy) in enumerate(shape[:, :4]):
+            x, y = ox + rx * np.cos(turn), oy + ry * np.sin(turn)
+            points = np.stack([x, y, np.full_like(x, end * length), np.ones_like(x)])
+            low.append((at[2] @ points).min())
+    return np.array(low)
+
+
+@pytest.fixture(params=["person31", "balan31"])
+def sunk(request):
+    """A body whose feet lie some centimetres below the floor."""
+    body = load_body(request.param, 1.75)
+    pose = body.neutral + 0.05 * np.random.default_rng(2).standard_normal(body.size)
+    pose[body.index("pelvis_tz")] -= lowest_m(body, pose).min() + 0.06
+    return body, pose
+
+
+def test_rows_are_the_lowest_points_of_the_ends_below_the_floor(sunk) -> None:
+    body, pose = sunk
+    rows = floor_rows(body, pose, 7.0)
+    expected = lowest_m(body, pose)
+    expected = np.sort(expected[(expected > -DEEPEST_M) & (expected < -SLACK_M)])
+    np.testing.assert_allclose(np.sort(rows.value - SLACK_M), expected, atol=1e-6)
+    np.testing.assert_allclose(surface(body, pose, rows)[:, 2], rows.value - SLACK_M, atol=1e-9)
+    assert set(rows.weight) == {7.0}
+
+
+def test_the_kernel_sums_the_same_rows(sunk) -> None:
+    """Normal equations along the chain against those of the rows."""
+    body, pose = sunk
+    rows, arrays = floor_rows(body, pose, 7.0), body_arrays(body)
+    nodes, world = np.empty((body.node_parent.size, 3, 4)), np.ones(18 * LANES)
+    cone_ends(pose, arrays, nodes, world)
+    sums = np.zeros((body.node_parent.size, SUMS))
+    add_floor(arrays, world, 7.0, sums)
+    hessian, slope = np.empty((body.size, body.size)), np.empty(body.size)
+    sum_chain(arrays, nodes, sums, hessian, slope)
+    # The kernel's points lie on the axes above the lowest ones: the height's slopes differ by the
+    # ends' tilt alone, and not at all for translations.
+    slopes = pose_slopes(body, pose, rows)
+    up = body.index("pelvis_tz")
+    assert hessian[up, up] == pytest.approx(7.0 * len(rows.value))
+    assert slope[up] == pytest.approx(7.0 * rows.value.sum())
+    np.testing.assert_allclose(slopes[:, up], 1.0)
+
+
+def test_a_body_that_is_far_below_stands_on_another_floor(sunk) -> None:
+    body, pose = sunk
+    pose = pose.copy()
+    pose[body.index("pelvis_tz")] -= 3.0
+    assert len(floor_rows(body, pose, 1.0).value) == 0
+    pose[body.index("pelvis_tz")] += 4.0
+    assert len(floor_rows(body, pose, 1.0).value) == 0
+
+
+def blank_frame(body):
+    """A frame without any silhouette: priors alone decide."""
+    rig = ring_rig(3, (320, 240))
+    nothing = np.zeros((240, 320), np.uint8)
+    seen = {c.name: Observation.from_mask(c.name, 0, nothing > 0, nothing) for c in rig}
+    views = Fitness(body, rig.cameras).lay_out(seen)
+    return ContourFrame(
+        body, {c.name: c for c in rig}, seen, views, pixels_per_m={c.name: 80.0 for c in rig}
+    )
+
+
+def test_a_refinement_lifts_the_feet_to_the_floor(sunk) -> None:
+    body, pose = sunk
+    frame = blank_frame(body)
+
+    def refined(precision):
+        return frame.refined(
+            pose, precision=1e4, priors=(Prior(pose, np.full(body.size, 1.0 / 0.05**2)),),
+            bounds=body.limits, iterations=8, truncation_m=(0.1, 0.1), floor_precision=precision,
+        )  # fmt: skip
+
+    np.testing.assert_array_equal(refined(0.0), np.clip(pose, *body.limits))
+    assert lowest_m(body, refined(1.0 / 0.01**2)).min() > -SLACK_M - 0.005
+
+
+def test_a_body_fit_lifts_the_feet_or_shortens_the_legs() -> None:
+    description = load_description("person31")
+    sizes = Sizes(description)
+    body = sizes.of_stature(1.75)
+    pose = body.neutral.copy()
+    pose[body.index("pelvis_tz")] -= lowest_m(body, pose).min() + 0.06
+    low = {}
+    for precision in (0.0, 1.0 / 0.01**2):
+        fit = BodyFit(sizes, body, sizes.prior(1.75), body.limits, floor_precision=precision)
+        fit.add(blank_frame(body), pose)
+        for _ in range(6):
+            fit.iterate(0.1)
+        low[precision] = lowest_m(fit.body, fit.poses[0]).min()
+    assert low[0.0] < -0.04
+    assert low[1.0 / 0.01**2] > -SLACK_M - 0.01
