@@ -11,14 +11,14 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.start.mirror import mirror_of
 
 LEGS = "legs"
-EVERY_NS = 120_000_000
+EVERY_NS = 100_000_000
 """The exchange is tried so often: some times within half of a step."""
 LEAST_M = 0.1
 """Legs nearer to each other's place, at every marker, need not be exchanged."""
 LEAST_GAIN = 0.004
 """Least rise of f_s. Where the legs pass each other both ways fit alike."""
-CLOSE = 0.08
-"""Exchanged legs that cost so much more are not refined."""
+CLOSE = 0.018
+"""As of `LimbSearch.compared`: legs in their place cost more when they are exchanged."""
 
 
 class LegExchange:

@@ -6,18 +6,18 @@ a turn may be missed. One frame does not tell; the mean of many does.
 
 import numpy as np
 
+from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.limbs.search import LimbSearch
 from markerless_tracker.tracking.start.mirror import turned_round
-from markerless_tracker.tracking.start.own_evidence import OwnEvidence
 
-EVERY_NS = 250_000_000
-"""Time between two comparisons."""
+EVERY_NS, DOUBTED_EVERY_NS = 600_000_000, 250_000_000
+"""Time between two comparisons; where the last one spoke for the other way."""
 LEAST_GAIN = 0.02
 """Sum of the rises of f_s, over comparisons, from which on the person is turned round."""
 LEAST_COMPARISONS = 3
-CLOSE = 0.1
-"""What costs so much more before its refinement is worse without it."""
-_REFINE = (8, (0.15, 0.035))
+CLOSE = 0.03
+"""As of `LimbSearch.compared`."""
 _FORGET = 0.9
 """Factor of the earlier sum in each comparison."""
 
@@ -40,27 +40,22 @@ class FacingWatch:
     def due(self, stamp_ns: int) -> bool:
         """Whether to compare at this time; if so, it is noted."""
         since = self._compared_ns
-        due = since is None or not 0 <= stamp_ns - since < EVERY_NS
+        every_ns = DOUBTED_EVERY_NS if self._gain > 0.0 else EVERY_NS
+        due = since is None or not 0 <= stamp_ns - since < every_ns
         if due:
             self._compared_ns = stamp_ns
         return due
 
-    def compare(
-        self, own: OwnEvidence, pose: FloatArray, cost: float, limits: FloatArray
-    ) -> FloatArray | None:
+    def compare(self, search: LimbSearch, body: BodyModel, limits: FloatArray) -> FloatArray | None:
         """The pose (p,) turned round, once it has been better for long enough; else None.
 
         Args:
-            own: the frame's evidence.
-            pose: (p,) the estimate.
-            cost: its cost in its own evidence.
+            search: of the frame, with the estimate.
+            body: the body.
             limits: (2, p).
         """
-        other = np.clip(turned_round(own.body).of(pose), *limits)
-        gain = -LEAST_GAIN
-        if own.cost(other) <= cost + CLOSE:
-            other, other_cost = own.refined(other, *_REFINE)
-            gain = cost - other_cost
+        other = np.clip(turned_round(body).of(search.pose), *limits)
+        other, gain = search.compared(other, CLOSE)
         self._gain = max(0.0, _FORGET * self._gain + gain)
         self._count = self._count + 1 if self._gain > 0.0 else 0
         if self._gain < LEAST_GAIN or self._count < LEAST_COMPARISONS or gain <= 0.0:

@@ -24,7 +24,7 @@ LEAST_GAIN = 0.003
 """Least rise of f_s between poses in evidence of their own, which differs a little by chance."""
 LEAST_M = 0.05
 """Limbs nearer to where they were, at every marker, are not elsewhere."""
-CLOSE = 0.02
+CLOSE = 0.01
 """What costs so much more in the evidence decided for the pose so far may be better in its own."""
 _PARENTS, _CHILDREN = 6, 10
 _REFINE = (3, (LIMB_M, 0.035))
@@ -70,44 +70,37 @@ class LimbSearch:
             self._frame, self._recombiner, self.pose, limb, rng, aim, cost
         )
         better = other_cost < cost - self._least_gain
-        if not self._own.differs:
-            if better:
-                self._take(other, other_cost)
-            return better
-        if better and self._own.cost(other) < self.own_cost:
-            self._take(other, None)
-            return True
-        if other_cost > cost + CLOSE or self._moved_m(other) < LEAST_M:
-            return False
-        return self._takes(other, LEAST_GAIN, CLOSE, _REFINE)
+        if self._own.differs:
+            if other_cost > cost + CLOSE or self._moved_m(other) < LEAST_M:
+                return False
+            other_cost = self._own.cost(other)
+            better = other_cost < self.own_cost - (0.0 if better else LEAST_GAIN)
+        if better:
+            self._take(other, other_cost)
+        return better
 
     def takes(self, other: FloatArray, least_gain: float, close: float) -> bool:
-        """Refine another pose (p,), and take it if it is better, each in its own evidence.
+        """Take another pose (p,) if f_s rises by `least_gain`; other arguments as `compared`."""
+        found, gain = self.compared(other, close)
+        if gain < least_gain:
+            return False
+        self._take(found, None)
+        return True
+
+    def compared(self, other: FloatArray, close: float) -> tuple[FloatArray, float]:
+        """Another pose (p,), refined, and by how much its f_s exceeds that of the estimate.
 
         Args:
-            other: the pose.
-            least_gain: rise of f_s from which on it is taken.
-            close: largest cost before the refinement, beyond that of the estimate.
+            other: the pose, which may be far from the estimate.
+            close: it is compared in evidence of its own if it costs at most so much more than the
+                estimate in the evidence that was decided for that.
         """
-        return self._takes(other, least_gain, close, _REFINE_FAR)
-
-    def _takes(
-        self,
-        other: FloatArray,
-        least_gain: float,
-        close: float,
-        refine: tuple[int, tuple[float, float]],
-    ) -> bool:
-        if self._own.cost(other) > self.own_cost + close:
-            return False
-        found, cost = self._own.refined(other, *refine)
-        if self._own.differs and cost <= self.own_cost + HOPELESS:
-            # Once more, in what the refined body decides.
-            found, cost = self._own.refined(found, *_REFINE)
-        if cost >= self.own_cost - least_gain:
-            return False
-        self._take(found, cost)
-        return True
+        refined = self._frame.refined(other[None], *_REFINE_FAR)
+        costs = self._frame.costs(np.concatenate([self.pose[None], refined]))
+        if not self._own.differs or costs[1] > costs[0] + close:
+            return refined[0], float(costs[0] - costs[1])
+        found, cost = self._own.refined(refined[0], *_REFINE)
+        return found, self.own_cost - cost
 
     def _take(self, pose: FloatArray, cost: float | None) -> None:
         self.pose = pose

@@ -177,7 +177,7 @@ class LimbWatch:
         recombiner = Recombiner(body, searcher.limits)
         search = LimbSearch(recombiner, frame, own, pose, searcher.config.min_improvement)
         if facing:
-            turned = self._facing.compare(own, pose, search.own_cost, searcher.limits)
+            turned = self._facing.compare(search, body, searcher.limits)
             if turned is not None:
                 return Recovered(turned, turned=True)
         found = []

@@ -8,11 +8,18 @@ from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
-from markerless_tracker.tracking.limbs.facing import EVERY_NS, LEAST_COMPARISONS, FacingWatch
+from markerless_tracker.tracking.limbs.facing import (
+    DOUBTED_EVERY_NS,
+    EVERY_NS,
+    LEAST_COMPARISONS,
+    FacingWatch,
+)
+from markerless_tracker.tracking.limbs.search import LimbSearch
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.mirror import TurnedRound
 from markerless_tracker.tracking.start.own_evidence import OwnEvidence
 from markerless_tracker.tracking.start.population import FramePopulation
+from markerless_tracker.tracking.start.recombination import Recombiner
 
 
 @pytest.fixture(scope="module")
@@ -41,10 +48,11 @@ def compared(scene, pose_of, count):
     for number in range(count):
         seen, true = observed(scene, 15 * number)
         pose, stamp_ns = pose_of(true), number * EVERY_NS
-        assert watch.due(stamp_ns) and not watch.due(stamp_ns + EVERY_NS - 1)
+        assert watch.due(stamp_ns) and not watch.due(stamp_ns + DOUBTED_EVERY_NS - 1)
         frame = FramePopulation(searcher, seen, stamp_ns, pose)
         own = OwnEvidence(searcher, seen, stamp_ns, frame)
-        found.append(watch.compare(own, pose, own.cost(pose), body.limits))
+        search = LimbSearch(Recombiner(body, body.limits), frame, own, pose, 0.001)
+        found.append(watch.compare(search, body, body.limits))
     return found
 
 
@@ -66,7 +74,7 @@ def test_a_tracker_that_starts_the_wrong_way_turns_the_person_and_fits_the_body_
     start = turned_away(body, scene.frame(0)[2])
     tracker = Tracker(scene.rig, body, TrackerConfig(threads=1), start_pose=start, shape_known=True)
     warnings = []
-    for frame in range(0, 90, 3):
+    for frame in range(0, 120, 4):
         seen, true = observed(scene, frame)
         result = tracker.step(seen, round(frame * 1e9 / 60))
         warnings += result.warnings
