@@ -11,8 +11,15 @@ from markerless_tracker.fitness.raster.outline_arrays import LANES
 
 SLACK_M = 0.01
 """Soles may lie so far below the floor: calibrations and sections are not exact."""
-DEEPEST_M = 0.2
-"""What lies deeper does not count: the person stands on another floor than z = 0."""
+BELIEVED_M = 0.1
+"""What lies deeper counts less and less: the person may stand on another floor than z = 0."""
+
+
+@kernel
+def floor_weight(value_m):  # type: ignore[no-untyped-def]
+    """Robust weight, 0 to 1, of a residual (Geman and McClure)."""
+    ratio = value_m / BELIEVED_M
+    return 1.0 / (1.0 + ratio * ratio) ** 2
 
 
 @kernel
@@ -22,7 +29,7 @@ def add_floor(body, world, weight, sums):  # type: ignore[no-untyped-def]
     Args:
         body: `BodyArrays`.
         world: (18 * LANES,) the cones' ends, as `cone_ends` has them.
-        weight: of each residual.
+        weight: of each residual, before its robust weight.
         sums: (m, SUMS) of the parts, changed.
     """
     for c in range(body.cone_node.size):
@@ -30,8 +37,9 @@ def add_floor(body, world, weight, sums):  # type: ignore[no-untyped-def]
             at = 9 * end * LANES + c
             first, second = world[at + 5 * LANES], world[at + 8 * LANES]
             low = world[at + 2 * LANES] - np.sqrt(first * first + second * second)
-            if -DEEPEST_M < low < -SLACK_M:
+            if low < -SLACK_M:
+                value = low + SLACK_M
                 add_wrench(
-                    world[at], world[at + LANES], low, 0.0, 0.0, 1.0, weight, low + SLACK_M,
-                    sums, body.cone_node[c],
+                    world[at], world[at + LANES], low, 0.0, 0.0, 1.0, weight * floor_weight(value),
+                    value, sums, body.cone_node[c],
                 )  # fmt: skip

@@ -11,7 +11,7 @@ from markerless_tracker.body import BodyModel, cone_transforms, transforms
 from markerless_tracker.body.kinematics import carried, move_axes
 from markerless_tracker.body.model import IntArray, is_translation
 from markerless_tracker.compiled import kernel
-from markerless_tracker.fitness.contour.floor import DEEPEST_M, SLACK_M
+from markerless_tracker.fitness.contour.floor import SLACK_M, floor_weight
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.geometry import FloatArray
 
@@ -58,7 +58,7 @@ def floor_rows(body: BodyModel, pose: FloatArray, weight: float) -> OutlineRows:
     Args:
         body: the body.
         pose: its pose.
-        weight: of each residual.
+        weight: of each residual, before its robust weight.
     """
     placed, shape = cone_transforms(body, pose), body.cone_shape
     down = -placed[:, None, 2, :2] * shape[:, :, :2]
@@ -67,7 +67,8 @@ def floor_rows(body: BodyModel, pose: FloatArray, weight: float) -> OutlineRows:
     ends = np.stack([np.zeros(len(shape)), body.cone_length], axis=1)
     middle = (placed[:, None, 2, :2] * shape[:, :, 2:4]).sum(axis=2)
     low = middle + placed[:, None, 2, 2] * ends + placed[:, None, 2, 3] - drop
-    cone, end = np.nonzero((-DEEPEST_M < low) & (low < -SLACK_M))
+    cone, end = np.nonzero(low < -SLACK_M)
+    value = low[cone, end] + SLACK_M
     place = np.zeros((len(cone), 5))
     place[np.arange(len(cone)), 2 * end] = round_[cone, end, 0]
     place[np.arange(len(cone)), 2 * end + 1] = round_[cone, end, 1]
@@ -77,8 +78,8 @@ def floor_rows(body: BodyModel, pose: FloatArray, weight: float) -> OutlineRows:
         cone=cone,
         place=place,
         gradient=np.tile([0.0, 0.0, 1.0], (len(cone), 1)),
-        value=low[cone, end] + SLACK_M,
-        weight=np.full(len(cone), weight),
+        value=value,
+        weight=np.array([weight * floor_weight(v) for v in value]),
     )
 
 

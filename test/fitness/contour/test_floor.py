@@ -9,7 +9,7 @@ from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.arrays import body_arrays
 from markerless_tracker.fitness.contour import ContourFrame, floor_rows, pose_slopes, surface
 from markerless_tracker.fitness.contour.chain_kernels import SUMS, sum_chain
-from markerless_tracker.fitness.contour.floor import DEEPEST_M, SLACK_M, add_floor
+from markerless_tracker.fitness.contour.floor import BELIEVED_M, SLACK_M, add_floor
 from markerless_tracker.fitness.raster.kernels import cone_ends
 from markerless_tracker.fitness.raster.outline_arrays import LANES
 from markerless_tracker.fitness.shape import BodyFit
@@ -44,10 +44,10 @@ def test_rows_are_the_lowest_points_of_the_ends_below_the_floor(sunk) -> None:
     body, pose = sunk
     rows = floor_rows(body, pose, 7.0)
     expected = lowest_m(body, pose)
-    expected = np.sort(expected[(expected > -DEEPEST_M) & (expected < -SLACK_M)])
+    expected = np.sort(expected[expected < -SLACK_M])
     np.testing.assert_allclose(np.sort(rows.value - SLACK_M), expected, atol=1e-6)
     np.testing.assert_allclose(surface(body, pose, rows)[:, 2], rows.value - SLACK_M, atol=1e-9)
-    assert set(rows.weight) == {7.0}
+    np.testing.assert_allclose(rows.weight, 7.0 / (1.0 + (rows.value / BELIEVED_M) ** 2) ** 2)
 
 
 def test_the_kernel_sums_the_same_rows(sunk) -> None:
@@ -64,17 +64,19 @@ def test_the_kernel_sums_the_same_rows(sunk) -> None:
     # ends' tilt alone, and not at all for translations.
     slopes = pose_slopes(body, pose, rows)
     up = body.index("pelvis_tz")
-    assert hessian[up, up] == pytest.approx(7.0 * len(rows.value))
-    assert slope[up] == pytest.approx(7.0 * rows.value.sum())
+    assert hessian[up, up] == pytest.approx(rows.weight.sum())
+    assert slope[up] == pytest.approx(rows.weight @ rows.value)
     np.testing.assert_allclose(slopes[:, up], 1.0)
 
 
-def test_a_body_that_is_far_below_stands_on_another_floor(sunk) -> None:
+def test_a_body_far_below_is_hardly_held_and_one_above_not_at_all(sunk) -> None:
     body, pose = sunk
     pose = pose.copy()
-    pose[body.index("pelvis_tz")] -= 3.0
-    assert len(floor_rows(body, pose, 1.0).value) == 0
-    pose[body.index("pelvis_tz")] += 4.0
+    pose[body.index("pelvis_tz")] -= 1.0
+    deep = floor_rows(body, pose, 1.0)
+    assert deep.value.min() < -1.0
+    assert deep.weight[deep.value < -0.5].max() < 0.002
+    pose[body.index("pelvis_tz")] += 2.0
     assert len(floor_rows(body, pose, 1.0).value) == 0
 
 
