@@ -19,7 +19,11 @@ from markerless_tracker.records import MaskWords, Observation
 
 
 class BodyArrays(NamedTuple):
-    """The arrays of a `BodyModel` that kernels need; shapes as documented there."""
+    """The arrays of a `BodyModel` that kernels need; shapes as documented there.
+
+    Attributes:
+        above_floor: (c, 2) as of the function of that name.
+    """
 
     parent: NDArray[np.int64]
     fixed: FloatArray
@@ -30,6 +34,7 @@ class BodyArrays(NamedTuple):
     cone_fixed: FloatArray
     cone_length: FloatArray
     cone_shape: FloatArray
+    above_floor: FloatArray
 
 
 class ViewArrays(NamedTuple):
@@ -91,7 +96,20 @@ def body_arrays(body: BodyModel) -> BodyArrays:
         body.cone_fixed.copy(),
         body.cone_length.copy(),
         body.cone_shape.copy(),
+        above_floor(body),
     )
+
+
+_TOE_WEIGHT = 0.25
+
+
+def above_floor(body: BodyModel) -> FloatArray:
+    """How much the ends (c, 2) of cones below the floor count: all alike, toes less.
+
+    A foot that is fixed to its shank points into the floor at the end of every step.
+    """
+    toes = [name.endswith("foot") for name in body.cone_names]
+    return np.array([(1.0, _TOE_WEIGHT if toe else 1.0) for toe in toes])
 
 
 def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Observation]) -> Views:

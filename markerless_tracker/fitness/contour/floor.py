@@ -24,7 +24,7 @@ def floor_weight(value_m):  # type: ignore[no-untyped-def]
 
 @kernel
 def add_floor(body, world, weight, sums):  # type: ignore[no-untyped-def]
-    """Add a residual for each end of a cone below the floor.
+    """Add a residual for each end of a cone below the floor; toes count less.
 
     Args:
         body: `BodyArrays`.
@@ -39,7 +39,8 @@ def add_floor(body, world, weight, sums):  # type: ignore[no-untyped-def]
             low = world[at + 2 * LANES] - np.sqrt(first * first + second * second)
             if low < -SLACK_M:
                 value = low + SLACK_M
+                robust = body.above_floor[c, end] * floor_weight(value)
                 add_wrench(
-                    world[at], world[at + LANES], low, 0.0, 0.0, 1.0, weight * floor_weight(value),
+                    world[at], world[at + LANES], low, 0.0, 0.0, 1.0, weight * robust,
                     value, sums, body.cone_node[c],
                 )  # fmt: skip

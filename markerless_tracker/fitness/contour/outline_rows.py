@@ -11,6 +11,7 @@ from markerless_tracker.body import BodyModel, cone_transforms, transforms
 from markerless_tracker.body.kinematics import carried, move_axes
 from markerless_tracker.body.model import IntArray, is_translation
 from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.arrays import above_floor
 from markerless_tracker.fitness.contour.floor import SLACK_M, floor_weight
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.geometry import FloatArray
@@ -53,7 +54,7 @@ def outline_rows(frame: ContourFrame) -> OutlineRows:
 
 
 def floor_rows(body: BodyModel, pose: FloatArray, weight: float) -> OutlineRows:
-    """The residuals of `add_floor` at a pose (p,): the lowest points of cones' ends below z = 0.
+    """The residuals of `add_floor` at a pose (p,), at the lowest points of the cones' ends.
 
     Args:
         body: the body.
@@ -79,7 +80,7 @@ def floor_rows(body: BodyModel, pose: FloatArray, weight: float) -> OutlineRows:
         place=place,
         gradient=np.tile([0.0, 0.0, 1.0], (len(cone), 1)),
         value=value,
-        weight=np.array([weight * floor_weight(v) for v in value]),
+        weight=weight * above_floor(body)[cone, end] * np.array([floor_weight(v) for v in value]),
     )
 
 
