@@ -49,6 +49,8 @@ class Beyond:
         if not person.size or not body.size:
             return
         beyond_px = (body[0] - person[0]) + (person[-1] - body[-1])
+        # Each of the two ends is known to half a row.
+        beyond_px -= np.sign(beyond_px)
         found = self._found.setdefault(camera.name, Histogram(-_MOST_M, _MOST_M, _BINS))
         found.add(float(beyond_px) / px_per_m)
 

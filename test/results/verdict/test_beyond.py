@@ -44,6 +44,11 @@ def test_one_camera_with_a_shadow_does_not_count(scene: Any, result: Any, masks:
     assert found.by_camera_m["cam01"] > 0.1 and abs(found.median_m) < 0.01
 
 
+def test_a_single_row_is_the_resolution_of_the_images(scene: Any, result: Any, masks: Any) -> None:
+    found = added(scene, result, masks, LEAST, dict.fromkeys(scene.rig.names, (1, 0)))
+    assert abs(found.median_m) < 0.003
+
+
 def test_few_frames_say_nothing(scene: Any, result: Any, masks: Any) -> None:
     assert np.isnan(added(scene, result, masks, LEAST - 1, {}).median_m)
 
