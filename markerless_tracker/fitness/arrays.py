@@ -22,7 +22,7 @@ class BodyArrays(NamedTuple):
     """The arrays of a `BodyModel` that kernels need; shapes as documented there.
 
     Attributes:
-        above_floor: (c, 2) as of the function of that name.
+        floor_share: (c, 2) as of the function of that name.
     """
 
     parent: NDArray[np.int64]
@@ -34,7 +34,7 @@ class BodyArrays(NamedTuple):
     cone_fixed: FloatArray
     cone_length: FloatArray
     cone_shape: FloatArray
-    above_floor: FloatArray
+    floor_share: FloatArray
 
 
 class ViewArrays(NamedTuple):
@@ -96,20 +96,18 @@ def body_arrays(body: BodyModel) -> BodyArrays:
         body.cone_fixed.copy(),
         body.cone_length.copy(),
         body.cone_shape.copy(),
-        above_floor(body),
+        floor_share(body),
     )
 
 
-_TOE_WEIGHT = 0.25
+TOE_SHARE = 0.25
+"""Feet of most bodies are fixed to their shanks: toes point into the floor at the end of a step."""
 
 
-def above_floor(body: BodyModel) -> FloatArray:
-    """How much the ends (c, 2) of cones below the floor count: all alike, toes less.
-
-    A foot that is fixed to its shank points into the floor at the end of every step.
-    """
+def floor_share(body: BodyModel) -> FloatArray:
+    """How much each end (c, 2) of a cone counts where it lies below the floor: toes less."""
     toes = [name.endswith("foot") for name in body.cone_names]
-    return np.array([(1.0, _TOE_WEIGHT if toe else 1.0) for toe in toes])
+    return np.array([(1.0, TOE_SHARE if toe else 1.0) for toe in toes])
 
 
 def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Observation]) -> Views:

@@ -16,7 +16,7 @@ BELIEVED_M = 0.1
 
 
 @kernel
-def floor_weight(value_m):  # type: ignore[no-untyped-def]
+def robust_weight(value_m):  # type: ignore[no-untyped-def]
     """Robust weight, 0 to 1, of a residual (Geman and McClure)."""
     ratio = value_m / BELIEVED_M
     return 1.0 / (1.0 + ratio * ratio) ** 2
@@ -39,7 +39,7 @@ def add_floor(body, world, weight, sums):  # type: ignore[no-untyped-def]
             low = world[at + 2 * LANES] - np.sqrt(first * first + second * second)
             if low < -SLACK_M:
                 value = low + SLACK_M
-                robust = body.above_floor[c, end] * floor_weight(value)
+                robust = body.floor_share[c, end] * robust_weight(value)
                 add_wrench(
                     world[at], world[at + LANES], low, 0.0, 0.0, 1.0, weight * robust,
                     value, sums, body.cone_node[c],

@@ -169,8 +169,7 @@ class ContourFrame:
         bounds = np.array(bounds, dtype=np.float64)
         descend(
             pose, steps, truncations_m, precision, mean, weight, bounds, floor_precision,
-            arrays, self.views.arrays,
-            self.contours, SPACING_M, self._step_px, self.samples, self.residuals, self._scratch,
-            self._outlines,
+            arrays, self.views.arrays, self.contours, SPACING_M, self._step_px, self.samples,
+            self.residuals, self._scratch, self._outlines,
         )  # fmt: skip
         return pose

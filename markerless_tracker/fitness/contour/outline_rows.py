@@ -11,8 +11,8 @@ from markerless_tracker.body import BodyModel, cone_transforms, transforms
 from markerless_tracker.body.kinematics import carried, move_axes
 from markerless_tracker.body.model import IntArray, is_translation
 from markerless_tracker.compiled import kernel
-from markerless_tracker.fitness.arrays import above_floor
-from markerless_tracker.fitness.contour.floor import SLACK_M, floor_weight
+from markerless_tracker.fitness.arrays import floor_share
+from markerless_tracker.fitness.contour.floor import SLACK_M, robust_weight
 from markerless_tracker.fitness.contour.frame import ContourFrame
 from markerless_tracker.geometry import FloatArray
 
@@ -80,7 +80,7 @@ def floor_rows(body: BodyModel, pose: FloatArray, weight: float) -> OutlineRows:
         place=place,
         gradient=np.tile([0.0, 0.0, 1.0], (len(cone), 1)),
         value=value,
-        weight=weight * above_floor(body)[cone, end] * np.array([floor_weight(v) for v in value]),
+        weight=weight * floor_share(body)[cone, end] * np.array([robust_weight(v) for v in value]),
     )
 
 

@@ -6,7 +6,7 @@ import pytest
 from markerless_tracker.body import cone_transforms, load_body, load_description
 from markerless_tracker.body.sizes import Sizes
 from markerless_tracker.fitness import Fitness
-from markerless_tracker.fitness.arrays import body_arrays
+from markerless_tracker.fitness.arrays import TOE_SHARE, body_arrays
 from markerless_tracker.fitness.contour import ContourFrame, floor_rows, pose_slopes, surface
 from markerless_tracker.fitness.contour.chain_kernels import SUMS, sum_chain
 from markerless_tracker.fitness.contour.floor import BELIEVED_M, SLACK_M, add_floor
@@ -49,7 +49,7 @@ def test_rows_are_the_lowest_points_of_the_ends_below_the_floor(sunk) -> None:
     np.testing.assert_allclose(surface(body, pose, rows)[:, 2], rows.value - SLACK_M, atol=1e-9)
     robust = 7.0 / (1.0 + (rows.value / BELIEVED_M) ** 2) ** 2
     toes = [body.cone_names[c].endswith("foot") for c in rows.cone] * (rows.place[:, 4] == 1.0)
-    np.testing.assert_allclose(rows.weight, np.where(toes, 0.25, 1.0) * robust)
+    np.testing.assert_allclose(rows.weight, np.where(toes, TOE_SHARE, 1.0) * robust)
 
 
 def test_the_kernel_sums_the_same_rows(sunk) -> None:
@@ -62,8 +62,8 @@ def test_the_kernel_sums_the_same_rows(sunk) -> None:
     add_floor(arrays, world, 7.0, sums)
     hessian, slope = np.empty((body.size, body.size)), np.empty(body.size)
     sum_chain(arrays, nodes, sums, hessian, slope)
-    # The kernel's points lie on the axes above the lowest ones: the height's slopes differ by the
-    # ends' tilt alone, and not at all for translations.
+    # The kernel takes the points below the axes instead of the lowest ones, which a translation of
+    # the body does not tell apart.
     slopes = pose_slopes(body, pose, rows)
     up = body.index("pelvis_tz")
     assert hessian[up, up] == pytest.approx(rows.weight.sum())

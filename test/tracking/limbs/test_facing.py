@@ -69,7 +69,7 @@ def test_a_person_who_faces_the_right_way_stays(scene) -> None:
     assert compared(scene, lambda true: true, 4) == [None] * 4
 
 
-def test_a_tracker_that_starts_the_wrong_way_turns_the_person_and_fits_the_body_anew(scene) -> None:
+def test_a_tracker_that_starts_the_wrong_way_turns_the_person_round(scene) -> None:
     body = scene.body
     start = turned_away(body, scene.frame(0)[2])
     tracker = Tracker(scene.rig, body, TrackerConfig(threads=1), start_pose=start, shape_known=True)

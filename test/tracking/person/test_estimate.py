@@ -1,11 +1,16 @@
 """A body is fitted to frames that agree with it, and to no others."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from markerless_tracker.body import load_description
+from markerless_tracker.body.sizes import Sizes
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.tracking import Tracker, TrackerConfig
-from markerless_tracker.tracking.person.estimate import START_FRAMES
+from markerless_tracker.tracking.person.body_fitting import Unmeasured
+from markerless_tracker.tracking.person.estimate import START_FRAMES, BodyEstimate
 
 FRAME_NS = 16_666_667
 
@@ -104,3 +109,28 @@ def test_a_body_without_fit_is_tracked_from_the_first_frame_on(scene, frames, re
     config = TrackerConfig.from_mapping(refined_settings)
     tracker = Tracker(scene.rig, scene.body, config, start_pose=scene.pose(0), shape_known=True)
     assert tracker.step(silhouettes(frames, 0, speck), 0).state is TrackState.LOST
+
+
+def estimated(*, known: bool) -> BodyEstimate:
+    """A person's body with sections of a thicker one; `known`: the person was measured."""
+    sizes = Sizes(load_description("person31"))
+    body = sizes.of_stature(1.8)
+    person = None if known else Unmeasured(sizes, None)
+    estimate = BodyEstimate(body, TrackerConfig(threads=1), person=person)
+    estimate.take_found(replace(body, cone_shape=1.3 * body.cone_shape), settled=True)
+    return estimate
+
+
+def test_an_unmeasured_body_is_generic_again_once_the_person_was_turned_round() -> None:
+    estimate = estimated(known=False)
+    moved = estimate.turned()
+    assert moved is not None and not moved.any()
+    np.testing.assert_allclose(estimate.body.cone_shape, estimate.generic.cone_shape, atol=1e-9)
+    np.testing.assert_allclose(estimate.body.cone_length, estimate.generic.cone_length, atol=1e-9)
+
+
+def test_a_measured_body_stays_when_the_person_is_turned_round() -> None:
+    estimate = estimated(known=True)
+    before = estimate.body
+    assert estimate.turned() is None
+    assert estimate.body is before
