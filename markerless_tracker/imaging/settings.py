@@ -91,6 +91,13 @@ class ShadowSettings(SettingsGroup):
         least=0.0,
         most=1.0,
     )
+    spread_max: float = setting(
+        0.05,
+        "where shadows are undecided, the ratios of a shadow to its background differ among the "
+        "channels by no more than this part of the largest; means of patches, colour cameras",
+        least=0.0,
+        most=1.0,
+    )
     value_min: float = setting(
         0.5, "darkest shadow, as a ratio of its brightness to the background's", least=0.0, most=1.0
     )

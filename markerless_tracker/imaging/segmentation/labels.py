@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.imaging.background.adapt import Adaptation
 from markerless_tracker.imaging.background.model import BackgroundModel
-from markerless_tracker.imaging.images import Image, grey_of
+from markerless_tracker.imaging.images import FloatImage, Image, grey_of
 from markerless_tracker.imaging.masks import SOLID, Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation import kernels
@@ -17,7 +17,16 @@ from markerless_tracker.imaging.segmentation.exposure import ExposureMeter
 from markerless_tracker.imaging.segmentation.gaussians import BackgroundGaussians
 from markerless_tracker.imaging.segmentation.morphology import FULL_FRAME_PX
 from markerless_tracker.imaging.segmentation.patches import mark_weak
-from markerless_tracker.imaging.segmentation.shadow import shadow_rule
+from markerless_tracker.imaging.segmentation.shadow import (
+    NOISE,
+    SIDE_PX,
+    even_patches,
+    inverse_means,
+    label_by_patch,
+    near_of,
+    patch_means,
+    shadow_rule,
+)
 from markerless_tracker.imaging.segmentation.texture import correct_labels, correction_radius_px
 from markerless_tracker.imaging.settings import ImagingSettings
 
@@ -65,6 +74,7 @@ class PixelLabeller:
             else None
         )
         self._rule = shadow_rule(settings, grey=gaussians.is_grey)
+        self._patches = self._patches_of_background()
         # A pixel that alternates between several appearances has no one pattern.
         self._uses_texture = (
             settings.texture.radius_px > 0 and settings.shadow.removal and not background.modes
@@ -84,12 +94,23 @@ class PixelLabeller:
         self._memory = np.empty(height * width, dtype=np.uint8)
         self._planes = np.empty(0 if gaussians.is_grey else 3 * height * width, dtype=np.uint8)
 
+    def _patches_of_background(self) -> FloatImage | None:
+        """What `even_patches` knows about the background, if the colours of patches are compared.
+
+        A pixel that alternates between several appearances has no one colour.
+        """
+        shadow, means = self._settings.shadow, self.background.mean
+        if self.background.is_grey or not (shadow.removal and shadow.undecided) or len(means) > 1:
+            return None
+        return inverse_means(means[0])
+
     def reset(self) -> None:
         """Return to the initial background."""
         if self._adaptation is not None:
             self._adaptation.reset()
             self.background.reset()
             self._first = kernels.coarse(self.background.mean[0], self.background.scale[0])
+            self._patches = self._patches_of_background()
         self.gain[:] = 1.0
 
     def measure_exposure(self, image: Image) -> None:
@@ -119,11 +140,35 @@ class PixelLabeller:
         else:
             planes = self._planes[: 3 * count].reshape(3, window.height, window.width)
             kernels.label_colour(part, *known, planes, labels)
+            self._compare_patches(part, planes, labels, window)
         if self._uses_texture:
             self._correct_by_texture(image, labels, window, corrected)
         if self._uses_patches:
             self._mark_weak(planes, labels, window)
         return labels
+
+    def _compare_patches(
+        self, part: Image, planes: NDArray[np.uint8], labels: Mask, window: Region
+    ) -> None:
+        """Tell shadow from foreground by the colours of patches, in place.
+
+        Args:
+            part: (h, w, 3) the image in the window.
+            planes: (3, h, w) its channels.
+            labels: (h, w).
+            window: where it lies in the image.
+        """
+        if self._patches is None:
+            return
+        corner = (window.left, window.top)
+        means = np.stack([patch_means(plane) for plane in planes])
+        spread = np.float32(self._settings.shadow.spread_max)
+        noise = np.float32(NOISE * self.background.sigma / SIDE_PX)
+        even = np.empty_like(labels)
+        even_patches(means, self._patches, self.gain, spread, noise, *corner, labels, even)
+        label_by_patch(
+            part, self._first[0], self.gain, self._rule, near_of(even), even, *corner, labels
+        )
 
     def _mark_weak(self, planes: NDArray[np.uint8], labels: Mask, window: Region) -> None:
         """Label background as weak where a patch differs from it, though no single pixel does."""
@@ -185,3 +230,4 @@ class PixelLabeller:
             self._means_channels_last, self._scales_channels_last,
         )  # fmt: skip
         self._first = kernels.coarse(self.background.mean[0], self.background.scale[0])
+        self._patches = self._patches_of_background()

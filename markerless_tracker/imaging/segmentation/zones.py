@@ -12,6 +12,7 @@ from markerless_tracker.imaging.segmentation.morphology import (
     opening_radius_px,
     repair_radius_px,
 )
+from markerless_tracker.imaging.segmentation.shadow import PATCH_RADIUS_PX
 from markerless_tracker.imaging.settings import ImagingSettings
 
 
@@ -70,7 +71,7 @@ class Zones:
             patches_before_repair=patches.grown(repair, size_px),
             zone_before_repair=before,
             corrected=corrected,
-            window=corrected.grown(LOOK_PX, size_px),
+            window=corrected.grown(LOOK_PX + 2 * PATCH_RADIUS_PX, size_px),
             open_sides=_open_sides(zone, size_px),
             frame_px=frame_px,
         )
