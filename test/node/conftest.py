@@ -60,12 +60,20 @@ class Peer:
         self.executor.add_node(self.node)
 
     def until(
-        self, condition: Callable[[], Any], what: str, *, deadline_s: float = DEADLINE_S
+        self,
+        condition: Callable[[], Any],
+        what: str | Callable[[], str],
+        *,
+        deadline_s: float = DEADLINE_S,
     ) -> Any:
-        """Spin until the condition holds; fails, saying what was missing, if it never does."""
+        """Spin until the condition holds; fails, saying what was missing, if it never does.
+
+        `what` may be made when it fails: what is known by then.
+        """
         end_s = time.monotonic() + deadline_s
         while not (value := condition()):
-            assert time.monotonic() < end_s, f"timed out waiting for {what}"
+            if time.monotonic() >= end_s:
+                pytest.fail(f"timed out waiting for {what() if callable(what) else what}")
             self.executor.spin_once(timeout_sec=0.05)
         return value
 

@@ -167,6 +167,9 @@ class SegmenterNode(GivenNode):
             "ready": "true",
             "received": str(self._images.received),
             "dropped": str(self._images.dropped),
+            "subscribers": str(
+                min(p.get_subscription_count() for p in self._publishers_of_evidence)
+            ),
             **self._status.values(),
         }
         message = DiagnosticArray()

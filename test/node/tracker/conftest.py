@@ -167,9 +167,10 @@ class Live:
             assert self.process.running, self.process.output
             return condition()
 
-        return self.peer.until(
-            check, f"{what}; state {self.values}, log {self.process.output}", deadline_s=deadline_s
-        )
+        def missing() -> str:
+            return f"{what}; state {self.values}, log {self.process.output}"
+
+        return self.peer.until(check, missing, deadline_s=deadline_s)
 
     @property
     def values(self) -> dict[str, str]:
