@@ -20,10 +20,11 @@ from markerless_tracker.imaging.segmentation.patches import mark_weak
 from markerless_tracker.imaging.segmentation.shadow import (
     NOISE,
     SIDE_PX,
+    compares_patches,
     even_patches,
     inverse_means,
     label_by_patch,
-    near_of,
+    near_even,
     patch_means,
     shadow_rule,
 )
@@ -99,8 +100,8 @@ class PixelLabeller:
 
         A pixel that alternates between several appearances has no one colour.
         """
-        shadow, means = self._settings.shadow, self.background.mean
-        if self.background.is_grey or not (shadow.removal and shadow.undecided) or len(means) > 1:
+        means = self.background.mean
+        if len(means) > 1 or not compares_patches(self._settings, grey=self.background.is_grey):
             return None
         return inverse_means(means[0])
 
@@ -150,7 +151,7 @@ class PixelLabeller:
     def _compare_patches(
         self, part: Image, planes: NDArray[np.uint8], labels: Mask, window: Region
     ) -> None:
-        """Tell shadow from foreground by the colours of patches, in place.
+        """Decide between shadow and foreground by the colours of patches, in place.
 
         Args:
             part: (h, w, 3) the image in the window.
@@ -167,7 +168,7 @@ class PixelLabeller:
         even = np.empty_like(labels)
         even_patches(means, self._patches, self.gain, spread, noise, *corner, labels, even)
         label_by_patch(
-            part, self._first[0], self.gain, self._rule, near_of(even), even, *corner, labels
+            part, self._first[0], self.gain, self._rule, near_even(even), even, *corner, labels
         )
 
     def _mark_weak(self, planes: NDArray[np.uint8], labels: Mask, window: Region) -> None:

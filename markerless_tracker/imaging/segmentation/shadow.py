@@ -31,7 +31,7 @@ PATCH_RADIUS_PX = 2
 """Radius of the patches whose colours are compared."""
 SIDE_PX = 2 * PATCH_RADIUS_PX + 1
 NOISE = 3.0
-"""Standard deviations of a patch's mean by which its ratios may differ besides."""
+"""Standard deviations of a patch's mean grey level by which its ratios may differ besides."""
 
 
 def shadow_rule(settings: ImagingSettings, *, grey: bool = False) -> tuple[np.float32, ...]:
@@ -52,6 +52,16 @@ def shadow_rule(settings: ImagingSettings, *, grey: bool = False) -> tuple[np.fl
         np.float32(settings.shadow.hue_max_deg),
         np.float32(settings.shadow.chroma_min),
     )
+
+
+def compares_patches(settings: ImagingSettings, *, grey: bool) -> bool:
+    """Whether the colours of patches decide besides those of pixels."""
+    return settings.shadow.removal and settings.shadow.undecided and not grey
+
+
+def patches_radius_px(settings: ImagingSettings, *, grey: bool) -> int:
+    """Radius within which a label depends on the colours of patches, px."""
+    return 2 * PATCH_RADIUS_PX if compares_patches(settings, grey=grey) else 0
 
 
 def patch_means(plane: Picture) -> Picture:
@@ -139,7 +149,7 @@ def label_by_patch(image, first, gain, rule, near, even, left, top, labels):  # 
                 labels[i, j] = SHADOW
 
 
-def near_of(even: Mask) -> Mask:
-    """Where (h, w) a pixel within the radius of a patch is set."""
+def near_even(even: Mask) -> Mask:
+    """Where (h, w) uint8, 0 or 255, an even patch has its centre within `PATCH_RADIUS_PX`."""
     square = np.ones((SIDE_PX, SIDE_PX), dtype=np.uint8)
     return cast(Mask, cv2.dilate(even, square))

@@ -12,7 +12,7 @@ from markerless_tracker.imaging.segmentation.morphology import (
     opening_radius_px,
     repair_radius_px,
 )
-from markerless_tracker.imaging.segmentation.shadow import PATCH_RADIUS_PX
+from markerless_tracker.imaging.segmentation.shadow import patches_radius_px
 from markerless_tracker.imaging.settings import ImagingSettings
 
 
@@ -26,7 +26,8 @@ class Zones:
         patches_before_repair, zone_before_repair: the same before opening and closing.
         corrected: where texture corrects labels: `zone_before_repair`, and as far from it as the
             opening of shadows and the means of patches depend on labels.
-        window: the labelled region.
+        window: the labelled region: `corrected`, and as far from it as those labels depend on
+            colours.
         open_sides: sides of `zone` beyond which the image continues.
         frame_px: pixels of the whole image.
     """
@@ -71,7 +72,7 @@ class Zones:
             patches_before_repair=patches.grown(repair, size_px),
             zone_before_repair=before,
             corrected=corrected,
-            window=corrected.grown(LOOK_PX + 2 * PATCH_RADIUS_PX, size_px),
+            window=corrected.grown(LOOK_PX + patches_radius_px(settings, grey=grey), size_px),
             open_sides=_open_sides(zone, size_px),
             frame_px=frame_px,
         )
