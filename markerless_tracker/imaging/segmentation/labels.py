@@ -19,6 +19,7 @@ from markerless_tracker.imaging.segmentation.morphology import FULL_FRAME_PX
 from markerless_tracker.imaging.segmentation.patches import mark_weak
 from markerless_tracker.imaging.segmentation.shadow import (
     NOISE,
+    PATCH_RADIUS_PX,
     SIDE_PX,
     compares_patches,
     even_patches,
@@ -159,17 +160,24 @@ class PixelLabeller:
             labels: (h, w).
             window: where it lies in the image.
         """
-        if self._patches is None:
+        size_px = (window.width, window.height)
+        box = occupied(labels, Region.whole(size_px))
+        if self._patches is None or box.width <= 0:
             return
-        corner = (window.left, window.top)
-        means = np.stack([patch_means(plane) for plane in planes])
+        # The patches of the box's pixels lie inside.
+        rows, columns = box.grown(PATCH_RADIUS_PX, size_px).slices
+        corner = (window.left + columns.start, window.top + rows.start)
+        means = patch_means(planes[:, rows, columns])
+        found = np.ascontiguousarray(labels[rows, columns])
         spread = np.float32(self._settings.shadow.spread_max)
         noise = np.float32(NOISE * self.background.sigma / SIDE_PX)
-        even = np.empty_like(labels)
-        even_patches(means, self._patches, self.gain, spread, noise, *corner, labels, even)
+        even = np.empty_like(found)
+        even_patches(means, self._patches, self.gain, spread, noise, *corner, found, even)
         label_by_patch(
-            part, self._first[0], self.gain, self._rule, near_even(even), even, *corner, labels
-        )
+            part[rows, columns], self._first[0], self.gain, self._rule, near_even(even), even,
+            *corner, found,
+        )  # fmt: skip
+        labels[rows, columns] = found
 
     def _mark_weak(self, planes: NDArray[np.uint8], labels: Mask, window: Region) -> None:
         """Label background as weak where a patch differs from it, though no single pixel does."""

@@ -64,15 +64,21 @@ def patches_radius_px(settings: ImagingSettings, *, grey: bool) -> int:
     return 2 * PATCH_RADIUS_PX if compares_patches(settings, grey=grey) else 0
 
 
-def patch_means(plane: Picture) -> Picture:
-    """Means (h, w) of the square patches around the pixels of a channel, mirrored at the border."""
-    return cast(Picture, cv2.blur(plane, (SIDE_PX, SIDE_PX)))
+def patch_means(planes: Picture) -> Picture:
+    """Means (c, h, w) of the square patches around the pixels of an image (c, h, w).
+
+    Patches are mirrored at the image's border.
+    """
+    means = np.empty(planes.shape, dtype=planes.dtype)
+    for plane, mean in zip(planes, means, strict=True):
+        cv2.blur(plane, (SIDE_PX, SIDE_PX), dst=mean)
+    return cast(Picture, means)
 
 
 def inverse_means(means: FloatImage) -> FloatImage:
     """1 / means (c, h, w) of the patches of a background (c, h, w), grey levels."""
-    inverse = [1.0 / np.maximum(patch_means(np.ascontiguousarray(plane)), 1.0) for plane in means]
-    return np.stack(inverse, dtype=np.float32)
+    inverse = 1.0 / np.maximum(patch_means(means), 1.0)
+    return inverse.astype(np.float32, copy=False)
 
 
 @compiled(error_model="numpy")
