@@ -216,8 +216,7 @@ class Tracker:
             views: camera name to its image (as `Segmenter.observe` takes it) or to a ready-made
                 observation; cameras may be missing. Or what `prepare` made of them.
             stamp_ns: time of the images; the search widens with the time since the last step.
-            effort: fraction of the frames, 0 to 1, in which swarms and searches for limbs may run
-                beside the refinement. Unless it is 0, frames over 45 ms apart are all searched.
+            effort: fraction of the frames, 0 to 1, searched beside the refinement; see `Effort`.
 
         Raises:
             ConfigError: no such effort.
@@ -323,8 +322,9 @@ class Tracker:
         self._effort.search(search, self.body, self.config, predicted, sigma)
         recovered, limbs = Recovered(search.pose), self._assessor.limbs
         again = self.config.refinement != "none" and self.config.search_again
-        if again and self._effort.granted:
-            recovered = limbs.recover(self._searcher, search.contours, seen, search.pose)
+        if again and self._effort.for_limbs:
+            one, contours = self._effort.reduced, search.contours
+            recovered = limbs.recover(self._searcher, contours, seen, search.pose, one=one)
         notes = seen.notes + self._body.take_warnings() + recovered.notes + seen.left_out
         jumped = recovered.jumped(self.body)
         # What is found elsewhere jumps; the rest of the body does not.

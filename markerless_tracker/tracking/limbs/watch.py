@@ -111,6 +111,7 @@ class LimbWatch:
         """Forget the limbs so far."""
         self._tracks: dict[str, LimbTrack] = {}
         self._next = 0
+        self._turn = 0
         self._unexplained = 0
         self._rotated_ns: int | None = None
         self._waits: dict[str, _Wait] = {}
@@ -148,7 +149,13 @@ class LimbWatch:
         return states
 
     def recover(
-        self, searcher: Searcher, contours: ContourFrame, seen: Seen, pose: FloatArray
+        self,
+        searcher: Searcher,
+        contours: ContourFrame,
+        seen: Seen,
+        pose: FloatArray,
+        *,
+        one: bool = False,
     ) -> Recovered:
         """Search the limbs that `assess` found lost, and the next one in rotation.
 
@@ -160,6 +167,8 @@ class LimbWatch:
             contours: the frame's contours.
             seen: the frame's evidence.
             pose: (p,) the estimate.
+            one: whether there is time for one thing alone: what compares the whole body's poses, or
+                one of the limbs, in turn.
         """
         body, stamp_ns, observations = searcher.body, seen.stamp_ns, seen.believed
         if not body.limbs:
@@ -168,8 +177,14 @@ class LimbWatch:
         if not unexplained.limbs:
             self._waits.clear()
         due = self._due(body, stamp_ns, unexplained.areas_m2)
-        legs = self._exchange.due(body, pose, searcher.limits, stamp_ns)
-        facing = self._facing.due(stamp_ns)
+        legs, facing = None, False
+        self._turn += 1
+        if not one or self._turn % 2:
+            legs = self._exchange.due(body, pose, searcher.limits, stamp_ns)
+            facing = self._facing.due(stamp_ns)
+        if one and due:
+            whole = facing or legs is not None
+            due = [] if whole else [due[self._turn // 2 % len(due)]]
         if not due and legs is None and not facing:
             return Recovered(pose)
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)

@@ -18,7 +18,8 @@ WORSE = 0.01
 NEAR = 0.1
 """A pose is refined once more if a parameter has moved by more than this, rad or m."""
 FAR_S = 0.045
-"""Frames farther apart than this are all searched: a limb can be lost from each to the next."""
+"""Frames farther apart than this, divided by the effort, are all searched: a limb can be lost from
+each to the next. A search takes longer than such a time: who is late would search every frame."""
 _MEMORY = 0.05
 
 
@@ -27,6 +28,7 @@ class Effort:
 
     The refinement follows a body that moves as predicted. Swarms find what it has lost, so they
     are needed where a frame is explained worse than this track's usual, or a limb is in doubt.
+    With an effort below 1 a frame is searched by swarms or by the limbs' searches, in turn.
 
     Args:
         needed_only: whether swarms search only the frames that need them; else all frames.
@@ -45,6 +47,9 @@ class Effort:
         self._usual_cost: float | None = None
         self._credit = 0.0
         self._granted = True
+        self._reduced = False
+        self._limbs_turn = False
+        self._swarms = False
         self._doubt = False
 
     def begin(self, effort: float, *, doubt: bool, since_s: float = 0.0) -> None:
@@ -62,15 +67,27 @@ class Effort:
             raise ConfigError(f"effort is {effort}, expected 0 to 1")
         self._credit = min(1.0, self._credit + effort)
         # Sums of fractions such as a tenth fall short of 1 by a rounding.
-        self._granted = self._credit > 1.0 - 1e-9 or (effort > 0.0 and since_s > FAR_S)
+        self._granted = self._credit > 1.0 - 1e-9 or (effort > 0.0 and since_s * effort > FAR_S)
         if self._granted:
             self._credit = 0.0
+            self._limbs_turn = not self._limbs_turn
+        self._reduced, self._swarms = effort < 1.0, False
         self._doubt = doubt
 
     @property
     def granted(self) -> bool:
         """Whether this frame may be searched beside the refinement."""
         return self._granted
+
+    @property
+    def reduced(self) -> bool:
+        """Whether the effort is below 1."""
+        return self._reduced
+
+    @property
+    def for_limbs(self) -> bool:
+        """Whether this frame may be searched by the limbs' searches; to be asked after `search`."""
+        return self._granted and not (self._reduced and self._swarms)
 
     def search(
         self,
@@ -91,7 +108,7 @@ class Effort:
             return
         begin = search.pose
         search.run((contour_stage("align", body, config, centre, sigma),))
-        swarms = self.wants_swarms(search.cost)
+        swarms = self._swarms = self.wants_swarms(search.cost)
         if swarms:
             search.run(rescue_stages(body, config, centre, sigma))
         # A refinement that begins near its end has arrived.
@@ -105,7 +122,7 @@ class Effort:
         Args:
             cost: of the pose after the first refinement.
         """
-        if not self._granted:
+        if not self._granted or (self._reduced and self._limbs_turn):
             return False
         usual = self._usual_cost
         badly = usual is None or cost > usual + WORSE

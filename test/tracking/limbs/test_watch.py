@@ -42,9 +42,9 @@ def contours_of(searcher, seen, pose):
     return searcher.frame(seen, 0, pose).contours
 
 
-def recover(watch, searcher, contours, seen, stamp_ns, pose):
+def recover(watch, searcher, contours, seen, stamp_ns, pose, *, one=False):
     """What `recover` finds: the pose and the names."""
-    found = watch.recover(searcher, contours, Seen(stamp_ns, seen, seen, seen), pose)
+    found = watch.recover(searcher, contours, Seen(stamp_ns, seen, seen, seen), pose, one=one)
     return found.pose, found.names
 
 
@@ -190,6 +190,36 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
     name_of = {scene.body.subspaces[name].tobytes(): name for name in limbs}
     names = [name_of[limb] for limb in searched]
     assert names[::2] == ["r_leg"] * 3 and set(names[1::2]) == {"l_leg", "r_arm", "l_arm"}
+
+
+def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_turns(
+    standing, monkeypatch
+) -> None:
+    scene, seen, pose, _ = standing
+    limbs = ("r_leg", "l_leg", "r_arm", "l_arm")
+    done: list[str] = []
+    package = "markerless_tracker.tracking.limbs"
+
+    def faces(*_):
+        done.append("facing")
+
+    def elsewhere(_f, _r, at, limb, *_):
+        done.append(next(n for n in limbs if np.array_equal(scene.body.subspaces[n], limb)))
+        return at, 9.0
+
+    monkeypatch.setattr(
+        f"{package}.watch.look_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})
+    )
+    monkeypatch.setattr(f"{package}.search.other_limb", elsewhere)
+    monkeypatch.setattr(f"{package}.watch.WAIT_NS", 0)
+    monkeypatch.setattr(f"{package}.facing.FacingWatch.compare", faces)
+    searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
+    contours = contours_of(searcher, seen, pose)
+    for number in range(24):
+        before = len(done)
+        recover(watch, searcher, contours, seen, number * ROTATION_NS, pose, one=True)
+        assert len(done) == before + 1
+    assert set(done) == {*limbs, "facing"}
 
 
 def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monkeypatch) -> None:

@@ -57,11 +57,15 @@ def test_reset_forgets_the_usual_cost() -> None:
 def test_effort_is_the_fraction_of_frames_that_are_searched(fraction: float, granted: int) -> None:
     effort = Effort(needed_only=False)
     count = 0
+    swarms = 0
     for _ in range(100):
         effort.begin(fraction, doubt=False)
         count += effort.granted
-        assert effort.wants_swarms(1.0) is effort.granted
+        swarms += effort.wants_swarms(1.0)
+        assert effort.granted or not effort.for_limbs
     assert count == granted
+    # With less than everything, every other search is left to the limbs.
+    assert swarms == (granted if fraction == 1.0 else granted // 2)
 
 
 @pytest.mark.parametrize("fraction", [-0.1, 1.1, float("nan")])
@@ -100,9 +104,24 @@ def test_a_pose_is_refined_again_if_it_moved_or_swarms_searched(step, cost, poli
 def test_frames_far_apart_are_all_searched() -> None:
     effort = _settled()
     granted = []
-    for since_s in (0.01, 0.01, 0.1, 0.1, 0.01):
+    for since_s in (0.01, 0.1, 0.12, 0.12, 0.01):
         effort.begin(0.4, doubt=True, since_s=since_s)
         granted.append(effort.granted)
     assert granted == [False, False, True, True, False]
     effort.begin(0.0, doubt=True, since_s=0.1)
     assert not effort.granted
+
+
+def test_who_is_late_searches_by_swarms_or_by_limbs_in_turn() -> None:
+    body = load_body("person31", 1.75)
+    found = []
+    for fraction in (1.0, 0.5):
+        effort = _settled()
+        for _ in range(6):
+            effort.begin(fraction, doubt=False, since_s=0.2)
+            search = Recorder(0.0, 0.05 + 2.0 * WORSE)
+            effort.search(search, body, TrackerConfig(), body.neutral, body.sigma)  # type: ignore[arg-type]
+            found.append((len(search.names) > 2, effort.for_limbs))
+    assert found[:6] == [(True, True)] * 6
+    assert sorted(found[6:8]) == [(False, True), (True, False)]
+    assert found[6:8] == found[8:10] == found[10:12]

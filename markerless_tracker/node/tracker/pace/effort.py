@@ -12,7 +12,6 @@ EARLY_SETS = 12
 """Sets in a row with time to spare before the effort rises."""
 SPARE = 0.2
 """Share of the time between two sets that counts as time to spare."""
-_FALL = 0.8
 _RISE = 1.15
 
 
@@ -46,8 +45,9 @@ class Lateness:
 class EffortRule:
     """The effort for the next set, in (0, 1].
 
-    It falls while the worker is late and rises again while it has time to spare; in between it
-    stays, so that it does not swing.
+    It falls to the least at once when the worker is late: the time between the sets it takes makes
+    each of them costlier. It rises again while there is time to spare; in between it stays, so that
+    it does not swing.
     """
 
     def __init__(self) -> None:
@@ -65,7 +65,7 @@ class EffortRule:
         self._recent.append(lateness.late)
         self._early = self._early + 1 if lateness.early else 0
         if sum(self._recent) >= LATE_SETS:
-            self._effort = max(LEAST, _FALL * self._effort)
+            self._effort = LEAST
             self._recent.clear()
         elif self._early >= EARLY_SETS:
             self._effort, self._early = min(1.0, _RISE * self._effort), 0
