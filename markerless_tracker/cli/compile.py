@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from markerless_tracker.calibration.contours.time_offset import TimeOffsetEstimate
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.cli.benchmark.arguments import list_of
 from markerless_tracker.cli.terminal.bars import progress_bars
@@ -91,6 +92,7 @@ def warm_up(config: TrackerConfig, channels: int) -> None:
     tracker = build_tracker(rig, config, backgrounds=backgrounds).tracker
     tracker.evidence.start_process()
     tracker.warm_up()
+    TimeOffsetEstimate(rig, step_px=config.edges.step_px).warm_up(tracker.body)
     tracker.evidence.close()
 
 

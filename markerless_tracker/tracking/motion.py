@@ -9,8 +9,8 @@ from markerless_tracker.tracking.config import TrackerConfig
 TRAINING_RATE_HZ = 60.0
 """Frame rate at which the published sigmas, changes of a parameter between frames, hold."""
 LIMB_SPEED_M_S = 2.0
-"""Speed of a hand or foot relative to its prediction: widens the image regions. A faster one costs a
-second, wider region."""
+"""Speed of a hand or foot relative to its prediction: widens the image regions. A faster one costs
+a second, wider region."""
 
 
 class MotionModel:

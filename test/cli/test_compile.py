@@ -38,6 +38,44 @@ def test_what_is_stored_is_not_compiled_again(capsys: pytest.CaptureFixture[str]
     assert done.stdout.strip() == "0", done.stderr
 
 
+TRACKS = """
+from markerless_tracker import compiled
+from markerless_tracker.calibration.contours.time_offset import TimeOffsetEstimate
+from markerless_tracker.imaging import learn_background
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import Tracker, TrackerConfig
+
+def kernels():
+    return {(d.py_func.__name__, str(s)) for d in compiled._dispatchers for s in d.overloads}
+
+scene = SyntheticScene(size_px=(328, 245), fps=30.0, samples=2, motion="walk")
+backgrounds = {name: learn_background(images) for name, images in scene.backgrounds(8).items()}
+tracker = Tracker(
+    scene.rig, scene.body, TrackerConfig(), start_pose=scene.pose(0), backgrounds=backgrounds
+)
+offsets = TimeOffsetEstimate(scene.rig, step_px=2.0)
+frames = [scene.frame(index)[0] for index in range(24)]
+tracker.warm_up()
+offsets.warm_up(tracker.body)
+before = kernels()
+used = 0
+for index, images in enumerate(frames):
+    result = tracker.step(images, scene.stamp_ns(index))
+    offsets.add(result, tracker.body)
+    used += offsets._frames
+print(sorted(kernels() - before), used > 0, len(before) > 0)
+"""
+
+
+def test_no_kernel_is_compiled_or_loaded_while_a_person_is_tracked() -> None:
+    """Each would hold up a set of a live stream, by half a second where it is compiled."""
+    done = subprocess.run(
+        [sys.executable, "-c", TRACKS], capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.stdout.strip() == "[] True True", done.stdout + done.stderr
+
+
 def test_every_optimizer_is_compiled_with_its_own_budget(monkeypatch) -> None:
     plans = []
     monkeypatch.setattr(compile_verb, "warm_up", lambda config, channels: plans.append(config))

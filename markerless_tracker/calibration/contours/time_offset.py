@@ -99,6 +99,21 @@ class TimeOffsetEstimate:
         self._blocks: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=BLOCKS)
         self._new_block()
 
+    def warm_up(self, body: BodyModel) -> None:
+        """Compile what a frame needs, for bodies of this kind; forgets the frames so far."""
+        observations = {}
+        for camera in self._cameras:
+            width, height = camera.size_px
+            mask = np.zeros((height, width), dtype=np.uint8)
+            mask[height // 4 : height // 2, width // 4 : width // 2] = 1
+            observations[camera.name] = Observation.from_mask(camera.name, 0, mask, mask)
+        pose = body.neutral
+        made_up = TrackResult(
+            0, TrackState.TRACKING, pose, markers(body, pose), 1.0, {}, 0, observations=observations
+        )
+        self._take(made_up, body, np.zeros(body.size))
+        self._new_block()
+
     def add(self, result: TrackResult, body: BodyModel) -> None:
         """Take a frame and the body that was tracked in it."""
         self._last.append((result, body))

@@ -39,7 +39,8 @@ def body_words(
     height = int(views.size[:, 1].max())
     outlines = make_outlines(1, height)
     world = np.ones(18 * LANES)
-    cone_ends(np.ascontiguousarray(pose), arrays, np.empty((body.node_parent.size, 3, 4)), world)
+    # A copy: for poses that may not be written the kernel would be compiled once more.
+    cone_ends(np.array(pose), arrays, np.empty((body.node_parent.size, 3, 4)), world)
     packed = {}
     for view, camera in enumerate(cameras):
         height, words = camera.size_px[1], int(views.words[view])

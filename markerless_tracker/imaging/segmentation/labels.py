@@ -31,6 +31,7 @@ from markerless_tracker.imaging.segmentation.shadow import (
 )
 from markerless_tracker.imaging.segmentation.texture import correct_labels, correction_radius_px
 from markerless_tracker.imaging.settings import ImagingSettings
+from markerless_tracker.observation import locked
 
 WEAK_RADIUS_PX = 3
 """Radius of the patches whose mean is compared with the background."""
@@ -174,8 +175,8 @@ class PixelLabeller:
         even = np.empty_like(found)
         even_patches(means, self._patches, self.gain, spread, noise, *corner, found, even)
         label_by_patch(
-            part[rows, columns], self._first[0], self.gain, self._rule, near_even(even), even,
-            *corner, found,
+            locked(part[rows, columns], np.uint8), self._first[0], self.gain, self._rule,
+            near_even(even), even, *corner, found,
         )  # fmt: skip
         labels[rows, columns] = found
 

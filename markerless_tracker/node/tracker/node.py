@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -235,6 +236,7 @@ class TrackerNode(GivenNode):
             setup.start_stamp_ns,
             view_reader(scaled, self._inputs),
             waits=any(setup.tracker.segmenter(name) is None for name in self._image_cameras),
+            warm_up=partial(self._time_offsets.warm_up, setup.tracker.body),
         )
 
     # outputs

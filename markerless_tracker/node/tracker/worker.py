@@ -91,12 +91,14 @@ class TrackerHandle:
         start_ns: see `StartGate`.
         decode: makes the tracker's image or observation of a camera's view.
         waits: whether the tracker has no backgrounds; sets are dropped until they are learned.
+        warm_up: compiles what runs beside the tracker.
     """
 
     tracker: Stepper
     start_ns: int | None
     decode: Callable[[str, Any], NDArray[np.uint8] | Observation]
     waits: bool = False
+    warm_up: Callable[[], None] = lambda: None
 
 
 class TrackWorker:
@@ -190,6 +192,7 @@ class TrackWorker:
             begun_s = self._reported_s = self._clock()
             with compilation(self._compiling) as kernels:
                 handle.tracker.warm_up()
+                handle.warm_up()
             collect_for_good()
         except Exception as error:
             self.fatal = one_line(error)
