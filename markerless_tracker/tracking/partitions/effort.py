@@ -18,8 +18,7 @@ WORSE = 0.01
 NEAR = 0.1
 """A pose is refined once more if a parameter has moved by more than this, rad or m."""
 FAR_S = 0.045
-"""Frames farther apart than this, divided by the effort, are all searched: a limb can be lost from
-each to the next. A search takes longer than such a time: who is late would search every frame."""
+"""Frames farther apart than this are all searched: a limb can be lost from each to the next."""
 _MEMORY = 0.05
 
 
@@ -28,7 +27,9 @@ class Effort:
 
     The refinement follows a body that moves as predicted. Swarms find what it has lost, so they
     are needed where a frame is explained worse than this track's usual, or a limb is in doubt.
-    With an effort below 1 a frame is searched by swarms or by the limbs' searches, in turn.
+    With an effort below 1 and no limb in doubt, a frame is searched by swarms or by the limbs'
+    searches, in turn, and frames count as far apart only beyond `FAR_S` / effort. A search takes
+    longer than `FAR_S`: who is late would search every frame and stay late.
 
     Args:
         needed_only: whether swarms search only the frames that need them; else all frames.
@@ -67,11 +68,12 @@ class Effort:
             raise ConfigError(f"effort is {effort}, expected 0 to 1")
         self._credit = min(1.0, self._credit + effort)
         # Sums of fractions such as a tenth fall short of 1 by a rounding.
-        self._granted = self._credit > 1.0 - 1e-9 or (effort > 0.0 and since_s * effort > FAR_S)
+        far_s = FAR_S if doubt else FAR_S / max(effort, 1e-9)
+        self._granted = self._credit > 1.0 - 1e-9 or (effort > 0.0 and since_s > far_s)
         if self._granted:
             self._credit = 0.0
             self._limbs_turn = not self._limbs_turn
-        self._reduced, self._swarms = effort < 1.0, False
+        self._reduced, self._swarms = effort < 1.0 and not doubt, False
         self._doubt = doubt
 
     @property
@@ -81,7 +83,7 @@ class Effort:
 
     @property
     def reduced(self) -> bool:
-        """Whether the effort is below 1."""
+        """Whether a frame is searched for one thing alone."""
         return self._reduced
 
     @property

@@ -105,9 +105,12 @@ def test_frames_far_apart_are_all_searched() -> None:
     effort = _settled()
     granted = []
     for since_s in (0.01, 0.1, 0.12, 0.12, 0.01):
-        effort.begin(0.4, doubt=True, since_s=since_s)
+        effort.begin(0.4, doubt=False, since_s=since_s)
         granted.append(effort.granted)
     assert granted == [False, False, True, True, False]
+    for since_s in (0.1, 0.1):
+        effort.begin(0.4, doubt=True, since_s=since_s)
+        assert effort.granted and not effort.reduced
     effort.begin(0.0, doubt=True, since_s=0.1)
     assert not effort.granted
 
