@@ -242,7 +242,7 @@ def cpu_seconds() -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}")
-    parser.add_argument("--trials", type=int, help="default: 200 for kills, 40 for speed")
+    parser.add_argument("--trials", type=int, help="default: 200 for kills, 100 for speed")
     parser.add_argument("-o", dest="out", type=Path, default=ROOT / "out" / "batch")
     args = parser.parse_args()
     figures: dict[str, Any] = {}
@@ -254,7 +254,7 @@ def main() -> None:
             if part == "kills":
                 found = kills(work, args.trials or 200)
             elif part == "speed":
-                found = speed(work, args.trials or 40)
+                found = speed(work, args.trials or 100)
             else:
                 parser.error(f"part {part}: expected some of {', '.join(PARTS)}")
         finally:
