@@ -88,7 +88,8 @@ def run(args: argparse.Namespace) -> int:
                 if args.names is not None:
                     names = names_in(args.names, names)
                 notes += EXPORTS[kind](path, reader, names)
-            written.append(path)
+            more = (path.with_suffix(ending) for ending in MORE_FILES.get(kind, ()))
+            written += [path, *(other for other in more if other.exists())]
     for note in notes:
         warn(console, note)
     if args.json:

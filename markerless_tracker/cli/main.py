@@ -11,6 +11,7 @@ Verbs are imported when called: ``--help`` does not wait for imports.
 """
 
 import argparse
+import difflib
 import importlib
 import os
 import sys
@@ -79,9 +80,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"{PROGRAM} {__version__}")
         return 0
     if verb not in VERBS:
-        sys.stderr.write(
-            f"{PROGRAM}: error: unknown verb {verb!r}, expected one of {', '.join(VERBS)}\n"
-        )
+        near = difflib.get_close_matches(verb, VERBS, n=1)
+        meant = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(VERBS)}"
+        sys.stderr.write(f"{PROGRAM}: error: unknown verb {verb!r}, {meant}\n")
         return 2
     try:
         return _run(verb, rest)

@@ -11,6 +11,7 @@ from rich.progress import Progress, TextColumn, TimeElapsedColumn
 
 from markerless_tracker.bags.mcap_bag import BagWriter
 from markerless_tracker.camera import read_calibration
+from markerless_tracker.cli.terminal.bars import warn
 from markerless_tracker.errors import DatasetError
 
 HELP = (
@@ -78,6 +79,8 @@ def run(args: argparse.Namespace) -> int:
         for name, count in sorted(counts.items()):
             print(f"{name}: {count}")
         print(f"{args.bag}: {total} messages of {len(counts)} topics")
+        if not total:
+            warn(console, "no message came: does the graph run, in the same ROS_DOMAIN_ID?")
     return 0 if total else NOTHING_ARRIVED
 
 

@@ -71,7 +71,8 @@ def _images(group: argparse._ArgumentGroup) -> None:
         "--fps",
         type=float,
         metavar="N",
-        help="track every k-th frame from the start frame on, to get this rate (default: all)",
+        help="track every k-th frame, from that of a given start pose on, to get this rate "
+        "(default: all)",
     )
     group.add_argument(
         "--scale",
@@ -140,7 +141,9 @@ def _search(group: argparse._ArgumentGroup) -> None:
         help=f"search algorithm: {', '.join(OPTIMIZERS)} (default sppso)",
     )
     group.add_argument(
-        "--body", metavar="NAME|FILE", help="body model: balan31, person31, ... or a YAML file"
+        "--body",
+        metavar="NAME|FILE",
+        help="body model: person31, balan31, ... or a YAML file (default: person32)",
     )
     group.add_argument(
         "--evaluations",

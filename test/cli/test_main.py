@@ -195,6 +195,11 @@ def test_module_runs_as_a_command() -> None:
     assert "unknown verb 'nonsense'" in done.stderr
 
 
+def test_a_mistyped_verb_is_told_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["trak", "walk"]) == 2
+    assert "unknown verb 'trak', did you mean track?" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", sorted(cli.VERBS))
 def test_each_verb_has_help_with_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     module = importlib.import_module(f"markerless_tracker.cli.{name}")

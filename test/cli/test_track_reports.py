@@ -70,7 +70,7 @@ def test_the_verdict_follows_the_counts(run: Run, warned, walk, tmp_path) -> Non
     lines = out.splitlines()
     assert lines[0].startswith(f"{tmp_path / 'out.trc'}: 6 frames, 6 tracked, 0 lost, 0 searching")
     assert lines[1].startswith("overlap of body and silhouettes: cam01 0.")
-    assert lines[2].startswith("stature 1.7") and lines[-1].startswith("next: ")
+    assert lines[2].startswith("stature of the body 1.7") and lines[-1].startswith("next: ")
     assert "warnings in 4 frames: 2 kinds" in lines
     _, out, _ = run(walk, "--start", walk / "ground_truth.trc", "--json", "--force")
     verdict = json.loads(out)["verdict"]

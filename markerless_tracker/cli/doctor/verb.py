@@ -25,6 +25,7 @@ HELP = (
     "say what to do; exit status 3 if there is one."
 )
 EXAMPLE = "markerless_tracker doctor --calibration calibration.toml --background background"
+_ADVICE = "correct it, or make it anew with `calibrate`"
 MOST_SECONDS = 3600.0
 """Longest time for which cameras are listened to."""
 
@@ -79,15 +80,13 @@ def _calibration(file: Path | None) -> tuple[CameraRig | None, list[Finding]]:
     try:
         rig = read_calibration(file)
     except TrackerError as error:
-        return None, [
-            Finding(name, RED, "", str(error), "correct it, or make it anew with `calibrate`")
-        ]
+        advice = "give the file's path" if not file.is_file() else _ADVICE
+        return None, [Finding(name, RED, "", str(error), advice)]
     doubts = calibration_doubts(rig)
     if not doubts:
         return rig, [Finding(name, GREEN, "", f"{len(rig)} cameras, plausible")]
-    advice = "correct calibration.toml, or make it anew with `calibrate`"
     return rig, [
-        Finding(name, RED, "", doubt.removeprefix("calibration: "), advice) for doubt in doubts
+        Finding(name, RED, "", doubt.removeprefix("calibration: "), _ADVICE) for doubt in doubts
     ]
 
 

@@ -16,6 +16,9 @@ from markerless_tracker.results.verdict.doubts import (
 )
 from markerless_tracker.results.verdict.record import RunRecord
 
+CLEARLY = 0.02
+"""Overlap by which a camera must lie below all others to be named."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
@@ -72,7 +75,7 @@ class Verdict:
             found.append(f"overlap of body and silhouettes: {listed}")
         if self.stature_m is not None:
             unusual = "" if self.stature_plausible else ", not a grown person's"
-            found.append(f"stature {self.stature_m:.2f} m{unusual}")
+            found.append(f"stature of the body {self.stature_m:.2f} m{unusual}")
         if self.worst_limb:
             found.append(
                 f"worst limb: {self.worst_limb}, lost in {self.worst_limb_lost} of {self.tracked} "
@@ -149,6 +152,18 @@ def verdict_of(
     )
 
 
+def fits_worst(overlap: Mapping[str, float]) -> str:
+    """The camera whose overlap lies clearly below those of all others; empty if there is none.
+
+    Args:
+        overlap: camera -> overlap (IoU) of its silhouette and the body.
+    """
+    known = sorted((value, name) for name, value in overlap.items() if math.isfinite(value))
+    if len(known) > 1 and known[1][0] - known[0][0] < CLEARLY:
+        return ""
+    return known[0][1] if known else ""
+
+
 def _where_to_look(record: RunRecord, doubtful: bool) -> str:
     if not record.frames:
         return "there was no frame"
@@ -164,7 +179,5 @@ def _where_to_look(record: RunRecord, doubtful: bool) -> str:
         )
     if doubtful:
         return pictures
-    worst = min(record.median_overlap.items(), key=lambda item: item[1], default=None)
-    if worst is None:
-        return pictures
-    return f"{worst[0]} fits worst; {pictures}"
+    worst = fits_worst(record.median_overlap)
+    return f"{worst} fits worst; {pictures}" if worst else pictures

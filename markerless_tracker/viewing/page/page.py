@@ -24,6 +24,12 @@ from markerless_tracker.viewing.page.tables import (
 FIRST_ANGLES = ("hip_flexion", "knee_angle", "ankle_angle", "arm_flex", "elbow_flex", "lumbar")
 """Beginnings of the angles that are shown first; the others are folded."""
 
+_LONG = {
+    "clav": "clavicle", "prot": "protraction", "elev": "elevation", "flex": "flexion",
+    "add": "adduction", "rot": "rotation", "dev": "deviation", "pro": "pronation,",
+    "sup": "supination",
+}  # fmt: skip
+"""Words that the angles' names cut short."""
 _SIDES = (("_l", "left"), ("_r", "right"))
 _STYLES = 8
 
@@ -159,7 +165,7 @@ def _angles(report: Report) -> str:
     marks = _strikes(report)
     charts = {
         base: line_chart(
-            base.replace("_", " "),
+            _words(base),
             "degrees",
             sorted(curves, key=lambda curve: curve.label),
             marks=marks,
@@ -180,6 +186,11 @@ def _angles(report: Report) -> str:
     )
 
 
+def _words(angle: str) -> str:
+    """An angle's name as people say it."""
+    return " ".join(_LONG.get(word, word) for word in angle.split("_"))
+
+
 def _cut(values: np.ndarray) -> np.ndarray:
     """Angles with a gap where they jump from 180 to -180 degrees."""
     jumps = np.abs(np.diff(values, prepend=values[:1])) > 300.0
@@ -194,7 +205,7 @@ def _strikes(report: Report) -> list[Mark]:
 
 def _gait(report: Report) -> str:
     if report.gait is None:
-        return ""
+        return '<p class="dim">Gait: nobody walks for a complete stride.</p>'
     events = report.gait.events
     listed = "; ".join(
         f"{side} foot {'strike' if strike else 'off'}: "

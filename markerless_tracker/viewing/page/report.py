@@ -13,6 +13,7 @@ from markerless_tracker.results.comparison.measures import Measures, measures
 from markerless_tracker.results.gait import Gait, gait
 from markerless_tracker.results.score import Score, score
 from markerless_tracker.results.stored_result import StoredResult
+from markerless_tracker.results.verdict.verdict import fits_worst
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,15 +97,16 @@ class Report:
             if count:
                 words.append(f"{count} {'frame' if count == 1 else 'frames'} {state.value.lower()}")
         if self.overlap:
-            worst, value = min(self.overlap.items(), key=lambda item: item[1])
-            words.append(f"{worst} fits worst (overlap {value:.2f})")
+            worst, least = fits_worst(self.overlap), min(self.overlap.values())
+            fits = f"{worst} fits worst" if worst else "all cameras fit alike"
+            words.append(f"{fits} (overlap {least:.2f})")
         limb = self.verdict.get("worst_limb")
         if limb:
             words.append(f"{limb} was lost in {self.verdict.get('worst_limb_lost')} frames")
         else:
             words.append("no limb was lost" if self.verdict else "")
         if math.isfinite(self.sd_mm):
-            words.append(f"the reported standard deviation of a joint is {self.sd_mm:.0f} mm")
+            words.append(f"the standard deviation of a joint is {self.sd_mm:.0f} mm (median)")
         return ", ".join(word for word in words if word) + "."
 
 

@@ -1,6 +1,7 @@
 """The verdict of made-up runs."""
 
 import json
+import math
 import re
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 from markerless_tracker.body import Subject, load_body, load_description
 from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.results.verdict.record import RunRecord
-from markerless_tracker.results.verdict.verdict import Verdict, verdict_of
+from markerless_tracker.results.verdict.verdict import Verdict, fits_worst, verdict_of
 
 TRACKING, LOST, SEARCHING = TrackState.TRACKING, TrackState.LOST, TrackState.SEARCHING
 
@@ -43,7 +44,8 @@ def test_a_good_run_has_no_doubt(judge: Judge, result: Any) -> None:
     assert found.worst_limb == "" and found.frames_with_warnings == 0
     lines = found.lines()
     assert lines[0].startswith("overlap of body and silhouettes: cam01 0.90, cam02 0.90")
-    assert lines[1] == "stature 1.72 m" and lines[-1].startswith("next: ") and len(lines) == 3
+    assert lines[1] == "stature of the body 1.72 m"
+    assert lines[-1].startswith("next: `track") and len(lines) == 3
     assert json.loads(json.dumps(found.as_mapping()))["stature_m"] == 1.72
 
 
@@ -229,3 +231,17 @@ def test_memory_does_not_grow_with_the_frames(judge: Judge, result: Any, scene: 
     finally:
         tracemalloc.stop()
     assert len(record.samples) <= 3
+
+
+@pytest.mark.parametrize(
+    ("overlap", "name"),
+    [
+        ({"cam01": 0.95, "cam02": 0.94, "cam03": 0.95}, ""),
+        ({"cam01": 0.95, "cam02": 0.91, "cam03": 0.94}, "cam02"),
+        ({"cam01": 0.95, "cam02": math.nan}, "cam01"),
+        ({"cam01": math.nan}, ""),
+        ({}, ""),
+    ],
+)
+def test_a_camera_fits_worst_where_it_clearly_does(overlap: dict[str, float], name: str) -> None:
+    assert fits_worst(overlap) == name

@@ -71,6 +71,8 @@ def test_everything_is_in_the_page(make_result, walk: Path) -> None:
     for name in ("LKnee", "balan31", "numpy, version", "refine.truncation_m", "overlap, cam02"):
         assert name in reader.texts
     assert str(walk) in reader.texts, "the source"
+    assert "arm flexion" in words and "arm_flex" not in words and "arm flex " not in words
+    assert "nobody walks for a complete stride" in words
 
 
 def test_several_results_stand_beside_each_other(make_result, walk: Path) -> None:
