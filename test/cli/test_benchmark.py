@@ -191,7 +191,7 @@ def test_the_table_of_speed(capsys) -> None:
 @pytest.mark.parametrize(
     ("words", "said", "status"),
     [
-        ([], "required: KIND", 2),
+        ([], "required: {tables,speed", 2),
         (["tables"], "required: SOURCE", 2),
         (["tables", "x", "--seeds", "0"], "expected a whole number from 1", 2),
         (["tables", "x", "--fps", "60,,20"], "expected values with commas", 2),
