@@ -22,7 +22,7 @@ from markerless_tracker.tracking.evidence.prepared import Lookahead, Outlook, Pr
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
-from markerless_tracker.tracking.limbs.watch import Recovered
+from markerless_tracker.tracking.limbs.watch import MENDED_M, Recovered
 from markerless_tracker.tracking.limits import check_pose, joint_speeds
 from markerless_tracker.tracking.motion import MotionModel
 from markerless_tracker.tracking.partitions.effort import Effort
@@ -276,10 +276,8 @@ class Tracker:
         return Seen(stamp_ns, observed, believed, imaged, notes, left_out)
 
     def _outlook(self, number: int) -> Outlook:
-        return Outlook(
-            number, self.body, copy.copy(self._motion), self._body.limits,
-            searching=self._starter is not None,
-        )  # fmt: skip
+        searching, motion = self._starter is not None, copy.copy(self._motion)
+        return Outlook(number, self.body, motion, self._body.limits, searching=searching)
 
     def _search_room(self, starter: Starter, seen: Seen) -> Found | None:
         """Search the whole views for a person; None if there is none."""
@@ -312,9 +310,8 @@ class Tracker:
                 return None
             predicted = start
             self._searcher = self._searcher_for(self.body)
-        limits = self._motion.reachable(
-            stamp_ns, self._searcher.limits, joint_speeds(self._searcher.body, self._motion.pose)
-        )
+        speeds = joint_speeds(self._searcher.body, self._motion.pose)
+        limits = self._motion.reachable(stamp_ns, self._searcher.limits, speeds)
         search = self._searcher.frame(
             believed, stamp_ns, predicted, limits=limits, reach_m=self._searcher.tracked_reach_m
         )
@@ -330,7 +327,10 @@ class Tracker:
         # What is found elsewhere jumps; the rest of the body does not.
         search.pose = np.clip(recovered.pose, *limits)
         search.pose[jumped] = recovered.pose[jumped]
-        return Found(search, stamp_ns, believed, notes, turned=recovered.turned, jumped=jumped)
+        return Found(
+            search, stamp_ns, believed, notes,
+            turned=recovered.turned, jumped=jumped, mended=recovered.moved_m > MENDED_M,
+        )  # fmt: skip
 
     def _learn(self, found: Found) -> None:
         """Take a frame into the motion and, while the body is tracked, into its fit."""
@@ -338,7 +338,7 @@ class Tracker:
         self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
         if not tracked or found.anew:
             return
-        moved = self._body.turned() if found.turned else self._body.fit_tracked_frame(found.search)
+        moved = self._body.fit_tracked_frame(found.search, turned=found.turned, mended=found.mended)
         if moved is not None:
             self._searcher = self._searcher_for(self.body)
             self._motion.shift(moved, self._body.limits)

@@ -106,11 +106,11 @@ def test_the_prior_sd_of_poses() -> None:
 # --- cones --------------------------------------------------------------------------------------
 
 
-def test_twenty_cones_with_hands_and_feet() -> None:
+def test_22_cones_with_hands_and_feet() -> None:
     middle = {"pelvis", "belly", "chest", "neck", "face", "crown"}
-    limbs = {"upper_arm", "forearm", "hand", "thigh", "calf", "shin", "foot"}
+    limbs = {"deltoid", "upper_arm", "forearm", "hand", "thigh", "calf", "shin", "foot"}
     assert set(NAMES) == middle | {f"{side}_{limb}" for side in "lr" for limb in limbs}
-    assert len(NAMES) == 20
+    assert len(NAMES) == 22
     assert (BODY.cone_shape[:, :, :2] > 0.01).all() and (BODY.cone_shape[:, :, :2] < 0.2).all()
 
 

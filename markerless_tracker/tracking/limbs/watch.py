@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.body import BodyModel, cone_transforms
+from markerless_tracker.body import BodyModel, cone_transforms, markers
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.body.parts import cones_of
 from markerless_tracker.camera import CameraRig
@@ -39,6 +39,8 @@ ROTATION_NS = 100_000_000
 """One limb that is not lost is searched elsewhere this often: every sixth frame at 60 frames/s."""
 WAIT_NS = 16_000_000
 """Time before a limb near unexplained silhouette is searched again, after a search without gain."""
+MENDED_M = 0.10
+"""A limb that is found so far from where it was was in a wrong place."""
 _DOUBLINGS = 4
 """That time doubles with each search without gain, so often."""
 _GROWN = 2.0
@@ -55,11 +57,13 @@ class Recovered:
         pose: (p,) the estimate.
         names: of the limbs that were taken from elsewhere; `legs` are exchanged.
         turned: whether the person faces the other way; nothing of the body is where it was.
+        moved_m: how far the limbs' joints were from where they were found, at most.
     """
 
     pose: FloatArray
     names: tuple[str, ...] = ()
     turned: bool = False
+    moved_m: float = 0.0
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -211,7 +215,8 @@ class LimbWatch:
                 self._waits.pop(name, None)
             else:
                 self._search_failed(name, stamp_ns, unexplained.areas_m2.get(name, 0.0))
-        return Recovered(search.pose, tuple(found))
+        moved_m = np.linalg.norm(markers(body, search.pose) - markers(body, pose), axis=1).max()
+        return Recovered(search.pose, tuple(found), moved_m=float(moved_m))
 
     def _search_failed(self, name: str, stamp_ns: int, area_m2: float) -> None:
         failures = 1

@@ -29,6 +29,10 @@ PIECES = 2
 than others. A piece is one step's sums over one of the frames that are fitted to."""
 
 SearcherFor = Callable[[BodyModel], Searcher]
+MENDED_FRAMES = 30
+"""Frames after a fit of the lengths in which a limb that is found elsewhere makes it doubtful."""
+MOST_MENDED = 6
+"""Fits of the lengths that begin anew for that reason."""
 
 
 class BodyEstimate:
@@ -36,7 +40,8 @@ class BodyEstimate:
 
     Sections are fitted in one frame with the pose held, lengths over several tracked frames. With a
     start given, sections are revised whenever a tracked pose shows something new. Only frames
-    whose silhouettes agree with the body are used: f_s of at least `LEAST_FIT`.
+    whose silhouettes agree with the body are used: f_s of at least `LEAST_FIT`. Lengths that were
+    fitted to a limb in a wrong place are wrong: they are fitted anew once the limb was found.
 
     Args:
         body: with generic sections, and lengths that were measured or follow from a stature.
@@ -84,6 +89,7 @@ class BodyEstimate:
         self._revision: Generator[None, None, BodyModel] | None = None
         self._reported = False
         self._lengths: BodyFitting | None = None
+        self._since_fit = self._mended = 0
         if self._person is not None and self._fits_sections and self._config.fit_lengths:
             self._lengths = self._new_fitting(self._person)
 
@@ -137,12 +143,24 @@ class BodyEstimate:
         if settled:
             self.sections_fitted, self.sized = True, None
 
-    def fit_tracked_frame(self, search: FrameSearch) -> FloatArray | None:
+    def fit_tracked_frame(
+        self, search: FrameSearch, *, turned: bool = False, mended: bool = False
+    ) -> FloatArray | None:
         """Use a tracked frame for what remains to be fitted, if it agrees with the body.
+
+        Args:
+            search: the frame's.
+            turned: whether the body was turned round.
+            mended: whether a limb was found elsewhere: it was in a wrong place before.
 
         Returns:
             If `body` has changed: how far (p,) its poses lie from those tracked so far.
         """
+        if turned:
+            return self.turned()
+        self._since_fit += 1
+        if mended:
+            self._fit_lengths_anew()
         if self._revision is not None:
             return self._go_on(self._revision)
         if not _agrees(search):
@@ -158,7 +176,7 @@ class BodyEstimate:
         fitted = self._lengths.add(self.body, search.contours, search.pose)
         if fitted is None:
             return None
-        self._lengths = None
+        self._lengths, self._since_fit = None, 0
         self.body = fitted.body
         return fitted.moved
 
@@ -175,6 +193,15 @@ class BodyEstimate:
         if self._config.fit_lengths:
             self._lengths = self._new_fitting(self._person)
         return np.zeros(self.body.size)
+
+    def _fit_lengths_anew(self) -> None:
+        """Drop the frames that lengths are being fitted to, or were shortly before."""
+        if self._person is None or not (self._fits_sections and self._config.fit_lengths):
+            return
+        recent = self._lengths is not None or self._since_fit <= MENDED_FRAMES
+        if recent and self._mended < MOST_MENDED:
+            self._mended += 1
+            self._lengths = self._new_fitting(self._person)
 
     def _new_fitting(self, person: Unmeasured) -> BodyFitting:
         return BodyFitting(person, self.limits, floor_precision(self._config))

@@ -28,7 +28,7 @@ def slow_hits(scene, pose, regions) -> int:
     """Points of the left arm's cones that lie in regions."""
     placed, hits = cone_transforms(scene.body, pose), 0
     for cone, name in enumerate(scene.body.cone_names):
-        if name not in ("l_upper_arm", "l_forearm", "l_hand"):
+        if name not in ("l_deltoid", "l_upper_arm", "l_forearm", "l_hand"):
             continue
         steps = ALONG[:, None] * scene.body.cone_length[cone]
         points = placed[cone, :, 3] + steps * placed[cone, :, 2]
