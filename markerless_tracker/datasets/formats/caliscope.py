@@ -1,6 +1,7 @@
 """Caliscope: `recordings/TRIAL/cam_0.mp4`, ... and the workspace's `camera_array.toml`."""
 
 import csv
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets.folder import VideoRecording
-from markerless_tracker.datasets.formats.numbers import array_of
+from markerless_tracker.datasets.formats.numbers import array_of, count_of
 from markerless_tracker.datasets.video.images import find_stream
 from markerless_tracker.errors import CalibrationError, DatasetError
 from markerless_tracker.geometry import rotation_from_rodrigues, transform
@@ -93,10 +94,9 @@ def read_cameras(path: Path) -> tuple[list[CameraModel], list[str]]:
                 f"{where}: fisheye lenses are not supported, expected fisheye = false"
             )
         size = array_of(where, table, "size", (2,))
-        flat = np.size(table["rotation"]) == 3
+        flat = count_of(table, "rotation") == 3
         rotation = array_of(where, table, "rotation", (3,) if flat else (3, 3))
-        count = int(np.size(table.get("distortions", [])))
-        distortion = array_of(where, table, "distortions", (count or 5,))
+        distortion = array_of(where, table, "distortions", (count_of(table, "distortions") or 5,))
         try:
             cameras.append(
                 CameraModel(
@@ -126,7 +126,10 @@ def _check_times(path: Path, names: tuple[str, ...]) -> None:
     try:
         with path.open(encoding="utf-8", newline="") as file:
             for row in csv.DictReader(file):
-                times.setdefault(f"cam_{int(row['cam_id'])}", []).append(float(row["frame_time"]))
+                time_s = float(row["frame_time"])
+                if not math.isfinite(time_s):
+                    raise ValueError(f"frame_time is {row['frame_time']!r}")
+                times.setdefault(f"cam_{int(row['cam_id'])}", []).append(time_s)
     except (OSError, UnicodeDecodeError, KeyError, TypeError, ValueError, csv.Error) as error:
         raise DatasetError(
             f"{path}: cannot be read ({type(error).__name__}: {error}), expected columns cam_id "

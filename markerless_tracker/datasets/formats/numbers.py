@@ -76,6 +76,14 @@ def array_of(where: str, table: Mapping[str, Any], field: str, shape: Sequence[i
     return values
 
 
+def count_of(table: Mapping[str, Any], field: str) -> int:
+    """How many numbers a field has, in any nesting; 0 where it is missing or uneven."""
+    try:
+        return int(np.size(table.get(field, [])))
+    except ValueError:
+        return 0
+
+
 def image_sizes(sources: Mapping[str, Path]) -> dict[str, tuple[int, int]]:
     """Camera -> (width, height) of the images of its video or folder.
 

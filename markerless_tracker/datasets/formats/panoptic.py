@@ -153,6 +153,8 @@ def _bodies(file: Path) -> list[tuple[Any, FloatArray]]:
         try:
             values = np.array(body["joints19"], dtype=np.float64).reshape(len(JOINTS), 4)
             joints = np.where(values[:, 3:] > LEAST_CONFIDENCE, values[:, :3], np.nan)
+            if not isinstance(body["id"], int | str):
+                raise TypeError
             found.append((body["id"], joints))
         except (KeyError, TypeError, ValueError) as error:
             raise DatasetError(

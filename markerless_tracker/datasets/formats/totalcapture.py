@@ -1,5 +1,6 @@
 """TotalCapture: a take with `TC_S1_NAME_cam1.mp4`, `calibration.cal` above it, Vicon joints."""
 
+import math
 import re
 from pathlib import Path
 
@@ -126,6 +127,11 @@ def read_cameras(path: Path) -> list[CameraModel]:
         raise CalibrationError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise CalibrationError(f"{path}: {error}, expected numbers only") from error
+    infinite = [number for number, value in enumerate(values, start=1) if not math.isfinite(value)]
+    if infinite:
+        raise CalibrationError(
+            f"{path}: number {infinite[0]} is {values[infinite[0] - 1]}, expected finite numbers"
+        )
     count, order = (int(value) for value in (*values[:2], 0, 0)[:2])
     each = 4 + 4 + order + 9 + 3
     if count < 1 or order not in (0, 1, 2) or len(values) != 2 + count * each:

@@ -114,6 +114,10 @@ def test_panoptic_joints_that_are_malformed(sequence: Path) -> None:
     recording = open_recording(sequence)
     with pytest.raises(DatasetError, match="00000000.json: bodies 0: expected id and joints19"):
         recording.ground_truth()
+    changed(path, '"joints19": [1, ', '"joints19": [')
+    changed(path, '"id": 0', '"id": []')
+    with pytest.raises(DatasetError, match="00000000.json: bodies 0: expected id and joints19"):
+        recording.ground_truth()
     changed(path, '"bodies": [', '"bodies": 0, "x": [')
     with pytest.raises(DatasetError, match="bodies is int, expected a list"):
         recording.ground_truth()

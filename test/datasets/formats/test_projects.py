@@ -163,6 +163,9 @@ def test_caliscope_times_say_whether_cameras_are_in_step(caliscope: Path) -> Non
     write(["0,soon"])
     with pytest.raises(DatasetError, match="expected columns cam_id and frame_time"):
         open_recording(caliscope)
+    write([*close[:4], "1,nan", "0,9.066"])
+    with pytest.raises(DatasetError, match="timestamps.csv: .*frame_time is 'nan'"):
+        open_recording(caliscope)
 
 
 @pytest.mark.parametrize(
@@ -172,6 +175,8 @@ def test_caliscope_times_say_whether_cameras_are_in_step(caliscope: Path) -> Non
         ("size = [32, 24]", "size = [32]", "cam_0: size is .*expected 2 finite"),
         ("fisheye = false", "fisheye = true", "cam_0: fisheye lenses are not supported"),
         ("distortions = [", "distortions = [0.1, ", "cam_0: 6 distortion coefficients"),
+        ("distortions = [", "distortions = [[], ", "cam_0: distortions is .*expected 5 finite"),
+        ("rotation = [", "rotation = [[], ", "cam_0: rotation is .*expected 3 x 3 finite"),
         ("rotation =", "turned =", "no camera with rotation and translation"),
         ("[cameras.", "[views.", r"no tables \[cameras.0\]"),
         ("[cameras.0]", "[cameras.0", "cannot be read"),

@@ -83,6 +83,14 @@ def test_totalcapture_files_that_are_malformed(take: Path, write_video) -> None:
     with pytest.raises(CalibrationError, match="2 cameras, but there is a video of camera 3"):
         open_recording(take)
     calibration = take.parents[2] / "calibration.cal"
+    text = calibration.read_text(encoding="ascii")
+    for number in (1, 3, 8):
+        words = text.split()
+        words[number - 1] = "nan"
+        calibration.write_text(" ".join(words), encoding="ascii")
+        with pytest.raises(CalibrationError, match=f"calibration.cal: number {number} is nan"):
+            open_recording(take)
+    calibration.write_text(text, encoding="ascii")
     changed(calibration, "2 1\n", "3 1\n")
     with pytest.raises(CalibrationError, match="44 numbers, of which the first say 3 cameras"):
         open_recording(take)
