@@ -170,9 +170,23 @@ def _of_node(path: Path, name: str, node: Any) -> Any:
             return node.real()
         if node.isSeq():
             return np.array([node.at(index).real() for index in range(node.size())])
+        _check_size(path, name, node)
         return node.mat()
     except (cv2.error, SystemError) as error:
         raise CalibrationError(f"{path}: {name} cannot be read by OpenCV") from error
+
+
+def _check_size(path: Path, name: str, node: Any) -> None:
+    """Make sure that a matrix has the numbers that it states: other sizes crash OpenCV."""
+    sides = [node.getNode(side) for side in ("rows", "cols")]
+    rows, columns = (int(side.real()) if side.isInt() else 0 for side in sides)
+    data = node.getNode("data")
+    count = data.size() if data.isSeq() else rows * columns
+    if rows < 1 or columns < 1 or rows * columns != count:
+        raise CalibrationError(
+            f"{path}: {name}: rows and cols are {rows} and {columns}, data has {count} values, "
+            "expected rows x cols numbers"
+        )
 
 
 def _text(path: Path) -> str:

@@ -150,8 +150,16 @@ def test_malformed_fields_are_named(folder: Path, make_rig, change: dict, messag
     [
         ("[1, 2]", "expected a mapping, got list"),
         ("a: [", "not a YAML file"),
-        ("%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n", "camera_matrix cannot be"),
+        (
+            "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n",
+            "camera_matrix: rows and cols are 3 and 0",
+        ),
         ("%YAML:1.0\n---\nx: [", "cannot be read by OpenCV"),
+        (
+            "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 1\n   cols: -7\n   dt: d\n"
+            "   data: [ 1., 2., 3. ]\n",
+            "camera_matrix: rows and cols are 1 and -7, data has 3 values",
+        ),
         ("camera_matrix: {rows: 3, cols: 3, data: [1, 2]}", "camera_matrix: data is .*3x3 numbers"),
     ],
 )
