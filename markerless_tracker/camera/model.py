@@ -11,6 +11,9 @@ from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import FloatArray, inverse
 from markerless_tracker.records import locked
 
+_ZERO = 1e-6
+"""Largest deviation of the entries of K that are 0 or 1."""
+
 
 @dataclass(frozen=True, eq=False)
 class CameraModel:
@@ -54,6 +57,12 @@ class CameraModel:
         if self.matrix[0, 0] <= 0 or self.matrix[1, 1] <= 0:
             raise CalibrationError(
                 f"{self.name}: focal lengths must be positive, K is {self.matrix.tolist()}"
+            )
+        below = np.abs(self.matrix - np.eye(3))[[1, 2, 2, 2], [0, 0, 1, 2]]
+        if below.max() > _ZERO:
+            raise CalibrationError(
+                f"{self.name}: K is {self.matrix.tolist()}, expected rows fx s cx, 0 fy cy, 0 0 1 "
+                "(transposed?)"
             )
         rotation = self.T_cam_world[:3, :3]
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0:
