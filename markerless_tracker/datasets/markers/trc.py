@@ -76,9 +76,12 @@ class TrcRows:
         stamps: list[int] = []
         values: list[list[float]] = []
         last: int | None = None
+        done = 0
         for number, line in enumerate(self._lines(), start=6):
             if not line.strip():
                 continue
+            if not line.endswith("\n"):
+                self._check_end(number, line, rows_before=done + len(stamps))
             stamp, row = _row(self._path, number, line, len(self.names))
             if last is not None and stamp <= last:
                 raise DatasetError(
@@ -90,9 +93,20 @@ class TrcRows:
             values.append(row)
             if len(stamps) == rows:
                 yield self._arrays(stamps, values)
+                done += len(stamps)
                 stamps, values = [], []
         if stamps:
             yield self._arrays(stamps, values)
+
+    def _check_end(self, number: int, line: str, rows_before: int) -> None:
+        """Make sure that a last line without line break is whole: else its last number is not."""
+        columns, expected = line.count("\t") + 1, 2 + 3 * len(self.names)
+        stated = self._rows is not None and rows_before + 1 < self._rows
+        if columns < expected and ((columns - 2) % 3 or stated):
+            raise DatasetError(
+                f"{self._path}: line {number}: ends after {columns} of {expected} columns, the "
+                "file is cut"
+            )
 
     def _arrays(
         self, stamps: list[int], values: list[list[float]]
@@ -121,6 +135,8 @@ class TrcRows:
         self.names = _names(path, lines[3])
         header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
         self._factor = METRES[_units(path, header)]
+        stated = header.get("NumFrames", "").strip()
+        self._rows = int(stated) if stated.isdecimal() else None
         try:
             self.fps = float(header.get("DataRate", "nan"))
         except ValueError:

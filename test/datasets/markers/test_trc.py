@@ -72,6 +72,8 @@ def test_a_blank_row_is_kept(tmp_path: Path, row: str) -> None:
         (HEADER + "1\t1e99\t1\t2\t3\t4\t5\t6\n", "line 6.*Time"),
         (HEADER + "1\t1\t\n2\t0.5\t\n", "line 7.*is not later than"),
         (HEADER + "1\t1\t\n2\t1\t\n", "line 7.*is not later than"),
+        (HEADER + "1\t1\t1\t2\t3\t4\t0.5", "line 6: ends after 7 of 8 columns, the file is cut"),
+        (HEADER + "1\t1\t1\t2\t3.", "line 6: ends after 5 of 8 columns, the file is cut"),
     ],
 )
 def test_malformed_files_are_refused_by_line(tmp_path: Path, text: str, reported: str) -> None:
