@@ -2,14 +2,13 @@
 
 import re
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.cal_file import read_cal
 from markerless_tracker.datasets.background import MAX_FRAMES
 from markerless_tracker.datasets.folder import VideoRecording
+from markerless_tracker.datasets.formats.humaneva_background import mixture_of, read_statistics
 from markerless_tracker.datasets.formats.humaneva_mocap import Sync, read_mocap, read_sync
 from markerless_tracker.datasets.formats.numbers import image_sizes
 from markerless_tracker.datasets.markers.track import MarkerTrack
@@ -19,7 +18,12 @@ from markerless_tracker.datasets.video.images import (
     open_stream,
 )
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.imaging import Image, scale_image
+from markerless_tracker.imaging import (
+    BackgroundModel,
+    Image,
+    scale_background_model,
+    scale_image,
+)
 
 FPS = 60.0
 CALIBRATION = "Calibration_Data"
@@ -87,20 +91,45 @@ class HumanEvaRecording(VideoRecording):
         found = {}
         for camera in self.rig:
             clips = _clips(self.path / _BACKGROUND, camera.name)
-            statistics = self.path / _BACKGROUND / f"{_BACKGROUND}_({camera.name}).mat"
+            statistics = self._statistics(camera.name)
             images = [image for clip in clips for image in _evenly(clip, MAX_FRAMES // len(clips))]
             if not clips and statistics.is_file():
-                images = _means(statistics)
+                images = [statistic.image for statistic in read_statistics(statistics)]
             for image in images:
-                came, stored = (image.shape[1], image.shape[0]), self._stored_sizes_px[camera.name]
-                if came != stored:
-                    raise DatasetError(
-                        f"{self.path / _BACKGROUND}: {camera.name}: images of {came[0]}x{came[1]} "
-                        f"px, expected {stored[0]}x{stored[1]} px"
-                    )
+                self._check_size(camera.name, (image.shape[1], image.shape[0]))
             if images:
                 found[camera.name] = [scale_image(image, camera.size_px) for image in images]
         return found
+
+    def background_models(self, folder: Path | None = None) -> dict[str, BackgroundModel]:
+        """Camera -> the Gaussians of its `.mat`, where it has variances and there are no clips.
+
+        Raises:
+            DatasetError: a file cannot be read, or is of another size.
+        """
+        if folder is not None:
+            return super().background_models(folder)
+        found = {}
+        for camera in self.rig:
+            statistics = self._statistics(camera.name)
+            if _clips(self.path / _BACKGROUND, camera.name) or not statistics.is_file():
+                continue
+            model = mixture_of(read_statistics(statistics))
+            if model is not None:
+                self._check_size(camera.name, model.size_px)
+                found[camera.name] = scale_background_model(model, camera.size_px)
+        return found
+
+    def _statistics(self, camera: str) -> Path:
+        return self.path / _BACKGROUND / f"{_BACKGROUND}_({camera}).mat"
+
+    def _check_size(self, camera: str, came: tuple[int, int]) -> None:
+        stored = self._stored_sizes_px[camera]
+        if came != stored:
+            raise DatasetError(
+                f"{self.path / _BACKGROUND}: {camera}: images of {came[0]}x{came[1]} px, expected "
+                f"{stored[0]}x{stored[1]} px"
+            )
 
     def _sync(self) -> Sync:
         found = {
@@ -180,30 +209,4 @@ def _evenly(clip: Path, most: int) -> list[Image]:
         for _ in range(every - 1):
             stream.skip()
     stream.close()
-    return images
-
-
-def _means(path: Path) -> list[Image]:
-    """The means (RGB in [0, 1]) of a file of background statistics, as BGR images."""
-    # Few recordings need it, and it takes a moment to import.
-    from scipy.io import loadmat
-
-    try:
-        content: dict[str, Any] = loadmat(str(path))
-    except Exception as error:  # damaged bytes raise any exception
-        raise DatasetError(f"{path}: cannot be read as a MATLAB file: {error}") from error
-    if "bg_means" not in content:
-        raise DatasetError(f"{path}: no bg_means, expected cells of the means of the pixels")
-    images = []
-    for number, mean in enumerate(np.asarray(content["bg_means"], dtype=object).ravel()):
-        try:
-            values = np.asarray(mean, dtype=np.float64)
-        except (TypeError, ValueError):
-            values = np.empty(0)
-        if values.ndim != 3 or values.shape[2] != 3 or not np.isfinite(values).all():
-            raise DatasetError(
-                f"{path}: bg_means {number + 1} has shape {values.shape}, expected (h, w, 3)"
-            )
-        levels = np.rint(255.0 * np.clip(values[..., ::-1], 0.0, 1.0))
-        images.append(np.ascontiguousarray(levels.astype(np.uint8)))
     return images

@@ -142,6 +142,41 @@ def test_the_empty_scene_from_clips_or_statistics(subject: Path, write_images) -
         open_recording(subject).background_frames()
 
 
+def test_statistics_are_a_mixture_with_their_variances(subject: Path, write_images) -> None:
+    def cells(values: list[np.ndarray]) -> np.ndarray:
+        found = np.empty((1, len(values)), dtype=object)
+        found[0] = values
+        return found
+
+    file = subject / "Background" / "Background_(C2).mat"
+    means = [picture(9, number)[..., ::-1] / 255.0 for number in range(2)]
+    spread = np.random.default_rng(3).uniform(1e-4, 1e-2, means[0].shape)
+    spread[0, 0] = 0.0
+    savemat(file, {"bg_means": cells(means), "bg_vars": cells([spread, 2.0 * spread])})
+    models = open_recording(subject).background_models()
+    assert list(models) == ["C2"]
+    model = models["C2"]
+    np.testing.assert_array_equal(model.image, picture(9, 0))
+    expected = np.where(spread > 0.0, spread, 1e-3)[..., ::-1] * 255.0**2
+    np.testing.assert_allclose(model.variance, expected, rtol=1e-5)
+    (mode,) = model.modes
+    assert (mode.weight == 0.5).all()
+    np.testing.assert_allclose(mode.mean, picture(9, 1), atol=1e-3)
+    np.testing.assert_allclose(mode.variance[1:], 2.0 * expected[1:], rtol=1e-5)
+    assert open_recording(subject, scale=0.5).background_models()["C2"].size_px == (16, 12)
+    for variances, message in (
+        ([spread], "bg_vars has 1 cells, expected 2"),
+        ([spread, -spread], "bg_vars 2 has negative values"),
+        ([spread, spread * np.nan], "bg_vars 2 has shape .*finite"),
+    ):
+        savemat(file, {"bg_means": cells(means), "bg_vars": cells(variances)})
+        with pytest.raises(DatasetError, match=rf"Background_\(C2\).mat: {message}"):
+            open_recording(subject).background_models()
+    # Clips go before statistics.
+    write_images(subject / "Background" / "Background_1_(C2)", 7, frames=1)
+    assert open_recording(subject).background_models() == {}
+
+
 def test_malformed_files_are_named(subject: Path) -> None:
     sync = subject / "Sync_Data" / "Combo_1_(C2).ofs"
     for text, message in (
