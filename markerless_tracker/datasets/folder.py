@@ -14,6 +14,7 @@ from markerless_tracker.datasets.video.images import (
     open_stream,
     read_image,
 )
+from markerless_tracker.datasets.video.numbering import check_numbers
 from markerless_tracker.datasets.video.rates import stamp_of
 from markerless_tracker.errors import ConfigError, DatasetError, ImageError
 from markerless_tracker.imaging import Image, scale_image
@@ -34,7 +35,7 @@ class VideoRecording(Recording):
         input_fps: rate of numbered images (overrides that of videos), 1/s.
 
     Raises:
-        DatasetError: a source cannot be read, rates differ or are unknown.
+        DatasetError: a source cannot be read or lacks an image, rates differ or are unknown.
         ImageError: a source's images do not have their calibration's size.
         ConfigError: the scale or rate is impossible.
     """
@@ -76,6 +77,9 @@ class VideoRecording(Recording):
             fps=_common_rate(path, rates),
             frame_count=self._most_frames if len(stated) == len(counts) else None,
         )
+        folders = {name: source for name, source in sources.items() if source.is_dir()}
+        for warning in check_numbers(folders):
+            self.warn(warning)
         if len(set(stated)) > 1:
             self.warn(
                 f"{self.name}: cameras differ in length ("

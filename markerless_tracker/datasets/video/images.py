@@ -125,11 +125,17 @@ def numbered_files(folder: Path) -> list[Path]:
     """The image files of a folder, by number where names end in one, by name otherwise."""
 
     def order(path: Path) -> tuple[int, str]:
-        digits = path.stem[len(path.stem.rstrip("0123456789")) :]
-        return int(digits) if digits else -1, path.name
+        number = image_number(path)
+        return -1 if number is None else number, path.name
 
     files = (file for file in folder.iterdir() if file.suffix.lower() in IMAGE_SUFFIXES)
     return sorted(files, key=order)
+
+
+def image_number(path: Path) -> int | None:
+    """The number at the end of an image's name, None without one."""
+    digits = path.stem[len(path.stem.rstrip("0123456789")) :]
+    return int(digits) if digits else None
 
 
 def read_image(path: Path) -> Image:

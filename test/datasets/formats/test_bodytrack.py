@@ -63,6 +63,18 @@ def test_start_pose_and_shape(sequence: Path) -> None:
         recording.body_shape()
 
 
+def test_a_lost_image_is_named(sequence: Path) -> None:
+    (sequence / "CAM2" / "image0001.bmp").unlink()
+    with pytest.raises(DatasetError, match="CAM2: no image 1, but CAM1 has one"):
+        open_recording(sequence)
+    (sequence / "CAM1" / "image0000.bmp").unlink()
+    (sequence / "CAM2" / "image0000.bmp").rename(sequence / "CAM2" / "image0001.bmp")
+    (sequence / "CAM1" / "image0002.bmp").rename(sequence / "CAM1" / "image0003.bmp")
+    (sequence / "CAM1" / "image0001.bmp").rename(sequence / "CAM1" / "image0002.bmp")
+    warnings = open_recording(sequence, input_fps=60.0).warnings
+    assert len(warnings) == 1 and "different image numbers (CAM1 2, CAM2 1)" in warnings[0]
+
+
 def test_what_is_missing_is_named(sequence: Path) -> None:
     (sequence / "CALIB" / "Camera2.cal").unlink()
     with pytest.raises(CalibrationError, match="Camera2.cal: cannot be read"):
