@@ -44,6 +44,12 @@ class CaliscopeRecording(VideoRecording):
         if file is None:
             raise CalibrationError(f"{path}: no {CAMERAS} here or in {_VOLUME} of the workspace")
         cameras, without = read_cameras(file)
+        known = {*without, *(camera.name for camera in cameras)}
+        unknown = [name for name in _videos(path) if name not in known]
+        if unknown:
+            raise CalibrationError(
+                f"{file}: no table of {', '.join(unknown)}, expected one for each video"
+            )
         found = {camera.name: find_stream(path, camera.name) for camera in cameras}
         sources = {name: source for name, source in found.items() if source is not None}
         if not sources:
@@ -52,6 +58,9 @@ class CaliscopeRecording(VideoRecording):
         super().__init__(path, sources, rig, scale=scale, input_fps=input_fps)
         if without:
             self.warn(f"{file}: {', '.join(without)} left out: no pose, or marked `ignore`")
+        missing = [name for name in found if name not in sources]
+        if missing:
+            self.warn(f"{path}: {', '.join(missing)} left out: calibrated, but no video")
         _check_times(path / TIMES, rig.names)
 
 
@@ -59,7 +68,14 @@ def is_caliscope(path: Path) -> bool:
     """Whether a folder has videos cam_0, ... and a calibration of Caliscope."""
     if not path.is_dir() or calibration_file(path) is None:
         return False
-    return any(_VIDEO.fullmatch(entry.stem) for entry in path.iterdir())
+    return bool(_videos(path))
+
+
+def _videos(path: Path) -> list[str]:
+    """Names of the cameras that have videos."""
+    entries = sorted(path.iterdir()) if path.is_dir() else []
+    found = (entry.stem for entry in entries if _VIDEO.fullmatch(entry.stem))
+    return list(dict.fromkeys(found))
 
 
 def calibration_file(path: Path) -> Path | None:

@@ -1,5 +1,6 @@
 """MPI-INF-3DHP: a sequence with `camera.calibration`, `imageSequence/` and `annot.mat`."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from markerless_tracker.geometry import FloatArray, apply, inverse, transform
 
 CALIBRATION, IMAGES, ANNOTATIONS = "camera.calibration", "imageSequence", "annot.mat"
 UP, UNITS = "y", "mm"
+_VIDEO = re.compile(r"video_\d+")
 JOINTS = (
     "spine3", "spine4", "spine2", "spine", "Pelvis", "Neck", "head", "Head", "left_clavicle",
     "LShoulder", "LElbow", "LWrist", "left_hand", "right_clavicle", "RShoulder", "RElbow", "RWrist",
@@ -48,6 +50,13 @@ class MpiInf3dhpRecording(VideoRecording):
         cameras = read_cameras(path / CALIBRATION)
         found = {name: find_stream(path / IMAGES, name) for name in cameras}
         sources = {name: source for name, source in found.items() if source is not None}
+        images = path / IMAGES
+        videos = {entry.stem for entry in images.iterdir()} if images.is_dir() else set()
+        unknown = sorted(name for name in videos if _VIDEO.fullmatch(name) and name not in cameras)
+        if unknown:
+            raise CalibrationError(
+                f"{path / CALIBRATION}: no camera {', '.join(unknown)}, expected one for each video"
+            )
         if not sources:
             raise DatasetError(f"{path / IMAGES}: no video_0.avi, video_1.avi, ..., expected them")
         self._stored = CameraRig(tuple(cameras[name] for name in sources))

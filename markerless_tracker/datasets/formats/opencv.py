@@ -1,5 +1,6 @@
 """Videos or image folders with calibrations by OpenCV, ROS or EasyMocap beside them."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from markerless_tracker.camera import CameraRig
@@ -11,12 +12,14 @@ from markerless_tracker.camera.yaml_files import (
 )
 from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.formats.numbers import image_sizes
+from markerless_tracker.datasets.recording import BACKGROUND
 from markerless_tracker.datasets.video.images import VIDEO_SUFFIXES, find_stream, numbered_files
 from markerless_tracker.errors import DatasetError
 
 SUFFIXES = (".yaml", ".yml", ".xml", ".json")
 INTRINSICS, POSES = "intri.yml", "extri.yml"
 _FOLDERS = (".", "videos", "images")
+_NO_CAMERAS = ("videos", "images", "calibration", BACKGROUND, "masks")
 
 
 class OpenCVRecording(VideoRecording):
@@ -55,6 +58,17 @@ class OpenCVRecording(VideoRecording):
             ]
             rig = CameraRig(tuple(cameras))
         super().__init__(path, sources, rig, scale=scale, input_fps=input_fps)
+        self._warn_of_others(sources)
+
+    def _warn_of_others(self, sources: Mapping[str, Path]) -> None:
+        """Warn of calibrations without images and of images without a calibration."""
+        files = {} if _is_pair(self.path) else _calibrations(self.path)
+        for name, file in files.items():
+            if name not in sources:
+                self.warn(f"{file}: left out, there are no images of {name}")
+        for name, images in _all_sources(self.path, _FOLDERS).items():
+            if name not in sources and name not in _NO_CAMERAS:
+                self.warn(f"{images}: left out, there is no calibration {name}{SUFFIXES[0]}")
 
 
 def is_opencv(path: Path) -> bool:
@@ -88,10 +102,10 @@ def _source(path: Path, name: str) -> Path | None:
     return next((found for place in places if (found := find_stream(place, name))), None)
 
 
-def _all_sources(path: Path) -> dict[str, Path]:
-    """Camera -> images, of all in `videos/` or `images/`."""
+def _all_sources(path: Path, folders: Sequence[str] = _FOLDERS[1:]) -> dict[str, Path]:
+    """Camera -> images, of all in some folders of a recording."""
     found: dict[str, Path] = {}
-    for folder in (path / "videos", path / "images"):
+    for folder in (path / name for name in folders):
         for entry in sorted(folder.iterdir()) if folder.is_dir() else []:
             if entry.suffix.lower() in VIDEO_SUFFIXES and entry.is_file():
                 found.setdefault(entry.stem, entry)

@@ -184,6 +184,20 @@ def test_malformed_poses_are_named(folder: Path, make_rig, text: str) -> None:
         open_recording(folder)
 
 
+def test_a_camera_without_its_other_half_is_left_out_with_a_warning(
+    folder: Path, make_rig, write_video, check
+) -> None:
+    rig = make_rig(*NAMES)
+    for model in make_rig(*NAMES, "top"):
+        storage(folder / f"{model.name}.yaml", of_opencv(model))
+    write_video(folder / "phone.avi", 2)
+    recording = open_recording(folder)
+    check(recording, rig)
+    unused, unknown = recording.warnings
+    assert unused.endswith("top.yaml: left out, there are no images of top")
+    assert unknown.endswith("phone.avi: left out, there is no calibration phone.yaml")
+
+
 def test_without_images(folder: Path) -> None:
     with pytest.raises(DatasetError, match="no images of any camera"):
         open_recording(folder, format="opencv")

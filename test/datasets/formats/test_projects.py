@@ -191,6 +191,16 @@ def test_caliscope_calibrations_that_are_malformed(caliscope, old, new, message)
         open_recording(caliscope)
 
 
+def test_caliscope_cameras_and_videos_that_differ(caliscope: Path) -> None:
+    (caliscope / "cam_1.avi").rename(caliscope / "cam_7.avi")
+    recording = open_recording(caliscope)
+    assert recording.rig.names == ("cam_0",)
+    assert recording.warnings[-1].endswith("cam_1 left out: calibrated, but no video")
+    (caliscope / "cam_7.avi").rename(caliscope / "cam_9.avi")
+    with pytest.raises(CalibrationError, match="camera_array.toml: no table of cam_9, expected"):
+        open_recording(caliscope)
+
+
 def test_caliscope_without_videos_or_calibration(caliscope: Path) -> None:
     for video in caliscope.glob("*.avi"):
         video.unlink()

@@ -156,6 +156,14 @@ def test_mpi_inf_3dhp_calibrations_that_are_malformed(mpi, old, new, message) ->
         open_recording(mpi)
 
 
+def test_mpi_inf_3dhp_calibration_that_is_cut(mpi: Path) -> None:
+    file = mpi / "camera.calibration"
+    text = file.read_text(encoding="ascii")
+    file.write_text(text[: text.rindex("name")], encoding="ascii")
+    with pytest.raises(CalibrationError, match="camera.calibration: no camera video_7, expected"):
+        open_recording(mpi)
+
+
 def test_mpi_inf_3dhp_annotations_that_are_malformed(mpi: Path) -> None:
     recording = open_recording(mpi)
     cells = np.empty((1, 1), dtype=object)
