@@ -7,6 +7,7 @@ import signal
 
 import pytest
 
+from markerless_tracker.cli import track
 from markerless_tracker.cli.batch.cluster import on_cluster
 from markerless_tracker.cli.batch.find import find_recordings
 from markerless_tracker.cli.batch.plan import plan
@@ -76,3 +77,39 @@ def test_a_cluster_does_them_too_and_survives_a_worker(planned) -> None:
     assert sorted(name for name in rows if rows[name]["status"] == "done") == ["a/one", "b/three"]
     assert "two: no such file" in rows["a/two"]["error"]
     assert records(planned) == seen
+
+
+def test_batch_has_every_option_of_track() -> None:
+    def options(declare) -> dict[str, tuple]:
+        parser = _Parser()
+        declare(parser)
+        return {
+            word: (action.dest, action.type, action.choices, action.default, action.nargs)
+            for action in parser._actions
+            for word in action.option_strings
+        }
+
+    of_track, of_batch = options(track.add_arguments), options(add_arguments)
+    # The results' place has another meaning.
+    assert of_track.pop("-o")[0] == "name" and of_batch.pop("-o")[0] == "out"
+    assert {word: of_batch.get(word) for word in of_track} == of_track
+    assert set(of_batch) - set(of_track) == {"--jobs", "--scheduler"}
+
+
+def test_every_option_reaches_the_trials(tmp_path) -> None:
+    parser = _Parser()
+    track.add_arguments(parser)
+    dests = {action.dest for action in parser._actions} - {
+        "help",
+        "json",
+        "force",
+        "source",
+        "name",
+    }
+    parser = _Parser()
+    add_arguments(parser)
+    args = parser.parse_args(
+        [str(tmp_path), "-o", str(tmp_path / "out"), "--up=-y", "--scale", "1"]
+    )
+    (trial,) = plan(args, {"one": tmp_path / "one"}, threads=1)
+    assert set(trial.arguments) == dests and trial.arguments["up"] == "-y"
