@@ -156,6 +156,18 @@ class PlayerNode(GivenNode):
     def _pass(self, spin: Callable[[float], bool]) -> bool:
         """Play once; returns whether to go on."""
         pace = Pace(self.settings.rate, clock=time.monotonic)
+        try:
+            return self._send_all(pace, spin)
+        finally:
+            # Also of a pass that is ended on the way.
+            if (lost_s := pace.shifted_s + pace.late_s) > _LATE_S:
+                self.get_logger().warning(
+                    f"could not keep pace: the last set was sent {lost_s:.2f} s late at rate "
+                    f"{self.settings.rate:g}"
+                )
+
+    def _send_all(self, pace: Pace, spin: Callable[[float], bool]) -> bool:
+        """Send the sets at their times; returns whether to go on."""
         with prefetch(self._sets, _PREFETCH_SETS) as sets:
             for played in sets:
                 wait_s = 0.0 if self._in_step else pace.wait_s(played.stamp_ns)
@@ -167,11 +179,6 @@ class PlayerNode(GivenNode):
                 self._publish(played)
                 if not self._until_dealt_with(played.stamp_ns, spin):
                     return False
-        if (lost_s := pace.shifted_s + pace.late_s) > _LATE_S:
-            self.get_logger().warning(
-                f"could not keep pace: the last set was sent {lost_s:.2f} s late at rate "
-                f"{self.settings.rate:g}"
-            )
         return True
 
     def _sets(self) -> Iterator[PlayedSet]:

@@ -1,7 +1,10 @@
 """A player under control: pause, step, resume, `/clock`, a choice of topics, a cut bag."""
 
+import re
+import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,12 +13,14 @@ import pytest
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from geometry_msgs.msg import PoseArray
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from std_srvs.srv import Trigger
 
 from markerless_tracker.bags import write_bag
 from markerless_tracker.datasets import open_recording, read_trc
+from markerless_tracker.node.player.node import PlayerNode
 from markerless_tracker.node.ros.qos import image_qos, output_qos
 from markerless_tracker.node.ros.stamps import stamp_of
 
@@ -52,6 +57,31 @@ def test_pause_step_and_resume(bag: Path, peer: Any, start: Callable[..., Any]) 
     assert player.wait() == 0, player.output
     assert "could not keep pace" not in player.output
     assert [round(stamp_of(image) * 30 / 1e9) for image in images] == list(range(SETS))
+
+
+@pytest.mark.parametrize("sets", [SETS, 4], ids=["whole", "ended"])
+def test_a_player_that_falls_behind_says_by_how_much(
+    bag: Path, ros_context: Any, monkeypatch: pytest.MonkeyPatch, sets: int
+) -> None:
+    given = [Parameter("bag", value=str(bag)), Parameter("rate", value=5.0)]
+    node = PlayerNode(context=ros_context, parameter_overrides=given)
+    warnings: list[str] = []
+    logger = SimpleNamespace(info=lambda text: None, warning=warnings.append)
+    monkeypatch.setattr(node, "get_logger", lambda: logger)
+    monkeypatch.setattr(node, "_discover", lambda spin: True)
+    sent: list[Any] = []
+
+    def slowly(played: Any) -> None:
+        sent.append(played)
+        time.sleep(0.1)
+
+    monkeypatch.setattr(node, "_publish", slowly)
+    node.play(lambda seconds: len(sent) < sets)
+    node.destroy_node()
+    # The sets are 1/150 s apart, each takes 0.1 s, the last one is not counted.
+    (warning,) = warnings
+    late_s = float(re.search(r"was sent (.*) s late at rate 5$", warning).group(1))
+    assert 0.8 * (sets - 2) * 0.1 < late_s < (sets + 1) * 0.1 + 1.0
 
 
 def test_a_step_needs_a_pause(bag: Path, peer: Any, start: Callable[..., Any]) -> None:
