@@ -1,6 +1,9 @@
 """Round trips of recordings through bags, and failures that must leave no bag."""
 
 import json
+import tracemalloc
+import weakref
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -173,3 +176,49 @@ def test_stamps_beyond_a_ros_message_are_refused(make_recording, tmp_path: Path)
     with pytest.raises(DatasetError, match="has no set of images"):
         write_bag(source, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+class Endless(Recording):
+    """A recording of noise that is made when it is read."""
+
+    def __init__(self, like: Recording, sets: int) -> None:
+        super().__init__(like.path, like.rig, scale=1.0, fps=60.0, frame_count=sets)
+        self.images: list[weakref.ref[np.ndarray]] = []
+        self.most = 0
+
+    def ground_truth(self) -> None:
+        return None
+
+    def _read(self, start: int, every: int) -> Iterator[FrameSet]:
+        rng = np.random.default_rng(5)
+        assert self.frame_count is not None
+        for index in range(start, self.frame_count, every):
+            images = {}
+            for camera in self.rig:
+                width, height = camera.size_px
+                images[camera.name] = rng.integers(0, 256, (height, width, 3), dtype=np.uint8)
+                self.images.append(weakref.ref(images[camera.name]))
+            self.images = [image for image in self.images if image() is not None]
+            self.most = max(self.most, len(self.images))
+            yield FrameSet(index, round(index * 1e9 / 60.0), images)
+
+    def _nearest(self, stamp_ns: int) -> tuple[int, int]:
+        raise NotImplementedError
+
+
+@pytest.mark.parametrize("compress", ["none", "zstd", "png"])
+def test_memory_does_not_grow_with_the_length(
+    make_recording, tmp_path: Path, compress: str
+) -> None:
+    like = open_recording(make_recording(size_px=(320, 240)))
+    kept = []
+    for sets in (20, 120):
+        recording = Endless(like, sets)
+        tracemalloc.start()
+        write_bag(recording, tmp_path / f"bag{sets}", compress=compress)
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert recording.most <= 12
+        kept.append(peak)
+    image = 320 * 240 * 3
+    assert kept[0] < 40 * image and kept[1] < kept[0] + 4 * image

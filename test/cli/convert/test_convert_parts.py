@@ -52,6 +52,18 @@ def test_an_impossible_part(make_recording, tmp_path: Path, capsys, words, messa
     assert message in capsys.readouterr().err and not (tmp_path / "bag").exists()
 
 
+def test_a_cut_bag_is_converted_up_to_the_cut(make_recording, tmp_path: Path, capsys) -> None:
+    converted(make_recording(frames=120), tmp_path / "whole")
+    file = tmp_path / "whole" / "whole.mcap"
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2])
+    capsys.readouterr()
+    kept = converted(tmp_path / "whole", tmp_path / "again")
+    assert kept == list(range(len(kept))) and 20 < len(kept) < 100
+    assert capsys.readouterr().err.count("cut or damaged, read up to there") == 1
+    assert open_recording(tmp_path / "again").warnings == ()
+
+
 @pytest.mark.parametrize("delay_s", [0.0, 0.03, 0.2])
 def test_a_kill_leaves_the_earlier_bag_or_the_new_one(
     make_recording, tmp_path: Path, delay_s: float
