@@ -122,7 +122,11 @@ def read_extrinsics(path: str | Path) -> dict[str, FloatArray]:
                 f"{path}: {name}: expected translation x, y, z and rotation x, y, z, w ({error})"
             ) from error
         length = float(np.linalg.norm(quaternion))
-        if not 0.99 < length < 1.01 or not np.isfinite(translation).all():
+        if not np.isfinite(translation).all():
+            raise CalibrationError(
+                f"{path}: {name}: translation is {translation}, expected finite numbers"
+            )
+        if not 0.99 < length < 1.01:
             raise CalibrationError(f"{path}: {name}: rotation is no unit quaternion")
         T_world_cam = transform(rotation_from_quaternion(quaternion / length), translation)
         poses[str(name)] = inverse(T_world_cam)

@@ -182,6 +182,10 @@ def test_malformed_poses_are_named(folder: Path, make_rig, text: str) -> None:
     (folder / "extrinsics.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(CalibrationError, match="left: rotation is no unit quaternion"):
         open_recording(folder)
+    text = "left: {translation: {x: 1, y: .nan, z: 3}, rotation: {x: 0, y: 0, z: 0, w: 1}}"
+    (folder / "extrinsics.yaml").write_text(text, encoding="utf-8")
+    with pytest.raises(CalibrationError, match=r"left: translation is \[1.0, nan, 3.0\]"):
+        open_recording(folder)
 
 
 def test_a_camera_without_its_other_half_is_left_out_with_a_warning(
