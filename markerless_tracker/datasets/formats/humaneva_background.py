@@ -81,7 +81,8 @@ def _cells(path: Path, content: dict[str, Any], field: str) -> list[FloatImage]:
     images = []
     for number, cell in enumerate(np.asarray(content[field], dtype=object).ravel(), start=1):
         try:
-            values = np.asarray(cell, dtype=np.float32)
+            with np.errstate(over="ignore"):
+                values = np.asarray(cell, dtype=np.float32)
         except (TypeError, ValueError):
             values = np.empty(0, dtype=np.float32)
         if values.ndim != 3 or values.shape[2] != 3 or not np.isfinite(values).all():
