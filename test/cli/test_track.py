@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 import yaml
 
+from markerless_tracker.bags import write_bag
 from markerless_tracker.cli.main import main
 from markerless_tracker.cli.synthesize import synthesize
-from markerless_tracker.datasets import read_trc
+from markerless_tracker.datasets import open_recording, read_trc
 from markerless_tracker.results.score import score
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
@@ -228,3 +229,16 @@ def test_help_has_an_example(capsys):
         main(["track", "--help"])
     assert caught.value.code == 0
     assert "example:\n  markerless_tracker track " in capsys.readouterr().out
+
+
+def test_a_cut_bag_is_tracked_up_to_the_cut(track, walk, tmp_path):
+    bag = tmp_path / "bag"
+    write_bag(open_recording(walk), bag)
+    file = bag / "bag.mcap"
+    content = file.read_bytes()
+    file.write_bytes(content[: int(0.6 * len(content))])
+    status, out, err = track("--json", "--start", walk / "ground_truth.trc", source=bag)
+    summary = json.loads(out)
+    assert status == 0 and summary["frames"] == summary["tracked"] == 2
+    assert " ".join(err.split()).count("cut or damaged, read up to there") == 1
+    assert any("cut or damaged" in warning for warning in summary["warnings"])
