@@ -19,6 +19,8 @@ STATURES_M = (1.40, 2.10)
 """Statures outside of these are doubted."""
 USUAL_STATURES_M, USUAL_OVERLAP = (1.50, 2.00), 0.85
 """So are those outside of these where the overlap is below that: the scale may be wrong."""
+COMMON_STATURES_M = (1.60, 1.90)
+"""So are those outside of these where the overlap is below `LEAST_OVERLAP`."""
 PROPORTION = 0.25
 """Largest deviation of a length, relative to the stature, from the body's description."""
 FLOOR_M = (0.01, 0.20)
@@ -178,7 +180,9 @@ def _unused(record: RunRecord) -> list[str]:
 
 def _sizes(body: BodyModel, description: BodyDescription, overlap: float) -> list[str]:
     stature = stature_m(description, body)
-    low, high = STATURES_M if overlap >= USUAL_OVERLAP else USUAL_STATURES_M
+    low, high = STATURES_M
+    if overlap < USUAL_OVERLAP:
+        low, high = USUAL_STATURES_M if overlap >= LEAST_OVERLAP else COMMON_STATURES_M
     found = []
     if not low <= stature <= high:
         found.append(

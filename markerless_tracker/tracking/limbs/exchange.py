@@ -1,7 +1,7 @@
-"""The legs exchanged: who walks passes one leg by the other, and both lie in one silhouette there.
+"""Both legs or both arms exchanged: in a walk they pass each other, within one silhouette there.
 
-Legs that were tracked into each other's place explain the silhouettes nearly as well, for as long
-as the step goes on. No search of one leg alone finds both again.
+Legs or arms that were tracked into each other's place explain the silhouettes nearly as well, for
+as long as the step goes on. No search of one limb alone finds both again.
 """
 
 import numpy as np
@@ -10,39 +10,51 @@ from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.start.mirror import mirror_of
 
-LEGS = "legs"
-EVERY_NS = 100_000_000
-"""The exchange is tried so often: some times within half of a step."""
+PAIRS = ("legs", "arms")
+EVERY_NS = 50_000_000
+"""The pairs are exchanged in turn, one so often: each some times within half of a step."""
 LEAST_M = 0.1
-"""Legs nearer to each other's place, at every marker, need not be exchanged."""
+"""Limbs nearer to each other's place, at every marker, need not be exchanged."""
 LEAST_GAIN = 0.004
 """Least rise of f_s. Where the legs pass each other both ways fit alike."""
 CLOSE = 0.018
-"""As of `LimbSearch.compared`: legs in their place cost more when they are exchanged."""
+"""As of `LimbSearch.compared`: limbs in their place cost more when they are exchanged."""
 
 
-class LegExchange:
-    """Tries the exchange of the legs at intervals."""
+class PairExchange:
+    """Tries the exchange of the legs and that of the arms at intervals."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Forget when it was tried."""
+        """Forget when they were tried."""
         self._tried_ns: int | None = None
+        self._next = 0
 
     def due(
         self, body: BodyModel, pose: FloatArray, limits: FloatArray, stamp_ns: int
-    ) -> FloatArray | None:
-        """The pose (p,) with the legs exchanged, within limits (2, p), if it is to be tried now."""
-        if LEGS not in body.subspaces:
-            return None
+    ) -> tuple[str, FloatArray] | None:
+        """A pair's name and the pose (p,) with it exchanged, within limits (2, p), if it is due."""
         if self._tried_ns is not None and 0 <= stamp_ns - self._tried_ns < EVERY_NS:
             return None
-        legs, other = body.subspaces[LEGS], pose.copy()
-        other[legs] = np.clip(mirror_of(body).of(pose)[legs], *limits[:, legs])
-        moved_m = np.linalg.norm(markers(body, other) - markers(body, pose), axis=1)
-        if moved_m.max() < LEAST_M:
-            return None
-        self._tried_ns = stamp_ns
-        return other
+        for turn in range(len(PAIRS)):
+            name = PAIRS[(self._next + turn) % len(PAIRS)]
+            other = _exchanged(name, body, pose, limits)
+            if other is not None:
+                self._tried_ns = stamp_ns
+                self._next = PAIRS.index(name) + 1
+                return name, other
+        return None
+
+
+def _exchanged(
+    name: str, body: BodyModel, pose: FloatArray, limits: FloatArray
+) -> FloatArray | None:
+    """The pose (p,) with a pair exchanged, unless that changes nothing."""
+    if name not in body.subspaces:
+        return None
+    pair, other = body.subspaces[name], pose.copy()
+    other[pair] = np.clip(mirror_of(body).of(pose)[pair], *limits[:, pair])
+    moved_m = np.linalg.norm(markers(body, other) - markers(body, pose), axis=1)
+    return other if moved_m.max() >= LEAST_M else None

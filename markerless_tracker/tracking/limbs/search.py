@@ -65,15 +65,14 @@ class LimbSearch:
 
     def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
         """Search a limb's parameters; whether it was found elsewhere. Arguments as `other_limb`."""
-        cost = float(self._frame.costs(self.pose[None])[0])
-        other, other_cost = other_limb(
-            self._frame, self._recombiner, self.pose, limb, rng, aim, cost
-        )
+        frame = self._own.undecided
+        cost = float(frame.costs(self.pose[None])[0])
+        other, other_cost = other_limb(frame, self._recombiner, self.pose, limb, rng, aim, cost)
         better = other_cost < cost - self._least_gain
         if self._own.differs:
             if other_cost > cost + CLOSE or self._moved_m(other) < LEAST_M:
                 return False
-            other_cost = self._own.cost(other)
+            other, other_cost = self._own.refined(other, *_REFINE)
             better = other_cost < self.own_cost - (0.0 if better else LEAST_GAIN)
         if better:
             self._take(other, other_cost)

@@ -1,7 +1,7 @@
 """Lost limbs: detecting them, and searching for them while the rest of the body stays.
 
 A limb outside the silhouettes is detected. A wrong limb inside the silhouettes goes undetected, so
-all limbs are searched elsewhere in rotation, and the legs are exchanged.
+all limbs are searched elsewhere in rotation, and both legs or both arms are exchanged.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import LimbState, Observation, TrackState
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.aimed import most_aimed
-from markerless_tracker.tracking.limbs.exchange import CLOSE, LEAST_GAIN, LEGS, LegExchange
+from markerless_tracker.tracking.limbs.exchange import CLOSE, LEAST_GAIN, PairExchange
 from markerless_tracker.tracking.limbs.facing import FacingWatch
 from markerless_tracker.tracking.limbs.search import LimbSearch
 from markerless_tracker.tracking.limbs.unexplained import look_unexplained
@@ -55,7 +55,7 @@ class Recovered:
 
     Attributes:
         pose: (p,) the estimate.
-        names: of the limbs that were taken from elsewhere; `legs` are exchanged.
+        names: of the limbs that were taken from elsewhere; `legs` and `arms` are exchanged.
         turned: whether the person faces the other way; nothing of the body is where it was.
         moved_m: how far the limbs' joints were from where they were found, at most.
     """
@@ -119,7 +119,7 @@ class LimbWatch:
         self._unexplained = 0
         self._rotated_ns: int | None = None
         self._waits: dict[str, _Wait] = {}
-        self._exchange = LegExchange()
+        self._exchange = PairExchange()
         self._facing = FacingWatch()
 
     @property
@@ -181,15 +181,15 @@ class LimbWatch:
         if not unexplained.limbs:
             self._waits.clear()
         due = self._due(body, stamp_ns, unexplained.areas_m2)
-        legs, facing = None, False
+        pair, facing = None, False
         self._turn += 1
         if not one or self._turn % 2:
-            legs = self._exchange.due(body, pose, searcher.limits, stamp_ns)
+            pair = self._exchange.due(body, pose, searcher.limits, stamp_ns)
             facing = self._facing.due(stamp_ns)
         if one and due:
-            whole = facing or legs is not None
+            whole = facing or pair is not None
             due = [] if whole else [due[self._turn // 2 % len(due)]]
-        if not due and legs is None and not facing:
+        if not due and pair is None and not facing:
             return Recovered(pose)
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
         own = OwnEvidence(searcher, seen.imaged, stamp_ns, frame)
@@ -200,8 +200,8 @@ class LimbWatch:
             if turned is not None:
                 return Recovered(turned, turned=True)
         found = []
-        if legs is not None and search.takes(legs, LEAST_GAIN, CLOSE):
-            found.append(LEGS)
+        if pair is not None and search.takes(pair[1], LEAST_GAIN, CLOSE):
+            found.append(pair[0])
         for name in due:
             rng = keyed_generator(searcher.config.seed, stamp_ns, f"{name} elsewhere")
             limb = body.subspaces[name]

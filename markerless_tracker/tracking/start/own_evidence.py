@@ -5,6 +5,7 @@ against every other one: a leg that was found wrong on a floor of its trousers' 
 """
 
 from collections.abc import Mapping
+from functools import cached_property
 
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
@@ -40,6 +41,13 @@ class OwnEvidence:
         self._frame = frame
         self.body = searcher.body
         self.differs = any(seen.undecided_words is not None for seen in imaged.values())
+
+    @cached_property
+    def undecided(self) -> FramePopulation:
+        """The evidence that no body decided: undecided pixels count for no pose."""
+        if not self.differs:
+            return self._frame
+        return FramePopulation(self._searcher, self._imaged, self._stamp_ns, self._frame.near)
 
     def cost(self, pose: FloatArray) -> float:
         """1 - f_s of a pose (p,)."""

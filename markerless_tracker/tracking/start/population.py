@@ -91,6 +91,7 @@ class FramePopulation:
     ) -> None:
         self._searcher = searcher
         self._stamp_ns = stamp_ns
+        self.near = near
         self.contours = contours or searcher.frame(observations, stamp_ns, near).contours
         self._costs = searcher.fitness.prepare(
             self.contours.views, Comparison.whole(near, len(searcher.body.cone_names))

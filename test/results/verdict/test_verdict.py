@@ -134,10 +134,18 @@ def test_a_camera_that_is_not_used_is_named(judge: Judge, result: Any) -> None:
     assert doubt.startswith("cam02 was used in 0 of 3 poses only")
 
 
+@pytest.mark.parametrize(("stature", "doubted"), [(1.54, True), (1.72, False), (1.93, True)])
+def test_where_the_body_fits_badly_few_statures_are_believed(
+    judge: Judge, result: Any, stature: float, doubted: bool
+) -> None:
+    doubts = judge([result(0, overlap=0.65)], load_body("person32", stature)).doubts
+    assert any(f"a stature of {stature:.2f} m" in doubt for doubt in doubts) == doubted
+
+
 @pytest.mark.parametrize(
     ("stature", "overlap", "doubted"),
     [(1.20, 0.95, True), (1.46, 0.95, False), (1.46, 0.80, True), (2.03, 0.80, True),
-     (1.85, 0.80, False), (2.20, 0.95, True)],
+     (1.85, 0.80, False), (1.54, 0.80, False), (2.20, 0.95, True)],
 )  # fmt: skip
 def test_statures(judge: Judge, result: Any, stature: float, overlap: float, doubted: bool) -> None:
     body = load_body("person32", stature)

@@ -1,76 +1,108 @@
-"""Legs that were tracked into each other's place are exchanged."""
+"""Legs and arms that were tracked into each other's place are exchanged."""
+
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, markers
+from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
-from markerless_tracker.tracking.limbs.exchange import EVERY_NS, LEAST_M, LegExchange
-from markerless_tracker.tracking.limbs.watch import LimbWatch
+from markerless_tracker.tracking.limbs.exchange import EVERY_NS, LEAST_M, PAIRS, PairExchange
+from markerless_tracker.tracking.limbs.watch import LimbWatch, Recovered
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.mirror import Mirror
 
-ANKLES = [MARKER_NAMES.index(name) for name in ("LAnkle", "RAnkle")]
+ENDS = {"legs": ("LAnkle", "RAnkle"), "arms": ("LWrist", "RWrist")}
 
 
-@pytest.fixture(scope="module")
-def walking():
-    """A step, its silhouettes, the true pose and that with the legs in each other's place."""
+@dataclass(frozen=True, eq=False)
+class Walking:
+    """A frame of a walk with a pair of limbs far apart, and the pose with the pair exchanged."""
+
+    pair: str
+    scene: SyntheticScene
+    seen: dict[str, Observation]
+    pose: FloatArray
+    swapped: FloatArray
+
+    def off_m(self, pose: FloatArray) -> float:
+        """Largest error of the pair's ends."""
+        return float(self._apart_m(pose, self.pose).max())
+
+    def _apart_m(self, pose: FloatArray, other: FloatArray) -> FloatArray:
+        body, rows = self.scene.body, [MARKER_NAMES.index(name) for name in ENDS[self.pair]]
+        return np.linalg.norm(markers(body, pose) - markers(body, other), axis=1)[rows]
+
+
+@pytest.fixture(scope="module", params=PAIRS)
+def walking(request) -> Walking:
     scene = SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=3)
+    pair, rows = request.param, [MARKER_NAMES.index(name) for name in ENDS[request.param]]
     best, apart = 0, 0.0
     for frame in range(0, 40, 4):
-        at = markers(scene.body, scene.frame(frame)[2])[ANKLES]
-        if (gap := float(np.linalg.norm(at[0] - at[1]))) > apart:
+        at = markers(scene.body, scene.frame(frame)[2])[rows]
+        if (gap := abs(float(at[0, 0] - at[1, 0]))) > apart:
             best, apart = frame, gap
     _, masks, pose = scene.frame(best)
     seen = {
         name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
         for name, mask in masks.items()
     }
-    swapped, legs = pose.copy(), scene.body.subspaces["legs"]
-    swapped[legs] = Mirror(scene.body).of(pose)[legs]
-    return scene, seen, pose, swapped
+    swapped, limbs = pose.copy(), scene.body.subspaces[pair]
+    swapped[limbs] = Mirror(scene.body).of(pose)[limbs]
+    return Walking(pair, scene, seen, pose, swapped)
 
 
-def off_m(body, pose, true):
-    return np.linalg.norm(markers(body, pose) - markers(body, true), axis=1)[ANKLES].max()
-
-
-def recovered(scene, seen, pose, stamp_ns=0):
+def recovered(walking: Walking, pose: FloatArray) -> Recovered:
+    """What is found elsewhere at a pose while that pair's exchange is due."""
+    scene = walking.scene
     body, config = scene.body, TrackerConfig(threads=1)
     searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
-    contours = searcher.frame(seen, stamp_ns, pose).contours
-    return LimbWatch(scene.rig).recover(searcher, contours, Seen(stamp_ns, seen, seen, seen), pose)
+    watch = LimbWatch(scene.rig)
+    watch._exchange._next = PAIRS.index(walking.pair)
+    contours = searcher.frame(walking.seen, 0, pose).contours
+    seen = Seen(0, walking.seen, walking.seen, walking.seen)
+    return watch.recover(searcher, contours, seen, pose)
 
 
-def test_exchanged_legs_are_exchanged_back(walking) -> None:
-    scene, seen, true, swapped = walking
-    assert off_m(scene.body, swapped, true) > 0.3
-    found = recovered(scene, seen, swapped)
-    assert found.names[:1] == ("legs",)
-    assert found.notes[0] == "legs: found elsewhere"
-    assert set(scene.body.subspaces["legs"]) <= set(found.jumped(scene.body))
-    assert off_m(scene.body, found.pose, true) < 0.05
+def test_an_exchanged_pair_is_exchanged_back(walking: Walking) -> None:
+    assert walking.off_m(walking.swapped) > 0.2
+    found = recovered(walking, walking.swapped)
+    assert found.names[:1] == (walking.pair,)
+    assert found.notes[0] == f"{walking.pair}: found elsewhere"
+    body = walking.scene.body
+    assert set(body.subspaces[walking.pair]) <= set(found.jumped(body))
+    assert walking.off_m(found.pose) < 0.05
 
 
-def test_legs_in_their_place_stay(walking) -> None:
-    scene, seen, true, _ = walking
-    assert "legs" not in recovered(scene, seen, true).names
+def test_a_pair_in_its_place_stays(walking: Walking) -> None:
+    assert walking.pair not in recovered(walking, walking.pose).names
 
 
-def test_it_is_tried_at_intervals_and_where_it_changes_anything(walking) -> None:
-    scene, _, true, swapped = walking
-    body, exchange = scene.body, LegExchange()
-    first = exchange.due(body, true, body.limits, 10)
-    assert first is not None
-    np.testing.assert_allclose(markers(body, first), markers(body, swapped), atol=0.01)
-    assert exchange.due(body, true, body.limits, 10 + EVERY_NS - 1) is None
-    assert exchange.due(body, true, body.limits, 10 + EVERY_NS) is not None
+def test_the_pairs_are_tried_in_turn_where_it_changes_anything(walking: Walking) -> None:
+    body, exchange = walking.scene.body, PairExchange()
+    stamps = [10, 10 + EVERY_NS, 10 + 2 * EVERY_NS]
+    tried = [exchange.due(body, walking.pose, body.limits, stamp) for stamp in stamps]
+    assert [one and one[0] for one in tried] == [PAIRS[0], PAIRS[1], PAIRS[0]]
+    other = tried[PAIRS.index(walking.pair)]
+    assert other is not None
+    np.testing.assert_allclose(markers(body, other[1]), markers(body, walking.swapped), atol=0.01)
+    assert exchange.due(body, walking.pose, body.limits, stamps[-1] + EVERY_NS - 1) is None
     # Time that was set back begins anew.
-    assert exchange.due(body, true, body.limits, 0) is not None
+    assert exchange.due(body, walking.pose, body.limits, 0) is not None
     exchange.reset()
     assert exchange.due(body, body.neutral, body.limits, 0) is None
     assert LEAST_M > 0.0
+
+
+def test_a_pair_alone_in_another_place_is_tried_every_time(walking: Walking) -> None:
+    body, exchange = walking.scene.body, PairExchange()
+    pose, limbs = body.neutral.copy(), body.subspaces[walking.pair]
+    pose[limbs] = walking.pose[limbs]
+    for stamp in (0, EVERY_NS):
+        tried = exchange.due(body, pose, body.limits, stamp)
+        assert tried is not None and tried[0] == walking.pair

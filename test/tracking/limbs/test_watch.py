@@ -95,8 +95,9 @@ def test_states_name_the_limb_that_is_off(standing) -> None:
         assert {limb.particle_sd_ratio for limb in states.values()} == {0.25}
 
 
-def test_a_lost_arm_is_found_alone(standing) -> None:
+def test_a_lost_arm_is_found_alone(standing, monkeypatch) -> None:
     scene, seen, pose, raised = standing
+    monkeypatch.setattr("markerless_tracker.tracking.limbs.exchange.LEAST_M", 9.0)
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
     watch.assess(scene.body, raised, seen, np.full(scene.body.size, np.nan))
@@ -213,6 +214,7 @@ def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_turns(
     monkeypatch.setattr(f"{package}.search.other_limb", elsewhere)
     monkeypatch.setattr(f"{package}.watch.WAIT_NS", 0)
     monkeypatch.setattr(f"{package}.facing.FacingWatch.compare", faces)
+    monkeypatch.setattr(f"{package}.exchange.LEAST_M", 9.0)
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, pose)
     for number in range(24):

@@ -53,8 +53,10 @@ def changes(lengths):
 
 
 def test_lengths_change_once_and_are_kept(walk) -> None:
+    """Without a limb found elsewhere: nothing is searched again."""
     scene, taken = walk
-    tracker = build_tracker(scene.rig, TrackerConfig(threads=1), stature=1.65).tracker
+    config = TrackerConfig(threads=1, search_again=False)
+    tracker = build_tracker(scene.rig, config, stature=1.65).tracker
     lengths = tracked(tracker, taken)
     assert changes(lengths) == [LAST]
     true = SIZES.of(scene.body)

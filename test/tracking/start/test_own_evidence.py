@@ -49,6 +49,18 @@ def test_evidence_decided_for_a_wrong_pose_speaks_against_the_true_one(legs_unde
     assert own.cost(true) == own_of(searcher, seen, true)[1].cost(true)
 
 
+def test_undecided_pixels_count_for_no_pose(legs_undecided) -> None:
+    searcher, seen, true, wrong = legs_undecided
+    frame, own = own_of(searcher, seen, wrong)
+    shared, apart = (
+        frame.costs(np.array([true, wrong])),
+        own.undecided.costs(np.array([true, wrong])),
+    )
+    assert abs(apart[0] - apart[1]) < 0.25 * (shared[0] - shared[1])
+    same = own_of(searcher, seen, true)[1].undecided.costs(np.array([true, wrong]))
+    np.testing.assert_array_equal(apart, same)
+
+
 def test_a_pose_is_refined_in_its_own_evidence(legs_undecided) -> None:
     searcher, seen, true, wrong = legs_undecided
     _, own = own_of(searcher, seen, wrong)
@@ -67,5 +79,5 @@ def test_without_undecided_pixels_all_poses_share_the_evidence(legs_undecided) -
         for name, one in two_classes.items()
     }
     frame, own = own_of(searcher, two_classes, true)
-    assert not own.differs
+    assert not own.differs and own.undecided is frame
     assert own.cost(wrong) == frame.costs(wrong[None])[0]

@@ -1,0 +1,65 @@
+"""A limb is found where the evidence that was decided for a wrong pose speaks against it."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import MARKER_NAMES, markers
+from markerless_tracker.fitness.raster.silhouette import body_masks
+from markerless_tracker.optim import keyed_generator
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.evidence.undecided import decide
+from markerless_tracker.tracking.limbs.search import CLOSE, LimbSearch
+from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.start.own_evidence import OwnEvidence
+from markerless_tracker.tracking.start.population import FramePopulation
+from markerless_tracker.tracking.start.recombination import Recombiner
+
+ANKLE = MARKER_NAMES.index("LAnkle")
+
+
+@pytest.fixture(scope="module")
+def bent():
+    """A stander whose left leg was tracked bent, onto undecided pixels; some of the leg is, too."""
+    scene = SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=3)
+    _, masks, pose = scene.frame(0)
+    wrong = pose.copy()
+    wrong[[scene.body.index("l_hip_y"), scene.body.index("l_knee")]] += -0.8, 0.6
+    covered = body_masks(scene.body, wrong, list(scene.rig))
+    seen = {}
+    for name, mask in masks.items():
+        trousers = mask & ~covered[name]
+        trousers[::2] = False
+        undecided = (covered[name] & ~mask) | trousers
+        edges = np.zeros(mask.shape, np.uint8)
+        seen[name] = Observation.from_mask(name, 0, mask & ~undecided, edges, undecided=undecided)
+    body, config = scene.body, TrackerConfig(threads=1)
+    searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
+    return searcher, seen, pose, wrong
+
+
+def test_a_leg_that_decided_its_evidence_is_found_elsewhere(bent) -> None:
+    searcher, seen, true, wrong = bent
+    body = searcher.body
+    frame = FramePopulation(searcher, decide(seen, searcher.cameras, body, wrong), 0, wrong)
+    own = OwnEvidence(searcher, seen, 0, frame)
+    costs = frame.costs(np.array([true, wrong]))
+    assert costs[0] > costs[1] + CLOSE
+    assert own.cost(true) < own.cost(wrong)
+    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, wrong, 0.003)
+    leg = body.subspaces["l_leg"]
+    assert any(search.elsewhere(leg, keyed_generator(0, 0, f"{i}"), None) for i in range(8))
+    off_m = np.linalg.norm(markers(body, search.pose) - markers(body, true), axis=1)[ANKLE]
+    assert off_m < 0.1 < np.linalg.norm(markers(body, wrong) - markers(body, true), axis=1)[ANKLE]
+
+
+def test_a_leg_in_its_place_stays(bent) -> None:
+    searcher, seen, true, _ = bent
+    body = searcher.body
+    frame = FramePopulation(searcher, decide(seen, searcher.cameras, body, true), 0, true)
+    own = OwnEvidence(searcher, seen, 0, frame)
+    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, true, 0.003)
+    for name in body.limbs:
+        assert not search.elsewhere(body.subspaces[name], keyed_generator(0, 0, name), None)
+    assert search.pose is true
