@@ -37,10 +37,7 @@ HELP = (
     "folder of numbered images (cam01/, ...) per camera, or a bag. World: the board on the floor; "
     "origin at the inner corner at the bottom left of its print, x along its columns, z up."
 )
-EXAMPLE = (
-    "markerless_tracker calibrate recordings/board -o calibration.toml --squares 10x7 "
-    "--square-size 0.12"
-)
+EXAMPLE = "markerless_tracker calibrate board -o calibration.toml --square-size 0.12"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -33,7 +33,7 @@ HELP = (
     "after rotation, translation and scale are, PCK the share of joints within 150 mm after the "
     "pelvis is aligned."
 )
-EXAMPLE = "markerless_tracker evaluate out/walk.trc recordings/walk/ground_truth.trc --skip 30"
+EXAMPLE = "markerless_tracker evaluate out/walk.trc walk/ground_truth.trc --skip 30"
 
 _WIDTH = 160
 

@@ -26,8 +26,8 @@ from markerless_tracker.libraries import quiet_decoders, single_threaded
 
 PROGRAM = "markerless_tracker"
 
-HELP_WIDTH = 88
-"""Columns of a verb's description."""
+HELP_WIDTH = 78
+"""Columns of a verb's description: `--help` fits into a terminal of 80."""
 
 VERBS: Mapping[str, str] = MappingProxyType(
     {

@@ -27,9 +27,7 @@ HELP = (
     "silhouettes, settings. The page holds everything and opens without a network. The film needs "
     "PyAV (markerless_tracker[view]) and the images of the result's source, or of --source."
 )
-EXAMPLE = (
-    "markerless_tracker report out/walk -o walk.html --reference recordings/walk/ground_truth.trc"
-)
+EXAMPLE = "markerless_tracker report out/walk -o walk.html --reference walk/truth.trc"
 
 PAPERS = (
     ("sppso_2", {"evaluations": 1000}, "Lee walk", "SPPSO, Lee walk"),

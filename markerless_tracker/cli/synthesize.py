@@ -23,7 +23,13 @@ from markerless_tracker.cli.terminal.bars import progress_bars
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.datasets.writer import new_recording
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.synthesis import LIGHTS, MILD_LENS, MOTIONS, SyntheticScene
+from markerless_tracker.synthesis import (
+    LIGHTS,
+    MILD_LENS,
+    MOST_CAMERAS,
+    MOTIONS,
+    SyntheticScene,
+)
 from markerless_tracker.synthesis.boards import BoardScene
 from markerless_tracker.synthesis.people import ACTIONS
 from markerless_tracker.synthesis.scenes import GeneratedScene
@@ -35,8 +41,10 @@ HELP = (
     "SEED renders a sampled room and a clothed person with other shapes than the tracker's cones; "
     "--checkerboard renders a moving calibration board for `calibrate`, seen by the same cameras."
 )
-EXAMPLE = "markerless_tracker synthesize recordings/synthetic --seconds 2 --motion balance"
+EXAMPLE = "markerless_tracker synthesize made_up --seconds 2 --motion balance"
 EMPTY_IMAGES = 10
+LEAST_CAMERAS = 2
+"""What tracking and calibration of a rig need."""
 _MOST_FRAMES = 100_000
 _NOT_WITH_SCENE = (
     "cameras", "size", "seed", "stature", "body", "noise", "shadow", "light", "grey", "dull",
@@ -50,8 +58,12 @@ _RATES = {"person": (4.0, 60.0), "board": (40.0, 10.0)}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("out", metavar="OUT", type=Path, help="folder to write (new or empty)")
-    parser.add_argument("--seconds", type=float, help="duration in s (default 4, of a board 40)")
-    parser.add_argument("--fps", type=float, help="frames per second (default 60, of a board 10)")
+    parser.add_argument(
+        "--seconds", metavar="S", type=float, help="duration in s (default 4, of a board 40)"
+    )
+    parser.add_argument(
+        "--fps", metavar="N", type=float, help="frames per second (default 60, of a board 10)"
+    )
     parser.add_argument(
         "--checkerboard", action="store_true",
         help="render a checkerboard instead of a person: on the floor, where its frame is the "
@@ -67,16 +79,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--square-size", metavar="M", type=float, help="side of a square in m (default 0.12)"
     )
     parser.add_argument(
-        "--motion", choices=ACTIONS,
-        help="motion of the person (default walk, or the scene's); without --scene "
-        f"{', '.join(MOTIONS)}",
+        "--motion", choices=ACTIONS, metavar="MOTION",
+        help=f"motion of the person: {', '.join(MOTIONS)} (default walk); with --scene also "
+        f"{', '.join(one for one in ACTIONS if one not in MOTIONS)} (default: the scene's)",
     )  # fmt: skip
     parser.add_argument(
         "--scene", metavar="SEED", type=int,
         help="render the generated scene of this seed: room, lamps, cameras, clothes, person; "
         "with --seconds, --fps, --motion, --lossless and --json only",
     )  # fmt: skip
-    parser.add_argument("--cameras", type=int, default=4, help="number of cameras (default 4)")
+    parser.add_argument(
+        "--cameras", metavar="N", type=int, default=4,
+        help=f"number of cameras, {LEAST_CAMERAS} to {MOST_CAMERAS} (default 4)",
+    )  # fmt: skip
     parser.add_argument(
         "--size",
         metavar="WxH",
@@ -84,7 +99,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="image size in px (default 656x490)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, help="seed of motion, room, clothes and noise (default 0)"
+        "--seed",
+        metavar="N",
+        type=int,
+        default=0,
+        help="seed of motion, room, clothes and noise (default 0)",
     )
     parser.add_argument(
         "--stature",
@@ -94,15 +113,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="body height in m (default 1.72)",
     )
     parser.add_argument(
-        "--body", default="balan31", help="body model by name or YAML file (default balan31)"
+        "--body",
+        metavar="NAME|FILE",
+        default="balan31",
+        help="body model by name or YAML file (default balan31)",
     )
     parser.add_argument(
-        "--noise", metavar="SIGMA", type=float, default=3.0,
+        "--noise", metavar="LEVELS", type=float, default=3.0,
         help="standard deviation of the sensor noise in grey levels (default 3)",
     )  # fmt: skip
     parser.add_argument(
-        "--shadow", type=float, default=0.35,
-        help="fraction of the light that the shadow on the floor removes (default 0.35)",
+        "--shadow", metavar="FRACTION", type=float, default=0.35,
+        help="fraction of the light that the shadow on the floor removes, 0 to 1 (default 0.35)",
     )  # fmt: skip
     parser.add_argument(
         "--light", choices=tuple(LIGHTS), default="steady",
@@ -121,6 +143,11 @@ def run(args: argparse.Namespace) -> int:
     """Write the recording; returns the exit status."""
     if args.checkerboard and args.charuco:
         raise ConfigError("--checkerboard and --charuco are two boards, expected one of them")
+    if not LEAST_CAMERAS <= args.cameras <= MOST_CAMERAS:
+        raise ConfigError(
+            f"--cameras is {args.cameras}, expected {LEAST_CAMERAS} to {MOST_CAMERAS}: one camera "
+            "does not see how far away a limb is"
+        )
     is_board = args.checkerboard or args.charuco
     default_s, default_fps = _RATES["board" if is_board else "person"]
     args.seconds = default_s if args.seconds is None else args.seconds

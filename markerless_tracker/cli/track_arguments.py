@@ -106,7 +106,10 @@ def _images(group: argparse._ArgumentGroup) -> None:
 def add_format(group: "argparse._ActionsContainer") -> None:
     """Declare what says how a recording is to be read."""
     group.add_argument(
-        "--format", choices=FORMATS, help="format of the recording (default: detected)"
+        "--format",
+        choices=FORMATS,
+        metavar="FORMAT",
+        help=f"format of the recording: {', '.join(FORMATS)} (default: detected)",
     )
     group.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images, 1/s")
 

@@ -29,7 +29,7 @@ HELP = (
     "opens. Films and the viewer need markerless_tracker[view]. With --node the same of a running "
     "tracker, from its topics."
 )
-EXAMPLE = "markerless_tracker view out/walk --film walk.webm --sheet walk.png --rrd walk.rrd"
+EXAMPLE = "markerless_tracker view out/walk --film walk.webm --sheet walk.png"
 
 MOST_RRD_PICTURES = 300
 """Frames whose pictures go into the file for the Rerun viewer."""

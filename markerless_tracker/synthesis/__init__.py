@@ -5,12 +5,13 @@
 """
 
 from markerless_tracker.synthesis.motion import MOTIONS, Motion
-from markerless_tracker.synthesis.rig import MILD_LENS, look_at, ring_rig
+from markerless_tracker.synthesis.rig import MILD_LENS, MOST_CAMERAS, look_at, ring_rig
 from markerless_tracker.synthesis.scene import LIGHTS, SyntheticScene
 
 __all__ = [
     "LIGHTS",
     "MILD_LENS",
+    "MOST_CAMERAS",
     "MOTIONS",
     "Motion",
     "SyntheticScene",

@@ -5,6 +5,8 @@ import numpy as np
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.geometry import FloatArray, inverse, transform
 
+MOST_CAMERAS = 99
+"""Names have two digits."""
 MILD_LENS = (-0.08, 0.03, 0.0008, -0.0006, 0.0)
 """Distortion k1 k2 p1 p2 k3 of an ordinary wide lens: some px at the corners."""
 

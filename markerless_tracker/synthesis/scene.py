@@ -15,7 +15,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.synthesis.mesh import body_mesh
 from markerless_tracker.synthesis.motion import Motion
 from markerless_tracker.synthesis.render import Image, Look, Mask, Renderer, clothes, dull_clothes
-from markerless_tracker.synthesis.rig import MILD_LENS, ring_rig
+from markerless_tracker.synthesis.rig import MILD_LENS, MOST_CAMERAS, ring_rig
 from markerless_tracker.synthesis.room import room_picture
 from markerless_tracker.synthesis.threads import side_by_side
 
@@ -74,7 +74,7 @@ class SyntheticScene:
         grey: bool = False,
         dull: bool = False,
     ) -> None:
-        _check("cameras", cameras, 1, 99)
+        _check("cameras", cameras, 1, MOST_CAMERAS)
         _check("image width", size_px[0], 16, 8192)
         _check("image height", size_px[1], 16, 8192)
         _check("fps", fps, 0.1, 1000.0)

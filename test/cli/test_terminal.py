@@ -35,6 +35,31 @@ def test_every_verb_prints_json_on_request() -> None:
     assert [name for name, parser in found.items() if "--json" not in parser.format_help()] == []
 
 
+def test_help_fits_into_80_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No line is longer than the terminal; an example is one line per command."""
+    monkeypatch.setenv("COLUMNS", "80")
+    helps = {verb: parser_of(verb).format_help() for verb in VERBS}
+    helps |= {name: parser.format_help() for name, parser in parsers()}
+    wide = {(name, line) for name, text in helps.items() for line in text.splitlines() if line[80:]}
+    assert wide == set()
+    for name, text in helps.items():
+        head, colon, lines = text.rpartition("\nexample")[2].partition(":\n")
+        assert colon and head in ("", "s"), name
+        assert all(line.startswith("  markerless_tracker ") for line in lines.splitlines()), name
+
+
+def test_a_value_is_named_by_its_meaning_or_unit() -> None:
+    """No option's value is named as the option itself: `--fps FPS` says nothing."""
+    plain = {
+        f"{name} {action.option_strings[-1]}"
+        for name, parser in parsers()
+        for action in parser._actions
+        if action.option_strings and action.nargs != 0
+        if action.metavar is None and action.choices is None
+    }
+    assert plain == set()
+
+
 def test_bars_are_made_in_one_place() -> None:
     makers = {
         path.relative_to(CLI).as_posix()

@@ -34,7 +34,7 @@ HELP = (
     "option stand for each recording's path and name. Exit status 1: some recordings failed; 3: no "
     "person was found in all recordings."
 )
-EXAMPLE = "markerless_tracker batch recordings -o out --start '{source}/ground_truth.trc'"
+EXAMPLE = "markerless_tracker batch walks -o out --start '{source}/ground_truth.trc'"
 
 _WIDTH = 120
 

@@ -19,7 +19,7 @@ HELP = (
     "Recordings need a ground_truth.trc; in tables its first row gives the start pose and the "
     "segment lengths, all its rows are the reference."
 )
-EXAMPLE = "markerless_tracker benchmark tables RECORDING --fps 60,20 --seeds 6 -o out/tables"
+EXAMPLE = "markerless_tracker benchmark tables WALK --fps 60,20 --seeds 6 -o out/tables"
 
 _KINDS = {
     "tables": tables,
@@ -35,7 +35,7 @@ _KINDS = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    kinds = parser.add_subparsers(dest="kind", required=True, metavar=f"{{{','.join(_KINDS)}}}")
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND")
     for kind in _KINDS.values():
         kind.add_parser(kinds)
 

@@ -2,10 +2,35 @@
 
 import argparse
 import math
+import textwrap
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
+
+from markerless_tracker.cli.main import HELP_WIDTH
 
 T = TypeVar("T")
+
+
+def add_kind(
+    kinds: "argparse._SubParsersAction[Any]", name: str, *examples: str, help: str, description: str
+) -> argparse.ArgumentParser:
+    """A parser of one kind of benchmark.
+
+    Args:
+        kinds: receives it.
+        name: of the kind.
+        examples: the lines below the help, as they are.
+        help: one line in the list of kinds.
+        description: begins the help.
+    """
+    parser: argparse.ArgumentParser = kinds.add_parser(
+        name,
+        help=help,
+        description=textwrap.fill(description, HELP_WIDTH),
+        epilog="\n  ".join(("example:" if len(examples) == 1 else "examples:", *examples)),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    return parser
 
 
 def list_of(kind: Callable[[str], T]) -> Callable[[str], tuple[T, ...]]:

@@ -13,7 +13,7 @@ from rich.table import Table
 from markerless_tracker.benchmarks import cameras
 from markerless_tracker.benchmarks.tables.runs import LOST_LIMB_MM
 from markerless_tracker.benchmarks.with_truth import Report, RunStart
-from markerless_tracker.cli.benchmark.arguments import count, list_of
+from markerless_tracker.cli.benchmark.arguments import add_kind, count, list_of
 from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
 
 _STARTS = ("measured", "automatic")
@@ -21,11 +21,12 @@ _STARTS = ("measured", "automatic")
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
-    parser = kinds.add_parser(
+    parser = add_kind(
+        kinds,
         "cameras",
+        "markerless_tracker benchmark cameras WALK --stature 1.72",
         help="error with every subset of the cameras, and its ratio to that of all cameras",
         description="Whole runs with all cameras and with every subset of the given sizes.",
-        epilog="example: markerless_tracker benchmark cameras WALK --stature 1.72",
     )
     add_recordings(parser)
     parser.add_argument(

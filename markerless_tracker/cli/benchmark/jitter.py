@@ -9,17 +9,19 @@ from rich.table import Table
 
 from markerless_tracker.benchmarks import jitter
 from markerless_tracker.benchmarks.with_truth import Report, RunStart
+from markerless_tracker.cli.benchmark.arguments import add_kind
 from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
-    parser = kinds.add_parser(
+    parser = add_kind(
+        kinds,
         "jitter",
+        "markerless_tracker synthesize STAND --motion stand --seconds 3",
+        "markerless_tracker benchmark jitter STAND WALK",
         help="jitter of a standing person and lag of a moving one, without and with the filter",
         description="Jitter, lag and error, without and with smoothing: one_euro.",
-        epilog="example: markerless_tracker synthesize STAND --motion stand --seconds 3 && "
-        "markerless_tracker benchmark jitter STAND WALK",
     )
     add_recordings(parser, without="start and lengths from the first row of ground_truth.trc")
 

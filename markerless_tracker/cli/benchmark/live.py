@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from markerless_tracker.benchmarks.machine import machine
-from markerless_tracker.cli.benchmark.arguments import list_of, positive
+from markerless_tracker.cli.benchmark.arguments import add_kind, list_of, positive
 from markerless_tracker.cli.benchmark.recordings import add_recordings, each, settings
 from markerless_tracker.cli.replay.measure import LivePlan, measure_live
 from markerless_tracker.cli.terminal.bars import progress_bars
@@ -22,14 +22,15 @@ _WIDTH = 150
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
-    parser = kinds.add_parser(
+    parser = add_kind(
+        kinds,
         "live",
+        "markerless_tracker benchmark live WALK --rates 60,30",
         help="rate, latency, error and CPU time live over ROS 2",
         description=(
             "Recordings as bags, played at several rates to a running tracker: player and tracker "
             "are processes of their own, connected by ROS 2."
         ),
-        epilog="example: markerless_tracker benchmark live WALK --rates 60,30",
     )
     add_recordings(parser)
     parser.add_argument(

@@ -9,17 +9,18 @@ from rich.table import Table
 
 from markerless_tracker.benchmarks import recovery
 from markerless_tracker.benchmarks.with_truth import Report
-from markerless_tracker.cli.benchmark.arguments import count
+from markerless_tracker.cli.benchmark.arguments import add_kind, count
 from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
-    parser = kinds.add_parser(
+    parser = add_kind(
+        kinds,
         "recovery",
+        "markerless_tracker benchmark recovery WALK --stature 1.72",
         help="frames until the person is tracked again after black views or missing frames",
         description="Black views, missing frames, and frames until the person is tracked again.",
-        epilog="example: markerless_tracker benchmark recovery WALK --stature 1.72",
     )
     add_recordings(parser)
     parser.add_argument("--seeds", type=count, default=5, metavar="N", help="seeds 0..N-1 (5)")

@@ -10,7 +10,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.cli.benchmark.arguments import count
+from markerless_tracker.cli.benchmark.arguments import add_kind, count
 from markerless_tracker.cli.terminal.bars import progress_bars
 from markerless_tracker.cli.track import read_config
 from markerless_tracker.errors import ConfigError
@@ -20,15 +20,16 @@ from markerless_tracker.tracking import TrackerConfig
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
-    parser = kinds.add_parser(
+    parser = add_kind(
+        kinds,
         "silhouettes",
+        "markerless_tracker benchmark silhouettes WALK --pictures masks",
         help="masks against exact ones, compared with OpenCV's MOG2 and KNN",
         description=(
             "Silhouettes against a recording's masks/ or, without masks, against the body posed at "
             "its ground_truth.trc; compared with OpenCV's MOG2 and KNN on the same frames, with "
             "the same morphology, one thread each."
         ),
-        epilog="example: markerless_tracker benchmark silhouettes RECORDING --pictures out/masks",
     )
     parser.add_argument(
         "sources", nargs="*", type=Path, metavar="SOURCE",

@@ -10,17 +10,18 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.cli.benchmark.arguments import count
+from markerless_tracker.cli.benchmark.arguments import add_kind, count
 from markerless_tracker.cli.terminal.bars import progress_bars
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
-    parser = kinds.add_parser(
+    parser = add_kind(
+        kinds,
         "speed",
+        "markerless_tracker benchmark speed --threads 2",
         help="time of each part, and ratios to a fixed reference timed alternately",
         description="Time of each part, and ratios to a fixed reference timed alternately.",
-        epilog="example: markerless_tracker benchmark speed --threads 2",
     )
     parser.add_argument(
         "source", nargs="?", type=Path, metavar="SOURCE",

@@ -10,18 +10,19 @@ from rich.table import Table
 from markerless_tracker.benchmarks import postures, starts
 from markerless_tracker.benchmarks.silhouettes.generated import SETS
 from markerless_tracker.benchmarks.with_truth import Report
-from markerless_tracker.cli.benchmark.arguments import count
+from markerless_tracker.cli.benchmark.arguments import add_kind, count
 from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
 from markerless_tracker.errors import ConfigError
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
-    parser = kinds.add_parser(
+    parser = add_kind(
+        kinds,
         "start",
+        "markerless_tracker benchmark start WALK BALANCE --stature 1.72,1.70",
         help="automatic starts from many frames of recordings",
         description="Automatic starts, scored by the ground_truth.trc after some frames.",
-        epilog="example: markerless_tracker benchmark start WALK BALANCE --stature 1.72,1.70",
     )
     add_recordings(parser, sources="*")
     parser.add_argument(

@@ -17,6 +17,7 @@ from markerless_tracker.benchmarks.tables.papers import PaperRow, choose, read_p
 from markerless_tracker.benchmarks.tables.plots import write_plot
 from markerless_tracker.benchmarks.tables.variants import variants
 from markerless_tracker.cli.benchmark.arguments import (
+    add_kind,
     count,
     list_of,
     not_negative,
@@ -33,12 +34,13 @@ from markerless_tracker.tracking import TrackerConfig
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     """Declare the arguments."""
-    parser = kinds.add_parser(
+    parser = add_kind(
+        kinds,
         "tables",
+        "markerless_tracker benchmark tables WALK --truth-score -o out/all",
+        "markerless_tracker benchmark tables WALK --table all -o out/papers",
         help="error in mm: presets x optimizers x bodies x refinements x rates x seeds",
         description="Error on recordings with a ground_truth.trc, mean and sd over seeds.",
-        epilog="examples: markerless_tracker benchmark tables RECORDING --truth-score -o out/all; "
-        "markerless_tracker benchmark tables RECORDING --table all -o out/papers",
     )
     parser.add_argument("sources", nargs="+", type=Path, metavar="SOURCE", help="recording")
     parser.add_argument(

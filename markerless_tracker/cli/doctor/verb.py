@@ -24,7 +24,7 @@ HELP = (
     "of the stamps, sharpness, exposure, and whether the background is still the scene. Red lines "
     "say what to do; exit status 3 if there is one."
 )
-EXAMPLE = "markerless_tracker doctor --calibration calibration.toml --background background"
+EXAMPLE = "markerless_tracker doctor --calibration walk/calibration.toml"
 _ADVICE = "correct it, or make it anew with `calibrate`"
 MOST_SECONDS = 3600.0
 """Longest time for which cameras are listened to."""
