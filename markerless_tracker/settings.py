@@ -2,13 +2,16 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import Field, dataclass, field, fields
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from typing import Any, ClassVar, Self
 
 from markerless_tracker.errors import ConfigError
 
 # Whole numbers up to here are floats without loss; no setting needs larger ones.
 _EXACT = 2**53
+_AS_NEAR = 0.1
+MOST_SIMILAR = 3
+"""Names that the message about an unknown one suggests."""
 
 
 @dataclass(frozen=True)
@@ -159,10 +162,23 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
     A name without its group is near the name in its group.
     """
+    close = similar(name, known)
+    return f", did you mean {' or '.join(map(repr, close))}?" if close else ""
+
+
+def similar(name: str, known: Iterable[str]) -> list[str]:
+    """The known names that are near enough, the nearest first, at most `MOST_SIMILAR`.
+
+    A name without its group is near the names in groups. Names much farther than the nearest are
+    left out.
+    """
     named = sorted(known)
     inside = [full for full in named if full.rpartition(".")[2] == name]
-    close = inside if len(inside) == 1 else get_close_matches(name, named, n=1)
-    return f", did you mean {close[0]!r}?" if close else ""
+    if inside:
+        return inside[:MOST_SIMILAR]
+    near = get_close_matches(name, named, n=MOST_SIMILAR)
+    ratios = [SequenceMatcher(None, one, name).ratio() for one in near]
+    return [one for one, ratio in zip(near, ratios, strict=True) if ratio > ratios[0] - _AS_NEAR]
 
 
 def _described(entry: "Field[Any]", prefix: str) -> Setting:

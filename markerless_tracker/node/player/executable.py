@@ -27,9 +27,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: list[str], stop: StopSignals) -> int:
     if "-h" in argv or "--help" in argv:
-        from markerless_tracker.node.player.parameters import descriptions
+        from markerless_tracker.node.player.parameters import default_values, descriptions
 
-        print_help("player", _SUMMARY, _EXAMPLE, descriptions())
+        print_help("player", _SUMMARY, _EXAMPLE, descriptions(), default_values())
         return 0
     from markerless_tracker.node.player.node import PlayerNode
 

@@ -47,7 +47,7 @@ def read_player_settings(given: Mapping[str, Any]) -> PlayerSettings:
     Raises:
         ConfigError: no bag, an unknown name or an impossible value; names the parameter.
     """
-    declared.check_names(given, _NAMES)
+    declared.check_names(given, _NAMES, "player")
     values = declared.present(given)
     if "bag" not in values:
         raise ConfigError("bag: not given, expected the folder of a bag (-p bag:=FOLDER)")
@@ -74,6 +74,11 @@ def player_values(settings: PlayerSettings) -> dict[str, Any]:
     """Value of every parameter in a type that ROS supports."""
     topics = None if settings.topics is None else list(settings.topics)
     return {**asdict(settings), "bag": str(settings.bag), "topics": topics}
+
+
+def default_values() -> dict[str, Any]:
+    """Value of every parameter unless it is given; `bag` has none."""
+    return {entry.name: entry.default for entry in fields(PlayerSettings) if entry.name != "bag"}
 
 
 def descriptions() -> dict[str, str]:

@@ -2,7 +2,8 @@
 
 from array import array
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from difflib import get_close_matches
+from inspect import cleandoc
+from textwrap import dedent
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -10,7 +11,7 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.node import Node
 
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.settings import Setting
+from markerless_tracker.settings import Setting, similar
 
 ROS_OWN = ("use_sim_time", "start_type_description_service")
 """Parameters that every ROS node has."""
@@ -99,16 +100,22 @@ def declare_effective(
         node.declare_parameter(name, value, descriptor, ignore_override=True)
 
 
-def check_names(given: Iterable[str], known: Sequence[str]) -> None:
+def check_names(given: Iterable[str], known: Sequence[str], node: str) -> None:
     """Check that all given names are parameters: rclpy itself ignores others.
 
+    Args:
+        given: the names.
+        known: all names.
+        node: the executable, whose `--help` lists them.
+
     Raises:
-        ConfigError: one is not; names the most similar parameter.
+        ConfigError: one is not; names the most similar parameters.
     """
     for name in given:
         if name not in known:
-            near = get_close_matches(name, known, n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
+            listed = f"`{node} --help` lists all {len(known)}"
+            near = similar(name, known)
+            hint = f"did you mean {' or '.join(map(repr, near))}? {listed}" if near else listed
             raise ConfigError(f"parameter {name!r} is unknown, {hint}")
 
 
@@ -118,10 +125,19 @@ def present(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def attribute_lines(owner: type) -> dict[str, str]:
-    """Descriptions of attributes from a class' docstring, by name (lines ``name: text``)."""
-    attributes = (owner.__doc__ or "").partition("Attributes:")[2]
-    pairs = (line.strip().partition(": ") for line in attributes.splitlines())
-    return {name: line for name, colon, line in pairs if colon and name.isidentifier()}
+    """Descriptions of attributes from a class' docstring, by name (``name: text``, indented on)."""
+    attributes = cleandoc(owner.__doc__ or "").partition("Attributes:\n")[2]
+    found: dict[str, str] = {}
+    for line in dedent(attributes).splitlines():
+        name, colon, text = line.partition(": ")
+        if colon and name.isidentifier():
+            found[name] = text
+        elif line.startswith(" "):
+            last = next(reversed(found))
+            found[last] += f" {line.strip()}"
+        else:
+            break
+    return {name: text.removesuffix(".") for name, text in found.items()}
 
 
 def _hold(descriptor: ParameterDescriptor, setting: Setting) -> None:

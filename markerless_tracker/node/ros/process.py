@@ -1,8 +1,10 @@
 """Starting and stopping an executable of this package in a ROS graph."""
 
 import os
+import shutil
 import signal
 import sys
+import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -19,6 +21,8 @@ NOT_INSTALLED = (
 )
 NOTICE_S = 0.1
 """Longest time until a signal is noticed."""
+_NAME_WIDTH = 24
+"""Columns of the parameters' names in `--help`."""
 _NEEDED = (
     "rclpy",
     "diagnostic_msgs.msg",
@@ -96,14 +100,40 @@ def run_executable(
             return 1
 
 
-def print_help(name: str, summary: str, example: str, lines: Mapping[str, str]) -> None:
-    """Print a summary of an executable, an example, and a line about each parameter."""
-    width = max(map(len, lines)) + 2
-    listed = "\n".join(f"  {key:{width}}{line}" for key, line in lines.items())
+def print_help(
+    name: str, summary: str, example: str, lines: Mapping[str, str], defaults: Mapping[str, Any]
+) -> None:
+    """Print a summary of an executable, an example, and each parameter with its default.
+
+    Args:
+        name: the executable's.
+        summary: one sentence.
+        example: a command line.
+        lines: a line about each parameter.
+        defaults: their values unless given; None, an empty text or nothing at all: no default.
+    """
+    listed = "".join(_entry(key, line, defaults.get(key)) for key, line in lines.items())
     print(
         f"usage: {name} --ros-args [-p NAME:=VALUE ...] [--params-file FILE]\n\n{summary}\n\n"
-        f"example:\n  {example}\n\nparameters:\n{listed}"
+        f"example:\n  {example}\n\nparameters [default]:\n{listed}",
+        end="",
     )
+
+
+def _entry(name: str, line: str, default: Any) -> str:
+    """A parameter as `argparse` lists options, as wide as the terminal."""
+    plain = str(default).lower() if isinstance(default, bool) else default
+    text = line if default is None or default == "" else f"{line} [{plain}]"
+    width = max(_NAME_WIDTH + 20, shutil.get_terminal_size().columns - 2)
+    indent = " " * _NAME_WIDTH
+    wrapped = textwrap.fill(
+        text, width, initial_indent=indent, subsequent_indent=indent,
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+    head = f"  {name}"
+    if len(head) < _NAME_WIDTH - 1:
+        return f"{head}{wrapped[len(head) :]}\n"
+    return f"{head}\n{wrapped}\n"
 
 
 def init_context(arguments: Sequence[str], domain_id: int | None = None) -> Any:

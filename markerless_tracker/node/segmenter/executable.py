@@ -13,7 +13,8 @@ from markerless_tracker.node.ros.process import (
 
 _SUMMARY = "Publishes the evidence of one camera's images, for a tracker on another machine."
 _EXAMPLE = (
-    "segmenter --ros-args -r __node:=segmenter_cam01 -p camera:=cam01 -p background_dir:=empty"
+    "segmenter --ros-args -r __node:=segmenter_cam01 \\\n"
+    "      -p camera:=cam01 -p background_dir:=empty"
 )
 
 
@@ -28,9 +29,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: list[str], stop: StopSignals) -> int:
     if "-h" in argv or "--help" in argv:
-        from markerless_tracker.node.segmenter.parameters import segmenter_descriptions
+        from markerless_tracker.node.segmenter.parameters import (
+            segmenter_defaults,
+            segmenter_descriptions,
+        )
 
-        print_help("segmenter", _SUMMARY, _EXAMPLE, segmenter_descriptions())
+        print_help("segmenter", _SUMMARY, _EXAMPLE, segmenter_descriptions(), segmenter_defaults())
         return 0
     from markerless_tracker.libraries import collect_for_good
     from markerless_tracker.node.segmenter.node import SegmenterNode

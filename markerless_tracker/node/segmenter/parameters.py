@@ -58,7 +58,7 @@ def read_segmenter_settings(given: Mapping[str, Any]) -> SegmenterSettings:
         ConfigError: no camera or background, an unknown name or an impossible value; names the
             parameter.
     """
-    declared.check_names(given, known_parameters())
+    declared.check_names(given, known_parameters(), "segmenter")
     values = declared.present(given)
     for name, expected in (
         ("camera", "the camera's name (-p camera:=cam01)"),
@@ -90,6 +90,15 @@ def segmenter_values(settings: SegmenterSettings) -> dict[str, Any]:
     own["background_dir"] = str(settings.background_dir)
     chosen = settings.config.by_name()
     return {**own, **{name: chosen[name] for name in _used()}}
+
+
+def segmenter_defaults() -> dict[str, Any]:
+    """Value of every parameter unless it is given; `camera` and `background_dir` have none."""
+    given = SegmenterSettings(
+        camera="", background_dir=Path(), config=TrackerConfig.from_mapping({})
+    )
+    values = segmenter_values(given)
+    return {**values, "camera": None, "background_dir": None}
 
 
 def segmenter_descriptions() -> dict[str, str]:

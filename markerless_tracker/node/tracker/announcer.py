@@ -1,11 +1,59 @@
 """Log lines of a running tracker: one per event, in the words of `state` and the diagnostics."""
 
-from collections.abc import Mapping
+import sys
+import time
+from collections.abc import Callable, Mapping
 
 from markerless_tracker.calibration.contours.time_offset import TimeOffset
 from markerless_tracker.node.health import NEWS, Health
 from markerless_tracker.node.ros.notices import Notices, kind_of
 from markerless_tracker.records import TrackResult, TrackState
+
+LONG_S = 5.0
+"""Time after which the log says that a first start may take long."""
+PROGRESS_S = 20.0
+"""Time between two lines of progress while kernels are compiled, in a terminal."""
+
+
+class CompilingLines:
+    """Log lines while kernels are compiled: one at the beginning, one when it takes long.
+
+    In a terminal progress follows every `PROGRESS_S`. Elsewhere `state` alone shows it.
+
+    Args:
+        inform: logs a line.
+        clock: monotonic time in s.
+        terminal: whether the log is shown in a terminal; None: whether standard error is one.
+    """
+
+    def __init__(
+        self,
+        inform: Callable[[str], None],
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        terminal: bool | None = None,
+    ) -> None:
+        self._inform = inform
+        self._clock = clock
+        self._terminal = sys.stderr.isatty() if terminal is None else terminal
+        self._next_s = clock() + LONG_S
+        self._long = False
+        inform("compiling what is not stored from an earlier start")
+
+    def progress(self, activity: str) -> None:
+        """Log the activity if its time has come."""
+        now_s = self._clock()
+        if now_s < self._next_s:
+            return
+        self._next_s = now_s + PROGRESS_S
+        if not self._long:
+            self._inform(
+                f"{activity}, which takes up to two minutes at a first start "
+                "(`markerless_tracker compile` does it at install time)"
+            )
+        elif self._terminal:
+            self._inform(activity)
+        self._long = True
 
 
 class Announcer:

@@ -15,8 +15,8 @@ from markerless_tracker.node.ros.process import (
 
 _SUMMARY = "Tracks a person in the images of several calibrated cameras."
 _EXAMPLE = (
-    "tracker --ros-args -p calibration_file:=bag/calibration.toml "
-    "-p background_dir:=bag/background -p stature:=1.75"
+    "tracker --ros-args -p calibration_file:=bag/calibration.toml \\\n"
+    "      -p background_dir:=bag/background -p stature:=1.75"
 )
 _CLOSE_S = 3.0
 _SWITCH_S = 0.001
@@ -34,9 +34,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: list[str], stop: StopSignals) -> int:
     if "-h" in argv or "--help" in argv:
-        from markerless_tracker.node.tracker.parameters import descriptions
+        from markerless_tracker.node.tracker.parameters import default_values, descriptions
 
-        print_help("tracker", _SUMMARY, _EXAMPLE, descriptions())
+        print_help("tracker", _SUMMARY, _EXAMPLE, descriptions(), default_values())
         return 0
     # The compiled passes give the interpreter up, and would wait for it up to 5 ms each.
     sys.setswitchinterval(_SWITCH_S)

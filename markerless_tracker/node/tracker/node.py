@@ -24,7 +24,7 @@ from markerless_tracker.node.tracker.cameras.build import make_inputs, view_read
 from markerless_tracker.node.tracker.changes import FIXED, LIVE, LiveSettings
 from markerless_tracker.node.tracker.publishing.files import Pictures, ResultFile
 from markerless_tracker.node.tracker.publishing.results import ResultPublishers
-from markerless_tracker.node.tracker.report import RunReport
+from markerless_tracker.node.tracker.report import RunReport, sets_line
 from markerless_tracker.node.tracker.services import Services
 from markerless_tracker.node.tracker.setup import RigSource, build
 from markerless_tracker.node.tracker.status import TrackerStatus
@@ -163,6 +163,7 @@ class TrackerNode(GivenNode):
         verdict = self._report.verdict()
         if verdict is not None:
             self._inform(verdict.counts)
+            self._inform(sets_line(counts))
             for line in verdict.lines():
                 self._inform(line)
             notes["verdict"] = verdict.as_mapping()

@@ -134,7 +134,7 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
     Raises:
         ConfigError: an unknown name or an impossible value; names the parameter.
     """
-    declared.check_names(given, parameter_names())
+    declared.check_names(given, parameter_names(), "tracker")
     values = declared.present(given)
     own: dict[str, Any] = {
         name: Path(declared.text(name, values[name])).expanduser()
@@ -182,6 +182,11 @@ def effective_values(settings: NodeSettings) -> dict[str, Any]:
     own = {name: getattr(settings, name) for name in _OWN}
     chosen = settings.config.by_name()
     return {name: _as_parameter(value) for name, value in {**chosen, **own}.items()}
+
+
+def default_values() -> dict[str, Any]:
+    """Value of every parameter unless it is given; None where there is none."""
+    return effective_values(read_settings({}))
 
 
 def descriptions() -> dict[str, str]:

@@ -1,5 +1,6 @@
 """The verdict of a live run: what its frames add up to."""
 
+from collections.abc import Mapping
 from threading import Lock
 
 from markerless_tracker.body import load_description
@@ -9,6 +10,27 @@ from markerless_tracker.records import TrackResult
 from markerless_tracker.results.verdict.record import RunRecord
 from markerless_tracker.results.verdict.verdict import Verdict, verdict_of
 from markerless_tracker.tracking import Tracker
+
+_LEFT_OUT = {
+    "incomplete": "incomplete",
+    "late": "late",
+    "dropped_before_ready": "before the tracker was ready",
+    "dropped_before_start": "before the start frame",
+    "dropped_while_learning": "while learning",
+    "dropped_on_error": "with an error",
+}
+"""Count of `state` -> words, for sets of images that were not tracked beside those skipped."""
+
+
+def sets_line(counts: Mapping[str, str]) -> str:
+    """How many sets of images were not tracked, and why, in a line.
+
+    Args:
+        counts: the values of `state`.
+    """
+    others = [f"{counts[key]} {words}" for key, words in _LEFT_OUT.items() if counts[key] != "0"]
+    skipped = f"sets of images not tracked: {counts['skipped']} skipped for newer ones"
+    return ", ".join((skipped, *others))
 
 
 class RunReport:

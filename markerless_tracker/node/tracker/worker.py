@@ -15,7 +15,7 @@ from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.libraries import collect_for_good
 from markerless_tracker.node.health import PROCESSING
-from markerless_tracker.node.tracker.announcer import ready_line
+from markerless_tracker.node.tracker.announcer import CompilingLines, ready_line
 from markerless_tracker.node.tracker.learning import Learning, OpenRequest
 from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
 from markerless_tracker.node.tracker.pace.effort import EffortRule, Lateness
@@ -30,8 +30,6 @@ START_TOLERANCE_NS = 4_000_000
 frames are further apart (8.3 ms at 120 fps)."""
 
 _POLL_S = 0.2
-_REPORT_S = 5.0
-"""Time between two lines of the log while kernels are compiled."""
 
 
 class Stepper(Protocol):
@@ -142,7 +140,6 @@ class TrackWorker:
         self._reset = Event()
         self._request = OpenRequest()
         self._waits = False
-        self._reported_s = 0.0
         self._effort = EffortRule()
         self.fatal: str | None = None
         # Compilation cannot be interrupted and must not keep the process alive.
@@ -188,9 +185,8 @@ class TrackWorker:
             if handle is None:
                 return
             self._status.doing("compiling")
-            self._inform("compiling what is not stored from an earlier start")
-            begun_s = self._reported_s = self._clock()
-            with compilation(self._compiling) as kernels:
+            begun_s, lines = self._clock(), CompilingLines(self._inform, self._clock)
+            with compilation(partial(self._compiling, lines)) as kernels:
                 handle.tracker.warm_up()
                 handle.warm_up()
             collect_for_good()
@@ -224,15 +220,11 @@ class TrackWorker:
         if request is not None:
             request.refuse("the tracker ends")
 
-    def _compiling(self, _: str, done: int, most: int) -> None:
-        """Report the progress of a first start, in the log every `_REPORT_S`."""
-        self._status.doing(f"compiling {done} of at most {most} kernels")
-        now_s = self._clock()
-        if now_s - self._reported_s >= _REPORT_S:
-            self._reported_s = now_s
-            self._inform(
-                f"{self._status.activity} (`markerless_tracker compile` does it at install time)"
-            )
+    def _compiling(self, lines: CompilingLines, _: str, done: int, most: int) -> None:
+        """Report the progress of a first start."""
+        activity = f"compiling {done} of at most {most} kernels"
+        self._status.doing(activity)
+        lines.progress(activity)
 
     def _make(self) -> TrackerHandle | None:
         while not self._stop.is_set():

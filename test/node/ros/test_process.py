@@ -83,17 +83,36 @@ def test_a_signal_is_noted_and_breaks_nothing(number: int) -> None:
 
 @pytest.mark.parametrize(
     ("node", "parameters"),
-    [("tracker", ("calibration_file", "edge_weight")), ("player", ("bag", "loop"))],
-)
-def test_help_lists_the_parameters(
-    node: str, parameters: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+    [
+        (
+            "tracker",
+            (
+                "calibration_file",
+                "scale factor by which images are made smaller on arrival [1.0]",
+                "tf_cameras publish the optical frames of `calibration_file` on /tf_static [true]",
+                "sppso, hmcpso, hpso, mcpso, pso, glpso, apf, pf) [sppso]", "edge_weight",
+                "evidence: none, every camera has a segmenter (auto, raw",
+            ),
+        ),
+        ("player", ("bag", "loop start again at the end [false]")),
+        ("segmenter", ("camera", "value_max of grey cameras [0.95]")),
+    ],
+)  # fmt: skip
+def test_help_lists_the_parameters_with_their_defaults(
+    node: str,
+    parameters: tuple[str, ...],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    monkeypatch.setenv("COLUMNS", "80")
     main = importlib.import_module(f"markerless_tracker.node.{node}.executable").main
     assert main(["--help"]) == 0
     text = capsys.readouterr().out
     assert "example:" in text
-    assert all(f"\n  {name} " in text for name in parameters)
+    assert [line for line in text.splitlines() if line[80:]] == []
+    words = " ".join(text.split())
+    assert [one for one in parameters if one not in words] == []
 
 
 class Deaf(Listener):

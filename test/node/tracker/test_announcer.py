@@ -9,7 +9,10 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 from markerless_tracker.calibration.contours.time_offset import TimeOffset
 from markerless_tracker.node.health import Health, Level
 from markerless_tracker.node.ros.notices import Notices
-from markerless_tracker.node.tracker.announcer import Announcer, ready_line
+from markerless_tracker.node.tracker.announcer import Announcer, CompilingLines, ready_line
+from markerless_tracker.node.tracker.cameras.counts import SyncCounts
+from markerless_tracker.node.tracker.report import sets_line
+from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.records import TrackResult, TrackState
 
 TRACKING, LOST, SEARCHING = TrackState.TRACKING, TrackState.LOST, TrackState.SEARCHING
@@ -63,6 +66,23 @@ def test_a_camera_that_is_gone_and_back_is_said_once_each() -> None:
     assert log.lines[1:] == ["TRACKING: every camera is used again"]
 
 
+@pytest.mark.parametrize(("terminal", "more"), [(True, 4), (False, 0)])
+def test_a_first_start_is_two_lines_and_progress_in_a_terminal(terminal: bool, more: int) -> None:
+    lines: list[str] = []
+    now_s = 100.0
+    compiling = CompilingLines(lines.append, lambda: now_s, terminal=terminal)
+    for done in range(90):
+        now_s += 1.0
+        compiling.progress(f"compiling {done} of at most 120 kernels")
+    first, long, *progress = lines
+    assert first == "compiling what is not stored from an earlier start"
+    assert long.startswith("compiling 4 of at most 120 kernels, which takes up to two minutes")
+    assert "`markerless_tracker compile`" in long
+    assert progress == [
+        f"compiling {done} of at most 120 kernels" for done in (24, 44, 64, 84)[:more]
+    ]
+
+
 def test_the_duration_of_the_compilation() -> None:
     line = ready_line("waiting for images", 12, 34.56)
     assert line == "ready, waiting for images; 12 kernels compiled, 34.6 s"
@@ -80,3 +100,17 @@ def test_a_late_camera_is_said_once_with_the_offsets_that_correct_it() -> None:
         "images are late, by the person's motion: cam02 by +20 ms (sd 1.0 ms); "
         'stamp_offsets:="[0.000, 0.030, 0.000]" corrects it'
     ]
+
+
+def test_the_sets_that_were_not_tracked_are_counted() -> None:
+    status = TrackerStatus()
+    status.became_ready("waiting for images", now_s=0.0)
+    assert sets_line(status.values(SyncCounts(), (), ())) == (
+        "sets of images not tracked: 0 skipped for newer ones"
+    )
+    status.dropped("before_ready", 4)
+    counts = SyncCounts(complete=20, skipped=7, incomplete=2)
+    assert sets_line(status.values(counts, (), ())) == (
+        "sets of images not tracked: 7 skipped for newer ones, 2 incomplete, "
+        "4 before the tracker was ready"
+    )

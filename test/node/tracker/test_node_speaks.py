@@ -41,10 +41,11 @@ def test_a_run_from_ready_to_the_result(tmp_path: Path, begin: Any, scenes: Any)
     # The diagnostics have the same words.
     assert "SEARCHING: searching for a person" in messages
     for line in (
-        "compiling", "TRACKING: person found (", "LOST: person lost (",
+        "compiling what is not", "TRACKING: person found (", "LOST: person lost (",
         "SEARCHING: searching for a person (", "TRACKING: person found again (",
         "TRACKING: tracking without cam03", "TRACKING: every camera is used again",
-        "frames written", "overlap of body and silhouettes: cam01 0.", "next: ",
+        "frames written", "sets of images not tracked: ",
+        "overlap of body and silhouettes: cam01 0.", "next: ",
     ):  # fmt: skip
         assert log.count(line) == 1, (line, log)
     verdict = json.loads((tmp_path / "walk.json").read_text(encoding="utf-8"))["verdict"]

@@ -70,7 +70,9 @@ def test_an_unknown_parameter_ends_the_process(world: Any, start: Any) -> None:
     process = start("tracker", **world.parameters(), evaluatoins=10)
     assert process.wait() == 1
     (line,) = process.output.splitlines()
-    assert line == "tracker: parameter 'evaluatoins' is unknown, did you mean 'evaluations'?"
+    assert line.startswith(
+        "tracker: parameter 'evaluatoins' is unknown, did you mean 'evaluations'? `tracker --help`"
+    )
 
 
 def test_an_empty_list_ends_the_process_with_one_line(world: Any, start: Any) -> None:

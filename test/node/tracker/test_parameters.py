@@ -34,6 +34,14 @@ def test_every_promised_parameter_and_every_setting_is_one() -> None:
     assert set(player_descriptions()) == {entry.name for entry in fields(PlayerSettings)}
 
 
+def test_an_unknown_name_gets_a_few_suggestions() -> None:
+    for name in parameter_names():
+        with pytest.raises(ConfigError) as error:
+            read_settings({f"{name}_": 1})
+        text = str(error.value)
+        assert repr(name) in text and text.count(" or ") <= 2 and len(text) < 200
+
+
 def test_what_is_given_is_in_effect() -> None:
     settings = read_settings(
         {
@@ -63,7 +71,12 @@ def test_what_is_given_is_in_effect() -> None:
     [
         ({"seeed": 1}, "'seeed'.*'seed'"),
         ({"edge_wieght": 1.0}, "'edge_weight'"),
-        ({"qqqq": 1}, "'qqqq' is unknown, expected one of .*calibration_file"),
+        ({"qqqq": 1}, r"'qqqq' is unknown, `tracker --help` lists all \d+$"),
+        (
+            {"background": "empty"},
+            r"'background' is unknown, did you mean 'background_dir'.*\? `tracker --help` lists",
+        ),
+        ({"iterations": 2}, "did you mean 'level_set.iterations' or 'refine.iterations'\\?"),
         ({"scale": 0.0}, "scale: got 0.0"),
         ({"scale": True}, "scale: got True"),
         ({"scale": "half"}, "scale: got 'half'"),
