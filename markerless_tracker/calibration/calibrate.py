@@ -82,6 +82,7 @@ def calibrate(
     thickness_m: float = 0.0,
     k3: bool = False,
     progress: Callable[[int, int | None], None] | None = None,
+    adjusting: Callable[[], None] | None = None,
 ) -> Calibration:
     """Calibrate the cameras of a recording of a board.
 
@@ -91,6 +92,7 @@ def calibrate(
         most_sets, floor_frame, progress: see `find_views`.
         thickness_m: height of the print above the floor while the board lies there.
         k3: whether the lens has a third radial coefficient.
+        adjusting: called when the search is done and the adjustment begins.
 
     Raises:
         CalibrationError: cameras saw no board, too few of them, none together with the others, or
@@ -99,6 +101,8 @@ def calibrate(
     views = find_views(
         recording, board, most_sets=most_sets, floor_frame=floor_frame, progress=progress
     )
+    if adjusting is not None:
+        adjusting()
     lenses = {name: start_lens(views, name, k3=k3) for name in recording.rig.names}
     bundle = adjust(views, lenses, start_layout(views, lenses), k3=k3)
     T_print_floor = transform(np.eye(3), [0.0, 0.0, -thickness_m])

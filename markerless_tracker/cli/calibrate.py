@@ -25,7 +25,8 @@ from markerless_tracker.camera.board import (
     board_squares,
     read_board,
 )
-from markerless_tracker.cli.terminal.bars import progress_bars, warn
+from markerless_tracker.cli.terminal.bars import warn
+from markerless_tracker.cli.terminal.notices import Bars
 from markerless_tracker.datasets.uncalibrated import open_uncalibrated
 from markerless_tracker.datasets.writer import write_image
 from markerless_tracker.errors import ConfigError, DatasetError
@@ -102,8 +103,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"thickness is {args.thickness:g} m, expected 0 to 1")
     recording = open_uncalibrated(args.recording)
     board = board_of(args, recording.path)
-    with progress_bars(console) as bars:
-        task = bars.add_task(f"searching {recording.name}", total=None)
+    with Bars(console) as bars:
+        bars.begin(f"searching {recording.name}")
         found = calibrate(
             recording,
             board,
@@ -111,7 +112,8 @@ def run(args: argparse.Namespace) -> int:
             floor_frame=args.floor_frame,
             thickness_m=args.thickness,
             k3=args.k3,
-            progress=lambda done, total: bars.update(task, completed=done, total=total),
+            progress=bars.step,
+            adjusting=lambda: bars.begin(f"calibrating {len(recording.rig)} cameras"),
         )
     args.out.parent.mkdir(parents=True, exist_ok=True)
     write_calibration(args.out, found.rig)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from rich.console import Console
 
 from markerless_tracker.body import MARKER_NAMES, write_pose, write_subject
 from markerless_tracker.camera.board import (
@@ -19,7 +20,7 @@ from markerless_tracker.camera.board import (
     board_squares,
     write_board,
 )
-from markerless_tracker.cli.terminal.bars import progress_bars
+from markerless_tracker.cli.terminal.notices import Bars
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.datasets.writer import new_recording
 from markerless_tracker.errors import ConfigError
@@ -158,16 +159,11 @@ def run(args: argparse.Namespace) -> int:
     for name in ("squares", "square_size"):
         if getattr(args, name) is not None:
             raise ConfigError(f"--{name.replace('_', '-')} needs --checkerboard or --charuco")
-    scene = _synthetic(args) if args.scene is None else _generated(args)
-    with progress_bars() as bar:
-        task = bar.add_task(f"rendering {args.out.name}", total=frames)
-        synthesize(
-            args.out,
-            scene,
-            frames=frames,
-            lossless=args.lossless,
-            progress=lambda done: bar.update(task, completed=done),
-        )
+    with Bars(Console(stderr=True)) as bars:
+        bars.begin(f"preparing {args.out.name}")
+        scene = _synthetic(args) if args.scene is None else _generated(args)
+        bars.begin(f"rendering {args.out.name}", frames)
+        synthesize(args.out, scene, frames=frames, lossless=args.lossless, progress=bars.step)
     if args.json:
         print(json.dumps({
             "path": str(args.out), "frames": frames, "fps": args.fps, "motion": scene.motion.kind,
@@ -188,21 +184,24 @@ def _board(args: argparse.Namespace, frames: int) -> int:
         if args.charuco
         else Board(CHECKERBOARD, columns, rows, square_m)
     )
-    scene = BoardScene(
-        board,
-        cameras=args.cameras,
-        size_px=_size(args.size),
-        fps=args.fps,
-        seconds=args.seconds,
-        seed=args.seed,
-        noise=args.noise,
-        distortion=(0.0,) * 5 if args.undistorted else MILD_LENS,
-    )
-    with progress_bars() as bar:
+    with Bars(Console(stderr=True)) as bars:
+        bars.begin(f"preparing {args.out.name}")
+        scene = BoardScene(
+            board,
+            cameras=args.cameras,
+            size_px=_size(args.size),
+            fps=args.fps,
+            seconds=args.seconds,
+            seed=args.seed,
+            noise=args.noise,
+            distortion=(0.0,) * 5 if args.undistorted else MILD_LENS,
+        )
+        bars.begin(f"rendering {args.out.name}", frames)
         with new_recording(args.out, scene.rig, scene.fps, lossless=args.lossless) as writer:
             write_board(writer.folder / BOARD_FILE, board)
-            for index in bar.track(range(frames), description=f"rendering {args.out.name}"):
+            for index in range(frames):
                 writer.write(scene.frame(index))
+                bars.step(index + 1)
     if args.json:
         print(json.dumps({
             "path": str(args.out), "frames": frames, "fps": args.fps, "board": board.kind,

@@ -4,6 +4,9 @@ import argparse
 import io
 import json
 import math
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -124,3 +127,37 @@ def test_a_command_writes_json_alone_where_no_terminal_is(tmp_path: Path, capsys
     captured = capsys.readouterr()
     assert json.loads(captured.out)["frames"] == 2
     assert captured.err == ""
+
+
+def terminal_of(words: list[str], folder: Path) -> tuple[int, str]:
+    """Exit status of a command in a terminal of 80 columns, and all that it showed there."""
+    pty = pytest.importorskip("pty", reason="no pseudo-terminals")
+    ours, theirs = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "80"}
+    command = [sys.executable, "-m", "markerless_tracker", *words]
+    with subprocess.Popen(
+        command, cwd=folder, env=environment, stdin=theirs, stdout=subprocess.PIPE, stderr=theirs
+    ) as process:
+        os.close(theirs)
+        shown = b""
+        while True:
+            try:
+                shown += (piece := os.read(ours, 65536))
+            except OSError:  # how a pseudo-terminal ends
+                break
+            if not piece:
+                break
+        status = process.wait()
+    os.close(ours)
+    return status, shown.decode()
+
+
+def test_boards_are_made_and_searched_with_progress_in_a_terminal(tmp_path: Path) -> None:
+    words = ["synthesize", "board", "--checkerboard", "--seconds", "1", "--cameras", "2"]
+    status, text = terminal_of([*words, "--size", "164x122"], tmp_path)
+    assert status == 0 and "preparing board" in text and "rendering board" in text, text
+    assert "10/10" in text
+    # A second holds too few places of the board: the error follows the progress.
+    status, text = terminal_of(["calibrate", "board", "-o", "c.toml"], tmp_path)
+    assert "searching board" in text and "10/10" in text, text
+    assert status == 0 or "markerless_tracker: error: " in text
