@@ -20,6 +20,8 @@ _ARROWS = 8.0
 """Errors are drawn this much larger than they are."""
 _RAY_M = 1.2
 _GRID_M = 1.0
+_ABOVE_PX, _BELOW_PX = 12, 24
+"""Baseline of a camera's name, from the camera."""
 
 
 def coverage_picture(bundle: Bundle, camera: str, measures: CameraMeasures) -> Image:
@@ -90,8 +92,11 @@ def layout_picture(rig: CameraRig, boards: tuple[FloatArray, ...], outline_m: Fl
                 picture, place(eye), place(apply(T_world_cam, _RAY_M * ray)), _BLUE, 1, cv2.LINE_AA
             )
         cv2.circle(picture, place(eye), 6, _BLUE, cv2.FILLED, cv2.LINE_AA)
+        ahead = place(apply(T_world_cam, np.array([0.0, 0.0, _RAY_M])))
         left, top = place(eye)
-        _write(picture, f"{camera.name} {eye[2]:.2f} m up", (left - 60, top - 12))
+        # Behind the camera: not over what it sees.
+        behind = _BELOW_PX if ahead[1] < top else -_ABOVE_PX
+        _write(picture, f"{camera.name} {eye[2]:.2f} m up", (left - 60, top + behind))
     _write(picture, "from above, one line per metre; the board on the floor is black", (8, 20))
     return picture
 

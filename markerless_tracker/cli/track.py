@@ -61,9 +61,10 @@ def run(args: argparse.Namespace) -> int:
     console = Console(stderr=True)
     with Bars(console) as bars:
         finished = track_source(args, bars)
-    for warning in finished.late_warnings:
-        warn(console, warning)
     verdict = finished.outcome.verdict
+    # The verdict's lines say the rest.
+    for warning in finished.late_warnings if args.json else finished.recording.warnings:
+        warn(console, warning)
     if args.json:
         print(json.dumps(finished.summary, indent=2))
     else:

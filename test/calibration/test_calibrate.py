@@ -14,6 +14,7 @@ from markerless_tracker.cli.main import main
 from markerless_tracker.datasets import FrameSet, Recording
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import apply
+from markerless_tracker.synthesis import ring_rig
 from markerless_tracker.synthesis.boards import BoardScene
 from markerless_tracker.synthesis.boards.motion import visible_side
 
@@ -74,8 +75,22 @@ def _room_lit(scene, number, noise):
 
 
 @pytest.fixture(scope="module")
-def found(stills, tmp_path_factory):
-    return calibrate(Stills(tmp_path_factory.mktemp("board"), stills), BOARD, thickness_m=0.02)
+def parts():
+    """What the calibration told of its progress, in order."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def found(stills, tmp_path_factory, parts):
+    return calibrate(
+        Stills(tmp_path_factory.mktemp("board"), stills), BOARD, thickness_m=0.02,
+        progress=lambda done, total: parts.append((done, total)),
+        adjusting=lambda: parts.append("adjusting"),
+    )  # fmt: skip
+
+
+def test_the_search_is_told_step_by_step_then_the_adjustment(found, parts, stills) -> None:
+    assert parts[-1] == "adjusting" and len(parts) == 1 + len(stills)
 
 
 def test_the_true_cameras_are_found(found, scene) -> None:
@@ -98,6 +113,19 @@ def test_pictures_show_corners_and_cameras(found, scene) -> None:
     assert picture.shape == (306, 410, 3) and (picture == (170, 90, 20)).all(axis=2).sum() > 200
     layout = layout_picture(found.rig, found.bundle.boards, BOARD.outline_m)
     assert (layout == (170, 90, 20)).all(axis=2).sum() > 300
+
+
+def test_names_of_cameras_do_not_cover_what_they_see() -> None:
+    rig = ring_rig(4)
+    picture = layout_picture(rig, (np.eye(4),), BOARD.outline_m)
+    blue = (picture == (170, 90, 20)).all(axis=2).astype(np.uint8)
+    ink = (picture == (40, 40, 40)).all(axis=2)
+    dots = cv2.connectedComponentsWithStats(cv2.erode(blue, np.ones((5, 5), np.uint8)))[3][1:]
+    assert len(dots) == len(rig)
+    for x, y in dots.astype(int):
+        above = ink[y - 26 : y - 8, x - 60 : x + 60].sum()
+        below = ink[y + 8 : y + 30, x - 60 : x + 60].sum()
+        assert (below > above) == (y > picture.shape[0] / 2), (x, y)
 
 
 def test_a_board_of_another_size_is_named(stills, tmp_path) -> None:

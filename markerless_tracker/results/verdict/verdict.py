@@ -77,12 +77,11 @@ class Verdict:
             unusual = "" if self.stature_plausible else ", not a grown person's"
             found.append(f"stature of the body {self.stature_m:.2f} m{unusual}")
         if self.worst_limb:
-            found.append(
-                f"worst limb: {self.worst_limb}, lost in {self.worst_limb_lost} of {self.tracked} "
-                "tracked frames"
-            )
+            limb, lost = limb_in_words(self.worst_limb), self.worst_limb_lost
+            found.append(f"worst limb: {limb}, lost in {lost} of {self.tracked} tracked frames")
         if self.frames_with_warnings:
-            found.append(f"warnings in {self.frames_with_warnings} frames: {self.kinds}")
+            count = self.frames_with_warnings
+            found.append(f"warnings in {count} frame{'s' * (count != 1)}: {self.kinds}")
         found += [f"doubt: {text}" for text in self.doubts]
         found += [f"likely cause: {text}" for text in self.causes]
         return [*found, f"next: {self.look}"]
@@ -150,6 +149,13 @@ def verdict_of(
         causes=tuple(dict.fromkeys(causes)),
         look=_where_to_look(record, bool(doubts)),
     )
+
+
+def limb_in_words(limb: str) -> str:
+    """A limb's name as people say it: `left arm` for `l_arm`."""
+    side, _, part = limb.partition("_")
+    sides = {"l": "left", "r": "right"}
+    return f"{sides[side]} {part}" if part and side in sides else limb
 
 
 def fits_worst(overlap: Mapping[str, float]) -> str:

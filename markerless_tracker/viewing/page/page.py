@@ -103,12 +103,23 @@ def _parts(report: Report) -> str:
     """Tables and charts of a result."""
     return "".join(
         [
-            f"<h3>Joints</h3>{joints_table(report)}",
+            f'<h3>Joints</h3>{joints_table(report)}<p class="dim">{_joints_words(report)}</p>',
             _angles(report),
             _gait(report),
             _overlap(report),
             _run(report),
         ]
+    )
+
+
+def _joints_words(report: Report) -> str:
+    """What the columns of the joints' table are."""
+    sd = "sd: the standard deviation that the tracker itself states, of x, y and z together."
+    if report.score is None:
+        return sd
+    return (
+        "Error: distance to the reference. Forward, left, up: its mean offset in the person's "
+        f"heading frame; with offsets off, each joint's is subtracted first. {sd}"
     )
 
 

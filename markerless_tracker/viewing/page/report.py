@@ -13,7 +13,7 @@ from markerless_tracker.results.comparison.measures import Measures, measures
 from markerless_tracker.results.gait import Gait, gait
 from markerless_tracker.results.score import Score, score
 from markerless_tracker.results.stored_result import StoredResult
-from markerless_tracker.results.verdict.verdict import fits_worst
+from markerless_tracker.results.verdict.verdict import CLEARLY, fits_worst, limb_in_words
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,17 +97,27 @@ class Report:
             if count:
                 words.append(f"{count} {'frame' if count == 1 else 'frames'} {state.value.lower()}")
         if self.overlap:
-            worst, least = fits_worst(self.overlap), min(self.overlap.values())
-            fits = f"{worst} fits worst" if worst else "all cameras fit alike"
-            words.append(f"{fits} (overlap {least:.2f})")
+            words.append(self._fits())
         limb = self.verdict.get("worst_limb")
         if limb:
-            words.append(f"{limb} was lost in {self.verdict.get('worst_limb_lost')} frames")
+            lost = self.verdict.get("worst_limb_lost")
+            frames_lost = f"{lost} {'frame' if lost == 1 else 'frames'}"
+            words.append(f"the {limb_in_words(limb)} was lost in {frames_lost}")
         else:
             words.append("no limb was lost" if self.verdict else "")
         if math.isfinite(self.sd_mm):
             words.append(f"the standard deviation of a joint is {self.sd_mm:.0f} mm (median)")
         return ", ".join(word for word in words if word) + "."
+
+    def _fits(self) -> str:
+        """How well the body fits the silhouettes of the cameras."""
+        worst = fits_worst(self.overlap)
+        least, most = min(self.overlap.values()), max(self.overlap.values())
+        if worst:
+            return f"{worst} fits worst (overlap {least:.2f})"
+        if most - least < CLEARLY:
+            return f"all cameras fit alike (overlap {least:.2f})"
+        return f"the overlap of the cameras is {least:.2f} to {most:.2f}"
 
 
 def make_report(

@@ -50,7 +50,9 @@ def joints_table(report: Report) -> str:
             number(float(np.quantile(known, 0.95)) if known.size else None),
         ]
         rows.append(row)
-    errors = ["error, mm", "worst", "forward", "left", "up"] if score is not None else []
+    errors = (
+        ["error, mm", "worst, mm", "forward, mm", "left, mm", "up, mm"] if score is not None else []
+    )
     return table(["joint", *errors, "sd, mm (median)", "sd, mm (95 %)"], rows)
 
 
@@ -73,7 +75,7 @@ def gait_table(parameters: Sequence[Parameter]) -> str:
 
 def mapping_table(heading: tuple[str, str], values: Mapping[str, Any]) -> str:
     """Names and values; nested mappings have dotted names."""
-    rows = [[name, str(value)] for name, value in dotted(values).items()]
+    rows = [[name, _plain(value)] for name, value in dotted(values).items()]
     return table(heading, rows, kind="wide words")
 
 
@@ -86,6 +88,11 @@ def dotted(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         else:
             found[f"{prefix}{name}"] = value
     return found
+
+
+def _plain(value: Any) -> str:
+    """A setting as it is written in YAML and for ROS."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _errors(report: Report, name: str) -> list[str]:
@@ -119,7 +126,7 @@ def _figures(reports: Sequence[Report]) -> list[tuple[str, list[str]]]:
         ("mean error, mm", [number(s.mean_mm if s else None) for s in scores]),
         ("worst frame, mm", [number(s.max_mm if s else None) for s in scores]),
         ("mean error of the limbs, mm", [number(s.limbs_mm if s else None) for s in scores]),
-        ("offsets off, mm", [number(s.offsets_off_mm if s else None) for s in scores]),
+        ("mean error, offsets off, mm", [number(s.offsets_off_mm if s else None) for s in scores]),
         ("MPJPE, mm", [number(m.mpjpe_mm if m else None) for m in more]),
         ("PA-MPJPE, mm", [number(m.pa_mpjpe_mm if m else None) for m in more]),
         ("PCK (150 mm)", [number(m.pck if m else None, 3) for m in more]),

@@ -60,7 +60,7 @@ def test_states_limbs_warnings_and_where_to_look(judge: Judge, result: Any) -> N
     assert found.counts == "9 frames, 3 tracked, 3 lost, 3 searching"
     # Only tracked frames count for the limbs, and only what follows the first of them is a loss.
     assert (found.worst_limb, found.worst_limb_lost) == ("r_arm", 2)
-    assert "worst limb: r_arm, lost in 2 of 3 tracked frames" in found.lines()
+    assert "worst limb: right arm, lost in 2 of 3 tracked frames" in found.lines()
     assert "warnings in 9 frames: 1 kind" in found.lines()
     assert found.look.startswith("nobody was tracked from 0.50 to 0.70 s (3 frames)")
 
