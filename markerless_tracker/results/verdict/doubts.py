@@ -118,6 +118,10 @@ def causes_of_nobody(
             "the background shows the person, too (one that was learned from the recording shows "
             "a person who stands still)"
         )
+    if len(record.rig) == 1 and not start_given and not found:
+        found.append(
+            "there is one camera: a person is found from two on; give a start pose, or add a camera"
+        )
     if record.samples and not found:
         fault = find_fault(record.rig, record.samples) if search_faults else None
         # Frames in the state LOST have a pose, too.

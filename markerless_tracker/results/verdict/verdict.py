@@ -165,9 +165,9 @@ def fits_worst(overlap: Mapping[str, float]) -> str:
         overlap: camera -> overlap (IoU) of its silhouette and the body.
     """
     known = sorted((value, name) for name, value in overlap.items() if math.isfinite(value))
-    if len(known) > 1 and known[1][0] - known[0][0] < CLEARLY:
+    if len(known) < 2 or known[1][0] - known[0][0] < CLEARLY:
         return ""
-    return known[0][1] if known else ""
+    return known[0][1]
 
 
 def _where_to_look(record: RunRecord, doubtful: bool) -> str:

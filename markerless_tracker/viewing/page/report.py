@@ -115,6 +115,8 @@ class Report:
         least, most = min(self.overlap.values()), max(self.overlap.values())
         if worst:
             return f"{worst} fits worst (overlap {least:.2f})"
+        if len(self.overlap) == 1:
+            return f"the overlap of the only camera is {least:.2f}"
         if most - least < CLEARLY:
             return f"all cameras fit alike (overlap {least:.2f})"
         return f"the overlap of the cameras is {least:.2f} to {most:.2f}"

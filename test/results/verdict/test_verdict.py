@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import Subject, load_body, load_description
+from markerless_tracker.camera import CameraRig
 from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.results.verdict.record import RunRecord
 from markerless_tracker.results.verdict.verdict import Verdict, fits_worst, verdict_of
@@ -217,6 +218,15 @@ def test_nobody_although_something_stands_there(judge: Judge, result: Any) -> No
     assert "is no whole person: too little of one is in view" in cause
 
 
+def test_nobody_in_front_of_one_camera(result: Any, scene: Any, masks: Any) -> None:
+    record = RunRecord(CameraRig(scene.rig.cameras[:1]))
+    for index in range(3):
+        shown = {"cam01": masks[index]["cam01"]}
+        record.add(result(index, SEARCHING, shown=shown), scene.body)
+    (cause,) = verdict_of(record, load_description("balan31")).causes
+    assert cause.startswith("there is one camera: a person is found from two on")
+
+
 def test_no_frame_at_all(judge: Judge) -> None:
     found = judge([])
     assert found.counts.startswith("0 frames") and found.look == "there was no frame"
@@ -246,7 +256,8 @@ def test_memory_does_not_grow_with_the_frames(judge: Judge, result: Any, scene: 
     [
         ({"cam01": 0.95, "cam02": 0.94, "cam03": 0.95}, ""),
         ({"cam01": 0.95, "cam02": 0.91, "cam03": 0.94}, "cam02"),
-        ({"cam01": 0.95, "cam02": math.nan}, "cam01"),
+        ({"cam01": 0.95, "cam02": math.nan}, ""),
+        ({"cam01": 0.95}, ""),
         ({"cam01": math.nan}, ""),
         ({}, ""),
     ],

@@ -113,13 +113,14 @@ def test_doubts_of_the_verdict_are_shown(make_result) -> None:
         ((0.94, 0.89, 0.94, 0.89), "the overlap of the cameras is 0.89 to 0.94,"),
         ((0.90, 0.91, 0.90, 0.90), "all cameras fit alike (overlap 0.90),"),
         ((0.90, 0.81, 0.92, 0.91), "cam02 fits worst (overlap 0.81),"),
+        ((0.96,), "the overlap of the only camera is 0.96,"),
     ],
 )
 def test_cameras_fit_alike_only_where_their_overlap_is_alike(
     make_result, overlap: tuple[float, ...], words: str
 ) -> None:
     result = read_result(make_result())
-    named = tuple(f"cam{number:02d}" for number in range(1, 5))
+    named = tuple(f"cam{number:02d}" for number in range(1, len(overlap) + 1))
     same = np.tile(overlap, (len(result), 1))
     report = make_report("a", result.with_arrays(overlap=same, camera_names=named))
     assert words in report.sentence()
