@@ -10,6 +10,8 @@ from markerless_tracker.errors import ConfigError
 # Whole numbers up to here are floats without loss; no setting needs larger ones.
 _EXACT = 2**53
 _AS_NEAR = 0.1
+_LIKE = 0.8
+_LEAST_BEGINNING = 3
 MOST_SIMILAR = 3
 """Names that the message about an unknown one suggests."""
 
@@ -169,16 +171,19 @@ def nearest(name: str, known: Iterable[str]) -> str:
 def similar(name: str, known: Iterable[str]) -> list[str]:
     """The known names that are near enough, the nearest first, at most `MOST_SIMILAR`.
 
-    A name without its group is near the names in groups. Names much farther than the nearest are
-    left out.
+    A name without its group is near the names in groups, the beginning of a name near the whole.
+    Names much farther than the nearest are left out.
     """
     named = sorted(known)
     inside = [full for full in named if full.rpartition(".")[2] == name]
     if inside:
         return inside[:MOST_SIMILAR]
+    likeness = {one: SequenceMatcher(None, one, name).ratio() for one in named}
     near = get_close_matches(name, named, n=MOST_SIMILAR)
-    ratios = [SequenceMatcher(None, one, name).ratio() for one in near]
-    return [one for one, ratio in zip(near, ratios, strict=True) if ratio > ratios[0] - _AS_NEAR]
+    begun = [one for one in named if one.startswith(name) and len(name) >= _LEAST_BEGINNING]
+    if begun and (not near or likeness[near[0]] < _LIKE):
+        near = sorted(begun, key=lambda one: -likeness[one])[:MOST_SIMILAR]
+    return [one for one in near if likeness[one] > likeness[near[0]] - _AS_NEAR]
 
 
 def _described(entry: "Field[Any]", prefix: str) -> Setting:

@@ -35,7 +35,10 @@ _KINDS = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    kinds = parser.add_subparsers(dest="kind", required=True, metavar="KIND")
+    parser.usage = "%(prog)s [-h] KIND ..."
+    kinds = parser.add_subparsers(
+        dest="kind", required=True, metavar=f"{{{','.join(_KINDS)}}}", prog=parser.prog
+    )
     for kind in _KINDS.values():
         kind.add_parser(kinds)
 

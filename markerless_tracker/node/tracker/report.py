@@ -21,6 +21,8 @@ _LEFT_OUT = {
 }
 """Count of `state` -> words, for sets of images that were not tracked beside those skipped."""
 
+_PICTURES = "while it runs the topics debug/NAME/evidence show silhouettes and body"
+
 
 def sets_line(counts: Mapping[str, str]) -> str:
     """How many sets of images were not tracked, and why, in a line.
@@ -72,4 +74,5 @@ class RunReport:
                 known=self._doubts,
                 start_given=self._start_given,
                 search_faults=False,
+                pictures=_PICTURES,
             )

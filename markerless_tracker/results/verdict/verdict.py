@@ -18,6 +18,8 @@ from markerless_tracker.results.verdict.record import RunRecord
 
 CLEARLY = 0.02
 """Overlap by which a camera must lie below all others to be named."""
+PICTURES = "`track --debug-images DIR` shows silhouettes and body of every frame"
+"""Where to look, offline."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,6 +115,7 @@ def verdict_of(
     known: Sequence[str] = (),
     start_given: bool = False,
     search_faults: bool = True,
+    pictures: str = PICTURES,
 ) -> Verdict:
     """The verdict of a run.
 
@@ -123,6 +126,7 @@ def verdict_of(
         start_given: whether the run was to begin with a start pose.
         search_faults: whether to find out, where the run is doubtful, which cameras may be
             exchanged; takes some seconds.
+        pictures: what shows silhouettes and body.
     """
     somebody = record.tracked > 0
     stature = None if record.body is None else stature_m(description, record.body)
@@ -147,7 +151,7 @@ def verdict_of(
         warnings=len(record.warnings.kinds),
         doubts=tuple(dict.fromkeys(doubts)),
         causes=tuple(dict.fromkeys(causes)),
-        look=_where_to_look(record, bool(doubts)),
+        look=_where_to_look(record, pictures, doubtful=bool(doubts)),
     )
 
 
@@ -170,10 +174,9 @@ def fits_worst(overlap: Mapping[str, float]) -> str:
     return known[0][1]
 
 
-def _where_to_look(record: RunRecord, doubtful: bool) -> str:
+def _where_to_look(record: RunRecord, pictures: str, *, doubtful: bool) -> str:
     if not record.frames:
         return "there was no frame"
-    pictures = "`track --debug-images DIR` shows silhouettes and body of every frame"
     if not record.tracked:
         return pictures
     longest = max(record.stretch, record.before, key=lambda stretch: stretch.frames)

@@ -45,7 +45,7 @@ def test_a_run_from_ready_to_the_result(tmp_path: Path, begin: Any, scenes: Any)
         "SEARCHING: searching for a person (", "TRACKING: person found again (",
         "TRACKING: tracking without cam03", "TRACKING: every camera is used again",
         "frames written", "sets of images not tracked: ",
-        "overlap of body and silhouettes: cam01 0.", "next: ",
+        "overlap of body and silhouettes: cam01 0.", "debug/NAME/evidence show silhouettes",
     ):  # fmt: skip
         assert log.count(line) == 1, (line, log)
     verdict = json.loads((tmp_path / "walk.json").read_text(encoding="utf-8"))["verdict"]

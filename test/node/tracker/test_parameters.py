@@ -76,6 +76,7 @@ def test_what_is_given_is_in_effect() -> None:
             {"background": "empty"},
             r"'background' is unknown, did you mean 'background_dir'.*\? `tracker --help` lists",
         ),
+        ({"calib": "x"}, r"did you mean 'calibration_file'\?"),
         ({"iterations": 2}, "did you mean 'level_set.iterations' or 'refine.iterations'\\?"),
         ({"scale": 0.0}, "scale: got 0.0"),
         ({"scale": True}, "scale: got True"),
