@@ -42,6 +42,11 @@ def check_recording(
                 "correct calibration.toml, or make it anew with `calibrate`")
         for doubt in calibration_doubts(recording.rig)
     ]  # fmt: skip
+    if len(recording.rig) == 1:
+        found.append(
+            Finding("calibration", RED, "", "one camera",
+                    "add cameras: a person is found from two on, at best with four")
+        )  # fmt: skip
     if not found:
         found.append(Finding("calibration", GREEN, "", f"{len(recording.rig)} cameras, plausible"))
         found.append(_middle(recording.rig))
@@ -153,7 +158,7 @@ def _background(name: str, signals: Mapping[str, CameraSignals]) -> Finding:
                 )  # fmt: skip
     moved = moved_px(signal.scene, signal.background)
     state = worse(grade(share, UNLIKE), grade(moved, MOVED_PX))
-    text = f"{share:.0%} of the scene differ from it, shifted by {moved:.1f} px"
+    text = f"{share:.0%} of the scene differs from it, shifted by {moved:.1f} px"
     if state == GREEN:
         return Finding("background", GREEN, name, text)
     return Finding(

@@ -237,7 +237,7 @@ def _background(name: str, scene: NDArray[np.float64], empty: NDArray[np.uint8])
     usable = (base > 20.0) & (base < 240.0)
     gain = float(np.median(scene[usable] / base[usable])) if usable.any() else 1.0
     share, moved = unlike_share(scene, gain * base), moved_px(scene, base)
-    text = f"{share:.0%} of the scene differ from it, shifted by {moved:.1f} px, light x{gain:.2f}"
+    text = f"{share:.0%} of the scene differs from it, shifted by {moved:.1f} px, light x{gain:.2f}"
     state = worse(grade(share, UNLIKE), grade(moved, MOVED_PX))
     if state == GREEN:
         return Finding("background", GREEN, name, text)

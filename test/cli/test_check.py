@@ -82,6 +82,18 @@ def test_red_lines_name_the_camera_and_say_what_to_do(
     assert "RED  light: cam04" in capsys.readouterr().out
 
 
+def test_one_camera_is_too_few(tmp_path: Path, scene, frames, capsys) -> None:
+    path = tmp_path / "one"
+    with new_recording(path, CameraRig(scene.rig.cameras[:1]), scene.fps) as writer:
+        for views in frames[:12]:
+            writer.write({"cam01": views["cam01"]})
+    status, found = checked(path, capsys)
+    (calibration,) = [f for f in found if f["check"] == "calibration"]
+    assert status == 3 and (calibration["state"], calibration["text"]) == ("red", "one camera")
+    assert "from two on" in calibration["advice"]
+    assert [f for f in found if f["check"] == "views"] == []
+
+
 def test_cameras_that_see_the_floor_too_near_and_other_units(
     tmp_path: Path, scene, frames, capsys
 ) -> None:
