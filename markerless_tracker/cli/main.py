@@ -37,14 +37,14 @@ VERBS: Mapping[str, str] = MappingProxyType(
         "convert": "write a recording, dataset or videos as an MCAP bag",
         "track": "track the person in a recording or bag",
         "batch": "track many recordings: results and one summary table",
-        "export": "write a result in the formats of OpenSim, C3D, BVH, CSV, NumPy and ROS",
+        "export": "write a result for OpenSim, as C3D, BVH, CSV, NumPy or a bag",
         "record": "record the topics of a running graph to an MCAP bag",
         "evaluate": "compare a result with reference markers, in mm",
-        "report": "write one HTML page about a result: film, verdict, errors, angles, gait",
+        "report": "write an HTML page about a result: film, verdict, angles, gait",
         "view": "show a result over its images: film, picture, Rerun viewer",
-        "synthesize": "render a synthetic person as a recording with exact reference markers",
+        "synthesize": "render a synthetic person, or a board, with the exact truth",
         "benchmark": "measure speed and accuracy",
-        "compile": "compile everything for this machine, so that no first start waits for it",
+        "compile": "compile for this machine, so that no first start waits for it",
     }
 )
 """Verb -> description in one line."""
@@ -127,7 +127,8 @@ def _overview() -> str:
         f"usage: {PROGRAM} VERB ...\n\n"
         "Full-body pose tracking from several calibrated cameras.\n\n"
         f"verbs:\n{rows}\n"
-        f"{PROGRAM} VERB --help describes a verb, with an example; {PROGRAM} --version.\n"
+        f"{PROGRAM} VERB --help describes a verb, with an example.\n"
+        f"{PROGRAM} --version prints the version.\n"
     )
 
 

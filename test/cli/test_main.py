@@ -52,6 +52,7 @@ def test_overview_lists_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
     for name, text in cli.VERBS.items():
         assert f"  {name}" in out
         assert text in out
+    assert [line for line in out.splitlines() if line[80:]] == []
 
 
 def test_without_a_verb_the_overview_is_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
