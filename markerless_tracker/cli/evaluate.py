@@ -112,7 +112,8 @@ def run(args: argparse.Namespace) -> int:
         console.print(_summary_table(args.results, figures))
     else:
         console.print(_joint_table(figures[0].score))
-        _say(console, _sentence(figures[0]))
+        for line in _lines(figures[0]):
+            _say(console, line)
     for path, found in zip(args.results, figures, strict=True):
         where = f"{path}: " if len(figures) > 1 else ""
         for line in _remarks(found):
@@ -120,17 +121,19 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _sentence(found: _Figures) -> str:
+def _lines(found: _Figures) -> list[str]:
+    """The figures of one result, in lines that a terminal of 80 columns does not wrap."""
     figures, more = found.score, found.measures
-    return (
-        f"mean {figures.mean_mm:.1f} mm, worst frame {figures.max_mm:.1f} mm, worst joint in a "
-        f"frame {figures.worst_joint_mm:.1f} mm, limbs {_text(figures.limbs_mm)} mm; "
-        f"offsets off {_text(figures.offsets_off_mm)} mm, limbs "
-        f"{_text(figures.offsets_off_limbs_mm)} mm; MPJPE {_text(more.mpjpe_mm)} mm, PA-MPJPE "
-        f"{_text(more.pa_mpjpe_mm)} mm, PCK {_share(more.pck)}; inside 1, 2, 3 sd "
-        f"{_shares(figures)}; {figures.frames} of {figures.reference_frames} reference frames "
-        "compared"
-    )
+    return [
+        f"mean {figures.mean_mm:.1f} mm, limbs {_text(figures.limbs_mm)} mm; worst frame "
+        f"{figures.max_mm:.1f} mm, worst joint {figures.worst_joint_mm:.1f} mm",
+        f"offsets off: {_text(figures.offsets_off_mm)} mm, limbs "
+        f"{_text(figures.offsets_off_limbs_mm)} mm",
+        f"MPJPE {_text(more.mpjpe_mm)} mm, PA-MPJPE {_text(more.pa_mpjpe_mm)} mm, PCK "
+        f"{_share(more.pck)}",
+        f"inside 1, 2, 3 sd: {_shares(figures)}",
+        f"{figures.frames} of {figures.reference_frames} reference frames compared",
+    ]
 
 
 def _remarks(found: _Figures) -> list[str]:

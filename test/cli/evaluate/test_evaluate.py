@@ -40,6 +40,7 @@ def test_a_table(files, capsys) -> None:
     out = capsys.readouterr().out
     assert "Head" in out and "+20.0" in out
     assert "mean 20.0 mm" in out and "2 of 3 reference frames" in out
+    assert [line for line in out.splitlines() if line[80:]] == []
 
 
 def test_what_cannot_be_compared_fails_in_one_line(files, tmp_path: Path, capsys) -> None:
@@ -102,7 +103,7 @@ def test_deviations_and_lost_frames_come_from_the_json_beside_the_result(
     assert summary["inside_sd"] == pytest.approx([2 / 3, 1.0, 1.0])
     assert summary["offsets_off_mm"] == pytest.approx({"limbs": 0.0, "all": 0.0}, abs=1e-6)
     assert main(["evaluate", *files]) == 0
-    assert "inside 1, 2, 3 sd 0.667, 1.000, 1.000" in capsys.readouterr().out
+    assert "inside 1, 2, 3 sd: 0.667, 1.000, 1.000" in capsys.readouterr().out
 
 
 def test_another_tools_json_beside_a_marker_file_is_named(files, tmp_path: Path, capsys) -> None:
