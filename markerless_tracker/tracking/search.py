@@ -6,7 +6,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, Feasibility
 from markerless_tracker.camera import CameraModel, CameraRig
-from markerless_tracker.fitness import Fitness, ViewTerms
+from markerless_tracker.fitness import Fitness, Views, ViewTerms
 from markerless_tracker.fitness.contour import REACH_M, ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import (
@@ -154,6 +154,11 @@ class FrameSearch:
         self._terms: tuple[FloatArray, dict[str, ViewTerms]] | None = None
         self._whole: Comparison | None = None
         self._costs_of: Callable[[FloatArray], FloatArray] | None = None
+
+    @property
+    def views(self) -> Views:
+        """The evidence as the fitness has it."""
+        return self._views
 
     @property
     def contours(self) -> ContourFrame:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from markerless_tracker.body import markers
+from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.search import LIMB_M
@@ -20,6 +20,9 @@ LAYERS = (0.4, 0.2)
 """Then the best are varied in layers, by these fractions of the prior's standard deviations."""
 HOPELESS = 0.03
 """A limb whose cost exceeds the largest useful cost by more than this is not refined."""
+NEAR_M = 0.10
+"""A limb that is drawn nearer than that to where it was, at every marker, is where it was: refined,
+it would return there."""
 LEAST_GAIN = 0.003
 """Least rise of f_s between poses in evidence of their own, which differs a little by chance."""
 LEAST_M = 0.05
@@ -70,7 +73,7 @@ class LimbSearch:
         other, other_cost = other_limb(frame, self._recombiner, self.pose, limb, rng, aim, cost)
         better = other_cost < cost - self._least_gain
         if self._own.differs:
-            if other_cost > cost + CLOSE or self._moved_m(other) < LEAST_M:
+            if other_cost > cost + CLOSE or _apart_m(self._own.body, other, self.pose) < LEAST_M:
                 return False
             other, other_cost = self._own.refined(other, *_REFINE)
             better = other_cost < self.own_cost - (0.0 if better else LEAST_GAIN)
@@ -112,10 +115,6 @@ class LimbSearch:
             self._known_cost = self._own.cost(self.pose)
         return self._known_cost
 
-    def _moved_m(self, other: FloatArray) -> float:
-        body = self._own.body
-        return float(np.linalg.norm(markers(body, other) - markers(body, self.pose), axis=1).max())
-
 
 def other_limb(
     frame: FramePopulation,
@@ -129,7 +128,8 @@ def other_limb(
     """The best pose (p,) that is found with a limb elsewhere, and its cost 1 - f_s.
 
     Draws are sparse for a limb of six joints, so the best are varied twice, as in an annealed
-    filter. One contour refinement, of the whole body, then refines the best of all.
+    filter. One contour refinement, of the whole body, then refines the best of all. If that is
+    where the limb was, the pose itself is returned, with a cost that is not below `most_cost`.
 
     Args:
         frame: the evidence.
@@ -168,5 +168,13 @@ def other_limb(
         costs = np.concatenate([costs[best], more])
     if costs.min() > most_cost + HOPELESS:
         return pose, float(costs.min())
-    refined = frame.refined(poses[[int(costs.argmin())]], *_REFINE)
+    best_pose = poses[int(costs.argmin())]
+    if _apart_m(recombiner.body, best_pose, pose) < NEAR_M:
+        return pose, most_cost
+    refined = frame.refined(best_pose[None], *_REFINE)
     return refined[0], float(frame.costs(refined)[0])
+
+
+def _apart_m(body: BodyModel, one: FloatArray, other: FloatArray) -> float:
+    """Largest distance of a marker between two poses (p,)."""
+    return float(np.linalg.norm(markers(body, one) - markers(body, other), axis=1).max())

@@ -16,7 +16,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
-from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.many_poses import markers_of_many
 from markerless_tracker.tracking.start.postures import first_guesses
@@ -78,6 +78,9 @@ class FramePopulation:
         stamp_ns: keys the draws, together with the seed.
         near: (p,) a pose whose root is near the body.
         contours: the frame's contour evidence, if it was made already.
+
+    Attributes:
+        near: as given.
     """
 
     def __init__(
@@ -92,11 +95,21 @@ class FramePopulation:
         self._searcher = searcher
         self._stamp_ns = stamp_ns
         self.near = near
-        self.contours = contours or searcher.frame(observations, stamp_ns, near).contours
+        frame = searcher.frame(observations, stamp_ns, near) if contours is None else contours
+        self._frame: FrameSearch | ContourFrame = frame
         self._costs = searcher.fitness.prepare(
-            self.contours.views, Comparison.whole(near, len(searcher.body.cone_names))
+            frame.views, Comparison.whole(near, len(searcher.body.cone_names))
         )
-        self._beside = [self.contours]
+
+    @property
+    def contours(self) -> ContourFrame:
+        """The frame's contour evidence, made when first asked for."""
+        frame = self._frame
+        return frame if isinstance(frame, ContourFrame) else frame.contours
+
+    @cached_property
+    def _beside(self) -> list[ContourFrame]:
+        return [self.contours]
 
     @cached_property
     def _recombiner(self) -> Recombiner:
@@ -166,7 +179,7 @@ class FramePopulation:
         The rest of the body is drawn once.
         """
         whole = Comparison.whole(pose, len(self._searcher.body.cone_names))
-        return self._searcher.fitness.prepare(self.contours.views, replace(whole, active=limb))
+        return self._searcher.fitness.prepare(self._frame.views, replace(whole, active=limb))
 
     def refined(
         self, poses: FloatArray, iterations: int, truncation: tuple[float, float]

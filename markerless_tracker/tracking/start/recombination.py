@@ -39,10 +39,13 @@ class Recombiner:
     Args:
         body: the body.
         limits: (2, p), kept.
+
+    Attributes:
+        body: the body.
     """
 
     def __init__(self, body: BodyModel, limits: FloatArray) -> None:
-        self._body = body
+        self.body = body
         self._limits = limits
         self._sd = joint_sd(body)
         self._limbs = [body.subspaces[step[0]] for step in body.steps("six")[1:]]
@@ -57,15 +60,15 @@ class Recombiner:
     # Draws of a limb need neither of these, and both take milliseconds.
     @cached_property
     def _known(self) -> FloatArray:
-        return postures(self._body)
+        return postures(self.body)
 
     @cached_property
     def _mirror(self) -> Mirror:
-        return mirror_of(self._body)
+        return mirror_of(self.body)
 
     def children(self, parents: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
         """Children (count, p) of poses (n, p), the best parent first."""
-        out = np.empty((count, self._body.size))
+        out = np.empty((count, self.body.size))
         for child in out:
             child[:] = parents[min(int(rng.geometric(_RANK)) - 1, len(parents) - 1)]
             kind = rng.random()
@@ -91,7 +94,7 @@ class Recombiner:
     ) -> FloatArray:
         """Poses (count, p): one with a limb drawn about its prior mean."""
         poses = np.tile(pose, (count, 1))
-        poses[:, limb] = self._body.neutral[limb]
+        poses[:, limb] = self.body.neutral[limb]
         return self.with_limb_near(poses, limb, 1.0, rng)
 
     def with_limb_near(

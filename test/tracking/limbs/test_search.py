@@ -10,12 +10,13 @@ from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.undecided import decide
-from markerless_tracker.tracking.limbs.search import CLOSE, LimbSearch
+from markerless_tracker.tracking.limbs.search import CLOSE, LimbSearch, other_limb
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.own_evidence import OwnEvidence
 from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.recombination import Recombiner
 
+SEARCH = "markerless_tracker.tracking.limbs.search"
 ANKLE = MARKER_NAMES.index("LAnkle")
 
 
@@ -63,3 +64,25 @@ def test_a_leg_in_its_place_stays(bent) -> None:
     for name in body.limbs:
         assert not search.elsewhere(body.subspaces[name], keyed_generator(0, 0, name), None)
     assert search.pose is true
+
+
+def test_a_draw_where_the_limb_is_is_not_refined(bent, monkeypatch) -> None:
+    searcher, seen, true, wrong = bent
+    body = searcher.body
+    frame = FramePopulation(searcher, decide(seen, searcher.cameras, body, true), 0, true)
+    monkeypatch.setattr(f"{SEARCH}.DRAWS", 4)
+    monkeypatch.setattr(Recombiner, "with_prior_limb", lambda _, at, limb, n, rng: drawn)
+    monkeypatch.setattr(Recombiner, "with_limb", lambda _, at, limb, n, rng: drawn)
+    monkeypatch.setattr(Recombiner, "with_limb_near", lambda _, at, limb, f, rng: at.copy())
+    refined: list[int] = []
+    monkeypatch.setattr(
+        FramePopulation, "refined", lambda _, poses, *args: refined.append(1) or poses
+    )
+    for knee_rad, times in ((0.1, 0), (0.5, 1)):
+        drawn = np.tile(true, (2, 1))
+        drawn[:, body.index("l_knee")] += knee_rad
+        limb = body.subspaces["l_leg"]
+        rng = keyed_generator(0, 0, "leg")
+        found, cost = other_limb(frame, Recombiner(body, searcher.limits), true, limb, rng)
+        assert len(refined) == times
+        assert (found is true) == (times == 0) and (cost == np.inf) == (times == 0)
