@@ -130,8 +130,9 @@ def test_deviations_are_those_of_what_is_seen(still) -> None:
     assert deviation["knee_angle_r"] < 8.0
 
 
-def test_a_full_turn_goes_through_without_a_jump() -> None:
-    turning = track(standing("hanging"), 70, turn_rad_s=2.4 * np.pi)
+@pytest.mark.parametrize(("frames", "turn_rad_s"), [(70, 2.4 * np.pi), (130, 1.2 * np.pi)])
+def test_a_full_turn_goes_through_without_a_jump(frames: int, turn_rad_s: float) -> None:
+    turning = track(standing("hanging"), frames, turn_rad_s)
     rotation = turning.names.index("pelvis_rotation")
     turned = turning.found[-1, rotation] - turning.found[0, rotation]
     assert turned > 360.0
