@@ -16,8 +16,9 @@ from markerless_tracker.records import Observation, pack_mask, unpack_mask
 @pytest.fixture
 def cameras() -> tuple[CameraModel, ...]:
     matrix = np.array([[50.0, 1.5, 20.0], [0.0, 60.0, 10.0], [0.0, 0.0, 1.0]])
+    more = np.array([[1.0, 1.0, 1.0], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
     return tuple(
-        CameraModel(name, size, matrix + i, np.arange(5) * 0.01 * i, np.eye(4))
+        CameraModel(name, size, matrix + i * more, np.arange(5) * 0.01 * i, np.eye(4))
         for i, (name, size) in enumerate((("a", (70, 9)), ("b", (33, 20)), ("c", (64, 5))))
     )
 

@@ -19,6 +19,8 @@ from markerless_tracker.tracking.search import pixels_per_m
 LEAST = 6
 """Comparisons of a camera without which it does not count."""
 LEAST_CAMERAS = 2
+_FRAMES = 0.75
+"""Quantile over the frames: arms of a body that is too small fill the head in some of them."""
 _UPRIGHT = 0.8
 _PELVIS = MARKER_NAMES.index("Pelvis")
 _MOST_M, _BINS = 1.0, 400
@@ -56,8 +58,9 @@ class Beyond:
 
     @property
     def by_camera_m(self) -> Mapping[str, float]:
-        """Camera -> median over the frames, m."""
-        return {n: found.median for n, found in self._found.items() if found.count >= LEAST}
+        """Camera -> upper quartile over the frames, m."""
+        counted = {n: found for n, found in self._found.items() if found.count >= LEAST}
+        return {n: found.quantile(_FRAMES) for n, found in counted.items()}
 
     @property
     def median_m(self) -> float:

@@ -127,7 +127,7 @@ def test_a_disturbed_pose_is_recovered(name, seed) -> None:
     start, prior = shown.start(100 + seed)
     found = refined(shown, shown.frame(), start, prior)
     assert shown.error_mm(start) > 70.0
-    assert shown.error_mm(found) < 5.0
+    assert shown.error_mm(found) < 6.0
 
 
 def test_a_small_disturbance_needs_few_iterations() -> None:
