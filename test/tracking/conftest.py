@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, load_body
 from markerless_tracker.camera import CameraModel
+from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image, learn_background
 from markerless_tracker.records import Observation
@@ -127,3 +129,25 @@ def pose(body) -> FloatArray:
     standing = body.neutral.copy()
     standing[body.index("pelvis_tz")] = 0.95
     return standing
+
+
+BentLeg = tuple[
+    SyntheticScene, dict[str, Image], FloatArray, FloatArray, Mapping[str, NDArray[np.bool_]]
+]
+
+
+@pytest.fixture(scope="session")
+def bent_leg() -> Callable[[float, float], BentLeg]:
+    """Makes a stander, and a pose whose left leg is bent by angles of the hip and the knee in rad.
+
+    Gives the scene, the masks, both poses (p,), and what the body covers at the wrong one.
+    """
+
+    def make(hip_rad: float, knee_rad: float) -> BentLeg:
+        scene = SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=3)
+        _, masks, pose = scene.frame(0)
+        wrong = pose.copy()
+        wrong[[scene.body.index("l_hip_y"), scene.body.index("l_knee")]] += hip_rad, knee_rad
+        return scene, masks, pose, wrong, body_masks(scene.body, wrong, list(scene.rig))
+
+    return make

@@ -21,14 +21,14 @@ LAYERS = (0.4, 0.2)
 HOPELESS = 0.03
 """A limb whose cost exceeds the largest useful cost by more than this is not refined."""
 NEAR_M = 0.10
-"""A limb that is drawn nearer than that to where it was, at every marker, is where it was: refined,
-it would return there."""
+"""A limb that is drawn nearer than that to its place, at every marker, would return there when
+refined."""
 LEAST_GAIN = 0.003
 """Least rise of f_s between poses in evidence of their own, which differs a little by chance."""
 LEAST_M = 0.05
 """Limbs nearer to where they were, at every marker, are not elsewhere."""
 CLOSE = 0.01
-"""What costs so much more in the evidence decided for the pose so far may be better in its own."""
+"""What costs so much more in undecided evidence may be better in its own."""
 _PARENTS, _CHILDREN = 6, 10
 _REFINE = (3, (LIMB_M, 0.035))
 """Iterations of the refinement of the best, and truncation (m) of the first and the last."""

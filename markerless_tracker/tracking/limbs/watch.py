@@ -40,7 +40,7 @@ ROTATION_NS = 100_000_000
 WAIT_NS = 16_000_000
 """Time before a limb near unexplained silhouette is searched again, after a search without gain."""
 MENDED_M = 0.10
-"""A limb that is found so far from where it was was in a wrong place."""
+"""A limb that is found so far from its last place was wrong there."""
 _DOUBLINGS = 4
 """That time doubles with each search without gain, so often."""
 _GROWN = 2.0

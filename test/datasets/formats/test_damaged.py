@@ -11,20 +11,30 @@ import yaml
 from markerless_tracker.datasets import open_recording
 from markerless_tracker.errors import TrackerError
 
+from . import (
+    test_anipose,
+    test_bodytrack,
+    test_human36m,
+    test_humaneva,
+    test_opencv,
+    test_panoptic,
+    test_projects,
+    test_public_sets,
+)
 from .conftest import picture
-from .test_anipose import session as anipose  # noqa: F401
-from .test_bodytrack import sequence as bodytrack  # noqa: F401
-from .test_human36m import subject as human36m  # noqa: F401
-from .test_human36m import write_cdf as cdf  # noqa: F401
-from .test_humaneva import subject as humaneva  # noqa: F401
 from .test_opencv import NAMES, of_opencv, of_ros, storage, write_extrinsics
-from .test_opencv import folder as videos  # noqa: F401
-from .test_panoptic import sequence as panoptic  # noqa: F401
 from .test_panoptic import write_bodies
-from .test_projects import caliscope, freemocap  # noqa: F401
-from .test_public_sets import mpi as mpi_inf_3dhp  # noqa: F401
-from .test_public_sets import take as totalcapture  # noqa: F401
 from .test_public_sets import write_positions
+
+# Fixtures: the complete recordings of the readers' own tests.
+anipose = test_anipose.session
+bodytrack = test_bodytrack.sequence
+human36m, cdf = test_human36m.subject, test_human36m.write_cdf
+humaneva = test_humaneva.subject
+videos = test_opencv.folder
+panoptic = test_panoptic.sequence
+caliscope, freemocap = test_projects.caliscope, test_projects.freemocap
+mpi_inf_3dhp, totalcapture = test_public_sets.mpi, test_public_sets.take
 
 VIDEOS = (".avi", ".mkv")
 NUMBERS = ("nan", "-7", "0", "1e30", "[]", "x", "")
@@ -62,7 +72,7 @@ def complete(kind: str, path: Path, request: pytest.FixtureRequest) -> Path:
 
 
 @pytest.fixture
-def opencv(videos: Path, make_rig) -> Path:  # noqa: F811
+def opencv(videos: Path, make_rig) -> Path:
     left, right = make_rig(*NAMES)
     storage(videos / "left.yaml", of_opencv(left))
     (videos / "right.yaml").write_text(yaml.safe_dump(of_ros(right)), encoding="utf-8")

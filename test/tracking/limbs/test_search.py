@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, markers
-from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Observation
-from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.limbs.search import CLOSE, LimbSearch, other_limb
@@ -21,13 +19,9 @@ ANKLE = MARKER_NAMES.index("LAnkle")
 
 
 @pytest.fixture(scope="module")
-def bent():
+def bent(bent_leg):
     """A stander whose left leg was tracked bent, onto undecided pixels; some of the leg is, too."""
-    scene = SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=3)
-    _, masks, pose = scene.frame(0)
-    wrong = pose.copy()
-    wrong[[scene.body.index("l_hip_y"), scene.body.index("l_knee")]] += -0.8, 0.6
-    covered = body_masks(scene.body, wrong, list(scene.rig))
+    scene, masks, pose, wrong, covered = bent_leg(-0.8, 0.6)
     seen = {}
     for name, mask in masks.items():
         trousers = mask & ~covered[name]

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.records import Observation
-from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.search import Searcher
@@ -14,13 +12,9 @@ from markerless_tracker.tracking.start.population import FramePopulation
 
 
 @pytest.fixture(scope="module")
-def legs_undecided():
+def legs_undecided(bent_leg):
     """A person whose legs are undecided, with as much floor around them, and a bent left knee."""
-    scene = SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=3)
-    _, masks, pose = scene.frame(0)
-    wrong = pose.copy()
-    wrong[[scene.body.index("l_hip_y"), scene.body.index("l_knee")]] += -0.5, 0.9
-    covered = body_masks(scene.body, wrong, list(scene.rig))
+    scene, masks, pose, wrong, covered = bent_leg(-0.5, 0.9)
     seen = {}
     for name, mask in masks.items():
         low = np.arange(len(mask))[:, None] > 0.6 * np.flatnonzero(mask.any(axis=1)).max()
