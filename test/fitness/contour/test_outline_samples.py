@@ -99,6 +99,7 @@ def test_samples_lie_on_their_cones_outline_at_right_angles(posed) -> None:
             t = np.clip(((p - polygon) * d).sum(axis=1) / (d * d).sum(axis=1), 0.0, 1.0)
             away = np.linalg.norm(polygon + t[:, None] * d - p, axis=1)
             side = int(away.argmin())
+            # A polygon's sides cut the round ends; tapered cones have the widest ones.
             assert away[side] < 0.06
             normal = np.array([d[side, 1], -d[side, 0]]) / np.linalg.norm(d[side])
             if normal @ (p - polygon.mean(axis=0)) < 0:
