@@ -106,15 +106,16 @@ def _compiles(source: Path, names: list[str]) -> bool:
 
 
 class Compilation(event.Listener):  # type: ignore[misc]
-    """Counts what is compiled; nothing that is stored on disk already counts.
-
-    Attributes:
-        done: kernels compiled so far.
-    """
+    """Counts what is compiled; nothing that is stored on disk already counts."""
 
     def __init__(self, report: Progress) -> None:
-        self.done = 0
+        self._here = self._elsewhere = 0
         self._report = report
+
+    @property
+    def done(self) -> int:
+        """Kernels compiled so far, here and in other processes."""
+        return self._here + self._elsewhere
 
     def on_start(self, event: Any) -> None:
         """Called by numba."""
@@ -123,13 +124,21 @@ class Compilation(event.Listener):  # type: ignore[misc]
     def on_end(self, event: Any) -> None:
         """Called by numba."""
         if event.data["dispatcher"] in _dispatchers:
-            self.done += 1
+            self._here += 1
             self._tell(event)
+
+    def elsewhere(self, name: str, done: int, most: int) -> None:
+        """Another process, which works for this one, has compiled so many kernels."""
+        self._elsewhere = done
+        self._report(name, self.done, max(most, len(_dispatchers)))
 
     def _tell(self, event: Any) -> None:
         dispatcher = event.data["dispatcher"]
         if dispatcher in _dispatchers:
             self._report(dispatcher.py_func.__name__, self.done, len(_dispatchers))
+
+
+_compilations: list[Compilation] = []
 
 
 @contextmanager
@@ -141,10 +150,18 @@ def compilation(report: Progress) -> Iterator[Compilation]:
     """
     listener = Compilation(report)
     event.register(_COMPILE, listener)
+    _compilations.append(listener)
     try:
         yield listener
     finally:
+        _compilations.remove(listener)
         event.unregister(_COMPILE, listener)
+
+
+def compiled_elsewhere(name: str, done: int, most: int) -> None:
+    """Tell all `compilation` blocks what another process has compiled; as `Progress`."""
+    for listener in _compilations:
+        listener.elsewhere(name, done, most)
 
 
 class _Impl(CompileResultCacheImpl):  # type: ignore[misc]

@@ -1,7 +1,8 @@
 """From files and settings to a tracker, for the node and the offline verbs alike."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,11 +39,13 @@ class TrackerSetup:
 
     Attributes:
         tracker: the tracker.
+        make: makes another tracker that begins as this one did; can be pickled.
         start_stamp_ns: time that the start pose is meant for; None = the first frame that comes.
         person: what is known of a person whose lengths were not measured; None if they were.
     """
 
     tracker: Tracker
+    make: Callable[[], Tracker]
     start_stamp_ns: int | None
     person: Unmeasured | None = None
 
@@ -107,7 +110,8 @@ def build_tracker(
         pose = pose_from_markers(body, start.markers_m, limits=joint_limits(body, config))
     elif start_file is not None:
         pose = read_pose(start_file, body)
-    tracker = Tracker(
+    make = partial(
+        Tracker,
         rig,
         body,
         config,
@@ -119,7 +123,7 @@ def build_tracker(
         ),
         person=person,
     )
-    return TrackerSetup(tracker, None if start is None else start.stamp_ns, person)
+    return TrackerSetup(make(), make, None if start is None else start.stamp_ns, person)
 
 
 def _subject(

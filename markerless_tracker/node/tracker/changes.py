@@ -7,12 +7,14 @@ from typing import Any
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
+from markerless_tracker.body import BodyModel
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.records import TrackResult
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.config import live_settings
 from markerless_tracker.tracking.partitions.frame import frame_stages
+from markerless_tracker.tracking.processes.fitting import FittingProcess
 
 LIVE = live_settings()
 """Parameters that may be set while the tracker runs."""
@@ -29,12 +31,19 @@ class SettableTracker:
     """
 
     def __init__(
-        self, tracker: Tracker, changed: Callable[[int, TrackerConfig], None] = lambda *_: None
+        self,
+        tracker: Tracker | FittingProcess,
+        changed: Callable[[int, TrackerConfig], None] = lambda *_: None,
     ) -> None:
         self._tracker = tracker
         self._changed = changed
         self._lock = Lock()
         self._next: TrackerConfig | None = None
+
+    @property
+    def body(self) -> BodyModel:
+        """As `Tracker.body`."""
+        return self._tracker.body
 
     def check(self, config: TrackerConfig) -> None:
         """Make sure that settings can be used.
@@ -108,7 +117,7 @@ class LiveSettings:
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 
-    def settable(self, tracker: Tracker) -> SettableTracker:
+    def settable(self, tracker: Tracker | FittingProcess) -> SettableTracker:
         """The tracker that the parameters change from now on."""
         self._tracker = SettableTracker(tracker, self._changed)
         return self._tracker

@@ -13,6 +13,7 @@ from rclpy.clock_type import ClockType
 from markerless_tracker.body import BodyModel
 from markerless_tracker.calibration.contours.time_offset import TimeOffsetEstimate
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.libraries import usable_cores
 from markerless_tracker.node.health import QUIET_S, Facts, assess
 from markerless_tracker.node.ros import messages
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
@@ -33,6 +34,7 @@ from markerless_tracker.node.tracker.topics import CameraTopics
 from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, TrackWorker
 from markerless_tracker.records import TrackState
 from markerless_tracker.tracking import Tracker
+from markerless_tracker.tracking.processes.fitting import FittingProcess
 
 STATE_PERIOD_S = 0.5
 
@@ -93,7 +95,8 @@ class TrackerNode(GivenNode):
         self._sets: Synchronizer[Any] = Synchronizer(
             self._source.names, tolerance_ns=round(self._settings.sync_tolerance * 1e9)
         )
-        self._tracker: Tracker | None = None
+        self._tracker: Tracker | FittingProcess | None = None
+        self._end_processes: Callable[[], None] = lambda: None
         self._time_offsets: TimeOffsetEstimate | None = None
         self._found = False
         self._handle: TrackerHandle | None = None
@@ -154,8 +157,7 @@ class TrackerNode(GivenNode):
             DatasetError: the result files cannot be completed.
         """
         ended = self._worker.stop(timeout_s)
-        if self._tracker is not None:
-            self._tracker.evidence.close()
+        self._end_processes()
         self._notices.flush()
         self._news.flush()
         counts = self._status.values(self._sets.counts, (), ())
@@ -222,18 +224,22 @@ class TrackerNode(GivenNode):
         self._status.doing("reading the backgrounds and the start")
         scaled = rig.scaled(self._settings.scale)
         setup = build(self._settings, rig, scaled)
-        setup.tracker.evidence.start_process()
+        tracker: Tracker | FittingProcess = setup.tracker
+        if (self._settings.config.threads or usable_cores()) > 1:
+            process = FittingProcess(setup, self._warn)
+            self._end_processes = process.close
+            self._status.add_cpu_of(lambda: process.cpu_s)
+            tracker = process
         self._pictures = Pictures(self, scaled)
         self._results.describe(setup.tracker.body)
-        self._tracker = setup.tracker
+        self._tracker = tracker
         step_px = self._settings.config.edges.step_px
         self._time_offsets = TimeOffsetEstimate(setup.tracker.rig, step_px=step_px)
-        self._status.add_cpu_of(lambda: setup.tracker.evidence.process_cpu_s)
         self._result_file.begin(setup.tracker)
         for doubt in self._report.begin(setup.tracker, rig):
             self._warn(doubt)
         return TrackerHandle(
-            self._live.settable(setup.tracker),
+            self._live.settable(tracker),
             setup.start_stamp_ns,
             view_reader(scaled, self._inputs),
             waits=any(setup.tracker.segmenter(name) is None for name in self._image_cameras),
@@ -244,15 +250,15 @@ class TrackerNode(GivenNode):
 
     def _publish(self, tracked: TrackedSet) -> None:
         assert self._tracker is not None and self._time_offsets is not None
-        self._result_file.add(tracked.result)
-        self._report.add(tracked.result)
+        self._result_file.add(tracked.result, tracked.body)
+        self._report.add(tracked.result, tracked.body)
         self._announcer.result(tracked.result)
         self._found = self._found or tracked.result.state is TrackState.TRACKING
         if not self.context.ok():  # a signal was received while this set was tracked
             return
-        self._results.publish(tracked.result, self._tracker.body)
-        self._pictures.publish(tracked, self._tracker)
-        self._time_offsets.add(tracked.result, self._tracker.body)
+        self._results.publish(tracked.result, tracked.body)
+        self._pictures.publish(tracked, self._tracker.segmenter)
+        self._time_offsets.add(tracked.result, tracked.body)
         self._announcer.time_offsets(self._time_offsets.by_camera, self._source.offsets_s)
 
     def _dealt(self) -> None:

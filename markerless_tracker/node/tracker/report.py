@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from threading import Lock
 
-from markerless_tracker.body import load_description
+from markerless_tracker.body import BodyModel, load_description
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.doubts import calibration_doubts
 from markerless_tracker.records import TrackResult
@@ -56,11 +56,11 @@ class RunReport:
             self._doubts = calibration_doubts(rig)
             return self._doubts
 
-    def add(self, result: TrackResult) -> None:
-        """Take a result."""
+    def add(self, result: TrackResult, body: BodyModel) -> None:
+        """Take a result, and the body as it is now."""
         with self._lock:
-            if self._record is not None and self._tracker is not None:
-                self._record.add(result, self._tracker.body)
+            if self._record is not None:
+                self._record.add(result, body)
 
     def verdict(self) -> Verdict | None:
         """The verdict so far; None before the first result."""

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from threading import Event, Thread
@@ -10,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.body import BodyModel
 from markerless_tracker.compiled import compilation
 from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.imaging import BackgroundModel
@@ -34,6 +36,10 @@ _POLL_S = 0.2
 
 class Stepper(Protocol):
     """The part of `tracking.Tracker` that the worker uses."""
+
+    @property
+    def body(self) -> BodyModel:
+        """The tracked body."""
 
     def warm_up(self) -> None:
         """Compile all kernels of a step."""
@@ -74,10 +80,15 @@ class StartGate:
 
 @dataclass(frozen=True)
 class TrackedSet:
-    """A result and the images or evidence it came from (scaled, as the tracker saw them)."""
+    """A result, and the images or evidence it came from (scaled, as the tracker saw them).
+
+    Attributes:
+        body: the tracked body, as it was fitted to the person by then.
+    """
 
     result: TrackResult
     images: Images
+    body: BodyModel
 
 
 @dataclass(frozen=True)
@@ -100,7 +111,7 @@ class TrackerHandle:
 
 
 class TrackWorker:
-    """A thread that compiles, then tracks the newest set, again and again.
+    """A thread that compiles, then tracks the newest set, again and again; another publishes.
 
     No exception leaves the thread: an error in one set is reported and costs that set; an error
     before the first set ends the worker and is kept in `fatal`.
@@ -109,10 +120,11 @@ class TrackWorker:
         sets: source of the complete sets.
         status: receives counts, times and errors.
         prepare: makes the `TrackerHandle`; None while an input is missing, then called again.
-        publish: called in the worker's thread with each result.
+        publish: called with each result, in a thread of its own and in order; the next set is
+            tracked meanwhile.
         report: called with each error, one line.
         inform: called with a line for the log when a phase begins.
-        dealt: called in the worker's thread after each set, tracked or dropped.
+        dealt: called after each set, tracked or dropped; in the thread of `publish`.
         clock: monotonic time in s, the clock of the sets' arrival.
     """
 
@@ -204,18 +216,22 @@ class TrackWorker:
         ahead = Ahead(
             self._sets, partial(self._evidence, handle), poll_s=_POLL_S, clock=self._clock
         )
+        publishing = ThreadPoolExecutor(1, thread_name_prefix="publish")
+        published: Future[None] = publishing.submit(lambda: None)
         while not self._stop.is_set():
             asked_s = self._clock()
             taken = ahead.next()
             if taken is not None:
                 ahead.fitting()
-                self._handle(handle, gate, taken, self._clock() - asked_s)
+                tracked = self._handle(handle, gate, taken, self._clock() - asked_s)
                 ahead.fitted()
-                self._end(taken.matched)
+                published.result()
+                published = publishing.submit(self._give, taken.matched, tracked)
             request = self._request.current
             if request is not None:
                 request.refuse_if_overdue(self._status.activity)
         ahead.close()
+        publishing.shutdown()
         request = self._request.current
         if request is not None:
             request.refuse("the tracker ends")
@@ -243,7 +259,8 @@ class TrackWorker:
 
     def _handle(
         self, handle: TrackerHandle, gate: StartGate, taken: Taken, waited_s: float
-    ) -> None:
+    ) -> TrackedSet | None:
+        """Track a set; None if it was dropped or failed."""
         matched = taken.matched
         learning = self._request.current
         try:
@@ -258,21 +275,21 @@ class TrackWorker:
             if not gate.admits(matched.stamp_ns):
                 self._status.dropped("before_start")
                 self._status.doing("waiting for the start frame")
-                return
+                return None
             if taken.error is not None:
                 raise taken.error
             images, views = taken.made
             if learning is None and self._waits:
                 self._status.dropped("while_learning")
                 self._status.doing("waiting for learn_background")
-                return
+                return None
             if learning is not None:
                 self._status.doing("learning the background")
                 learning.take(images)
                 if self._waits or not (learning.looks or learning.answered):
                     self._status.dropped("while_learning")
                     self._learn(handle, learning, matched.stamp_ns)
-                    return
+                    return None
             else:
                 self._status.doing(PROCESSING)
             age_s = max(0.0, self._clock() - matched.arrived_s)
@@ -285,17 +302,21 @@ class TrackWorker:
                 learning.refuse(one_line(error))
             self._status.set_failed(one_line(error))
             self._trouble(matched.stamp_ns, error)
-            return
+            return None
         self._status.tracked(result, arrived_s=matched.arrived_s, finished_s=finished_s)
-        try:
-            self._publish(TrackedSet(result, images))
-        except Exception as error:
-            self._trouble(matched.stamp_ns, error)
+        tracked = TrackedSet(result, images, handle.tracker.body)
         if learning is not None:
             learning.saw(result.state)
             self._learn(handle, learning, matched.stamp_ns)
+        return tracked
 
-    def _end(self, matched: MatchedSet[Any]) -> None:
+    def _give(self, matched: MatchedSet[Any], tracked: TrackedSet | None) -> None:
+        """Publish a set's result and that the set was dealt with."""
+        try:
+            if tracked is not None:
+                self._publish(tracked)
+        except Exception as error:
+            self._trouble(matched.stamp_ns, error)
         self._status.dealt_with(matched.stamp_ns)
         try:
             self._dealt()

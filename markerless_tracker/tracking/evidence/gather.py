@@ -14,7 +14,6 @@ from markerless_tracker.libraries import usable_cores
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.prepared import Outlook, SeenView
-from markerless_tracker.tracking.evidence.process.parent import SegmentingProcess
 from markerless_tracker.tracking.evidence.selection import (
     BodyLines,
     body_lines,
@@ -23,6 +22,7 @@ from markerless_tracker.tracking.evidence.selection import (
     explained_part,
     place_cones,
 )
+from markerless_tracker.tracking.processes.segmenting import SegmentingProcess
 
 WIDE_MARGIN_M = 0.5
 """Margin around the predicted body that is segmented where the first region cuts the person off."""

@@ -7,12 +7,14 @@ from typing import Any
 
 from sensor_msgs.msg import Image
 
+from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import draw_overlay
 from markerless_tracker.drawing.evidence import class_picture
 from markerless_tracker.drawing.steps import draw_steps
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image as Picture
+from markerless_tracker.imaging import Segmenter
 from markerless_tracker.node.ros.images import fill_image
 from markerless_tracker.node.ros.messages import header, optical_frame
 from markerless_tracker.node.ros.qos import output_qos
@@ -58,13 +60,13 @@ class ResultFile:
         """Set the tracker whose results are written; the file states its settings as they are."""
         self._tracker, self._config = tracker, tracker.config
 
-    def add(self, result: TrackResult) -> None:
+    def add(self, result: TrackResult, body: BodyModel) -> None:
         """Write a result and the body as it is now; too late after `close`."""
         with self._lock:
             writer = self._opened()
-            if writer is None or self._tracker is None:
+            if writer is None:
                 return
-            writer.body = self._tracker.body
+            writer.body = body
             try:
                 writer.add(result)
             except DatasetError as error:
@@ -130,24 +132,33 @@ class Pictures:
             for kind in ("overlay", "evidence")
         }
 
-    def publish(self, fitted: TrackedSet, tracker: Tracker) -> None:
-        """Draw and publish the debug images that have subscribers."""
+    def publish(self, fitted: TrackedSet, segmenter: Callable[[str], Segmenter | None]) -> None:
+        """Draw and publish the debug images that have subscribers.
+
+        Args:
+            fitted: the set.
+            segmenter: of a camera, None without a background.
+        """
         for (name, kind), publisher in self._publishers.items():
             if not publisher.get_subscription_count() or name not in fitted.images:
                 continue
-            draw = self._overlay if kind == "overlay" else self._evidence
-            picture = draw(name, fitted, tracker)
+            if kind == "overlay":
+                picture: Picture | None = self._overlay(name, fitted)
+            else:
+                picture = self._evidence(name, fitted, segmenter(name))
             if picture is not None:
                 message = Image(header=header(fitted.result.stamp_ns, optical_frame(name)))
                 publisher.publish(fill_image(message, picture, f"debug/{name}/{kind}"))
 
-    def _overlay(self, name: str, fitted: TrackedSet, tracker: Tracker) -> Picture:
+    def _overlay(self, name: str, fitted: TrackedSet) -> Picture:
         image = _picture(fitted.images[name])
         if fitted.result.pose is None:
             return image
-        return draw_overlay(image, self._rig[name], tracker.body, fitted.result.pose)
+        return draw_overlay(image, self._rig[name], fitted.body, fitted.result.pose)
 
-    def _evidence(self, name: str, fitted: TrackedSet, tracker: Tracker) -> Picture | None:
+    def _evidence(
+        self, name: str, fitted: TrackedSet, segmenter: Segmenter | None
+    ) -> Picture | None:
         """None for an image without evidence."""
         observation = fitted.result.observations.get(name)
         if observation is None:
@@ -156,9 +167,9 @@ class Pictures:
             _picture(fitted.images[name]),
             observation,
             self._rig[name],
-            tracker.body,
+            fitted.body,
             fitted.result.pose,
-            tracker.segmenter(name),
+            segmenter,
         )
 
 

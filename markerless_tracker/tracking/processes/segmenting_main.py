@@ -1,11 +1,10 @@
 """Main program of the segmenting process: images in, observations out, until its input ends.
 
-Started as ``python -m markerless_tracker.tracking.evidence.process.child FD``, where FD is the
+Started as ``python -m markerless_tracker.tracking.processes.segmenting_main FD``, where FD is the
 shared memory. Its input is the parent's requests; its output belongs to the answers alone.
 """
 
 import mmap
-import os
 import sys
 import time
 from typing import Any, BinaryIO
@@ -16,12 +15,11 @@ from markerless_tracker.libraries import collect_for_good, single_threaded
 def main(memory_fd: int) -> int:
     """Serve until the parent ends; returns the exit status."""
     single_threaded()
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    # Whatever prints must not end up among the answers.
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    from markerless_tracker.tracking.processes.child import take_output
+
     memory = mmap.mmap(memory_fd, 0, prot=mmap.PROT_READ)
     try:
-        serve(sys.stdin.buffer, answers, memory)
+        serve(sys.stdin.buffer, take_output(), memory)
     except (EOFError, BrokenPipeError):
         pass  # The parent has ended.
     return 0
@@ -38,17 +36,17 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
         EOFError, BrokenPipeError: the parent has ended.
     """
     # Read while the parent prepares itself.
-    import numpy as np
-
     from markerless_tracker.tracking.evidence.gather import EvidenceMaker
-    from markerless_tracker.tracking.evidence.process.wire import Request, receive, send
+    from markerless_tracker.tracking.processes.images import get
+    from markerless_tracker.tracking.processes.segmenting import SegmentRequest
+    from markerless_tracker.tracking.processes.wire import receive, send
 
     maker: EvidenceMaker | None = None
     while True:
         message = receive(requests)
         answer: Any
         try:
-            if not isinstance(message, Request):
+            if not isinstance(message, SegmentRequest):
                 rig, config, backgrounds = message
                 maker = EvidenceMaker(rig, config, backgrounds, map)
                 maker.wait()
@@ -57,14 +55,8 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
             elif maker is None:
                 raise RuntimeError("images came before the backgrounds")
             else:
-                images = {
-                    name: np.frombuffer(
-                        memory, np.uint8, int(np.prod(place.shape)), place.offset
-                    ).reshape(place.shape)
-                    for name, place in message.images.items()
-                }
-                regions = {name: place.region for name, place in message.images.items()}
-                seen = maker.segment_regions(images, message.stamp_ns, regions)
+                images = {name: get(memory, place) for name, place in message.images.items()}
+                seen = maker.segment_regions(images, message.stamp_ns, message.regions)
                 answer = {name: view._replace(image=None) for name, view in seen.items()}
         except Exception as error:
             answer = error

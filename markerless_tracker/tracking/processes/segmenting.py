@@ -1,26 +1,25 @@
 """The segmenting process as its parent sees it."""
 
-import mmap
-import os
-import subprocess
-import sys
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from threading import Lock, Thread
-from typing import Any, BinaryIO, cast
-
-import numpy as np
+from typing import Any, NamedTuple, cast
 
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.imaging import BackgroundModel, Image, Region
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.prepared import SeenView
-from markerless_tracker.tracking.evidence.process.wire import Place, Request, receive, send
+from markerless_tracker.tracking.processes.child import Child
+from markerless_tracker.tracking.processes.images import Place, put, set_bytes
 
-_CHILD = "markerless_tracker.tracking.evidence.process.child"
-_ALIGNED = 64
-_END_S = 5.0
+_MAIN = "markerless_tracker.tracking.processes.segmenting_main"
+
+
+class SegmentRequest(NamedTuple):
+    """Images of one time to segment, by camera: where they lie, and which part; None = all."""
+
+    stamp_ns: int
+    images: dict[str, Place]
+    regions: dict[str, Region | None]
 
 
 class SegmentingProcess:
@@ -38,28 +37,12 @@ class SegmentingProcess:
         self._lock = Lock()
         self._ready = False
         self._cpu_s = 0.0
-        size = sum(_aligned(3 * width * height) for width, height in (c.size_px for c in rig))
-        fd = _memory_fd(size)
-        try:
-            self._memory = mmap.mmap(fd, size)
-            package = str(Path(__file__).resolve().parents[4])
-            paths = [package, *filter(None, [os.environ.get("PYTHONPATH")])]
-            # A session of its own: a terminal's Ctrl-C is for this process, which ends the other.
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", _CHILD, str(fd)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                pass_fds=(fd,),
-                start_new_session=True,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-            )
-        finally:
-            os.close(fd)
+        self._child = Child(_MAIN, set_bytes(rig))
 
     @property
     def pid(self) -> int:
         """Its process id."""
-        return self._process.pid
+        return self._child.pid
 
     @property
     def cpu_s(self) -> float:
@@ -94,15 +77,12 @@ class SegmentingProcess:
         with self._lock:
             if not self._ready:
                 return None
-            offset, places = 0, {}
-            for name, image in images.items():
-                if offset + image.size > len(self._memory):
-                    return None
-                shared = np.frombuffer(self._memory, np.uint8, image.size, offset)
-                np.copyto(shared.reshape(image.shape), image)
-                places[name] = Place(offset, image.shape, regions[name])
-                offset += _aligned(image.size)
-            answer = self._ask(Request(stamp_ns, places))
+            memory = self._child.memory
+            places = put(memory, images, 0, len(memory))
+            if places is None:
+                return None
+            parts = {name: regions[name] for name in images}
+            answer = self._ask(SegmentRequest(stamp_ns, places, parts))
         if isinstance(answer, Exception):
             raise answer
         if answer is None:
@@ -112,16 +92,7 @@ class SegmentingProcess:
 
     def close(self) -> None:
         """End the process."""
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.close()
-        except OSError:
-            pass  # It ended with something left to read.
-        try:
-            self._process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        self._child.close()
 
     def _begin(self, message: Any) -> None:
         try:
@@ -132,24 +103,9 @@ class SegmentingProcess:
     def _ask(self, message: Any) -> Any:
         """Send a message; returns the answer, None if the process has ended."""
         try:
-            send(cast(BinaryIO, self._process.stdin), message)
-            answer, self._cpu_s = receive(cast(BinaryIO, self._process.stdout))
+            self._child.send(message)
+            answer, self._cpu_s = self._child.receive()
         except (EOFError, OSError, ValueError):
             self._ready = False
             return None
         return answer
-
-
-def _aligned(size: int) -> int:
-    return -(-size // _ALIGNED) * _ALIGNED
-
-
-def _memory_fd(size: int) -> int:
-    """A file without a name, so that nothing is left behind whatever happens."""
-    if hasattr(os, "memfd_create"):
-        fd = os.memfd_create("markerless_tracker_images")
-    else:
-        with tempfile.TemporaryFile() as file:
-            fd = os.dup(file.fileno())
-    os.ftruncate(fd, size)
-    return fd

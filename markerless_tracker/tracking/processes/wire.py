@@ -1,33 +1,10 @@
-"""What the two processes send each other: pickled objects, each after its length."""
+"""What two processes send each other: pickled objects, each after its length."""
 
 import pickle
 import struct
-from typing import Any, BinaryIO, NamedTuple
-
-from markerless_tracker.imaging import Region
+from typing import Any, BinaryIO
 
 _LENGTH = struct.Struct("<Q")
-
-
-class Place(NamedTuple):
-    """Where an image lies in the shared memory, and which part of it is to be segmented.
-
-    Attributes:
-        offset: of its first byte.
-        shape: (h, w) or (h, w, 3), uint8.
-        region: None = the whole image.
-    """
-
-    offset: int
-    shape: tuple[int, ...]
-    region: Region | None
-
-
-class Request(NamedTuple):
-    """Images of one time to segment, by camera."""
-
-    stamp_ns: int
-    images: dict[str, Place]
 
 
 def send(stream: BinaryIO, message: Any) -> None:

@@ -1,0 +1,104 @@
+"""A process that works for this one, and the memory that both see."""
+
+import mmap
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+from markerless_tracker.tracking.processes.wire import receive, send
+
+_PACKAGE = Path(__file__).resolve().parents[3]
+_END_S = 5.0
+
+
+class Child:
+    """A running module of the package, and shared memory; ends with this process.
+
+    Args:
+        module: its main program. Its arguments are `arguments` and the memory's descriptor.
+        size: bytes of shared memory.
+        arguments: further words of its command line.
+        pass_fds: further descriptors that it inherits.
+
+    Attributes:
+        memory: the shared memory.
+    """
+
+    def __init__(
+        self,
+        module: str,
+        size: int,
+        arguments: Sequence[str] = (),
+        pass_fds: Sequence[int] = (),
+    ) -> None:
+        fd = _memory_fd(size)
+        try:
+            self.memory = mmap.mmap(fd, size)
+            paths = [str(_PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
+            # A session of its own: a terminal's Ctrl-C is for this process, which ends the other.
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", module, *arguments, str(fd)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                pass_fds=(fd, *pass_fds),
+                start_new_session=True,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            )
+        finally:
+            os.close(fd)
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return self._process.pid
+
+    def send(self, message: Any) -> None:
+        """Write an object to its input.
+
+        Raises:
+            OSError, ValueError: it has ended, or is being ended.
+        """
+        send(cast(BinaryIO, self._process.stdin), message)
+
+    def receive(self) -> Any:
+        """Read an object that it wrote.
+
+        Raises:
+            EOFError, OSError, ValueError: it has ended, or is being ended.
+        """
+        return receive(cast(BinaryIO, self._process.stdout))
+
+    def close(self) -> None:
+        """End it."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.close()
+        except OSError:
+            pass  # It ended with something left to read.
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+
+def _memory_fd(size: int) -> int:
+    """A file without a name, so that nothing is left behind whatever happens."""
+    if hasattr(os, "memfd_create"):
+        fd = os.memfd_create("markerless_tracker_images")
+    else:
+        with tempfile.TemporaryFile() as file:
+            fd = os.dup(file.fileno())
+    os.ftruncate(fd, size)
+    return fd
+
+
+def take_output() -> BinaryIO:
+    """In the child: its output, for answers alone; what else is printed goes to standard error."""
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    return answers

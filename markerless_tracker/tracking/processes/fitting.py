@@ -1,0 +1,234 @@
+"""The process of a tracker as its parent sees it."""
+
+import os
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from threading import Lock
+from typing import Any, BinaryIO, NamedTuple
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.compiled import compiled_elsewhere
+from markerless_tracker.errors import ImageError
+from markerless_tracker.imaging import BackgroundModel, Image, Segmenter
+from markerless_tracker.records import Observation, TrackResult
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.processes.child import Child
+from markerless_tracker.tracking.processes.images import Place, put, set_bytes
+from markerless_tracker.tracking.processes.wire import receive, send
+from markerless_tracker.tracking.setup import TrackerSetup
+
+_MAIN = "markerless_tracker.tracking.processes.fitting_main"
+_SETS = 3
+"""Sets of images in shared memory: one that is tracked, one prepared, and the next."""
+
+Views = Mapping[str, Image | Observation]
+
+
+class SetOfViews(NamedTuple):
+    """The views of one time, by camera: where an image lies, or an observation."""
+
+    number: int
+    stamp_ns: int
+    views: dict[str, Place | Observation]
+
+
+class Call(NamedTuple):
+    """A method of the tracker and its arguments."""
+
+    method: str
+    arguments: tuple[Any, ...] = ()
+
+
+class Step(NamedTuple):
+    """A set to track, which was prepared or not."""
+
+    views: SetOfViews
+    effort: float
+
+
+class Compiled(NamedTuple):
+    """Progress of a compilation: the kernel, how many are done, how many there can be."""
+
+    name: str
+    done: int
+    most: int
+
+
+class Tracked(NamedTuple):
+    """A result; the body if it is another than before."""
+
+    result: TrackResult
+    body: BodyModel | None
+
+
+@dataclass(frozen=True, eq=False)
+class Handed:
+    """A set whose images the process has.
+
+    Attributes:
+        views: the images and observations.
+        sent: the same as the process was told.
+    """
+
+    views: Views
+    sent: SetOfViews
+
+
+class FittingProcess:
+    """A tracker in a process of its own: calls and bytes are those of `Tracker`.
+
+    The process ends with this one, or when it is closed. If it ends by itself, the tracker goes on
+    in this process, from its start. `prepare` may be called beside `step`; other calls must come
+    from one thread at a time.
+
+    Args:
+        setup: the tracker to be. The one of this process takes no steps as long as the other lives.
+        report: called with a line if the process has ended by itself.
+
+    Attributes:
+        body: as `Tracker.body` after the last step.
+    """
+
+    def __init__(self, setup: TrackerSetup, report: Callable[[str], None] = lambda _: None) -> None:
+        self._local = setup.tracker
+        self._report = report
+        self.body: BodyModel = setup.tracker.body
+        self._set_bytes = set_bytes(setup.tracker.rig)
+        self._number = 0
+        self._cpu_s = 0.0
+        self._ended = False
+        self._lock = Lock()
+        # Sets are prepared beside the other calls, on a line of their own.
+        sets_read, sets_write = os.pipe()
+        made_read, made_write = os.pipe()
+        try:
+            self._child = Child(
+                _MAIN,
+                _SETS * self._set_bytes,
+                [str(sets_read), str(made_write)],
+                (sets_read, made_write),
+            )
+        finally:
+            os.close(sets_read)
+            os.close(made_write)
+        self._sets: BinaryIO = os.fdopen(sets_write, "wb")
+        self._made: BinaryIO = os.fdopen(made_read, "rb")
+        self._ask(setup.make)
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return self._child.pid
+
+    @property
+    def cpu_s(self) -> float:
+        """CPU time that it, and what it started, had taken when it last answered, s."""
+        return self._cpu_s + self._local.evidence.process_cpu_s
+
+    def segmenter(self, camera: str) -> Segmenter | None:
+        """As `Tracker.segmenter`, of the tracker in this process."""
+        return self._local.segmenter(camera)
+
+    def warm_up(self) -> None:
+        """As `Tracker.warm_up`."""
+        self._call("warm_up")
+
+    def reset(self) -> None:
+        """As `Tracker.reset`."""
+        self._call("reset")
+
+    def configure(self, config: TrackerConfig) -> None:
+        """As `Tracker.configure`."""
+        self._local.configure(config)
+        self._call("configure", config)
+
+    def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
+        """As `Tracker.take_backgrounds`."""
+        self._local.evidence.take_backgrounds(backgrounds)
+        self._call("take_backgrounds", dict(backgrounds))
+
+    def prepare(self, views: Views, stamp_ns: int) -> Any:
+        """As `Tracker.prepare`; what it returns is for `step`."""
+        if self._ended:
+            return self._local.prepare(views, stamp_ns)
+        handed = self._hand_over(views, stamp_ns)
+        try:
+            send(self._sets, handed.sent)
+            error = receive(self._made)
+        except (EOFError, OSError, ValueError):
+            return handed  # `step` finds out, too.
+        if error is not None:
+            raise error
+        return handed
+
+    def step(self, views: Any, stamp_ns: int, effort: float = 1.0) -> TrackResult:
+        """As `Tracker.step`."""
+        if not self._ended:
+            handed = views if isinstance(views, Handed) else self._hand_over(views, stamp_ns)
+            answer = self._ask(Step(handed.sent, effort))
+            if isinstance(answer, Tracked):
+                if answer.body is not None:
+                    self.body = answer.body
+                return answer.result
+        given = views.views if isinstance(views, Handed) else views
+        result = self._local.step(given, stamp_ns, effort)
+        self.body = self._local.body
+        return result
+
+    def close(self) -> None:
+        """End the process."""
+        for stream in (self._sets, self._made):
+            with suppress(OSError):
+                stream.close()
+        self._child.close()
+        self._local.evidence.close()
+
+    def _hand_over(self, views: Views, stamp_ns: int) -> Handed:
+        """Put a set where the process finds it."""
+        with self._lock:
+            number = self._number
+            self._number += 1
+        begin = number % _SETS * self._set_bytes
+        images = {n: v for n, v in views.items() if not isinstance(v, Observation)}
+        places = put(self._child.memory, images, begin, begin + self._set_bytes)
+        if places is None:
+            for name, image in images.items():
+                segmenter = self._local.segmenter(name)
+                if segmenter is not None:
+                    segmenter.check(image)
+            raise ImageError(f"{', '.join(images)}: larger images than the calibration says")
+        sent = {n: v if isinstance(v, Observation) else places[n] for n, v in views.items()}
+        return Handed(views, SetOfViews(number, stamp_ns, sent))
+
+    def _call(self, method: str, *arguments: Any) -> None:
+        if not self._ended:
+            self._ask(Call(method, arguments))
+        if self._ended and method != "configure":
+            getattr(self._local, method)(*arguments)
+
+    def _ask(self, message: Any) -> Any:
+        """Send a message; returns the answer, None if the process has ended.
+
+        Raises:
+            Exception: what the tracker raised.
+        """
+        try:
+            self._child.send(message)
+            answer = self._child.receive()
+            while isinstance(answer, Compiled):
+                compiled_elsewhere(*answer)
+                answer = self._child.receive()
+        except (EOFError, OSError, ValueError):
+            self._end()
+            return None
+        answer, self._cpu_s = answer
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    def _end(self) -> None:
+        """Go on in this process."""
+        self._ended = True
+        self._report("the tracker's process has ended; tracking begins anew in this one")
+        self._local.warm_up()

@@ -1,0 +1,164 @@
+"""Main program of a tracker's process: sets of images in, results out, until its input ends.
+
+Started as ``python -m markerless_tracker.tracking.processes.fitting_main SETS MADE FD``. SETS and
+MADE are descriptors: sets to prepare come from the first, what became of them goes to the second.
+FD is the shared memory. Its input is the parent's other requests; its output belongs to the answers
+alone.
+"""
+
+import mmap
+import os
+import pickle
+import sys
+import time
+from threading import Lock, Thread
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from markerless_tracker.libraries import collect_for_good, single_threaded
+
+if TYPE_CHECKING:
+    from markerless_tracker.imaging import Image
+    from markerless_tracker.records import Observation
+    from markerless_tracker.tracking.processes.fitting import SetOfViews, Step, Tracked
+    from markerless_tracker.tracking.tracker import Tracker
+
+
+def main(sets_fd: int, made_fd: int, memory_fd: int) -> int:
+    """Serve until the parent ends; returns the exit status."""
+    single_threaded()
+    from markerless_tracker.tracking.processes.child import take_output
+
+    service = Service(mmap.mmap(memory_fd, 0))
+    sets, made = os.fdopen(sets_fd, "rb"), os.fdopen(made_fd, "wb")
+    Thread(target=_until_end, args=(service.serve_sets, sets, made), daemon=True).start()
+    _until_end(service.serve, sys.stdin.buffer, take_output())
+    service.close()
+    return 0
+
+
+class Service:
+    """A tracker and what its parent asks of it.
+
+    Args:
+        memory: shared with the parent; holds the images.
+    """
+
+    def __init__(self, memory: mmap.mmap) -> None:
+        # Read while the parent prepares itself.
+        import markerless_tracker.tracking  # noqa: F401
+
+        self._memory = memory
+        self._tracker: Tracker | None = None
+        self._told: Any = None
+        self._lock = Lock()
+        self._prepared: dict[int, Any] = {}
+
+    def close(self) -> None:
+        """End what the tracker started."""
+        if self._tracker is not None:
+            self._tracker.evidence.close()
+
+    def serve(self, requests: BinaryIO, answers: BinaryIO) -> None:
+        """Answer requests; each answer is what was found, or the exception, and the CPU time.
+
+        The first request is a function that makes the tracker.
+
+        Raises:
+            EOFError, BrokenPipeError: the parent has ended.
+        """
+        from markerless_tracker.compiled import compilation
+        from markerless_tracker.tracking.processes.fitting import Call, Compiled, Step
+        from markerless_tracker.tracking.processes.wire import receive, send
+
+        def progress(name: str, done: int, most: int) -> None:
+            send(answers, Compiled(name, done, most))
+
+        while True:
+            request = receive(requests)
+            answer: Any = None
+            try:
+                if isinstance(request, Step):
+                    answer = self._step(request)
+                elif isinstance(request, Call):
+                    with compilation(progress):
+                        getattr(self.tracker, request.method)(*request.arguments)
+                    if request.method == "warm_up":
+                        collect_for_good()
+                else:
+                    self._tracker = request()
+                    self.tracker.evidence.start_process()
+            except Exception as error:
+                answer = _portable(error)
+            cpu_s = time.process_time()
+            if self._tracker is not None:
+                cpu_s += self._tracker.evidence.process_cpu_s
+            send(answers, (answer, cpu_s))
+
+    def serve_sets(self, sets: BinaryIO, made: BinaryIO) -> None:
+        """Prepare sets; each answer is None, or the exception.
+
+        Raises:
+            EOFError, BrokenPipeError: the parent has ended.
+        """
+        from markerless_tracker.tracking.processes.wire import receive, send
+
+        while True:
+            of: SetOfViews = receive(sets)
+            error: Exception | None = None
+            try:
+                prepared = self.tracker.prepare(self._views(of), of.stamp_ns)
+                with self._lock:
+                    self._prepared[of.number] = prepared
+            except Exception as raised:
+                error = _portable(raised)
+            send(made, error)
+
+    @property
+    def tracker(self) -> "Tracker":
+        """The tracker."""
+        if self._tracker is None:
+            raise RuntimeError("a request came before the tracker")
+        return self._tracker
+
+    def _step(self, step: "Step") -> "Tracked":
+        from markerless_tracker.tracking.processes.fitting import Tracked
+
+        of = step.views
+        with self._lock:
+            prepared = self._prepared.pop(of.number, None)
+            # Sets that were prepared and then left out.
+            for number in [n for n in self._prepared if n < of.number]:
+                del self._prepared[number]
+        views = self._views(of) if prepared is None else prepared
+        result = self.tracker.step(views, of.stamp_ns, step.effort)
+        body = self.tracker.body
+        told, self._told = self._told, body
+        return Tracked(result, None if body is told else body)
+
+    def _views(self, of: "SetOfViews") -> "dict[str, Image | Observation]":
+        from markerless_tracker.tracking.processes.images import Place, get
+
+        return {
+            name: get(self._memory, view) if isinstance(view, Place) else view
+            for name, view in of.views.items()
+        }
+
+
+def _portable(error: Exception) -> Exception:
+    """The error, or one of its text if it cannot be handed to another process."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error
+
+
+def _until_end(serve: Any, requests: BinaryIO, answers: BinaryIO) -> None:
+    try:
+        serve(requests, answers)
+    except (EOFError, BrokenPipeError):
+        pass  # The parent has ended.
+
+
+if __name__ == "__main__":
+    sys.exit(main(*map(int, sys.argv[1:])))
