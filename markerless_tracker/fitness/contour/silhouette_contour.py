@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.contour.signed_distance import signed_distance
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation
@@ -19,8 +20,6 @@ UNDECIDED_PX = 2.0
 # Pixels within that distance.
 _AROUND = np.arange(-int(UNDECIDED_PX), int(UNDECIDED_PX) + 1)
 _NEAR_UNDECIDED = (np.hypot(_AROUND[:, None], _AROUND) <= UNDECIDED_PX).astype(np.uint8)
-# Chamfer distances of 5x5 depend on pixels so near.
-_REACH_PX = 2
 _SAME_PX = 0.5
 _FAR_PX = np.float32(1e4)
 _SMALLEST_EDGE_PX = 12
@@ -95,7 +94,7 @@ def silhouette_contour(
     left, right = max(0, first - margin), min(width, first + columns + margin)
     box = left, top, right, bottom
     window = _window(observation, mask, box)
-    distance = _signed_distance(window)
+    distance = signed_distance(window)
     known, free = distance, None
     if undecided is not None:
         known, free = _without_undecided(
@@ -157,23 +156,6 @@ def _window(
     return window
 
 
-def _signed_distance(mask: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Distances (h, w) to the edge of a mask (h, w) of 0 and 1, px, positive outside."""
-    distance = np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, 5), np.float32)
-    # Inside, only the pixels of the mask and those next to it matter.
-    left, top, width, height = cv2.boundingRect(mask)
-    part = np.s_[
-        max(top - _REACH_PX, 0) : top + height + _REACH_PX,
-        max(left - _REACH_PX, 0) : left + width + _REACH_PX,
-    ]
-    near = distance[part]
-    near -= cv2.distanceTransform(np.ascontiguousarray(mask[part]), cv2.DIST_L2, 5)
-    # The edge runs midway between pixels inside and outside.
-    near += mask[part]
-    distance -= 0.5
-    return distance
-
-
 def _without_undecided(
     distance: NDArray[np.float32],
     person: NDArray[np.uint8],
@@ -199,13 +181,29 @@ def _without_undecided(
     columns, rows = person.shape[1], person.shape[0]
     patch = Region(left, top, left + width, top + height).grown(reach_px, (columns, rows))
     around = patch.grown(reach_px, (columns, rows))
-    wider = _signed_distance((person | undecided)[around.slices])[patch.relative_to(around).slices]
-    same = np.abs(wider - distance[patch.slices]) < _SAME_PX
-    free[patch.slices] = cv2.dilate(undecided[patch.slices], _NEAR_UNDECIDED) == 0
-    same &= free[patch.slices]
+    either = np.ascontiguousarray((person | undecided)[around.slices])
+    wider = signed_distance(either)[patch.relative_to(around).slices]
+    beside = np.asarray(cv2.dilate(undecided[patch.slices], _NEAR_UNDECIDED), np.uint8)
     known = distance.copy()
-    known[patch.slices][~same] = _FAR_PX
+    keep_same(wider, beside, known[patch.slices], free[patch.slices])
     return known, free
+
+
+@kernel
+def keep_same(wider, beside, known, free):  # type: ignore[no-untyped-def]
+    """Keep the known distances that are the wider mask's, too, and not beside undecided pixels.
+
+    Args:
+        wider: (h, w) distances to the edge of person and undecided pixels together.
+        beside: (h, w) not 0 within `UNDECIDED_PX` of undecided pixels.
+        known: (h, w) distances to the edge of the person, changed.
+        free: (h, w) filled with whether a pixel is not beside undecided ones.
+    """
+    for v in range(known.shape[0]):
+        for u in range(known.shape[1]):
+            free[v, u] = beside[v, u] == 0
+            if beside[v, u] != 0 or abs(wider[v, u] - known[v, u]) >= _SAME_PX:
+                known[v, u] = _FAR_PX
 
 
 @kernel

@@ -28,7 +28,7 @@ from markerless_tracker.node.tracker.publishing.results import ResultPublishers
 from markerless_tracker.node.tracker.report import RunReport, sets_line
 from markerless_tracker.node.tracker.services import Services
 from markerless_tracker.node.tracker.setup import RigSource, build
-from markerless_tracker.node.tracker.status import TrackerStatus
+from markerless_tracker.node.tracker.status import NOTED, TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.node.tracker.topics import CameraTopics
 from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, TrackWorker
@@ -37,24 +37,8 @@ from markerless_tracker.tracking import Tracker
 from markerless_tracker.tracking.processes.fitting import FittingProcess
 
 STATE_PERIOD_S = 0.5
-
-_NOTED = (
-    "tracked",
-    "skipped",
-    "incomplete",
-    "late",
-    "duplicates",
-    "restarts",
-    "dropped_before_ready",
-    "dropped_before_start",
-    "dropped_while_learning",
-    "dropped_on_error",
-    "latency_median_ms",
-    "latency_p95_ms",
-    "fps",
-    "first_pose_s",
-    "cpu_s",
-)
+STATE_LEAST_S = 0.05
+"""Time between two states of a tracker that more sets wait for; making one takes time from them."""
 
 
 class TrackerNode(GivenNode):
@@ -96,7 +80,7 @@ class TrackerNode(GivenNode):
             self._source.names, tolerance_ns=round(self._settings.sync_tolerance * 1e9)
         )
         self._tracker: Tracker | FittingProcess | None = None
-        self._end_processes: Callable[[], None] = lambda: None
+        self._end_process: Callable[[], None] = lambda: None
         self._time_offsets: TimeOffsetEstimate | None = None
         self._found = False
         self._handle: TrackerHandle | None = None
@@ -104,7 +88,7 @@ class TrackerNode(GivenNode):
         self._repeated = (0, 0.0)
         self._late_ns: int | None = None
         self._state_lock = Lock()
-        self._started_s = self._seconds()
+        self._started_s = self._state_s = self._seconds()
         self._result_file = ResultFile(
             self._settings.result_file, overwrite=self._settings.overwrite, report=self._warn
         )
@@ -157,11 +141,11 @@ class TrackerNode(GivenNode):
             DatasetError: the result files cannot be completed.
         """
         ended = self._worker.stop(timeout_s)
-        self._end_processes()
+        self._end_process()
         self._notices.flush()
         self._news.flush()
         counts = self._status.values(self._sets.counts, (), ())
-        notes: dict[str, Any] = {"node": {key: counts[key] for key in _NOTED}}
+        notes: dict[str, Any] = {"node": {key: counts[key] for key in NOTED}}
         verdict = self._report.verdict()
         if verdict is not None:
             self._inform(verdict.counts)
@@ -226,10 +210,9 @@ class TrackerNode(GivenNode):
         setup = build(self._settings, rig, scaled)
         tracker: Tracker | FittingProcess = setup.tracker
         if (self._settings.config.threads or usable_cores()) > 1:
-            process = FittingProcess(setup, self._warn)
-            self._end_processes = process.close
+            process = tracker = FittingProcess(setup, self._warn)
+            self._end_process = process.close
             self._status.add_cpu_of(lambda: process.cpu_s)
-            tracker = process
         self._pictures = Pictures(self, scaled)
         self._results.describe(setup.tracker.body)
         self._tracker = tracker
@@ -261,13 +244,19 @@ class TrackerNode(GivenNode):
         self._time_offsets.add(tracked.result, tracked.body)
         self._announcer.time_offsets(self._time_offsets.by_camera, self._source.offsets_s)
 
-    def _dealt(self) -> None:
-        if self.context.ok():
+    def _dealt(self, arrived_s: float) -> None:
+        """Publish that a set was dealt with; of sets that newer ones follow not each."""
+        if not self.context.ok():
+            return
+        now_s, last_s = self._seconds(), self._sets.complete_s
+        followed = last_s is not None and last_s > arrived_s
+        if not followed or now_s - self._state_s >= STATE_LEAST_S:
             self._publish_state()
 
     def _publish_state(self, missing: Sequence[str] | None = None) -> DiagnosticArray:
         now_s = self._seconds()
         with self._state_lock:
+            self._state_s = now_s
             if missing is not None:
                 self._missing = list(missing)
             late_ns = self._sets.late_ns

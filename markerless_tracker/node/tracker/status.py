@@ -17,6 +17,25 @@ WINDOW = 300
 RATE_S = 5.0
 """Time over which the rate of a running stream is computed."""
 
+NOTED = (
+    "tracked",
+    "skipped",
+    "incomplete",
+    "late",
+    "duplicates",
+    "restarts",
+    "dropped_before_ready",
+    "dropped_before_start",
+    "dropped_while_learning",
+    "dropped_on_error",
+    "latency_median_ms",
+    "latency_p95_ms",
+    "fps",
+    "first_pose_s",
+    "cpu_s",
+)
+"""Values that a result file keeps."""
+
 
 class TrackerStatus:
     """Counts, times and errors since the start. Safe to use from several threads."""

@@ -21,15 +21,12 @@ from markerless_tracker.node.tracker.announcer import CompilingLines, ready_line
 from markerless_tracker.node.tracker.learning import Learning, OpenRequest
 from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
 from markerless_tracker.node.tracker.pace.effort import EffortRule, Lateness
+from markerless_tracker.node.tracker.pace.start_gate import StartGate
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
 from markerless_tracker.records import Observation, TrackResult
 
 Images = Mapping[str, NDArray[np.uint8] | Observation]
-
-START_TOLERANCE_NS = 4_000_000
-"""Tolerance when a frame is compared with the start row's time: marker files round their times, and
-frames are further apart (8.3 ms at 120 fps)."""
 
 _POLL_S = 0.2
 
@@ -55,27 +52,6 @@ class Stepper(Protocol):
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
         """Use other backgrounds from now on, and forget the person."""
-
-
-class StartGate:
-    """Drops sets before the start row's time, once.
-
-    A stream that begins later than that time, or a start without a time, begins with its first
-    complete set.
-
-    Args:
-        start_ns: the start row's time, None if there is none.
-    """
-
-    def __init__(self, start_ns: int | None) -> None:
-        self._start_ns = start_ns
-        self._open = start_ns is None
-
-    def admits(self, stamp_ns: int) -> bool:
-        """Whether a set of that stamp is to be tracked."""
-        if not self._open and self._start_ns is not None:
-            self._open = stamp_ns >= self._start_ns - START_TOLERANCE_NS
-        return self._open
 
 
 @dataclass(frozen=True)
@@ -124,7 +100,8 @@ class TrackWorker:
             tracked meanwhile.
         report: called with each error, one line.
         inform: called with a line for the log when a phase begins.
-        dealt: called after each set, tracked or dropped; in the thread of `publish`.
+        dealt: called after each set, tracked or dropped, with the time at which it was complete;
+            in the thread of `publish`.
         clock: monotonic time in s, the clock of the sets' arrival.
     """
 
@@ -137,7 +114,7 @@ class TrackWorker:
         publish: Callable[[TrackedSet], None],
         report: Callable[[str], None],
         inform: Callable[[str], None] = lambda _: None,
-        dealt: Callable[[], None] = lambda: None,
+        dealt: Callable[[float], None] = lambda _: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._sets = sets
@@ -319,7 +296,7 @@ class TrackWorker:
             self._trouble(matched.stamp_ns, error)
         self._status.dealt_with(matched.stamp_ns)
         try:
-            self._dealt()
+            self._dealt(matched.arrived_s)
         except Exception as error:
             self._trouble(matched.stamp_ns, error)
 

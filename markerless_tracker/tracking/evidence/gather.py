@@ -22,6 +22,7 @@ from markerless_tracker.tracking.evidence.selection import (
     explained_part,
     place_cones,
 )
+from markerless_tracker.tracking.processes.child import SharedMemory
 from markerless_tracker.tracking.processes.segmenting import SegmentingProcess
 
 WIDE_MARGIN_M = 0.5
@@ -142,15 +143,18 @@ class EvidenceMaker:
         """
         return {n: self._segmented(n, v, stamp_ns, regions[n], 0) for n, v in images.items()}
 
-    def start_process(self) -> None:
+    def start_process(self, shared: SharedMemory | None = None) -> None:
         """Let a process of its own segment what is made ahead; `warm_up` hands it its backgrounds.
 
         Without effect with one thread, and if the backgrounds follow the images: the steps decide
         on the order then.
+
+        Args:
+            shared: memory that the images lie in; None for memory of its own.
         """
         several = (self._config.threads or usable_cores()) > 1
         if several and self.segmenters and not self._follows and self._process is None:
-            self._process = SegmentingProcess(self._rig)
+            self._process = SegmentingProcess(self._rig, shared)
 
     @property
     def process_cpu_s(self) -> float:

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO, NamedTuple, cast
 
 from markerless_tracker.tracking.processes.wire import receive, send
 
@@ -15,12 +15,24 @@ _PACKAGE = Path(__file__).resolve().parents[3]
 _END_S = 5.0
 
 
+class SharedMemory(NamedTuple):
+    """Memory that several processes see.
+
+    Attributes:
+        fd: descriptor of its file.
+        memory: how this process sees it.
+    """
+
+    fd: int
+    memory: mmap.mmap
+
+
 class Child:
     """A running module of the package, and shared memory; ends with this process.
 
     Args:
         module: its main program. Its arguments are `arguments` and the memory's descriptor.
-        size: bytes of shared memory.
+        memory: bytes of shared memory to make, or memory that is shared already.
         arguments: further words of its command line.
         pass_fds: further descriptors that it inherits.
 
@@ -31,13 +43,13 @@ class Child:
     def __init__(
         self,
         module: str,
-        size: int,
+        memory: int | SharedMemory,
         arguments: Sequence[str] = (),
         pass_fds: Sequence[int] = (),
     ) -> None:
-        fd = _memory_fd(size)
+        fd = memory.fd if isinstance(memory, SharedMemory) else _memory_fd(memory)
         try:
-            self.memory = mmap.mmap(fd, size)
+            self.memory = memory.memory if isinstance(memory, SharedMemory) else mmap.mmap(fd, 0)
             paths = [str(_PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
             # A session of its own: a terminal's Ctrl-C is for this process, which ends the other.
             self._process = subprocess.Popen(
@@ -49,7 +61,8 @@ class Child:
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
             )
         finally:
-            os.close(fd)
+            if not isinstance(memory, SharedMemory):
+                os.close(fd)
 
     @property
     def pid(self) -> int:

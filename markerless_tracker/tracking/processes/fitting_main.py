@@ -19,6 +19,7 @@ from markerless_tracker.libraries import collect_for_good, single_threaded
 if TYPE_CHECKING:
     from markerless_tracker.imaging import Image
     from markerless_tracker.records import Observation
+    from markerless_tracker.tracking.processes.child import SharedMemory
     from markerless_tracker.tracking.processes.fitting import SetOfViews, Step, Tracked
     from markerless_tracker.tracking.tracker import Tracker
 
@@ -26,9 +27,9 @@ if TYPE_CHECKING:
 def main(sets_fd: int, made_fd: int, memory_fd: int) -> int:
     """Serve until the parent ends; returns the exit status."""
     single_threaded()
-    from markerless_tracker.tracking.processes.child import take_output
+    from markerless_tracker.tracking.processes.child import SharedMemory, take_output
 
-    service = Service(mmap.mmap(memory_fd, 0))
+    service = Service(SharedMemory(memory_fd, mmap.mmap(memory_fd, 0)))
     sets, made = os.fdopen(sets_fd, "rb"), os.fdopen(made_fd, "wb")
     Thread(target=_until_end, args=(service.serve_sets, sets, made), daemon=True).start()
     _until_end(service.serve, sys.stdin.buffer, take_output())
@@ -40,14 +41,18 @@ class Service:
     """A tracker and what its parent asks of it.
 
     Args:
-        memory: shared with the parent; holds the images.
+        shared: memory shared with the parent; holds the images.
     """
 
-    def __init__(self, memory: mmap.mmap) -> None:
+    def __init__(self, shared: "SharedMemory") -> None:
         # Read while the parent prepares itself.
+        import cv2
+
         import markerless_tracker.tracking  # noqa: F401
 
-        self._memory = memory
+        # Its threads wait for each other in a loop, and take the cores from the other processes.
+        cv2.setNumThreads(1)
+        self._shared = shared
         self._tracker: Tracker | None = None
         self._told: Any = None
         self._lock = Lock()
@@ -86,7 +91,7 @@ class Service:
                         collect_for_good()
                 else:
                     self._tracker = request()
-                    self.tracker.evidence.start_process()
+                    self.tracker.evidence.start_process(self._shared)
             except Exception as error:
                 answer = _portable(error)
             cpu_s = time.process_time()
@@ -139,7 +144,7 @@ class Service:
         from markerless_tracker.tracking.processes.images import Place, get
 
         return {
-            name: get(self._memory, view) if isinstance(view, Place) else view
+            name: get(self._shared.memory, view) if isinstance(view, Place) else view
             for name, view in of.views.items()
         }
 

@@ -34,9 +34,18 @@ def set_bytes(rig: CameraRig) -> int:
 def put(
     memory: mmap.mmap, images: Mapping[str, Image], begin: int, end: int
 ) -> dict[str, Place] | None:
-    """Copy images into a part of the memory; None if they do not fit into it."""
+    """Copy images into a part of the memory; None if they do not fit into it.
+
+    Those that lie in the memory already stay where they are.
+    """
     places = {}
+    whole = np.frombuffer(memory, np.uint8)
+    first = whole.ctypes.data
     for name, image in images.items():
+        at = image.ctypes.data - first
+        if 0 <= at < whole.size and image.flags.c_contiguous:
+            places[name] = Place(at, image.shape)
+            continue
         if begin + image.size > end:
             return None
         shared = np.frombuffer(memory, np.uint8, image.size, begin)

@@ -8,7 +8,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.imaging import BackgroundModel, Image, Region
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.prepared import SeenView
-from markerless_tracker.tracking.processes.child import Child
+from markerless_tracker.tracking.processes.child import Child, SharedMemory
 from markerless_tracker.tracking.processes.images import Place, put, set_bytes
 
 _MAIN = "markerless_tracker.tracking.processes.segmenting_main"
@@ -25,19 +25,22 @@ class SegmentRequest(NamedTuple):
 class SegmentingProcess:
     """A process that segments images; ends with this one, or when it is closed.
 
-    Images are copied into shared memory once. A process that has ended is not started again:
-    `segment` gives None from then on. Safe to use from several threads.
+    Images are copied into shared memory, unless that is given: then they must lie there. A process
+    that has ended is not started again: `segment` gives None from then on. Safe to use from several
+    threads.
 
     Args:
         rig: the cameras, whose sizes say how much memory is shared.
+        shared: memory that is shared already, and that the images lie in.
     """
 
-    def __init__(self, rig: CameraRig) -> None:
+    def __init__(self, rig: CameraRig, shared: SharedMemory | None = None) -> None:
         self._rig = rig
         self._lock = Lock()
         self._ready = False
         self._cpu_s = 0.0
-        self._child = Child(_MAIN, set_bytes(rig))
+        self._child = Child(_MAIN, shared or set_bytes(rig))
+        self._own_bytes = 0 if shared else len(self._child.memory)
 
     @property
     def pid(self) -> int:
@@ -77,8 +80,7 @@ class SegmentingProcess:
         with self._lock:
             if not self._ready:
                 return None
-            memory = self._child.memory
-            places = put(memory, images, 0, len(memory))
+            places = put(self._child.memory, images, 0, self._own_bytes)
             if places is None:
                 return None
             parts = {name: regions[name] for name in images}

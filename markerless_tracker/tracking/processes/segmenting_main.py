@@ -36,11 +36,15 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
         EOFError, BrokenPipeError: the parent has ended.
     """
     # Read while the parent prepares itself.
+    import cv2
+
     from markerless_tracker.tracking.evidence.gather import EvidenceMaker
     from markerless_tracker.tracking.processes.images import get
     from markerless_tracker.tracking.processes.segmenting import SegmentRequest
     from markerless_tracker.tracking.processes.wire import receive, send
 
+    # Its threads wait for each other in a loop, and take the cores from the other processes.
+    cv2.setNumThreads(1)
     maker: EvidenceMaker | None = None
     while True:
         message = receive(requests)

@@ -6,8 +6,8 @@ import pytest
 
 from markerless_tracker.fitness.contour.silhouette_contour import (
     _NEAR_UNDECIDED,
-    _signed_distance,
     _without_undecided,
+    signed_distance,
     silhouette_contour,
 )
 from markerless_tracker.records import Observation
@@ -138,8 +138,8 @@ def test_near_the_edge_distances_are_those_of_the_whole_window(seed) -> None:
         undecided[top : top + 10, left : left + 8] = 1
     undecided[person == 1] = 0
     reach_px = 24
-    distance = _signed_distance(person)
-    wider = _signed_distance(person | undecided)
+    distance = signed_distance(person)
+    wider = signed_distance(person | undecided)
     same = (np.abs(wider - distance) < 0.5) & (cv2.dilate(undecided, _NEAR_UNDECIDED) == 0)
     known, free = _without_undecided(distance, person, undecided, reach_px)
     near = np.abs(distance) <= reach_px

@@ -10,10 +10,10 @@ import pytest
 from markerless_tracker.errors import ConfigError, ImageError
 from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.node.tracker.learning import Learning
+from markerless_tracker.node.tracker.pace.start_gate import StartGate
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.node.tracker.worker import (
-    StartGate,
     TrackedSet,
     TrackerHandle,
     TrackWorker,
@@ -39,6 +39,7 @@ class FakeTracker:
         self.error: Exception | None = None
         self.state = TrackState.TRACKING
         self.backgrounds: dict[str, Any] = {}
+        self.body: Any = object()
 
     def warm_up(self) -> None:
         self.threads.add(threading.get_ident())
