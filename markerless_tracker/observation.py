@@ -92,6 +92,19 @@ class Observation:
                 f"inside the frame of {full_w}x{full_h} px"
             )
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process: of an empty edge map its shape alone."""
+        state = dict(self.__dict__)
+        if not self.edges.any():
+            state["edges"] = self.edges.shape
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        edges = state["edges"]
+        if isinstance(edges, tuple):
+            state = {**state, "edges": locked(np.zeros(edges, dtype=np.uint8), np.uint8)}
+        self.__dict__.update(state)
+
     @property
     def width(self) -> int:
         """Width of the region in px."""

@@ -13,6 +13,8 @@ from markerless_tracker.tracking.processes.wire import receive, send
 
 _PACKAGE = Path(__file__).resolve().parents[3]
 _END_S = 5.0
+_PIPE_BYTES = 1 << 20
+"""Room for a result, so that its sender does not wait for the receiver; Linux only."""
 
 
 class SharedMemory(NamedTuple):
@@ -57,6 +59,7 @@ class Child:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 pass_fds=(fd, *pass_fds),
+                pipesize=_PIPE_BYTES,
                 start_new_session=True,
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
             )
