@@ -1,6 +1,7 @@
 """Records that cross rooms: packed masks, observations, stages, results."""
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
@@ -143,6 +144,23 @@ def test_undecided_pixels_come_back(mask: np.ndarray, seed: int) -> None:
     np.testing.assert_array_equal(decided.mask, mask | undecided)
     assert decided.undecided is None
     assert (decided.stamp_ns, decided.edges) == (seen.stamp_ns, seen.edges)
+
+
+def test_an_observation_comes_back_from_another_process() -> None:
+    mask = np.zeros((40, 300), np.uint8)
+    mask[10:20, 100:130] = 1
+    strong = np.full(mask.shape, 7, np.uint8)
+    sizes = []
+    for edges in (np.zeros_like(mask), strong):
+        one = Observation.from_mask("cam01", 5, mask, edges, undecided=1 - mask)
+        stored = pickle.dumps(one, protocol=5)
+        sizes.append(len(stored))
+        other = pickle.loads(stored)
+        for name in ("mask", "undecided", "edges"):
+            np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
+            assert not other.edges.flags.writeable
+        assert (other.camera, other.stamp_ns, other.size_px) == ("cam01", 5, (300, 40))
+    assert sizes[0] + mask.size <= sizes[1], "an empty edge map was sent"
 
 
 def test_no_pixel_is_person_and_undecided() -> None:

@@ -23,6 +23,7 @@ from markerless_tracker.node.tracker import parameters
 from markerless_tracker.node.tracker.announcer import Announcer
 from markerless_tracker.node.tracker.cameras.build import make_inputs, view_reader
 from markerless_tracker.node.tracker.changes import FIXED, LIVE, LiveSettings
+from markerless_tracker.node.tracker.pace.states import StatePace
 from markerless_tracker.node.tracker.publishing.files import Pictures, ResultFile
 from markerless_tracker.node.tracker.publishing.results import ResultPublishers
 from markerless_tracker.node.tracker.report import RunReport, sets_line
@@ -37,8 +38,6 @@ from markerless_tracker.tracking import Tracker
 from markerless_tracker.tracking.processes.fitting import FittingProcess
 
 STATE_PERIOD_S = 0.5
-STATE_LEAST_S = 0.05
-"""Time between two states of a tracker that more sets wait for; making one takes time from them."""
 
 
 class TrackerNode(GivenNode):
@@ -88,7 +87,8 @@ class TrackerNode(GivenNode):
         self._repeated = (0, 0.0)
         self._late_ns: int | None = None
         self._state_lock = Lock()
-        self._started_s = self._state_s = self._seconds()
+        self._state_pace = StatePace()
+        self._started_s = self._seconds()
         self._result_file = ResultFile(
             self._settings.result_file, overwrite=self._settings.overwrite, report=self._warn
         )
@@ -248,15 +248,13 @@ class TrackerNode(GivenNode):
         """Publish that a set was dealt with; of sets that newer ones follow not each."""
         if not self.context.ok():
             return
-        now_s, last_s = self._seconds(), self._sets.complete_s
-        followed = last_s is not None and last_s > arrived_s
-        if not followed or now_s - self._state_s >= STATE_LEAST_S:
+        if self._state_pace.due(self._seconds(), arrived_s, self._sets.complete_s):
             self._publish_state()
 
     def _publish_state(self, missing: Sequence[str] | None = None) -> DiagnosticArray:
         now_s = self._seconds()
         with self._state_lock:
-            self._state_s = now_s
+            self._state_pace.published(now_s)
             if missing is not None:
                 self._missing = list(missing)
             late_ns = self._sets.late_ns

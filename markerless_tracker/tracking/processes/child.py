@@ -12,7 +12,6 @@ from typing import Any, BinaryIO, NamedTuple, cast
 from markerless_tracker.tracking.processes.wire import receive, send
 
 _PACKAGE = Path(__file__).resolve().parents[3]
-_END_S = 5.0
 _PIPE_BYTES = 1 << 20
 """Room for a result, so that its sender does not wait for the receiver; Linux only."""
 
@@ -88,15 +87,15 @@ class Child:
         """
         return receive(cast(BinaryIO, self._process.stdout))
 
-    def close(self) -> None:
-        """End it."""
+    def close(self, timeout_s: float = 5.0) -> None:
+        """End it; it is killed if it does not end in that time."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.close()
         except OSError:
             pass  # It ended with something left to read.
         try:
-            self._process.wait(_END_S)
+            self._process.wait(timeout_s)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()

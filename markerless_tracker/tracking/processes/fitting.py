@@ -19,6 +19,8 @@ from markerless_tracker.tracking.processes.wire import receive, send
 from markerless_tracker.tracking.setup import TrackerSetup
 
 _MAIN = "markerless_tracker.tracking.processes.fitting_main"
+_END_S = 1.0
+"""Time for the step in progress; a compilation takes longer, and is not waited for."""
 _SETS = 3
 """Sets of images in shared memory: one that is tracked, one prepared, and the next."""
 
@@ -177,11 +179,11 @@ class FittingProcess:
         return result
 
     def close(self) -> None:
-        """End the process."""
+        """End the process; whoever waits for it goes on."""
+        self._child.close(_END_S)
         for stream in (self._sets, self._made):
             with suppress(OSError):
                 stream.close()
-        self._child.close()
         self._local.evidence.close()
 
     def _hand_over(self, views: Views, stamp_ns: int) -> Handed:

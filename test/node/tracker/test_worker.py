@@ -10,7 +10,6 @@ import pytest
 from markerless_tracker.errors import ConfigError, ImageError
 from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.node.tracker.learning import Learning
-from markerless_tracker.node.tracker.pace.start_gate import StartGate
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.node.tracker.worker import (
@@ -237,6 +236,43 @@ def test_time_set_back_keeps_the_track_and_uses_no_start_again() -> None:
     assert [line for line in bench.reports if "time was set back" in line]
 
 
+def test_the_next_set_is_tracked_while_one_is_published() -> None:
+    bench, free, dealt = Bench(), threading.Event(), []
+    given: list[int] = []
+
+    def publish(tracked: TrackedSet) -> None:
+        free.wait(60)
+        given.append(tracked.result.stamp_ns)
+
+    bench.worker = TrackWorker(
+        bench.sets, bench.status, prepare=lambda: bench.prepared, publish=publish,
+        report=bench.reports.append, dealt=dealt.append,
+    )  # fmt: skip
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    begun_s = time.monotonic()
+    for stamp in (1, 2):
+        bench.offer(stamp)
+        bench.until(lambda stamp=stamp: len(bench.tracker.seen) == stamp)
+    assert not given and not dealt
+    free.set()
+    bench.until(lambda: len(dealt) == 2)
+    assert given == [1, 2] and begun_s <= dealt[0] <= dealt[1]
+    assert bench.worker.stop(60)
+
+
+def test_a_result_is_published_with_the_body_of_its_time(bench: Bench) -> None:
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    body = bench.tracker.body
+    bench.offer(1)
+    bench.until(lambda: bench.published)
+    bench.tracker.body = object()
+    bench.offer(2)
+    bench.until(lambda: len(bench.published) == 2)
+    assert [one.body is body for one in bench.published] == [True, False]
+
+
 def test_stop_does_not_wait_for_the_compiler() -> None:
     bench = Bench()
     bench.tracker.compiled.clear()
@@ -244,21 +280,6 @@ def test_stop_does_not_wait_for_the_compiler() -> None:
     assert not bench.worker.stop(0.05)
     bench.tracker.compiled.set()
     assert bench.worker.stop(60)
-
-
-@pytest.mark.parametrize(
-    ("start_ns", "stamps", "admitted"),
-    [
-        (None, [5, 6], [True, True]),
-        (16_666_667, [0, FRAME_NS, 2 * FRAME_NS], [False, True, True]),
-        (17_000_000, [0, FRAME_NS], [False, True]),
-        (16_666_667, [10**18], [True]),
-        (FRAME_NS // 2, [0, 4_166_667, 8_333_333], [False, False, True]),
-    ],
-)
-def test_start_gate(start_ns: int | None, stamps: list[int], admitted: list[bool]) -> None:
-    gate = StartGate(start_ns)
-    assert [gate.admits(stamp) for stamp in stamps] == admitted
 
 
 def learn(bench: Bench, sets: int = 4) -> Learning:
