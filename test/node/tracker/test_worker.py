@@ -31,9 +31,8 @@ class FakeTracker:
         self.seen: list[tuple[int, dict[str, Any]]] = []
         self.resets = 0
         self.threads: set[int] = set()
-        self.compiled = threading.Event()
+        self.compiled, self.free = threading.Event(), threading.Event()
         self.compiled.set()
-        self.free = threading.Event()
         self.free.set()
         self.error: Exception | None = None
         self.state = TrackState.TRACKING
@@ -79,6 +78,9 @@ class Bench:
         self.status = TrackerStatus()
         self.published: list[TrackedSet] = []
         self.reports: list[str] = []
+        self.dealt: list[float] = []
+        self.may_publish = threading.Event()
+        self.may_publish.set()
         self.prepared: TrackerHandle | None = TrackerHandle(
             self.tracker, start_ns, lambda name, view: np.full((2, 2), view, np.uint8)
         )
@@ -86,9 +88,14 @@ class Bench:
             self.sets,
             self.status,
             prepare=lambda: self.prepared,
-            publish=self.published.append,
+            publish=self.publish,
             report=self.reports.append,
+            dealt=self.dealt.append,
         )
+
+    def publish(self, tracked: TrackedSet) -> None:
+        assert self.may_publish.wait(60)
+        self.published.append(tracked)
 
     def offer(self, *stamps: int) -> None:
         for stamp in stamps:
@@ -114,7 +121,7 @@ def bench() -> Any:
     assert bench.worker.stop(60)
 
 
-def test_sets_are_decoded_tracked_and_published_in_one_thread(bench: Bench) -> None:
+def test_sets_are_decoded_and_tracked_in_one_thread_and_published(bench: Bench) -> None:
     bench.worker.start()
     bench.until(lambda: bench.status.ready)
     bench.offer(5)
@@ -236,41 +243,26 @@ def test_time_set_back_keeps_the_track_and_uses_no_start_again() -> None:
     assert [line for line in bench.reports if "time was set back" in line]
 
 
-def test_the_next_set_is_tracked_while_one_is_published() -> None:
-    bench, free, dealt = Bench(), threading.Event(), []
-    given: list[int] = []
-
-    def publish(tracked: TrackedSet) -> None:
-        free.wait(60)
-        given.append(tracked.result.stamp_ns)
-
-    bench.worker = TrackWorker(
-        bench.sets, bench.status, prepare=lambda: bench.prepared, publish=publish,
-        report=bench.reports.append, dealt=dealt.append,
-    )  # fmt: skip
+def test_the_next_set_is_tracked_while_one_is_published(bench: Bench) -> None:
+    bench.may_publish.clear()
     bench.worker.start()
     bench.until(lambda: bench.status.ready)
-    begun_s = time.monotonic()
-    for stamp in (1, 2):
-        bench.offer(stamp)
-        bench.until(lambda stamp=stamp: len(bench.tracker.seen) == stamp)
-    assert not given and not dealt
-    free.set()
-    bench.until(lambda: len(dealt) == 2)
-    assert given == [1, 2] and begun_s <= dealt[0] <= dealt[1]
-    assert bench.worker.stop(60)
+    for count in (1, 2):
+        bench.offer(count)
+        bench.until(lambda count=count: len(bench.tracker.seen) == count)
+    assert not bench.published and not bench.dealt
+    bench.may_publish.set()
+    bench.until(lambda: len(bench.dealt) == len(bench.published) == 2)
 
 
 def test_a_result_is_published_with_the_body_of_its_time(bench: Bench) -> None:
     bench.worker.start()
-    bench.until(lambda: bench.status.ready)
-    body = bench.tracker.body
-    bench.offer(1)
-    bench.until(lambda: bench.published)
-    bench.tracker.body = object()
-    bench.offer(2)
+    for stamp in (1, 2):
+        bench.until(lambda: bench.status.ready)
+        bench.tracker.body = stamp
+        offer_one_by_one(bench, stamp)
     bench.until(lambda: len(bench.published) == 2)
-    assert [one.body is body for one in bench.published] == [True, False]
+    assert [one.body for one in bench.published] == [1, 2]
 
 
 def test_stop_does_not_wait_for_the_compiler() -> None:
@@ -303,8 +295,7 @@ def test_sets_become_backgrounds_and_the_first_and_the_last_are_tracked(
     bench.tracker.state = TrackState.SEARCHING
     bench.worker.start()
     bench.until(lambda: bench.status.ready)
-    learning = learn(bench)
-    second = learn(bench)
+    learning, second = learn(bench), learn(bench)
     assert second.answered and "already" in second.message
     offer_one_by_one(bench, 1, 2, 3, 4)
     bench.until(lambda: learning.answered)
