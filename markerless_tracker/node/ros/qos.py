@@ -115,6 +115,19 @@ class FollowingSubscription:
         if newest is not None:
             self._callback(newest[0])
 
+    def take_waiting(self) -> None:
+        """Call back with the messages that wait, each with its info; from the executor's thread.
+
+        At most as many as the middleware keeps.
+        """
+        handle = self._subscription.handle
+        for _ in range(self._depth):
+            with handle:
+                taken = handle.take_message(self._kind, self._raw)
+            if taken is None:
+                return
+            self._callback(*taken)
+
     def _subscribe(self) -> Any:
         reliable, latched = self._offered
         qos = image_qos(reliable=reliable, latched=latched, depth=self._depth)

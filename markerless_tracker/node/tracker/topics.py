@@ -34,6 +34,7 @@ class CameraTopics:
     ) -> None:
         self._clock = clock
         self._polled_s = -math.inf
+        self._taking = False
         self._infos = [
             FollowingSubscription(
                 node, CameraInfo, source.info_topic, source.on_info_bytes, depth=1, raw=True,
@@ -44,7 +45,7 @@ class CameraTopics:
         self._images: list[ImageSubscription | _EvidenceSubscription] = [
             _EvidenceSubscription(node, source, self._before_image)
             if isinstance(source, EvidenceInput)
-            else ImageSubscription(node, source, transport, self._before_image)
+            else ImageSubscription(node, source, transport, self._before_image, self._after_image)
             for source in inputs
         ]
 
@@ -60,6 +61,20 @@ class CameraTopics:
         """Take the camera infos now and then before an image."""
         if self._clock() - self._polled_s > POLL_INFOS_S:
             self._poll_infos()
+
+    def _after_image(self) -> None:
+        """Take the images of the other cameras that have come meanwhile.
+
+        The executor takes one message, and then looks at all that it waits for once more.
+        """
+        if self._taking:
+            return
+        self._taking = True
+        try:
+            for images in self._images:
+                images.take_waiting()
+        finally:
+            self._taking = False
 
     def _poll_infos(self) -> None:
         self._polled_s = self._clock()
@@ -94,6 +109,9 @@ class _EvidenceSubscription:
         for part in self._parts:
             part.follow()
 
+    def take_waiting(self) -> None:
+        """Nothing: evidence is small, and its two topics come to the executor."""
+
 
 class ImageSubscription:
     """Receives one camera's images, raw or compressed.
@@ -102,13 +120,18 @@ class ImageSubscription:
         node: creates the subscription.
         source: gets the messages.
         transport: "auto": raw images, compressed ones while only those are offered.
-        before: called before each message.
+        before, after: called before and after each message.
     """
 
     def __init__(
-        self, node: Any, source: CameraInput, transport: str, before: Callable[[], None]
+        self,
+        node: Any,
+        source: CameraInput,
+        transport: str,
+        before: Callable[[], None],
+        after: Callable[[], None] = lambda: None,
     ) -> None:
-        self._node, self._source, self._before = node, source, before
+        self._node, self._source, self._before, self._after = node, source, before, after
         self._auto = transport == "auto"
         self._compressed = transport == "compressed"
         # A remapped topic's compressed images have the name it is mapped to.
@@ -129,13 +152,18 @@ class ImageSubscription:
                 )
         self._subscription.follow()
 
+    def take_waiting(self) -> None:
+        """Take the images that have come."""
+        self._subscription.take_waiting()
+
     def _subscribe(self) -> FollowingSubscription:
-        before = self._before
+        before, after = self._before, self._after
         take = self._source.on_compressed if self._compressed else self._source.on_image
 
         def receive(serialised: bytes, info: Any) -> None:
             before()
             take(serialised, info["publication_sequence_number"])
+            after()
 
         topic = f"{self._topic}{COMPRESSED_SUFFIX}" if self._compressed else self._topic
         kind = CompressedImage if self._compressed else Image

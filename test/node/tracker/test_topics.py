@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
+from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
@@ -19,9 +20,8 @@ REMAPPED = ["cam01/image_raw:=/left/image", "cam01/camera_info:=/left/info"]
 class Source:
     """Takes the messages of a camera, as `CameraInput` does."""
 
-    image_topic, info_topic = "cam01/image_raw", "cam01/camera_info"
-
-    def __init__(self) -> None:
+    def __init__(self, camera: str = "cam01") -> None:
+        self.image_topic, self.info_topic = f"{camera}/image_raw", f"{camera}/camera_info"
         self.got: list[str] = []
 
     def on_image(self, serialised: bytes, sequence: int) -> None:
@@ -84,3 +84,25 @@ def test_a_chosen_transport_is_kept(node: Node, peer: Any, transport: str) -> No
         for kind, topic in (("raw", "/left/image"), ("compressed", "/left/image/compressed"))
     }
     assert [kind for kind, found in subscriptions.items() if found] == [transport]
+
+
+def test_images_that_came_meanwhile_are_taken_with_the_first(node: Node, peer: Any) -> None:
+    sources = [Source("cam02"), Source("cam03")]
+    topics = CameraTopics(node, sources, transport="raw", clock=lambda: 0.0)
+    publishers = [peer.node.create_publisher(Image, s.image_topic, output_qos()) for s in sources]
+
+    def connected() -> bool:
+        topics.tick()
+        for publisher in publishers:
+            publisher.publish(Image())
+        return all(source.got for source in sources)
+
+    peer.until(connected, "images of both")
+    peer.executor.spin_once(timeout_sec=0.0)
+    for source in sources:
+        source.got.clear()
+    for publisher in publishers:
+        publisher.publish(Image())
+        assert publisher.wait_for_all_acked(Duration(seconds=60))
+    peer.until(lambda: sources[0].got or sources[1].got, "an image")
+    assert sources[0].got and sources[1].got
