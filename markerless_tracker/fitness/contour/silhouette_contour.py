@@ -181,28 +181,32 @@ def _without_undecided(
     columns, rows = person.shape[1], person.shape[0]
     patch = Region(left, top, left + width, top + height).grown(reach_px, (columns, rows))
     around = patch.grown(reach_px, (columns, rows))
-    either = np.ascontiguousarray((person | undecided)[around.slices])
-    wider = signed_distance(either)[patch.relative_to(around).slices]
+    wider = signed_distance(np.ascontiguousarray((person | undecided)[around.slices]))
     beside = np.asarray(cv2.dilate(undecided[patch.slices], _NEAR_UNDECIDED), np.uint8)
     known = distance.copy()
-    keep_same(wider, beside, known[patch.slices], free[patch.slices])
+    inner = patch.relative_to(around)
+    keep_same(wider, inner.left, inner.top, beside, patch.left, patch.top, known, free)
     return known, free
 
 
 @kernel
-def keep_same(wider, beside, known, free):  # type: ignore[no-untyped-def]
-    """Keep the known distances that are the wider mask's, too, and not beside undecided pixels.
+def keep_same(wider, inner_left, inner_top, beside, left, top, known, free):  # type: ignore[no-untyped-def]
+    """Keep the known distances of a patch that are the wider mask's, too, and free of undecided.
 
     Args:
-        wider: (h, w) distances to the edge of person and undecided pixels together.
-        beside: (h, w) not 0 within `UNDECIDED_PX` of undecided pixels.
-        known: (h, w) distances to the edge of the person, changed.
-        free: (h, w) filled with whether a pixel is not beside undecided ones.
+        wider: distances to the edge of person and undecided pixels together, around the patch.
+        inner_left, inner_top: where the patch lies in it.
+        beside: (a, b) of the patch, not 0 within `UNDECIDED_PX` of undecided pixels.
+        left, top: where the patch lies in `known` and `free`.
+        known: (h, w) distances to the edge of the person, changed in the patch.
+        free: (h, w) whether a pixel is not beside undecided ones, filled in the patch.
     """
-    for v in range(known.shape[0]):
-        for u in range(known.shape[1]):
-            free[v, u] = beside[v, u] == 0
-            if beside[v, u] != 0 or abs(wider[v, u] - known[v, u]) >= _SAME_PX:
+    for i in range(beside.shape[0]):
+        for j in range(beside.shape[1]):
+            v, u = top + i, left + j
+            free[v, u] = beside[i, j] == 0
+            apart = abs(wider[inner_top + i, inner_left + j] - known[v, u])
+            if beside[i, j] != 0 or apart >= _SAME_PX:
                 known[v, u] = _FAR_PX
 
 
