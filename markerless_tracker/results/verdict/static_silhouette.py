@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.fitness.raster.silhouette import body_masks
+from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.search import pixels_per_m
 
@@ -96,11 +97,19 @@ class StaticSilhouette:
             empty = np.zeros(covered.shape, dtype=np.uint32)
             view = self._views[camera.name] = _View(empty, empty.copy())
         view.comparisons += 1
-        person = observation.in_full_frame(observation.mask)
-        view.person += person
         # The distance of the first comparison will do for the margin.
         margin = _disc(BESIDE_M * view.px_per_m) if view.px_per_m else _disc(1.0)
-        view.beside += person & (cv2.dilate(covered.view(np.uint8), margin) == 0)
+        # Outside of the region there is no person.
+        region = Region(
+            *observation.offset_px,
+            observation.offset_px[0] + observation.width,
+            observation.offset_px[1] + observation.height,
+        )
+        around = region.grown(len(margin), camera.size_px)
+        near = cv2.dilate(np.ascontiguousarray(covered[around.slices]).view(np.uint8), margin)
+        person = observation.mask
+        view.person[region.slices] += person
+        view.beside[region.slices] += person & (near[region.relative_to(around).slices] == 0)
 
 
 def _disc(radius_px: float) -> NDArray[np.uint8]:

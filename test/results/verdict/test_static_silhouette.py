@@ -1,5 +1,6 @@
 """Silhouette that no limb moves."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -53,3 +54,21 @@ def test_frames_without_a_tracked_person_are_passed_over(
         lost = result(index, TrackState.LOST, shown=furnished(masks[index], 24))
         check.add(lost, scene.body)
     assert check.found_m2() == {}
+
+
+def test_silhouettes_of_regions_count_as_those_of_whole_images(
+    scene: Any, result: Any, masks: Any
+) -> None:
+    """The square lies beside the body, at a side of the region."""
+    whole, parts = StaticSilhouette(scene.rig), StaticSilhouette(scene.rig)
+    for index in range(LEAST):
+        seen = result(index, shown=furnished(masks[index], 24))
+        whole.add(seen, scene.body)
+        cut = {}
+        for name, one in seen.observations.items():
+            rows, columns = np.nonzero(one.mask)
+            box = (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
+            cut[name] = one.cut(tuple(int(side) for side in box))
+            assert not cut[name].is_whole
+        parts.add(replace(seen, observations=cut), scene.body)
+    assert parts.found_m2() == whole.found_m2() != {}
