@@ -1,7 +1,7 @@
 """Long run of a tracker: memory, threads, files and latency must stay flat.
 
 A made-up person moves to and fro before four cameras; images are published at a fixed rate, or in
-lockstep. Every few seconds the tracker and its child process are looked at. Exit status 3 if
+lockstep. Every few seconds the tracker and the processes that it started are looked at. Exit status 3 if
 something grew.
 
     python bench/live/soak.py --minutes 60 --rate 30
@@ -42,7 +42,7 @@ READY_S, STUCK_S = 600.0, 120.0
 
 @dataclass(frozen=True)
 class Sample:
-    """The tracker's processes at one time."""
+    """The tracker and what it started, at one time."""
 
     time_s: float
     rss_mib: float
@@ -117,10 +117,11 @@ def prepare(folder: Path, size_px: tuple[int, int], rate: float) -> SyntheticSce
 
 
 def family(pid: int) -> list[int]:
-    """A process and its children."""
+    """A process, its children and theirs."""
     found = [pid]
     for task in Path(f"/proc/{pid}/task").iterdir():
-        found += map(int, (task / "children").read_text().split())
+        for child in (task / "children").read_text().split():
+            found += family(int(child))
     return found
 
 
