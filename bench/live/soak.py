@@ -1,8 +1,8 @@
 """Long run of a tracker: memory, threads, files and latency must stay flat.
 
 A made-up person moves to and fro before four cameras; images are published at a fixed rate, or in
-lockstep. Every few seconds the tracker and the processes that it started are looked at. Exit status 3 if
-something grew.
+lockstep. Every few seconds the tracker and the processes that it started are looked at. Exit status
+3 if something grew.
 
     python bench/live/soak.py --minutes 60 --rate 30
     python bench/live/soak.py --minutes 2 --lockstep --json
