@@ -25,6 +25,14 @@ class NoteColumn(ProgressColumn):
         return Text(str(task.fields.get("note", "")))
 
 
+class _Bars(Progress):
+    """Bars that leave no empty line behind where nothing is shown, as rich before 14 does."""
+
+    def stop(self) -> None:
+        if not self.disable:
+            super().stop()
+
+
 def progress_bars(console: Console | None = None) -> Progress:
     """Bars with the time since the beginning, the time that is left, and a note.
 
@@ -34,7 +42,7 @@ def progress_bars(console: Console | None = None) -> Progress:
         console: default: standard error.
     """
     console = Console(stderr=True) if console is None else console
-    return Progress(
+    return _Bars(
         TextColumn("{task.description}"), BarColumn(_BAR_WIDTH), MofNCompleteColumn(),
         TimeElapsedColumn(), TimeRemainingColumn(), NoteColumn(),
         console=console, disable=not console.is_terminal,
@@ -44,7 +52,7 @@ def progress_bars(console: Console | None = None) -> Progress:
 def seconds_bar() -> Progress:
     """A bar of a time that was asked for, on standard error; nothing where that is no terminal."""
     console = Console(stderr=True)
-    return Progress(
+    return _Bars(
         TextColumn("{task.description}"), BarColumn(_BAR_WIDTH), TimeRemainingColumn(),
         console=console, disable=not console.is_terminal,
     )  # fmt: skip

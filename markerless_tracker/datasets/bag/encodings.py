@@ -30,6 +30,8 @@ ENCODINGS: dict[str, tuple[int, int | None]] = {
     "yuv422_yuy2": (2, cv2.COLOR_YUV2BGR_YUY2),
 }
 
+_IN_PAIRS = frozenset({cv2.COLOR_YUV2BGR_UYVY, cv2.COLOR_YUV2BGR_YUY2})
+"""Conversions of encodings in which two pixels share their colour."""
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_GREY = (0, 4)
 """Colour types of PNG without colour: grey, grey with alpha."""
@@ -83,6 +85,11 @@ def decode_raw(
     image = rows if size == 1 else rows.reshape(height, width, size)
     if conversion is None:
         return image
+    # OpenCV 4.6 would decode it and leave a column out.
+    if conversion in _IN_PAIRS and width % 2:
+        raise ImageError(
+            f"{where}: {width}x{height} px cannot be {encoding}, expected an even width"
+        )
     try:
         return np.asarray(cv2.cvtColor(image, conversion), np.uint8)
     except cv2.error as error:

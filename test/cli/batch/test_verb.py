@@ -155,6 +155,8 @@ def test_two_batches_do_not_write_to_one_folder(trials, options, tmp_path, capsy
     ],
 )
 def test_mistakes_cost_no_time(trials, options, tmp_path, capsys, extra, message) -> None:
+    if "--scheduler" in extra:
+        pytest.importorskip("distributed", reason="distributed is not installed (extra [cluster])")
     assert call(trials, "-o", tmp_path / "out", *options, *extra) == 1
     err = capsys.readouterr().err
     assert message in err and err.splitlines()[-1].startswith("markerless_tracker: error: ")

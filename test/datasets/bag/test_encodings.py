@@ -87,7 +87,9 @@ def test_yuv_422(encodings: tuple[str, ...], order: str, padding: int) -> None:
         assert image.shape == (3, 8, 3) and decoded_channels(encoding) == 3
         assert np.abs(image.astype(int) - colour).max() <= 30
         assert image[0, 0].argmax() == 0 and image[0, 0].argmin() == 2
-    with pytest.raises(ImageError, match=f"cam01: 7x3 px cannot be {encodings[0]}"):
+    with pytest.raises(
+        ImageError, match=f"cam01: 7x3 px cannot be {encodings[0]}, expected an even"
+    ):
         decoded(stored[:, :7], encodings[0])
 
 

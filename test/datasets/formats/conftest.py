@@ -1,7 +1,9 @@
 """A rig and pictures of it, for recordings in every layout."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import cv2
 import numpy as np
@@ -11,6 +13,11 @@ from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets import Recording
 from markerless_tracker.datasets.upright.axes import UNITS, rotation_to
 from markerless_tracker.geometry import rodrigues_from_rotation, rotation_from_rodrigues, transform
+
+# pytest before 8 gives packages of test folders no path to import other modules from.
+package = sys.modules.setdefault(str(__package__), ModuleType(str(__package__)))
+if not hasattr(package, "__path__"):
+    package.__path__ = [str(Path(__file__).parent)]
 
 SIZE = (32, 24)
 FRAMES = 3

@@ -24,7 +24,8 @@ def subject(make_rig, write_video, tmp_path: Path) -> Path:
     rig = in_world_of(make_rig("cam_54138969", "cam_58860488"), units="mm")
     poses, lenses = np.zeros((4, 11, 6)), np.zeros((4, 9))
     for number, (row, camera) in enumerate(zip((0, 2), rig, strict=True)):
-        R, t = camera.T_cam_world[:3, :3], camera.T_cam_world[:3, 3]
+        T_cam_world = camera.T_cam_world.copy()
+        R, t = T_cam_world[:3, :3], T_cam_world[:3, 3]
         poses[row, [4, 8]] = [*Rotation.from_matrix(R).as_euler("XYZ"), *(-R.T @ t)]
         k1, k2, p1, p2, k3 = camera.distortion
         K = camera.matrix
