@@ -5,6 +5,7 @@ import io
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -63,11 +64,18 @@ def test_a_value_is_named_by_its_meaning_or_unit() -> None:
     assert plain == set()
 
 
+def test_where_nothing_is_shown_bars_print_nothing() -> None:
+    output = io.StringIO()
+    with progress_bars(Console(file=output)) as bars:
+        bars.update(bars.add_task("work", total=2), completed=1)
+    assert output.getvalue() == ""
+
+
 def test_bars_are_made_in_one_place() -> None:
     makers = {
         path.relative_to(CLI).as_posix()
         for path in CLI.rglob("*.py")
-        if "Progress(" in path.read_text(encoding="utf-8")
+        if re.search(r"\b(Progress|_Bars)\(", path.read_text(encoding="utf-8"))
     }
     # `record` has no end to show, and `make demo` prints its parts also where no terminal is.
     assert makers == {"terminal/bars.py", "record.py", "demo/__main__.py"}
