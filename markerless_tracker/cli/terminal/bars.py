@@ -25,7 +25,7 @@ class NoteColumn(ProgressColumn):
         return Text(str(task.fields.get("note", "")))
 
 
-class _Bars(Progress):
+class _QuietProgress(Progress):
     """Bars that leave no empty line behind where nothing is shown, as rich before 14 does."""
 
     def stop(self) -> None:
@@ -42,7 +42,7 @@ def progress_bars(console: Console | None = None) -> Progress:
         console: default: standard error.
     """
     console = Console(stderr=True) if console is None else console
-    return _Bars(
+    return _QuietProgress(
         TextColumn("{task.description}"), BarColumn(_BAR_WIDTH), MofNCompleteColumn(),
         TimeElapsedColumn(), TimeRemainingColumn(), NoteColumn(),
         console=console, disable=not console.is_terminal,
@@ -52,7 +52,7 @@ def progress_bars(console: Console | None = None) -> Progress:
 def seconds_bar() -> Progress:
     """A bar of a time that was asked for, on standard error; nothing where that is no terminal."""
     console = Console(stderr=True)
-    return _Bars(
+    return _QuietProgress(
         TextColumn("{task.description}"), BarColumn(_BAR_WIDTH), TimeRemainingColumn(),
         console=console, disable=not console.is_terminal,
     )  # fmt: skip
