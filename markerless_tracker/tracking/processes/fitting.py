@@ -179,7 +179,7 @@ class FittingProcess:
         return result
 
     def close(self) -> None:
-        """End the process; whoever waits for it goes on."""
+        """End the process; calls that wait for it return."""
         self._child.close(_END_S)
         for stream in (self._sets, self._made):
             with suppress(OSError):

@@ -11,6 +11,7 @@ import os
 import pickle
 import sys
 import time
+from importlib import import_module
 from threading import Lock, Thread
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -48,8 +49,7 @@ class Service:
         # Read while the parent prepares itself.
         import cv2
 
-        import markerless_tracker.tracking  # noqa: F401
-
+        import_module("markerless_tracker.tracking")
         # Its threads wait for each other in a loop, and take the cores from the other processes.
         cv2.setNumThreads(1)
         self._shared = shared
