@@ -1,7 +1,7 @@
 """The intact part of a chunk that a cut or damage ends."""
 
 from collections.abc import Iterator
-from io import BytesIO
+from io import SEEK_END, BytesIO
 from typing import IO
 
 import lz4.frame
@@ -31,7 +31,11 @@ def intact_records(file: IO[bytes], offset: int) -> Iterator[McapRecord]:
     if len(head) < _RECORD_HEAD or head[0] != Opcode.CHUNK:
         return
     length = int.from_bytes(head[1:], "little")
-    body = file.read(length if length < 2**63 else -1)
+    # A damaged length must not ask for more memory than the file has bytes.
+    begin = file.tell()
+    rest = file.seek(0, SEEK_END) - begin
+    file.seek(begin)
+    body = file.read(min(length, rest))
     if len(body) == length:
         # It is damaged somewhere inside: none of its bytes can be trusted.
         return

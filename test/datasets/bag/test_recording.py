@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
@@ -291,6 +291,7 @@ def test_a_bag_cut_before_its_first_set_is_an_error(bag) -> None:
     max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(st.lists(st.tuples(st.floats(0, 1), st.integers(0, 255)), min_size=1, max_size=30))
+@example([(0.0024, 1)])
 def test_damaged_bytes_raise_only_our_errors(whole_bag, edits) -> None:
     file = next(whole_bag.glob("*.mcap"))
     content = file.read_bytes()
