@@ -9,7 +9,7 @@ from typing import Any, BinaryIO, NamedTuple
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.compiled import compiled_elsewhere
-from markerless_tracker.errors import ImageError
+from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.imaging import BackgroundModel, Image, Segmenter
 from markerless_tracker.records import Observation, TrackResult
 from markerless_tracker.tracking.config import TrackerConfig
@@ -99,7 +99,7 @@ class FittingProcess:
         self._set_bytes = set_bytes(setup.tracker.rig)
         self._number = 0
         self._cpu_s = 0.0
-        self._ended = False
+        self._ended = self._closed = False
         self._lock = Lock()
         # Sets are prepared beside the other calls, on a line of their own.
         sets_read, sets_write = os.pipe()
@@ -180,6 +180,7 @@ class FittingProcess:
 
     def close(self) -> None:
         """End the process; calls that wait for it return."""
+        self._closed = True
         self._child.close(_END_S)
         for stream in (self._sets, self._made):
             with suppress(OSError):
@@ -230,7 +231,9 @@ class FittingProcess:
         return answer
 
     def _end(self) -> None:
-        """Go on in this process."""
+        """Go on in this process, unless all is over."""
         self._ended = True
+        if self._closed:
+            raise TrackerError("the tracker was closed")
         self._report("the tracker's process has ended; tracking begins anew in this one")
         self._local.warm_up()

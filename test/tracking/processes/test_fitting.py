@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.compiled import compilation, compiled_elsewhere
-from markerless_tracker.errors import CalibrationError, ConfigError, ImageError
+from markerless_tracker.errors import CalibrationError, ConfigError, ImageError, TrackerError
 from markerless_tracker.imaging import learn_background
 from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.tracking import Tracker, TrackerConfig, TrackerSetup
@@ -163,6 +163,13 @@ def test_a_process_that_was_killed_leaves_the_tracking_to_this_one(
     results = [said(process.step(views(f), f.stamp_ns)) for f in frames]
     assert results == here
     assert len(reports) == 1 and "ended" in reports[0]
+
+
+def test_a_closed_tracker_does_not_go_on_here(process, frames, reports) -> None:
+    process.close()
+    with pytest.raises(TrackerError, match="closed"):
+        process.step(frames[0].images, frames[0].stamp_ns)
+    assert not reports
 
 
 def test_closing_ends_it_and_what_it_started(setup) -> None:
