@@ -13,6 +13,7 @@ from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.masks import SOLID
 from markerless_tracker.imaging.region import Region
+from markerless_tracker.imaging.segmentation.kernels import LEVELS
 
 # Radius of the window from which the colour of the body beside a pixel is taken, px.
 _NEAR_PX = 3
@@ -38,7 +39,7 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, su
 
     Args:
         image: (a, b, c) uint8, a part of an image.
-        mean: (c, h, w) float32, the background.
+        mean: (c, h, w) uint16, the background, in steps of 1 / `LEVELS` grey level.
         gain: (c,) float32, brightness of the image relative to the background's.
         left, top: the part's first column and row in the image.
         mask: (a, b) uint8, 0 or 255.
@@ -49,6 +50,7 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, su
     """
     rows, columns = mask.shape
     channels = image.shape[2]
+    white, level = np.float32(255.0), np.float32(1.0 / LEVELS)
     for i in range(rows):
         first, last = max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)
         for j in range(columns):
@@ -64,7 +66,7 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, su
             along = np.float32(0.0)
             length = np.float32(0.0)
             for c in range(channels):
-                base = min(gain[c] * mean[c, top + i, left + j], np.float32(255.0))
+                base = min(gain[c] * level * np.float32(mean[c, top + i, left + j]), white)
                 contrast = np.float32(sums[c]) / np.float32(count) - base
                 along += (np.float32(image[i, j, c]) - base) * contrast
                 length += contrast * contrast
@@ -79,7 +81,7 @@ def border_radius_px(layers: int) -> int:
 
 def trim_border(
     image: Image,
-    mean: NDArray[np.float32],
+    mean: NDArray[np.uint16],
     gain: NDArray[np.float32],
     mask: NDArray[np.uint8],
     part: Region,
@@ -91,7 +93,7 @@ def trim_border(
 
     Args:
         image: (a, b, c) uint8, a part of an image.
-        mean: (c, h, w) grey levels, the background of the whole image.
+        mean: (c, h, w) the background of the whole image, in steps of 1 / `LEVELS` grey level.
         gain: (c,) brightness of the image relative to the background's.
         mask: (a, b) uint8, 0 or 255, of the part.
         part: its place in the image.

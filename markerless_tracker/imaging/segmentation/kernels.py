@@ -73,16 +73,6 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
 
 # Loops over one row with few arrays each, which the compiler vectorises.
 @compiled()
-def _split_row(pixel, blue, green, red):  # type: ignore[no-untyped-def]
-    for j in range(blue.size):
-        blue[j] = pixel[3 * j]
-    for j in range(blue.size):
-        green[j] = pixel[3 * j + 1]
-    for j in range(blue.size):
-        red[j] = pixel[3 * j + 2]
-
-
-@compiled()
 def _add_square(value, mean, scale, gain, distance):  # type: ignore[no-untyped-def]
     """Add ((value - gain mean) scale)^2 of one row; mean and scale are integers."""
     white = np.float32(255.0)
@@ -100,18 +90,17 @@ def _beyond(distance, limit, row, marks):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def label_colour(image, first, unit, mean, scale, gain, rule, left, top, planes, labels):  # type: ignore[no-untyped-def]
+def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
     """Label a part of a colour image: 0 background, 127 shadow, 255 foreground.
 
     Args:
-        image: (a, b, 3) uint8, BGR: the part alone.
+        planes: (3, a, b) uint8, blue, green and red: the part alone.
         first, unit: the first Gaussians, of `coarse`; most pixels are decided by them.
         mean: (k, 3, h, w) float32, grey levels, of the k Gaussians of each pixel.
         scale: (k, 3, h, w) float32, 1 / (sigma * sqrt(limit)): the foreground test is |.|^2 > 1.
         gain: (3,) float32, brightness of the image relative to the background's.
         rule: of `shadow.shadow_rule`.
         left, top: the part's first column and row in the image.
-        planes: (3, a, b) uint8, the part's channels, written.
         labels: (a, b) uint8, written.
     """
     one = np.float32(1.0)
@@ -128,7 +117,6 @@ def label_colour(image, first, unit, mean, scale, gain, rule, left, top, planes,
         v = top + i
         split = planes[:, i]
         # First whole rows without branches: most pixels are background of the first Gaussian.
-        _split_row(image[i].ravel(), split[0], split[1], split[2])
         distance[:] = 0.0
         for c in range(3):
             base = first[0, c, v, left : left + columns]

@@ -107,6 +107,12 @@ class PixelLabeller:
             return None
         return inverse_means(means[0])
 
+    @property
+    def means(self) -> NDArray[np.uint16]:
+        """(c, h, w) means of the first Gaussians, in steps of 1 / `kernels.LEVELS` grey level."""
+        means: NDArray[np.uint16] = self._first[0][0]
+        return means
+
     def reset(self) -> None:
         """Return to the initial background."""
         if self._adaptation is not None:
@@ -142,7 +148,8 @@ class PixelLabeller:
             kernels.label_grey(planes[0], *known, labels)
         else:
             planes = self._planes[: 3 * count].reshape(3, window.height, window.width)
-            kernels.label_colour(part, *known, planes, labels)
+            cv2.split(part, list(planes))
+            kernels.label_colour(planes, *known, labels)
             self._compare_patches(part, planes, labels, window)
         if self._uses_texture:
             self._correct_by_texture(image, labels, window, corrected)

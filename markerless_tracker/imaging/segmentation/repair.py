@@ -99,7 +99,7 @@ def _trim(
     place = box.moved(window.left, window.top)
     background = labeller.background
     trim_border(
-        background.pixels(image, place), background.mean[0], labeller.gain, part, place,
+        background.pixels(image, place), labeller.means, labeller.gain, part, place,
         layers=layers, least=_LEAST_CONTRAST * background.sigma,
     )  # fmt: skip
     mask[box.slices] = part

@@ -19,7 +19,7 @@ from typing import TypeVar, cast
 import cv2
 import numpy as np
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import compiled, kernel
 from markerless_tracker.imaging.images import FloatImage, Image
 from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.segmentation.kernels import FOREGROUND, LEVELS, SHADOW
@@ -81,7 +81,22 @@ def inverse_means(means: FloatImage) -> FloatImage:
     return inverse.astype(np.float32, copy=False)
 
 
-@compiled(error_model="numpy")
+# One loop over one row, which the compiler vectorises.
+@kernel
+def _even_row(blue, green, red, bright_b, bright_g, bright_r, by, spread, noise, label, even):  # type: ignore[no-untyped-def]
+    # No mean is above white.
+    least = np.float32(1.0) / np.float32(255.0)
+    for j in range(even.size):
+        b = np.float32(blue[j]) * max(by[0] * bright_b[j], least)
+        g = np.float32(green[j]) * max(by[1] * bright_g[j], least)
+        r = np.float32(red[j]) * max(by[2] * bright_r[j], least)
+        value = np.float32(max(blue[j], green[j], red[j]))
+        most = max(b, g, r)
+        alike = (most - min(b, g, r)) * value <= (spread * value + noise) * most
+        even[j] = np.uint8(255) if alike & (label[j] >= SHADOW) else np.uint8(0)
+
+
+@kernel
 def even_patches(patch, inverse, gain, spread, noise, left, top, labels, even):  # type: ignore[no-untyped-def]
     """Find the pixels that differ from the background and whose patch is as dark in all channels.
 
@@ -96,27 +111,24 @@ def even_patches(patch, inverse, gain, spread, noise, left, top, labels, even): 
         even: (a, b) uint8, written: 255 or 0.
     """
     one = np.float32(1.0)
-    # No mean is above white.
-    least = one / np.float32(255.0)
-    by_b, by_g, by_r = one / gain[0], one / gain[1], one / gain[2]
+    by = (one / gain[0], one / gain[1], one / gain[2])
     columns = labels.shape[1]
     for i in range(labels.shape[0]):
-        label, out = labels[i], even[i]
-        blue, green, red = patch[0, i], patch[1, i], patch[2, i]
-        bright_b = inverse[0, top + i, left : left + columns]
-        bright_g = inverse[1, top + i, left : left + columns]
-        bright_r = inverse[2, top + i, left : left + columns]
-        for j in range(columns):
-            out[j] = 0
-            if label[j] < SHADOW:
-                continue
-            value = np.float32(max(blue[j], green[j], red[j]))
-            b = np.float32(blue[j]) * max(by_b * bright_b[j], least)
-            g = np.float32(green[j]) * max(by_g * bright_g[j], least)
-            r = np.float32(red[j]) * max(by_r * bright_r[j], least)
-            most = max(b, g, r)
-            if (most - min(b, g, r)) * value <= (spread * value + noise) * most:
-                out[j] = 255
+        v, label = top + i, labels[i]
+        # What no label needs is not fetched from memory.
+        begin, end = 0, columns
+        while begin < end and label[begin] < SHADOW:
+            begin += 1
+        while begin < end and label[end - 1] < SHADOW:
+            end -= 1
+        even[i, :begin] = 0
+        even[i, end:] = 0
+        _even_row(
+            patch[0, i, begin:end], patch[1, i, begin:end], patch[2, i, begin:end],
+            inverse[0, v, left + begin : left + end], inverse[1, v, left + begin : left + end],
+            inverse[2, v, left + begin : left + end], by, spread, noise, label[begin:end],
+            even[i, begin:end],
+        )  # fmt: skip
 
 
 @compiled()

@@ -6,6 +6,7 @@ import pytest
 from markerless_tracker.imaging import ImagingSettings, Segmenter, learn_background
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.border import trim_border
+from markerless_tracker.imaging.segmentation.kernels import LEVELS
 
 SIZE_PX = (120, 90)
 
@@ -35,7 +36,8 @@ def test_the_border_is_where_half_a_pixel_is_covered(layers: int) -> None:
     body, floor = (30.0, 60.0, 160.0), (120.0, 120.0, 120.0)
     image = shot(covered, body, floor, 0.0, 0)
     mask = ((covered > 0.02) * 255).astype(np.uint8)
-    mean = np.broadcast_to(np.array(floor, np.float32)[:, None, None], (3, 90, 120)).copy()
+    mean = np.empty((3, 90, 120), np.uint16)
+    mean[:] = LEVELS * np.array(floor)[:, None, None]
     whole = Region.whole(SIZE_PX)
     trim_border(image, mean, np.ones(3, np.float32), mask, whole, layers=layers, least=10.0)
     clear = np.abs(covered - 0.5) > 0.05
@@ -47,7 +49,7 @@ def test_a_body_like_the_background_stays() -> None:
     mask = np.zeros((90, 120), np.uint8)
     mask[20:60, 30:70] = 255
     before = mask.copy()
-    mean = np.full((1, 90, 120), 98.0, np.float32)
+    mean = np.full((1, 90, 120), 98 * LEVELS, np.uint16)
     whole = Region.whole(SIZE_PX)
     trim_border(image, mean, np.ones(1, np.float32), mask, whole, layers=2, least=10.0)
     assert (mask == before).all()
