@@ -122,6 +122,7 @@ class FrameSearch:
             case.
 
     Attributes:
+        searcher, observations, stamp_ns: the arguments.
         pose: (p,) the estimate so far.
         evaluations, refinements: what was spent.
         cost: of the estimate, 1 - f, after `run` with a refinement; else infinite.
@@ -146,9 +147,9 @@ class FrameSearch:
         self.refinements = 0
         self.cost = np.inf
         self.particle_sd_ratio = np.full(searcher.body.size, np.nan)
-        self._searcher = searcher
-        self._observations = observations
-        self._stamp_ns = stamp_ns
+        self.searcher = searcher
+        self.observations = observations
+        self.stamp_ns = stamp_ns
         self._views = searcher.fitness.lay_out(observations)
         self._contours: ContourFrame | None = None
         self._terms: tuple[FloatArray, dict[str, ViewTerms]] | None = None
@@ -164,11 +165,11 @@ class FrameSearch:
     def contours(self) -> ContourFrame:
         """The frame's contour evidence, made when first asked for."""
         if self._contours is None:
-            searcher = self._searcher
+            searcher = self.searcher
             self._contours = ContourFrame(
                 searcher.body,
                 searcher.cameras,
-                self._observations,
+                self.observations,
                 self._views,
                 pixels_per_m=self._pixels_per_m(),
                 step_px=searcher.config.edges.step_px,
@@ -189,7 +190,7 @@ class FrameSearch:
         if contour is not None and self._whole is None:
             # A contour stage uses every parameter and every cone.
             self._whole = contour.comparison
-            self._costs_of = self._searcher.fitness.prepare(self._views, self._whole)
+            self._costs_of = self.searcher.fitness.prepare(self._views, self._whole)
             self.cost = float(self._costs_of(self.pose[None])[0])
         for stage in stages:
             found_cost = None
@@ -211,13 +212,13 @@ class FrameSearch:
     def terms(self) -> dict[str, ViewTerms]:
         """How well the estimate explains each view."""
         if self._terms is None or not np.array_equal(self._terms[0], self.pose):
-            self._terms = self.pose.copy(), self._searcher.fitness.terms(self._views, self.pose)
+            self._terms = self.pose.copy(), self.searcher.fitness.terms(self._views, self.pose)
         return self._terms[1]
 
     def _swarm(self, stage: Stage) -> tuple[FloatArray, float | None]:
         """The pose (p,) that a swarm finds, and its cost if that is known."""
-        searcher, plan = self._searcher, stage.plan
-        rng = keyed_generator(searcher.config.seed, self._stamp_ns, stage.name)
+        searcher, plan = self.searcher, stage.plan
+        rng = keyed_generator(searcher.config.seed, self.stamp_ns, stage.name)
         if plan.algorithm not in SWARMS or is_replaced(plan.algorithm):
             return self._filter(stage, rng), None
         active, centre = stage.comparison.active, stage.comparison.centre
@@ -242,7 +243,7 @@ class FrameSearch:
 
     def _filter(self, stage: Stage, rng: np.random.Generator) -> FloatArray:
         """The pose (p,) that an algorithm finds that is not compiled as a whole."""
-        searcher, plan = self._searcher, stage.plan
+        searcher, plan = self.searcher, stage.plan
         active, centre = stage.comparison.active, stage.comparison.centre
         evaluator = searcher.fitness.prepare(self._views, stage.comparison)
         problem = Problem(
@@ -265,7 +266,7 @@ class FrameSearch:
     @property
     def _forgiving(self) -> bool:
         """Whether collisions that the centre has already are allowed."""
-        return self._searcher.config.collision == "elliptic"
+        return self.searcher.config.collision == "elliptic"
 
     def _note(self, stage: Stage, evaluations: int, sd: FloatArray) -> None:
         """Note what a swarm spent, and the standard deviation (d,) of its particles."""
@@ -276,7 +277,7 @@ class FrameSearch:
 
     def _refine(self, plan: SearchPlan) -> FloatArray:
         """The pose (p,) after a contour refinement from the estimate so far."""
-        searcher, config = self._searcher, self._searcher.config
+        searcher, config = self.searcher, self.searcher.config
         self.refinements += plan.iterations
         return refined_on_contours(
             self.contours,
@@ -293,7 +294,7 @@ class FrameSearch:
 
     def _pixels_per_m(self) -> dict[str, float]:
         """Size of a metre at the body in each view, px."""
-        searcher = self._searcher
+        searcher = self.searcher
         at = root_m(searcher.body, self.pose)
         return {name: pixels_per_m(searcher.cameras[name], at) for name in self._views.names}
 

@@ -5,7 +5,7 @@ chest like a trunk farther back. Priors separate them: lengths and sections vary
 of one stature. The outlines therefore get a small weight. All frames share one body.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -106,7 +106,12 @@ class BodyFit:
         self._frames.append(_Frame(contours, pose))
 
     def iterate(self, truncation_m: float) -> None:
-        """One damped Gauss-Newton step of lengths, sections and all poses.
+        """One damped Gauss-Newton step of lengths, sections and all poses; see `pieces`."""
+        for _ in self.pieces(truncation_m):
+            pass
+
+    def pieces(self, truncation_m: float) -> Iterator[None]:
+        """`iterate` in pieces: one frame's equations each, and the solution in the last.
 
         The poses are eliminated first (Schur complement), as they are coupled through the body
         alone (docs/normal-equations.md). Equations that cannot be solved change nothing.
@@ -122,6 +127,7 @@ class BodyFit:
         for frame in self._frames:
             own, pull = self._equations(frame, body, longer, truncation_m, spreads)
             parts.append(eliminated(own, pull, body.size, hessian, slope))
+            yield
         self._view_sd_m = {name: float(np.mean(values)) for name, values in spreads.items()}
         hessian[np.diag_indices_from(hessian)] *= 1.0 + _DAMPING
         step = solved(hessian, slope)

@@ -16,6 +16,7 @@ from markerless_tracker.tracking.loss import LEAST_FIT, silhouette_fit
 from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import BodyFitting, Unmeasured
 from markerless_tracker.tracking.person.first_frame import StartMarkers, shape_of_first_frame
+from markerless_tracker.tracking.person.later_fits import LaterFits
 from markerless_tracker.tracking.person.varied import VariedFrames
 from markerless_tracker.tracking.refinement import floor_precision
 from markerless_tracker.tracking.search import FrameSearch, Searcher
@@ -39,7 +40,8 @@ class BodyEstimate:
     """A body that becomes the person's: first its sections, then its lengths are fitted.
 
     Sections are fitted in one frame with the pose held, lengths over several tracked frames. With a
-    start given, sections are revised whenever a tracked pose shows something new. Only frames
+    start given, sections are revised whenever a tracked pose shows something new; a body that was
+    not measured is fitted anew when poses have become more varied. Only frames
     whose silhouettes agree with the body are used: f_s of at least `LEAST_FIT`. Lengths that were
     fitted to a limb in a wrong place are wrong: they are fitted anew once the limb was found.
 
@@ -89,9 +91,10 @@ class BodyEstimate:
         self._revision: Generator[None, None, BodyModel] | None = None
         self._reported = False
         self._lengths: BodyFitting | None = None
+        self._later: LaterFits | None = None
         self._since_fit = self._mended = 0
         if self._person is not None and self._fits_sections and self._config.fit_lengths:
-            self._lengths = self._new_fitting(self._person)
+            self._begin_lengths(self._person)
 
     @property
     def awaits_first_frame(self) -> bool:
@@ -161,12 +164,15 @@ class BodyEstimate:
         self._since_fit += 1
         if mended:
             self._fit_lengths_anew()
+        agrees = _agrees(search)
+        if agrees and self._later is not None:
+            self._later.keep(search)
         if self._revision is not None:
             return self._go_on(self._revision)
-        if not _agrees(search):
+        if not agrees:
             return None
         if self.sections_fitted and self._lengths is None:
-            self._revise_sections(search)
+            self._revise(search)
             return None
         if not self.sections_fitted:
             self.body = fit_shape(self.body, [(search.contours, search.pose)])
@@ -191,7 +197,7 @@ class BodyEstimate:
         sizes = self._person.sizes
         self.body = sizes.body(sizes.of(self.body))
         if self._config.fit_lengths:
-            self._lengths = self._new_fitting(self._person)
+            self._begin_lengths(self._person)
         return np.zeros(self.body.size)
 
     def _fit_lengths_anew(self) -> None:
@@ -201,13 +207,18 @@ class BodyEstimate:
         recent = self._lengths is not None or self._since_fit <= MENDED_FRAMES
         if recent and self._mended < MOST_MENDED:
             self._mended += 1
-            self._lengths = self._new_fitting(self._person)
+            self._begin_lengths(self._person)
+        elif self._later is not None:
+            self._later, self._revision = LaterFits(self._person), None
 
-    def _new_fitting(self, person: Unmeasured) -> BodyFitting:
-        return BodyFitting(person, self.limits, floor_precision(self._config))
+    def _begin_lengths(self, person: Unmeasured) -> None:
+        self._lengths = BodyFitting(person, self.limits, floor_precision(self._config))
+        self._later, self._revision = LaterFits(person), None
 
-    def _revise_sections(self, search: FrameSearch) -> None:
-        """Begin to fit the sections to this frame as well, if its pose shows something new."""
+    def _revise(self, search: FrameSearch) -> None:
+        """Begin to fit the body anew, if this frame's pose shows something new."""
+        if self._later is not None and self._later.due():
+            self._revision = self._later.fit(search)
         if self._varied is None or not self._varied.takes(search.pose, self.body):
             return
         self._revision = shape_fitting(

@@ -5,9 +5,16 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from markerless_tracker.body import BodyModel
+from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 
 Item = TypeVar("Item")
+
+
+def posture_angles(body: BodyModel) -> IntArray:
+    """Indices of the parameters that make a posture: where a person stands and faces is none."""
+    return np.setdiff1d(body.joints, body.root)
 
 
 class EvenlySpread(Generic[Item]):

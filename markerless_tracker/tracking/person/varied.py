@@ -5,6 +5,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.person.spread import posture_angles
 
 MOST = 8
 """Frames that are kept."""
@@ -31,7 +32,7 @@ class VariedFrames:
         """Whether a pose (p,) differs from all kept ones, and there is room."""
         if len(self._frames) >= MOST:
             return False
-        angles = np.setdiff1d(body.joints, body.root)
+        angles = posture_angles(body)
         gaps = [np.sqrt(np.mean((pose - kept)[angles] ** 2)) for _, kept in self._frames]
         return bool(min(gaps) > VARIETY_RAD)
 

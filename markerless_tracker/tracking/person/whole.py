@@ -4,7 +4,7 @@ Bent and straight limbs, raised and hanging arms show where joints are. A few si
 not: the outline stays the same when a joint is moved along its limb.
 """
 
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +17,13 @@ from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.person.body_fitting import TRUNCATION_M, Unmeasured
-from markerless_tracker.tracking.person.spread import EvenlySpread, most_different
+from markerless_tracker.tracking.person.spread import (
+    EvenlySpread,
+    most_different,
+    posture_angles,
+)
 from markerless_tracker.tracking.refinement import floor_precision
-from markerless_tracker.tracking.search import make_searcher
+from markerless_tracker.tracking.search import Searcher, make_searcher
 
 MOST = 10
 """Frames that the body is fitted to. With more the outlines outweigh the priors, which hold what
@@ -45,21 +49,23 @@ class WholeRecording:
 
     def add(self, result: TrackResult) -> None:
         """Take a frame; those that are not tracked are passed over."""
-        pose = result.pose
-        if result.state is TrackState.TRACKING and pose is not None:
-            self._kept.offer(lambda: _Kept(result.stamp_ns, pose, dict(result.observations)))
+        if result.state is TrackState.TRACKING and result.pose is not None:
+            self.keep(result.stamp_ns, result.pose, result.observations)
+
+    def keep(
+        self, stamp_ns: int, pose: FloatArray, observations: Mapping[str, Observation]
+    ) -> None:
+        """Take a tracked frame: its time, pose (p,) and evidence."""
+        self._kept.offer(lambda: _Kept(stamp_ns, pose, dict(observations)))
 
     def chosen(self, body: BodyModel) -> list[int]:
         """At most `MOST` of the kept frames, ascending, each as far as possible from the others.
 
         By the joints' angles, without the root's; the one in the middle of the run is among them.
         """
-        frames = self._kept.items
-        angles = np.setdiff1d(body.joints, body.root)
-        poses = np.array([frame.pose[angles] for frame in frames])
-        order = most_different(
-            len(frames), MOST, lambda i: np.linalg.norm(poses - poses[i], axis=1)
-        )
+        angles = posture_angles(body)
+        poses = np.array([frame.pose[angles] for frame in self._kept.items])
+        order = most_different(len(poses), MOST, lambda i: np.linalg.norm(poses - poses[i], axis=1))
         return sorted(order)
 
     def fitted(
@@ -73,20 +79,37 @@ class WholeRecording:
             config: of the tracker.
             person: what is known of the person.
         """
-        limits = joint_limits(body, config)
-        prior = person.sizes.prior(person.stature_m)
+        if not self._kept.items:
+            return body
+        fitting = self.fitting(make_searcher(body, rig=rig, config=config, threads=1), person)
+        while True:
+            try:
+                next(fitting)
+            except StopIteration as end:
+                fitted: BodyModel = end.value
+                return fitted
+
+    def fitting(
+        self, searcher: Searcher, person: Unmeasured, steps: int = STEPS
+    ) -> Generator[None, None, BodyModel]:
+        """`fitted` in pieces: one frame's evidence, or one frame's equations in a step, each.
+
+        Args:
+            searcher: with the body that was tracked last; not used while another frame is searched.
+            person: what is known of the person.
+            steps: Gauss-Newton steps.
+        """
+        body, config = searcher.body, searcher.config
         fit = BodyFit(
-            person.sizes, body, prior, limits, varied=True, floor_precision=floor_precision(config)
-        )
-        searcher = make_searcher(body, rig=rig, config=config, threads=1)
-        chosen = self.chosen(body)
-        for frame in (self._kept.items[i] for i in chosen):
+            person.sizes, body, person.sizes.prior(person.stature_m), joint_limits(body, config),
+            varied=True, floor_precision=floor_precision(config),
+        )  # fmt: skip
+        for frame in [self._kept.items[i] for i in self.chosen(body)]:
             search = searcher.frame(
                 frame.observations, frame.stamp_ns, frame.pose, reach_m=searcher.tracked_reach_m
             )
             fit.add(search.contours, frame.pose)
-        if not chosen:
-            return body
-        for truncation_m in np.geomspace(*TRUNCATION_M, STEPS):
-            fit.iterate(float(truncation_m))
+            yield
+        for truncation_m in np.geomspace(*TRUNCATION_M, steps):
+            yield from fit.pieces(float(truncation_m))
         return fit.body
