@@ -16,6 +16,8 @@ NECK_RAD_S = 4.0
 """Greatest speed of each rotation of the head relative to the trunk: a fast turn to look aside."""
 ELBOW_RAD_S = 12.0
 """Greatest speed of an elbow: reached in reaching and catching, exceeded in throws only."""
+LIMB_RAD_S = 12.0
+"""Greatest speed of the joints of a limb that was nearly in its place and is found elsewhere."""
 _NECK = ("head_x", "head_y", "head_z")
 _ELBOWS = ("l_elbow", "r_elbow")
 

@@ -23,7 +23,7 @@ from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
 from markerless_tracker.tracking.limbs.watch import MENDED_M, Recovered
-from markerless_tracker.tracking.limits import check_pose, joint_speeds
+from markerless_tracker.tracking.limits import LIMB_RAD_S, check_pose, joint_speeds
 from markerless_tracker.tracking.motion import MotionModel
 from markerless_tracker.tracking.partitions.effort import Effort
 from markerless_tracker.tracking.partitions.frame import frame_stages
@@ -324,9 +324,8 @@ class Tracker:
             recovered = limbs.recover(self._searcher, contours, seen, search.pose, one=one)
         notes = seen.notes + self._body.take_warnings() + recovered.notes + seen.left_out
         jumped = recovered.jumped(self.body)
-        # What is found elsewhere jumps; the rest of the body does not.
-        search.pose = np.clip(recovered.pose, *limits)
-        search.pose[jumped] = recovered.pose[jumped]
+        corrected = self._motion.reachable(stamp_ns, limits, np.full_like(speeds, LIMB_RAD_S))
+        search.pose = recovered.placed(self.body, limits, corrected)
         return Found(
             search, stamp_ns, believed, notes,
             turned=recovered.turned, jumped=jumped, mended=recovered.moved_m > MENDED_M,

@@ -78,6 +78,20 @@ class Recovered:
             return np.arange(body.size)
         return np.array([i for name in self.names for i in body.subspaces[name]], dtype=np.int64)
 
+    def placed(self, body: BodyModel, limits: FloatArray, corrected: FloatArray) -> FloatArray:
+        """The pose (p,): limbs that were wrong jump, the rest of the body does not.
+
+        Args:
+            body: the body.
+            limits: (2, p) of what does not jump.
+            corrected: (2, p) the same of limbs that were nearly in their places (`MENDED_M`).
+        """
+        pose, jumped = np.clip(self.pose, *limits), self.jumped(body)
+        pose[jumped] = self.pose[jumped]
+        if not self.turned and self.moved_m <= MENDED_M:
+            pose[jumped] = np.clip(pose, *corrected)[jumped]
+        return np.asarray(pose)
+
 
 @dataclass(frozen=True)
 class _Wait:

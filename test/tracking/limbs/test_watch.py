@@ -12,9 +12,11 @@ from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import (
+    MENDED_M,
     ROTATION_NS,
     WAIT_NS,
     LimbWatch,
+    Recovered,
     inside_fractions,
 )
 from markerless_tracker.tracking.loss import LIMB_LOST_BELOW, LIMB_REGAINED_ABOVE
@@ -140,6 +142,20 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
     assert watch.assess(body, pose, seen, np.zeros(body.size)) == {}
     contours = contours_of(searcher, seen, pose)
     assert recover(watch, searcher, contours, seen, 0, pose) == (pose, ())
+
+
+@pytest.mark.parametrize(
+    ("moved_m", "turned", "allowed"),
+    [(0.5 * MENDED_M, False, 0.2), (2.0 * MENDED_M, False, 1.0), (0.0, True, 1.0)],
+)
+def test_a_limb_jumps_only_from_where_it_was_wrong(standing, moved_m, turned, allowed) -> None:
+    body = standing[0].body
+    pose, arm = body.neutral + 1.0, body.subspaces["l_arm"]
+    near = [np.array([body.neutral - reach, body.neutral + reach]) for reach in (0.3, 0.2)]
+    placed = Recovered(pose, ("l_arm",), turned=turned, moved_m=moved_m).placed(body, *near)
+    np.testing.assert_allclose((placed - body.neutral)[arm], allowed)
+    rest = np.setdiff1d(np.arange(body.size), arm)
+    np.testing.assert_allclose((placed - body.neutral)[rest], 1.0 if turned else 0.3)
 
 
 def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch) -> None:
