@@ -21,6 +21,7 @@ from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.many_poses import markers_of_many
 from markerless_tracker.tracking.start.postures import first_guesses
 from markerless_tracker.tracking.start.recombination import Recombiner
+from markerless_tracker.tracking.start.standing import off_floor
 
 PER_QUARTER = 4
 """Poses that are kept of each quarter of the headings, seen from the best."""
@@ -78,9 +79,10 @@ class FramePopulation:
         stamp_ns: keys the draws, together with the seed.
         near: (p,) a pose whose root is near the body.
         contours: the frame's contour evidence, if it was made already.
+        on_floor: whether feet off the floor cost something (`standing`), if there is one.
 
     Attributes:
-        near: as given.
+        near, on_floor: as given.
     """
 
     def __init__(
@@ -91,9 +93,11 @@ class FramePopulation:
         near: FloatArray,
         *,
         contours: ContourFrame | None = None,
+        on_floor: bool = False,
     ) -> None:
         self._searcher = searcher
         self._stamp_ns = stamp_ns
+        self.on_floor = on_floor and searcher.config.refine.floor_sd_m > 0.0
         self.near = near
         frame = searcher.frame(observations, stamp_ns, near) if contours is None else contours
         self._frame: FrameSearch | ContourFrame = frame
@@ -169,9 +173,12 @@ class FramePopulation:
         return self.selected(self.refined(population.poses, *_PROPAGATE))
 
     def costs(self, poses: FloatArray) -> FloatArray:
-        """1 - f_s (n,) of poses (n, p); infinite where there is none."""
+        """1 - f_s (n,) of poses (n, p), and what feet off the floor cost; infinite if unknown."""
         costs = self._costs(poses)
-        return np.where(np.isfinite(costs), costs, np.inf)
+        known = np.isfinite(costs)
+        if self.on_floor:
+            costs = costs + off_floor(self._searcher.body, poses)
+        return np.where(known, costs, np.inf)
 
     def limb_costs(self, pose: FloatArray, limb: IntArray) -> Evaluator:
         """Gives 1 - f_s (n,) of a limb's parameters (n, d) with the rest of a pose (p,).

@@ -147,7 +147,9 @@ class Starter:
         observations = imaged
         if any(seen.undecided_words is not None for seen in imaged.values()):
             observations = self._decide(imaged, best)
-        frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
+        frame = FramePopulation(
+            self._searcher, observations, stamp_ns, population.poses[0], on_floor=True
+        )
         population = frame.propagated(population)
         if len(self._seen[0]) == 1:
             population = self._second_look(frame, population, observations)
@@ -261,7 +263,7 @@ class Starter:
             searcher = self._searcher_for(body)
             near = body.neutral.copy()
             near[[body.index(f"pelvis_t{axis}") for axis in "xyz"]] = hull.trunk_m.mean(axis=0)
-            frame = FramePopulation(searcher, observations, stamp_ns, near)
+            frame = FramePopulation(searcher, observations, stamp_ns, near, on_floor=True)
             hints = None
             if self._last_pose is not None:
                 hints = np.array([self._last_pose, put_at(body, hull, self._last_pose)])
