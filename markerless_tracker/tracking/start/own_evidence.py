@@ -47,7 +47,7 @@ class OwnEvidence:
         """The evidence that no body decided: undecided pixels count for no pose."""
         if not self.differs:
             return self._frame
-        return self._population(self._imaged, self._frame.near)
+        return FramePopulation(self._searcher, self._imaged, self._stamp_ns, self._frame.near)
 
     def cost(self, pose: FloatArray) -> float:
         """1 - f_s of a pose (p,)."""
@@ -71,11 +71,4 @@ class OwnEvidence:
             return self._frame
         searcher = self._searcher
         decided = decide(self._imaged, searcher.cameras, searcher.body, pose)
-        return self._population(decided, pose)
-
-    def _population(
-        self, observations: Mapping[str, Observation], near: FloatArray
-    ) -> FramePopulation:
-        return FramePopulation(
-            self._searcher, observations, self._stamp_ns, near, on_floor=self._frame.on_floor
-        )
+        return FramePopulation(searcher, decided, self._stamp_ns, pose)

@@ -51,7 +51,7 @@ class Population:
 
     Attributes:
         poses: (n, p).
-        costs: (n,) 1 - f_s, ascending.
+        costs: (n,) of `FramePopulation.costs_on_floor`, ascending.
         headings: (n,) rad.
     """
 
@@ -79,10 +79,9 @@ class FramePopulation:
         stamp_ns: keys the draws, together with the seed.
         near: (p,) a pose whose root is near the body.
         contours: the frame's contour evidence, if it was made already.
-        on_floor: whether feet off the floor cost something (`standing`), if there is one.
 
     Attributes:
-        near, on_floor: as given.
+        near: as given.
     """
 
     def __init__(
@@ -93,11 +92,9 @@ class FramePopulation:
         near: FloatArray,
         *,
         contours: ContourFrame | None = None,
-        on_floor: bool = False,
     ) -> None:
         self._searcher = searcher
         self._stamp_ns = stamp_ns
-        self.on_floor = on_floor and searcher.config.refine.floor_sd_m > 0.0
         self.near = near
         frame = searcher.frame(observations, stamp_ns, near) if contours is None else contours
         self._frame: FrameSearch | ContourFrame = frame
@@ -123,7 +120,8 @@ class FramePopulation:
         """The best first guesses of every heading, and hints (n, p), refined."""
         rng = keyed_generator(self._searcher.config.seed, self._stamp_ns, "sow")
         guesses = first_guesses(self._searcher.body, self._searcher.limits, hull, rng)
-        costs = self.costs(guesses.reshape(-1, guesses.shape[2])).reshape(guesses.shape[:2])
+        costs = self.costs_on_floor(guesses.reshape(-1, guesses.shape[2]))
+        costs = costs.reshape(guesses.shape[:2])
         best = np.argsort(costs, axis=1, kind="stable")[:, :_PER_HEADING]
         order = np.argsort(np.take_along_axis(costs, best, axis=1).ravel(), kind="stable")[
             :_INITIALISED_COUNT
@@ -151,7 +149,7 @@ class FramePopulation:
 
     def _promising(self, children: FloatArray, parents: FloatArray, count: int) -> FloatArray:
         """So many of the children (n, p): the best, and the best of those that are new."""
-        order = np.argsort(self.costs(children), kind="stable")
+        order = np.argsort(self.costs_on_floor(children), kind="stable")
         chosen = [int(i) for i in order[: count - round(_NOVEL * count)]]
         body = self._searcher.body
         points = markers_of_many(body, children)
@@ -173,12 +171,16 @@ class FramePopulation:
         return self.selected(self.refined(population.poses, *_PROPAGATE))
 
     def costs(self, poses: FloatArray) -> FloatArray:
-        """1 - f_s (n,) of poses (n, p), and what feet off the floor cost; infinite if unknown."""
+        """1 - f_s (n,) of poses (n, p); infinite where there is none."""
         costs = self._costs(poses)
-        known = np.isfinite(costs)
-        if self.on_floor:
-            costs = costs + off_floor(self._searcher.body, poses)
-        return np.where(known, costs, np.inf)
+        return np.where(np.isfinite(costs), costs, np.inf)
+
+    def costs_on_floor(self, poses: FloatArray) -> FloatArray:
+        """`costs`, and what feet off the floor cost besides, if there is a floor."""
+        costs = self.costs(poses)
+        if self._searcher.config.refine.floor_sd_m > 0.0:
+            costs += off_floor(self._searcher.body, poses)
+        return costs
 
     def limb_costs(self, pose: FloatArray, limb: IntArray) -> Evaluator:
         """Gives 1 - f_s (n,) of a limb's parameters (n, d) with the rest of a pose (p,).
@@ -211,7 +213,7 @@ class FramePopulation:
 
     def selected(self, poses: FloatArray) -> Population:
         """The best of poses (n, p) that differ, among them some of each quarter of the headings."""
-        costs = self.costs(poses)
+        costs = self.costs_on_floor(poses)
         order = [int(i) for i in np.argsort(costs, kind="stable") if np.isfinite(costs[i])]
         points = markers_of_many(self._searcher.body, poses)
         headings = {i: heading(points[i]) for i in order}

@@ -10,10 +10,10 @@ from markerless_tracker.body import MARKER_NAMES, BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.start.many_poses import markers_of_many
 
-LOWER_M, UPPER_M, IN_FLOOR_M = 0.15, 0.40, 0.07
+LOWER_M, UPPER_M, IN_FLOOR_M = 0.25, 0.70, 0.05
 """Heights of the lower and of the upper ankle, m, up to which the person may stand: the upper leg
 may be raised. Below the last one a foot is in the floor."""
-LOWER_COST, UPPER_COST, IN_FLOOR_COST = 0.4, 0.1, 0.5
+LOWER_COST, UPPER_COST, IN_FLOOR_COST = 0.3, 0.1, 0.3
 """Cost of each metre above or below, in units of f_s."""
 MOST_COST = 0.15
 """All poses cost this much where the calibration's floor is not the room's: they still compare."""

@@ -33,8 +33,8 @@ SETTLING_FRAMES = 8
 """Frames from the first pose to the one from which on it is tracked like any other."""
 GENERATIONS = 7
 SECOND_GENERATIONS = 5
-_FLIP_MARGIN = 0.005
-"""Mean rise of f_s that the opposite heading needs before the settling ends."""
+_FLIP_MARGIN, _LAST_MARGIN = 0.005, 0.003
+"""Mean rise of f_s that the opposite heading needs before the settling ends, and at its end."""
 _WALKED_M, _WALK_M_S, _WALK_BONUS = 0.05, 0.25, 0.01
 """People walk forwards: added to f_s beyond that distance and speed."""
 _GENERATION_FRACTION = 0.5
@@ -147,9 +147,7 @@ class Starter:
         observations = imaged
         if any(seen.undecided_words is not None for seen in imaged.values()):
             observations = self._decide(imaged, best)
-        frame = FramePopulation(
-            self._searcher, observations, stamp_ns, population.poses[0], on_floor=True
-        )
+        frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
         population = frame.propagated(population)
         if len(self._seen[0]) == 1:
             population = self._second_look(frame, population, observations)
@@ -263,7 +261,7 @@ class Starter:
             searcher = self._searcher_for(body)
             near = body.neutral.copy()
             near[[body.index(f"pelvis_t{axis}") for axis in "xyz"]] = hull.trunk_m.mean(axis=0)
-            frame = FramePopulation(searcher, observations, stamp_ns, near, on_floor=True)
+            frame = FramePopulation(searcher, observations, stamp_ns, near)
             hints = None
             if self._last_pose is not None:
                 hints = np.array([self._last_pose, put_at(body, hull, self._last_pose)])
@@ -299,7 +297,7 @@ class Starter:
             )
             rise += 2.0 * _WALK_BONUS * float(np.cos(off))
         over = len(self._seen[0]) >= SETTLING_FRAMES
-        if rise <= (0.0 if over else _FLIP_MARGIN):
+        if rise <= (_LAST_MARGIN if over else _FLIP_MARGIN):
             return ()
         self._leading, self._flipped = other, True
         return ("start: the person has the opposite heading, turned round",)
