@@ -41,9 +41,9 @@ class BodyEstimate:
 
     Sections are fitted in one frame with the pose held, lengths over several tracked frames. With a
     start given, sections are revised whenever a tracked pose shows something new; a body that was
-    not measured is fitted anew when poses have become more varied. Only frames
-    whose silhouettes agree with the body are used: f_s of at least `LEAST_FIT`. Lengths that were
-    fitted to a limb in a wrong place are wrong: they are fitted anew once the limb was found.
+    not measured is fitted anew when poses have become more varied. Only frames whose silhouettes
+    agree with the body are used: f_s of at least `LEAST_FIT`. Lengths that were fitted to a limb in
+    a wrong place are wrong: they are fitted anew once the limb was found.
 
     Args:
         body: with generic sections, and lengths that were measured or follow from a stature.
@@ -219,6 +219,7 @@ class BodyEstimate:
         """Begin to fit the body anew, if this frame's pose shows something new."""
         if self._later is not None and self._later.due():
             self._revision = self._later.fit(search)
+            return
         if self._varied is None or not self._varied.takes(search.pose, self.body):
             return
         self._revision = shape_fitting(
