@@ -6,6 +6,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.fitness.contour import ContourFrame, normal_equations, outline_rows
+from markerless_tracker.fitness.shape.pieces import at_once
 from markerless_tracker.fitness.shape.sections import Sections
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
@@ -37,16 +38,12 @@ def fit_shape(
         tightness: factor of the prior's precision.
     """
     weighted = [(contours, pose, 1.0) for contours, pose in frames]
-    fitting = shape_fitting(
-        body, weighted, start=body, tightness=tightness, iterations=ITERATIONS,
-        truncation_m=TRUNCATION_M,
+    return at_once(
+        shape_fitting(
+            body, weighted, start=body, tightness=tightness, iterations=ITERATIONS,
+            truncation_m=TRUNCATION_M,
+        )
     )  # fmt: skip
-    while True:
-        try:
-            next(fitting)
-        except StopIteration as end:
-            fitted: BodyModel = end.value
-            return fitted
 
 
 def shape_fitting(

@@ -1,4 +1,4 @@
-"""Lengths that were not measured: fitted over the first tracked frames, then kept."""
+"""Lengths that were not measured, fitted over the first tracked frames."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

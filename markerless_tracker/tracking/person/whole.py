@@ -12,6 +12,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.fitness.shape import BodyFit
+from markerless_tracker.fitness.shape.pieces import at_once
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
@@ -81,13 +82,8 @@ class WholeRecording:
         """
         if not self._kept.items:
             return body
-        fitting = self.fitting(make_searcher(body, rig=rig, config=config, threads=1), person)
-        while True:
-            try:
-                next(fitting)
-            except StopIteration as end:
-                fitted: BodyModel = end.value
-                return fitted
+        searcher = make_searcher(body, rig=rig, config=config, threads=1)
+        return at_once(self.fitting(searcher, person))
 
     def fitting(
         self, searcher: Searcher, person: Unmeasured, steps: int = STEPS
