@@ -40,7 +40,7 @@ class Visits(SyntheticScene):
 def visits():
     """Results and, where a person is there, the true markers: one per frame."""
     scene = Visits(
-        body="person31", motion="walk", size_px=(164, 122), fps=FPS, samples=2, noise=4.0, seed=2
+        body="person31", motion="walk", size_px=(246, 183), fps=FPS, samples=2, noise=4.0, seed=2
     )
     config = TrackerConfig(threads=1)
     backgrounds = {name: learn_background(f, config) for name, f in scene.backgrounds(6).items()}
