@@ -41,6 +41,10 @@ Aim = Callable[[FloatArray, int], FloatArray]
 class LimbSearch:
     """The searches of one frame for limbs that are elsewhere.
 
+    Another pose is refined, all of the body. A limb is taken if that explains the frame better than
+    the estimate does, and than the estimate refined as much does: what the rest of the body gains
+    is no merit of the limb's.
+
     Args:
         recombiner: draws limbs of the body.
         frame: the evidence, decided near the predicted body.
@@ -72,11 +76,16 @@ class LimbSearch:
         cost = float(frame.costs(self.pose[None])[0])
         other, other_cost = other_limb(frame, self._recombiner, self.pose, limb, rng, aim, cost)
         better = other_cost < cost - self._least_gain
+        if better:
+            refined = frame.refined(self.pose[None], *_REFINE)
+            better = other_cost < float(frame.costs(refined)[0]) - self._least_gain
         if self._own.differs:
             if other_cost > cost + CLOSE or _apart_m(self._own.body, other, self.pose) < LEAST_M:
                 return False
             other, other_cost = self._own.refined(other, *_REFINE)
-            better = other_cost < self.own_cost - (0.0 if better else LEAST_GAIN)
+            least_gain = 0.0 if better else LEAST_GAIN
+            better = other_cost < self.own_cost - least_gain
+            better = better and other_cost < self._own.refined(self.pose, *_REFINE)[1] - least_gain
         if better:
             self._take(other, other_cost)
         return better

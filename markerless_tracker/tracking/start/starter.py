@@ -46,6 +46,9 @@ _FINER_AFTER = 1
 _FITS = 0.85
 """From this f_s on a generation that gains less than `_GAIN` is the last one."""
 _GAIN = 0.002
+_SURE_FIT, _SURE_GAP = 0.91, 0.025
+"""A first frame explained as well as this, and by so much worse with the opposite heading, is not
+searched a second time."""
 _TRUNK_MARKERS = [0, 1]
 
 Select = Callable[
@@ -133,6 +136,7 @@ class Starter:
         self._seen: tuple[list[_Seen | None], list[_Seen | None]] = ([], [])
         self._leading = 0
         self._flipped = False
+        self._sure = False
         self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
         self._begun_ns = 0
         self._from_m = np.zeros(3)
@@ -149,7 +153,7 @@ class Starter:
             observations = self._decide(imaged, best)
         frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
         population = frame.propagated(population)
-        if len(self._seen[0]) == 1:
+        if len(self._seen[0]) == 1 and not self._sure:
             population = self._second_look(frame, population, observations)
         elif len(self._seen[0]) == 1 + _FINER_AFTER:
             frame, population = self._resized((frame, population), observations, stamp_ns)
@@ -189,6 +193,7 @@ class Starter:
             self._population = population
             self._heading = float(population.headings[0])
             self._begun_ns = stamp_ns
+            self._sure = _is_sure(population)
             own = OwnEvidence(self._searcher, observations, stamp_ns, frame)
             self._note(own, frame, population)
             self._from_m = self._trunk(population.poses[0])
@@ -200,10 +205,10 @@ class Starter:
     ) -> dict[str, Observation]:
         """Observations whose undecided pixels the body at a pose (p,) decides.
 
-        In the second frame, which is searched independently, the hull decides first.
+        In a second frame that is searched independently, the hull decides first.
         """
         assert self._searcher is not None
-        if len(self._seen[0]) == 1:
+        if len(self._seen[0]) == 1 and not self._sure:
             hull = next(find_hulls(self._cameras, observations), None)
             if hull is not None:
                 observations = hulls_silhouettes(observations, self._cameras, hull)
@@ -321,6 +326,13 @@ class Starter:
     def _trunk(self, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None
         return np.asarray(markers(self._searcher.body, pose)[_TRUNK_MARKERS].mean(axis=0))
+
+
+def _is_sure(population: Population) -> bool:
+    """Whether the first frame's population leaves no doubt about posture and heading."""
+    opposite = population.facing(float(population.headings[0]) + np.pi).costs[:1]
+    gap = float(opposite[0] - population.costs[0]) if opposite.size else np.inf
+    return 1.0 - float(population.costs[0]) >= _SURE_FIT and gap >= _SURE_GAP
 
 
 def _improved(

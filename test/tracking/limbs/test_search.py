@@ -60,6 +60,33 @@ def test_a_leg_in_its_place_stays(bent) -> None:
     assert search.pose is true
 
 
+@pytest.mark.parametrize("knee_rad, taken", [(0.4, False), (0.0, True)])
+def test_what_the_rest_of_the_body_gains_is_no_merit_of_a_limb(
+    bent_leg, monkeypatch, knee_rad, taken
+) -> None:
+    scene, masks, pose, _, _ = bent_leg(-0.8, 0.6)
+    seen = {
+        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+    }
+    body, config = scene.body, TrackerConfig(threads=1)
+    searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
+    frame = FramePopulation(searcher, seen, 0, pose)
+    leg, knee = body.subspaces["l_leg"], body.index("l_knee")
+    # The whole body lies beside the person; the leg is right, or wrong by more than the other's.
+    estimate = pose.copy()
+    estimate[body.index("pelvis_tx")] += 0.04
+    estimate[knee] += 1.2 if taken else 0.0
+    other = pose.copy()
+    other[knee] += knee_rad
+    costs = frame.costs(np.array([estimate, other]))
+    assert costs[1] < costs[0] - 0.003
+    monkeypatch.setattr(f"{SEARCH}.other_limb", lambda *_: (other, float(costs[1])))
+    own = OwnEvidence(searcher, seen, 0, frame)
+    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, estimate, 0.003)
+    assert search.elsewhere(leg, keyed_generator(0, 0, "leg"), None) is taken
+
+
 def test_a_draw_where_the_limb_is_is_not_refined(bent, monkeypatch) -> None:
     searcher, seen, true, wrong = bent
     body = searcher.body
