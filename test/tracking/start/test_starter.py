@@ -11,6 +11,7 @@ from markerless_tracker.tracking import TrackerConfig, build_tracker
 from markerless_tracker.tracking.start.starter import SETTLING_FRAMES
 
 FRAMES = SETTLING_FRAMES + 2
+STARTER = "markerless_tracker.tracking.start.starter"
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +71,26 @@ def test_nobody_is_a_state_and_no_error(walk) -> None:
     assert result.state is TrackState.SEARCHING
     assert result.pose is None and result.markers_m is None and not result.iou
     assert tracker.step(seen, stamp).state is TrackState.TRACKING
+
+
+@pytest.mark.parametrize(
+    "sure_fit, sure_gap, looks", [(0.5, -1.0, 0), (0.5, 2.0, 1), (1.0, -1.0, 1)]
+)
+def test_a_second_frame_is_searched_anew_only_in_doubt(
+    walk, monkeypatch, sure_fit, sure_gap, looks
+) -> None:
+    scene, taken = walk
+    searched: list[int] = []
+    monkeypatch.setattr(f"{STARTER}._SURE_FIT", sure_fit)
+    monkeypatch.setattr(f"{STARTER}._SURE_GAP", sure_gap)
+    monkeypatch.setattr(
+        f"{STARTER}.Starter._second_look",
+        lambda _, frame, population, seen: searched.append(1) or population,
+    )
+    tracker = tracker_of(scene, stature=1.72)
+    for stamp, seen, _ in taken[:3]:
+        tracker.step(seen, stamp)
+    assert len(searched) == looks
 
 
 def test_the_same_again_after_a_reset(walk) -> None:
