@@ -158,17 +158,16 @@ def test_the_sizes_and_the_cameras_are_saved(running: Any) -> None:
 
 
 def test_changes_are_part_of_the_result(running: Any) -> None:
-    index = running.track()
+    running.track()
+    for smoothing in ("one_euro", "none"):
+        assert all(done.successful for done in put(running, smoothing=smoothing))
+        index = running.track()
     running.process.stop()
     result = json.loads(Path(running.folder / "live.json").read_text())
     changed = result["changed"]
     told = [{name: v for name, v in entry.items() if name != "stamp_ns"} for entry in changed]
-    assert told == [
-        {"optimizer": "pso", "evaluations": 3600},
-        {"optimizer": "sppso", "evaluations": 1000},
-        {"refine.swarms": "always"},
-        {"evaluations": 2000},
-    ]
+    # Tests before this one, if any ran on the same tracker, changed other settings.
+    assert told[-2:] == [{"smoothing": "one_euro"}, {"smoothing": "none"}]
     stamps = [entry["stamp_ns"] for entry in changed]
     assert stamps == sorted(stamps) and stamps[-1] <= running.camera.scene.stamp_ns(index)
     assert result["settings"]["evaluations"] == 1000
