@@ -39,6 +39,7 @@ class Visits(SyntheticScene):
 @pytest.fixture(scope="module")
 def visits():
     """Results and, where a person is there, the true markers: one per frame."""
+    # Half as large again as most scenes here: forearms narrower than 4 px are opened away.
     scene = Visits(
         body="person31", motion="walk", size_px=(246, 183), fps=FPS, samples=2, noise=4.0, seed=2
     )
