@@ -39,7 +39,7 @@ class Visits(SyntheticScene):
 @pytest.fixture(scope="module")
 def visits():
     """Results and, where a person is there, the true markers: one per frame."""
-    # Half as large again as most scenes here: forearms narrower than 4 px are opened away.
+    # In smaller images forearms are under 4 px wide, and the opening of silhouettes removes them.
     scene = Visits(
         body="person31", motion="walk", size_px=(246, 183), fps=FPS, samples=2, noise=4.0, seed=2
     )
