@@ -19,7 +19,7 @@ ALGORITHMS: dict[str, Callable[..., Optimizer]] = {
 """What `SearchPlan.algorithm` may name; its `options` are the class' keyword arguments.
 
 A program may replace an entry by an `Optimizer` of its own (examples/own_optimizer.py).
-HPSO, H-MCPSO and GLPSO are stages of these: see `tracking.partitions`.
+HPSO, H-MCPSO and GLPSO are stages of these: see `tracking.stages`.
 """
 _SHIPPED = dict(ALGORITHMS)
 

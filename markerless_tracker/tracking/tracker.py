@@ -25,13 +25,13 @@ from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
 from markerless_tracker.tracking.limbs.watch import MENDED_M, Recovered
 from markerless_tracker.tracking.limits import LIMB_RAD_S, check_pose, joint_speeds
 from markerless_tracker.tracking.motion import MotionModel
-from markerless_tracker.tracking.partitions.effort import Effort
-from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.person.estimate import BodyEstimate
 from markerless_tracker.tracking.person.first_frame import StartMarkers
 from markerless_tracker.tracking.person.resting import at_rest
 from markerless_tracker.tracking.search import make_searcher
+from markerless_tracker.tracking.stages.effort import Effort
+from markerless_tracker.tracking.stages.frame import frame_stages
 from markerless_tracker.tracking.start.starter import Starter
 from markerless_tracker.tracking.states import Phase, Track
 

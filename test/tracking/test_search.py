@@ -15,9 +15,9 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import CONTOUR, Observation
 from markerless_tracker.synthesis import ring_rig
 from markerless_tracker.tracking import TrackerConfig, search
-from markerless_tracker.tracking.partitions.frame import contour_stage, frame_stages
-from markerless_tracker.tracking.partitions.sppso import sppso_stages
 from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.stages.frame import contour_stage, frame_stages
+from markerless_tracker.tracking.stages.sppso import sppso_stages
 from markerless_tracker.tracking.swarms import SWARMS
 
 BODY = load_body("person31", 1.75)

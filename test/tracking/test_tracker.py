@@ -7,7 +7,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import Segmenter
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.tracking import Tracker, TrackerConfig
-from markerless_tracker.tracking.partitions import effort
+from markerless_tracker.tracking.stages import effort
 
 
 def errors_mm(result, frame):

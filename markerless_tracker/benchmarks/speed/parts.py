@@ -28,8 +28,8 @@ from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.results.result import versions
 from markerless_tracker.tracking import Tracker, TrackerConfig
-from markerless_tracker.tracking.partitions.frame import contour_stage, frame_stages
 from markerless_tracker.tracking.search import Searcher, make_fitness
+from markerless_tracker.tracking.stages.frame import contour_stage, frame_stages
 
 THOUSAND = 1000
 _ALONE = {"body": "balan31", "refinement": "none", "fit_shape": False, "edge_weight": 1.0}

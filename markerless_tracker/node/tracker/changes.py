@@ -13,8 +13,8 @@ from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.records import TrackResult
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.config import live_settings
-from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.processes.fitting import FittingProcess
+from markerless_tracker.tracking.stages.frame import frame_stages
 
 LIVE = live_settings()
 """Parameters that may be set while the tracker runs."""

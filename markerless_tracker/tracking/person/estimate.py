@@ -13,13 +13,13 @@ from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.loss import LEAST_FIT, silhouette_fit
-from markerless_tracker.tracking.partitions.frame import frame_stages
 from markerless_tracker.tracking.person.body_fitting import BodyFitting, Unmeasured
 from markerless_tracker.tracking.person.first_frame import StartMarkers, shape_of_first_frame
 from markerless_tracker.tracking.person.later_fits import LaterFits
 from markerless_tracker.tracking.person.varied import VariedFrames
 from markerless_tracker.tracking.refinement import floor_precision
 from markerless_tracker.tracking.search import FrameSearch, Searcher
+from markerless_tracker.tracking.stages.frame import frame_stages
 
 START_FRAMES = 30
 """Frames that may disagree with a given start pose before tracking begins without a fit."""

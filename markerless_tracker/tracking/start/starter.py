@@ -59,7 +59,7 @@ SearcherFor = Callable[[BodyModel], Searcher]
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class StartEstimate:
     """What the automatic start found in one frame.
 
     Attributes:
@@ -141,7 +141,7 @@ class Starter:
         self._begun_ns = 0
         self._from_m = np.zeros(3)
 
-    def step(self, observed: Mapping[str, Observation], stamp_ns: int) -> Found | None:
+    def step(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
         """Search one frame; None without a person."""
         if self._population is None or self._searcher is None:
             return self._begin(observed, stamp_ns)
@@ -168,9 +168,9 @@ class Starter:
         pose = self._best(population).poses[0]
         if settled:
             pose = self._settle(frame, pose)
-        return Found(self._searcher, pose, observations, settled, notes)
+        return StartEstimate(self._searcher, pose, observations, settled, notes)
 
-    def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> Found | None:
+    def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
         looking = [self._cameras[name] for name in observed]
         self._rejections.begin_frame(stamp_ns)
         for hull in find_hulls(self._cameras, observed):
@@ -197,7 +197,7 @@ class Starter:
             own = OwnEvidence(self._searcher, observations, stamp_ns, frame)
             self._note(own, frame, population)
             self._from_m = self._trunk(population.poses[0])
-            return Found(self._searcher, population.poses[0], observations, False)
+            return StartEstimate(self._searcher, population.poses[0], observations, False)
         return None
 
     def _decide(

@@ -1,4 +1,4 @@
-"""Tests for `markerless_tracker.tracking.partitions.effort`."""
+"""Tests for `markerless_tracker.tracking.stages.effort`."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from markerless_tracker.body import load_body
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.partitions.effort import NEAR, WORSE, Effort
+from markerless_tracker.tracking.stages.effort import NEAR, WORSE, Effort
 
 
 def _settled() -> Effort:

@@ -9,10 +9,10 @@ from markerless_tracker.body import load_body
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.records import CONTOUR
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.partitions import STAGES
-from markerless_tracker.tracking.partitions.budget import SWARM_SHARE, scaled_particles
-from markerless_tracker.tracking.partitions.frame import LIMB_SWARM, frame_stages
-from markerless_tracker.tracking.partitions.sppso import SPPSO_STAGES, sppso_stages
+from markerless_tracker.tracking.stages import STAGES
+from markerless_tracker.tracking.stages.budget import SWARM_SHARE, scaled_particles
+from markerless_tracker.tracking.stages.frame import LIMB_SWARM, frame_stages
+from markerless_tracker.tracking.stages.sppso import SPPSO_STAGES, sppso_stages
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Stage
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.partitions.budget import shared_out
-from markerless_tracker.tracking.partitions.hmcpso import check_swarms
-from markerless_tracker.tracking.partitions.stage import swarm_stage
+from markerless_tracker.tracking.stages.budget import shared_out
+from markerless_tracker.tracking.stages.hmcpso import check_swarms
+from markerless_tracker.tracking.stages.stage import swarm_stage
 
 WHOLE = ((20, 180),)
 """Particles and iterations at 3600 evaluations."""

@@ -9,12 +9,12 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Stage
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.partitions.filters import filter_stages
-from markerless_tracker.tracking.partitions.glpso import glpso_stages
-from markerless_tracker.tracking.partitions.hmcpso import hmcpso_stages
-from markerless_tracker.tracking.partitions.hpso import hpso_stages
-from markerless_tracker.tracking.partitions.sppso import sppso_stages
-from markerless_tracker.tracking.partitions.whole import whole_stages
+from markerless_tracker.tracking.stages.filters import filter_stages
+from markerless_tracker.tracking.stages.glpso import glpso_stages
+from markerless_tracker.tracking.stages.hmcpso import hmcpso_stages
+from markerless_tracker.tracking.stages.hpso import hpso_stages
+from markerless_tracker.tracking.stages.sppso import sppso_stages
+from markerless_tracker.tracking.stages.whole import whole_stages
 
 StageMaker = Callable[[BodyModel, TrackerConfig, FloatArray, FloatArray], tuple[Stage, ...]]
 

@@ -6,8 +6,8 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Stage
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.partitions.budget import shared_out
-from markerless_tracker.tracking.partitions.stage import swarm_stage
+from markerless_tracker.tracking.stages.budget import shared_out
+from markerless_tracker.tracking.stages.stage import swarm_stage
 
 
 def hierarchical_stages(

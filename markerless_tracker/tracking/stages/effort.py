@@ -6,12 +6,12 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.partitions.frame import (
+from markerless_tracker.tracking.search import FrameSearch
+from markerless_tracker.tracking.stages.frame import (
     contour_stage,
     frame_stages,
     rescue_stages,
 )
-from markerless_tracker.tracking.search import FrameSearch
 
 WORSE = 0.01
 """A frame is explained badly whose f lies this far below the track's usual one."""

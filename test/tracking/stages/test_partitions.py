@@ -9,9 +9,9 @@ from markerless_tracker.optim import ALGORITHMS
 from markerless_tracker.records import CONTOUR
 from markerless_tracker.tracking import OPTIMIZERS, TrackerConfig
 from markerless_tracker.tracking.config import PAPERS
-from markerless_tracker.tracking.partitions import STAGES
-from markerless_tracker.tracking.partitions.budget import SWARM_SHARE
-from markerless_tracker.tracking.partitions.frame import LIMB_SWARM, frame_stages
+from markerless_tracker.tracking.stages import STAGES
+from markerless_tracker.tracking.stages.budget import SWARM_SHARE
+from markerless_tracker.tracking.stages.frame import LIMB_SWARM, frame_stages
 
 BODIES = {
     name: load_body(name, 1.75)

@@ -10,7 +10,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Stage
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.partitions.hierarchy import hierarchical_stages
+from markerless_tracker.tracking.stages.hierarchy import hierarchical_stages
 
 STEP = (10, 60)
 """Particles and iterations of each step."""

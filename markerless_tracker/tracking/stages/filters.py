@@ -12,8 +12,8 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Stage
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.partitions.budget import SWARM_SHARE, scaled_particles
-from markerless_tracker.tracking.partitions.stage import swarm_stage
+from markerless_tracker.tracking.stages.budget import SWARM_SHARE, scaled_particles
+from markerless_tracker.tracking.stages.stage import swarm_stage
 
 
 def filter_stages(

@@ -18,8 +18,8 @@ from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Stage
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.partitions.budget import SWARM_SHARE, scaled_particles
-from markerless_tracker.tracking.partitions.stage import swarm_stage
+from markerless_tracker.tracking.stages.budget import SWARM_SHARE, scaled_particles
+from markerless_tracker.tracking.stages.stage import swarm_stage
 
 SPPSO_STAGES: Mapping[str, tuple[tuple[int, int], ...]] = {
     "two": ((10, 20), (20, 40)),

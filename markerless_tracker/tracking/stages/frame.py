@@ -6,8 +6,8 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import CONTOUR, Comparison, SearchPlan, Stage
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.partitions import STAGES
-from markerless_tracker.tracking.partitions.stage import swarm_stage
+from markerless_tracker.tracking.stages import STAGES
+from markerless_tracker.tracking.stages.stage import swarm_stage
 
 LIMB_SWARM = (6, 4)
 """Particles and iterations of each limb's own swarm at a budget of 1000."""

@@ -17,7 +17,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import swarm_sizes
 from markerless_tracker.records import Stage
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.partitions.hierarchy import hierarchical_stages
+from markerless_tracker.tracking.stages.hierarchy import hierarchical_stages
 
 STEP = (20, 30)
 """Particles, the master's included, and iterations of each step."""
