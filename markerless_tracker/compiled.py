@@ -2,7 +2,8 @@
 
 numba looks at the date of a kernel's own file only. A kernel that calls one in another file would
 keep the old one compiled into it after an edit there. So the names of the stored files hold a
-digest of all sources that they are compiled from. `make clean` removes old ones.
+digest of all sources that they are compiled from, and of numba's version: two environments that
+share the package's folder would replace each other's. `make clean` removes old ones.
 """
 
 import hashlib
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakSet
 
+from numba import __version__ as numba_version
 from numba import njit
 from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
@@ -60,9 +62,9 @@ inlined: Decorator = compiled(error_model="numpy", inline="always")
 
 @cache
 def source_digest(file: Path, package: Path = PACKAGE) -> str:
-    """Digest of what the kernels of a file are compiled from, part of the names of stored files."""
-    sources = b"\0".join(source.read_bytes() for source in kernel_sources(file, package))
-    return hashlib.sha256(sources).hexdigest()[:12]
+    """Digest of what compiles the kernels of a file and from what, part of stored files' names."""
+    parts = [numba_version.encode(), *(s.read_bytes() for s in kernel_sources(file, package))]
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()[:12]
 
 
 def kernel_sources(file: Path, package: Path = PACKAGE) -> list[Path]:

@@ -1,9 +1,12 @@
-"""Stored kernels: named after all sources that they are compiled from."""
+"""Stored kernels: named after all sources that they are compiled from, and after numba."""
 
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from markerless_tracker import compiled
 from markerless_tracker.compiled import PACKAGE, kernel_sources, source_digest
 
 PROGRAM = """
@@ -93,6 +96,14 @@ def test_a_kernel_depends_on_kernels_constants_and_named_tuples_that_it_imports(
     assert {"fitness/raster/kernels.py", "fitness/raster/fill.py", "body/kinematics.py"} <= names
     assert not {"errors.py", "records.py", "imaging/segmentation/kernels.py"} & names
     assert len(source_digest(PACKAGE / "fitness" / "raster" / "kernels.py")) == 12
+
+
+def test_another_numba_stores_its_kernels_beside(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = PACKAGE / "fitness" / "raster" / "kernels.py"
+    digest = source_digest.__wrapped__
+    mine = digest(file)
+    monkeypatch.setattr(compiled, "numba_version", "0.58.1")
+    assert digest(file) != mine
 
 
 def test_no_kernel_is_compiled_past_the_digest() -> None:
