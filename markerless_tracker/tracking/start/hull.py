@@ -42,7 +42,8 @@ FOOT_M, SHIN_M = 0.22, 0.16
 """Points lower than `SHIN_M` are feet only within `FOOT_M`, horizontally, of a leg above."""
 ASIDE_M = 0.45
 """Horizontal distance from the trunk. Beyond it, points on the floor are shadows, and so are points
-lower than `HIGH_M` that no two cameras show as person."""
+lower than `HIGH_M` that no two cameras show as person. A component ends so far from all points that
+two cameras show as person: shadows on walls join it."""
 _RADIUS_M = 5.0
 _UP_M = 2.5
 _FAR_M = 4.0
@@ -156,24 +157,26 @@ def _fine(
         np.pad(labels[box] == number, 1), structure=np.ones((3, 3, 3), dtype=np.bool_)
     )
     inside, looking, person = _occupied(first, size, FINE_M, views, near)
+    inside &= _beside(np.asarray(person.any(axis=2)))[:, :, None]
     parts, count = ndimage.label(inside)
     if count == 0:
         return None
-    sizes = np.bincount(parts.ravel())[1:]
-    largest = parts == 1 + int(sizes.argmax())
-    volume = FINE_M**3 * float(sizes.max())
+    # A shadow beside the person, on the coarse grid one with it, may be the larger part.
+    persons = np.bincount(parts.ravel(), weights=person.ravel())[1:]
+    part = parts == 1 + int(persons.argmax())
+    volume = FINE_M**3 * float(part.sum())
     if not LEAST_VOLUME_M3 <= volume <= MOST_VOLUME_M3:
         return None
-    lump = ndimage.find_objects(largest.view(np.uint8))[0]
-    depth = np.zeros(largest.shape)
-    depth[lump] = ndimage.distance_transform_edt(np.pad(largest[lump], 1))[1:-1, 1:-1, 1:-1]
-    points = first + FINE_M * (np.argwhere(largest) + 0.5)
+    lump = ndimage.find_objects(part.view(np.uint8))[0]
+    depth = np.zeros(part.shape)
+    depth[lump] = ndimage.distance_transform_edt(np.pad(part[lump], 1))[1:-1, 1:-1, 1:-1]
+    points = first + FINE_M * (np.argwhere(part) + 0.5)
     if float(np.ptp(points, axis=0).max()) < LEAST_HEIGHT_M:
         return None
-    if float(person[largest].mean()) < LEAST_PERSON:
+    if float(person[part].mean()) < LEAST_PERSON:
         return None
     return Hull.without_shadows(
-        points, FINE_M * depth[largest], int(np.median(looking[largest])), person[largest]
+        points, FINE_M * depth[part], int(np.median(looking[part])), person[part]
     )
 
 
@@ -255,6 +258,13 @@ def _occupied(
     inside &= person | (points[:, 2] > FLOOR_M)
     shape = tuple(int(n) for n in size)
     return inside.reshape(shape), looking.reshape(shape), person.reshape(shape)
+
+
+def _beside(footprint: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """A footprint (n, m) on the fine grid and what is beside it, within `ASIDE_M`."""
+    side = 2 * round(ASIDE_M / FINE_M) + 1
+    circle = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    return np.asarray(cv2.dilate(footprint.astype(np.uint8), circle), np.uint8).view(np.bool_)
 
 
 def _floor_alone(points_m: FloatArray, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:

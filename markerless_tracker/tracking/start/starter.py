@@ -6,9 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
-from markerless_tracker.body.anatomy import heading_difference
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.fitness.shape import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
@@ -28,15 +26,10 @@ from markerless_tracker.tracking.start.sizing import (
     stature_cost,
 )
 from markerless_tracker.tracking.start.start_gate import StartGate
+from markerless_tracker.tracking.start.two_headings import HeadingFit, TwoHeadings
 
-SETTLING_FRAMES = 8
-"""Frames from the first pose to the one from which on it is tracked like any other."""
 GENERATIONS = 7
 SECOND_GENERATIONS = 5
-_FLIP_MARGIN, _LAST_MARGIN = 0.005, 0.003
-"""Mean rise of f_s that the opposite heading needs before the settling ends, and at its end."""
-_WALKED_M, _WALK_M_S, _WALK_BONUS = 0.05, 0.25, 0.01
-"""People walk forwards: added to f_s beyond that distance and speed."""
 _GENERATION_FRACTION = 0.5
 _SHAPE_FRAMES = 5
 _SHAPE_SLACK = 0.01
@@ -75,15 +68,6 @@ class StartEstimate:
     observations: Mapping[str, Observation]
     settled: bool
     notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """One frame as the best pose of one heading explains it, in evidence of its own."""
-
-    contours: ContourFrame
-    pose: FloatArray
-    cost: float
 
 
 class Starter:
@@ -132,14 +116,9 @@ class Starter:
         self._start_gate.reset()
         self._population: Population | None = None
         self._searcher: Searcher | None = None
-        self._heading = 0.0
-        self._seen: tuple[list[_Seen | None], list[_Seen | None]] = ([], [])
-        self._leading = 0
-        self._flipped = False
+        self._headings = TwoHeadings(0.0)
         self._sure = False
         self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
-        self._begun_ns = 0
-        self._from_m = np.zeros(3)
 
     def step(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
         """Search one frame; None without a person."""
@@ -153,18 +132,20 @@ class Starter:
             observations = self._decide(imaged, best)
         frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
         population = frame.propagated(population)
-        if len(self._seen[0]) == 1 and not self._sure:
+        if len(self._headings) == 1 and not self._sure:
             population = self._second_look(frame, population, observations)
-        elif len(self._seen[0]) == 1 + _FINER_AFTER:
+        elif len(self._headings) == 1 + _FINER_AFTER:
             frame, population = self._resized((frame, population), observations, stamp_ns)
         population = frame.recombined(population, 0, fraction=_GENERATION_FRACTION)
         if 1.0 - population.costs[0] < LEAST_FIT:
             self.reset()
             return None
         self._population = population
-        self._note(OwnEvidence(self._searcher, imaged, stamp_ns, frame), frame, population)
-        notes += self._check_heading(stamp_ns)
-        settled = len(self._seen[0]) >= SETTLING_FRAMES
+        own = OwnEvidence(self._searcher, imaged, stamp_ns, frame)
+        self._note(own, frame, population, stamp_ns)
+        if self._headings.change():
+            notes += ("start: the person has the opposite heading, turned round",)
+        settled = self._headings.over
         pose = self._best(population).poses[0]
         if settled:
             pose = self._settle(frame, pose)
@@ -191,12 +172,10 @@ class Starter:
             if not self._start_gate.enough(self._searcher.body, best, looking, stamp_ns):
                 continue
             self._population = population
-            self._heading = float(population.headings[0])
-            self._begun_ns = stamp_ns
+            self._headings = TwoHeadings(float(population.headings[0]))
             self._sure = _is_sure(population)
             own = OwnEvidence(self._searcher, observations, stamp_ns, frame)
-            self._note(own, frame, population)
-            self._from_m = self._trunk(population.poses[0])
+            self._note(own, frame, population, stamp_ns)
             return StartEstimate(self._searcher, population.poses[0], observations, False)
         return None
 
@@ -208,7 +187,7 @@ class Starter:
         In a second frame that is searched independently, the hull decides first.
         """
         assert self._searcher is not None
-        if len(self._seen[0]) == 1 and not self._sure:
+        if len(self._headings) == 1 and not self._sure:
             hull = next(find_hulls(self._cameras, observations), None)
             if hull is not None:
                 observations = hulls_silhouettes(observations, self._cameras, hull)
@@ -275,48 +254,29 @@ class Starter:
         _, self._searcher, frame, population = min(tried, key=lambda one: one[0])
         return frame, population
 
-    def _note(self, own: OwnEvidence, frame: FramePopulation, population: Population) -> None:
-        for side, seen in enumerate(self._seen):
-            facing = population.facing(self._heading + side * np.pi)
-            best = facing.poses[0] if len(facing) else None
-            seen.append(None if best is None else _Seen(frame.contours, best, own.cost(best)))
+    def _note(
+        self, own: OwnEvidence, frame: FramePopulation, population: Population, stamp_ns: int
+    ) -> None:
+        def fit(heading_rad: float) -> HeadingFit | None:
+            facing = population.facing(heading_rad)
+            if not len(facing):
+                return None
+            best = facing.poses[0]
+            return HeadingFit(frame.contours, best, own.cost(best), self._trunk(best))
 
-    def _check_heading(self, stamp_ns: int) -> tuple[str, ...]:
-        """Change to the opposite heading, at most once, if it explains the frames better."""
-        other = 1 - self._leading
-        both = [
-            (a.cost, b.cost)
-            for a, b in zip(self._seen[self._leading], self._seen[other], strict=True)
-            if a is not None and b is not None
-        ]
-        lead, rival = self._seen[self._leading][-1], self._seen[other][-1]
-        if self._flipped or rival is None:
-            return ()
-        rise = float(np.mean([a - b for a, b in both])) if both and lead is not None else 1.0
-        moved = self._trunk(rival.pose) - self._from_m
-        seconds = (stamp_ns - self._begun_ns) * 1e-9
-        walked_m = float(np.hypot(moved[0], moved[1]))
-        if walked_m > _WALKED_M and seconds > 0.0 and walked_m / seconds > _WALK_M_S:
-            off = heading_difference(
-                float(np.arctan2(moved[1], moved[0])), self._heading + other * np.pi
-            )
-            rise += 2.0 * _WALK_BONUS * float(np.cos(off))
-        over = len(self._seen[0]) >= SETTLING_FRAMES
-        if rise <= (_LAST_MARGIN if over else _FLIP_MARGIN):
-            return ()
-        self._leading, self._flipped = other, True
-        return ("start: the person has the opposite heading, turned round",)
+        first, opposite = (fit(heading_rad) for heading_rad in self._headings.both_rad)
+        self._headings.note(stamp_ns, (first, opposite))
 
     def _best(self, population: Population) -> Population:
         """The part of a population that has the leading heading, or all if none has."""
-        facing = population.facing(self._heading + self._leading * np.pi)
+        facing = population.facing(self._headings.leading_rad)
         return facing if len(facing) else population
 
     def _settle(self, frame: FramePopulation, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None
         if not self._fit_shape:
             return pose
-        seen = [one for one in self._seen[self._leading] if one is not None]
+        seen = self._headings.leading_fits
         good = min((one.cost for one in seen), default=0.0) + _SHAPE_SLACK
         used = [(one.contours, one.pose) for one in seen if one.cost <= good][-_SHAPE_FRAMES:]
         body = fit_shape(self._searcher.body, used or [(frame.contours, pose)])

@@ -10,7 +10,7 @@ from markerless_tracker.cli.synthesize import synthesize
 from markerless_tracker.cli.terminal.notices import Notices
 from markerless_tracker.cli.track import track_source
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.start.starter import SETTLING_FRAMES
+from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
 
 FRAMES = SETTLING_FRAMES + 3
 """Too few for a fit of the lengths in one pass."""

@@ -15,7 +15,7 @@ from markerless_tracker.tracking.person.estimate import (
     BodyEstimate,
 )
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.starter import SETTLING_FRAMES
+from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
 
 SIZES = Sizes(load_description("person31"))
 TAKEN = EVERY * FRAMES + POLISH

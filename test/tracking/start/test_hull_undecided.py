@@ -6,7 +6,14 @@ import pytest
 from markerless_tracker.camera import project_camera
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.start.hull import FINE_M, FLOOR_M, FOOT_M, SHIN_M, find_hulls
+from markerless_tracker.tracking.start.hull import (
+    ASIDE_M,
+    FINE_M,
+    FLOOR_M,
+    FOOT_M,
+    SHIN_M,
+    find_hulls,
+)
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +96,30 @@ def test_a_shadow_without_a_person_is_no_hull(person) -> None:
         speck[0, 0] = True
         seen[name] = observe(name, speck, floor_disc(scene, name, mask))
     assert not list(find_hulls(cameras(scene), seen))
+
+
+@pytest.mark.parametrize("gap_m", [0.0, 0.1], ids=["touches", "near"])
+def test_a_larger_shadow_does_not_hide_the_person(person, gap_m) -> None:
+    """A low wall of undecided points that reaches far aside, of more volume than the person."""
+    scene, masks = person
+    nothing = {name: np.zeros_like(mask) for name, mask in masks.items()}
+    plain = next(find_hulls(cameras(scene), {n: observe(n, masks[n], nothing[n]) for n in masks}))
+    side = plain.points_m[:, 0].max() + gap_m
+    grid = np.stack(
+        np.meshgrid(np.linspace(0, 2, 150), np.linspace(-0.1, 0.1, 30), np.linspace(0, 0.5, 50)),
+        axis=-1,
+    ).reshape(-1, 3)
+    wall = grid + [side, scene.markers(0)[0][1], 0.1]
+    seen = {}
+    for name, mask in masks.items():
+        u, v = np.round(project_camera(wall, scene.rig[name])).astype(int).T
+        framed = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
+        shadow = np.zeros_like(mask)
+        shadow[v[framed], u[framed]] = True
+        seen[name] = observe(name, mask | shadow, shadow & ~mask)
+    hull = next(find_hulls(cameras(scene), seen))
+    assert np.linalg.norm((hull.trunk_m.mean(axis=0) - plain.trunk_m.mean(axis=0))[:2]) < 0.2
+    assert hull.points_m[:, 0].max() < plain.points_m[:, 0].max() + ASIDE_M + 3 * FINE_M
 
 
 def test_a_shadow_beside_the_person_is_left_out(person) -> None:

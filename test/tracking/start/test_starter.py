@@ -8,7 +8,7 @@ from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig, build_tracker
-from markerless_tracker.tracking.start.starter import SETTLING_FRAMES
+from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
 
 FRAMES = SETTLING_FRAMES + 2
 STARTER = "markerless_tracker.tracking.start.starter"
@@ -169,23 +169,3 @@ def test_some_blind_cameras_are_left_out_and_said(walk) -> None:
     result = tracker.step({**seen, "cam01": blind(seen)["cam01"]}, stamp)
     assert "cam01" not in result.iou and error_mm(result, points) < 60.0
     assert any(w.startswith("cam01: left out") for w in result.warnings)
-
-
-def test_who_is_turned_round_is_said_once() -> None:
-    """What explains the frames better wins; the first thought may be wrong once."""
-    from markerless_tracker.tracking.start.starter import Starter, _Seen
-
-    scene = SyntheticScene(body="person31", motion="stand", size_px=(64, 48), seed=2)
-    tracker = tracker_of(scene, stature=1.72)
-    starter = Starter(scene.rig, scene.body, tracker._searcher_for, tracker.evidence.select)
-    starter._searcher = tracker._searcher_for(scene.body)
-    pose = scene.pose(0)
-    starter._from_m = starter._trunk(pose)
-    for cost, other in ((0.10, 0.09), (0.10, 0.08)):
-        starter._seen[0].append(_Seen(None, pose, cost))
-        starter._seen[1].append(_Seen(None, pose, other))
-    (note,) = starter._check_heading(33_000_000)
-    assert "turned round" in note
-    for seen, cost in zip(starter._seen, (0.01, 0.2), strict=True):
-        seen.append(_Seen(None, pose, cost))
-    assert starter._check_heading(50_000_000) == ()

@@ -1,0 +1,92 @@
+"""Which of two opposite headings leads, from costs and movements written by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from markerless_tracker.tracking.start.two_headings import (
+    COMPARED,
+    SETTLING_FRAMES,
+    SIZED_FROM,
+    HeadingFit,
+    TwoHeadings,
+)
+
+FRAME_NS = 40_000_000
+STANDS = np.zeros(3)
+
+
+def fit(cost: float, trunk_m: np.ndarray = STANDS) -> HeadingFit:
+    return HeadingFit(None, np.zeros(1), cost, trunk_m)  # type: ignore[arg-type]
+
+
+def changes(
+    costs: list[tuple[float | None, float | None]], heading_rad: float = 0.0, walks_m: float = 0.0
+) -> list[int]:
+    """Numbers of the frames after which the opposite heading leads; it walks along x."""
+    both = TwoHeadings(heading_rad)
+    found = []
+    for number, pair in enumerate(costs):
+        at = np.array([walks_m * number, 0.0, 0.0])
+        first, opposite = (None if cost is None else fit(cost, at) for cost in pair)
+        both.note(number * FRAME_NS, (first, opposite))
+        if both.change():
+            found.append(number)
+    assert both.over == (len(costs) >= SETTLING_FRAMES)
+    assert both.leading_rad == (heading_rad + math.pi if found else heading_rad)
+    return found
+
+
+def test_the_heading_that_explains_the_frames_better_leads() -> None:
+    assert changes([(0.1, 0.1)] * SETTLING_FRAMES) == []
+    assert changes([(0.1, 0.08)] * SETTLING_FRAMES) == [SIZED_FROM]
+
+
+def test_a_small_gain_counts_in_the_end_alone() -> None:
+    assert changes([(0.1, 0.095)] * (SETTLING_FRAMES - 1)) == []
+    assert changes([(0.1, 0.095)] * SETTLING_FRAMES) == [SETTLING_FRAMES - 1]
+    assert changes([(0.1, 0.098)] * SETTLING_FRAMES) == []
+
+
+def test_frames_that_were_searched_for_the_first_heading_do_not_count() -> None:
+    early = [(0.1, 0.5)] * SIZED_FROM
+    later = [(0.1, 0.095)] * (SETTLING_FRAMES - SIZED_FROM)
+    assert changes(early + later) == [SETTLING_FRAMES - 1]
+
+
+def test_poses_that_improved_count_as_they_are_now() -> None:
+    before = SETTLING_FRAMES - COMPARED
+    assert changes([(0.109, 0.1)] * before + [(0.1, 0.1)] * COMPARED) == []
+
+
+def test_it_changes_once() -> None:
+    costs: list[tuple[float | None, float | None]] = [(0.1, 0.05)] * 4 + [(0.01, 0.5)] * 6
+    assert changes(costs) == [SIZED_FROM]
+
+
+def test_a_heading_without_a_pose_leads_no_longer() -> None:
+    assert changes([(0.1, 0.2)] * 4 + [(None, 0.2)]) == [4]
+    assert changes([(0.1, None)] * SETTLING_FRAMES) == []
+
+
+@pytest.mark.parametrize(
+    ("heading_rad", "walks_m", "expected"),
+    [
+        pytest.param(0.0, 0.03, [], id="forwards"),
+        pytest.param(math.pi, 0.03, [4], id="backwards"),
+        pytest.param(0.5 * math.pi, 0.03, [], id="sideways"),
+        pytest.param(math.pi, 0.005, [], id="slowly"),
+    ],
+)
+def test_a_person_walks_forwards(heading_rad: float, walks_m: float, expected: list[int]) -> None:
+    # Beyond 5 cm; a walk is worth 0.02, the smallest gain before the end 0.01.
+    assert changes([(0.1, 0.1)] * (SETTLING_FRAMES - 1), heading_rad, walks_m) == expected
+
+
+def test_poses_of_the_leading_heading() -> None:
+    both = TwoHeadings(1.0)
+    first, opposite = fit(0.1), fit(0.2)
+    both.note(0, (first, opposite))
+    both.note(1, (None, opposite))
+    assert both.leading_fits == [first] and len(both) == 2
