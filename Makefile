@@ -61,8 +61,8 @@ docs: $(DOCS_READY) ## build the documentation as a site in site/ (strict: a war
 demo: $(READY) ## track a person in a real recording, live over ROS 2 (5 minutes)
 	$(PY) -m markerless_tracker.cli.demo $(ARGS)
 
-bench: $(READY) ## measure the published figures (an hour)
-	@set -e; for script in bench/*.py; do echo "$$script"; $(PY) "$$script" $(ARGS); done
+bench: $(READY) ## measure the published tables (an hour)
+	$(PY) bench/run.py $(ARGS)
 
 peer: $(READY) $(PEER)/.ready ## measure MediaPipe with triangulation and this tracker (15 minutes)
 	$(PY) bench/peer/run.py $(ARGS)

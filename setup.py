@@ -30,6 +30,13 @@ def shared_files(folder: str) -> list[tuple[str, list[str]]]:
     return sorted(found.items())
 
 
+EXTRAS = {
+    "cluster": ["distributed>=2024.1"],
+    "formats": ["cdflib>=1", "ezc3d>=1.5"],
+    "plots": ["matplotlib>=3.8"],
+    "view": ["av>=14", "rerun-sdk>=0.24"],
+}
+
 setup(
     name=NAME,
     version=version(),
@@ -58,9 +65,8 @@ setup(
         "scipy>=1.11",
     ],
     extras_require={
-        "cluster": ["distributed>=2024.1"],
-        "formats": ["cdflib>=1", "ezc3d>=1.5"],
-        "plots": ["matplotlib>=3.8"],
+        **EXTRAS,
+        "all": sorted(sum(EXTRAS.values(), [])),
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
             "hypothesis",
@@ -75,7 +81,6 @@ setup(
             "types-PyYAML",
             "yourdfpy",
         ],
-        "view": ["av>=14", "rerun-sdk>=0.24"],
     },
     entry_points={
         "console_scripts": [

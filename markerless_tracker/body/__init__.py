@@ -6,6 +6,7 @@ from markerless_tracker.body.load import load_body, load_description
 from markerless_tracker.body.model import LIMB_MARKERS, MARKER_NAMES, BodyModel
 from markerless_tracker.body.start import pose_from_markers, read_pose, write_pose
 from markerless_tracker.body.subject import (
+    STATURE_RANGE_M,
     Subject,
     read_subject,
     subject_from_markers,
@@ -17,6 +18,7 @@ __all__ = [
     "LIMB_MARKERS",
     "MARKER_NAMES",
     "RULES",
+    "STATURE_RANGE_M",
     "BodyModel",
     "Feasibility",
     "Subject",

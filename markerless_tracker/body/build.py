@@ -103,10 +103,15 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
             _look(frames, _get(entry, "parent", where), where), chain, where
         )
     del frames["world"]
-    if sorted(set(nodes.parameter) - {-1}) != list(range(len(parameters))):
-        raise BodyModelError(f"body {d.name}: every parameter must move some frame")
-    if set(d.markers) != set(MARKER_NAMES):
-        raise BodyModelError(f"body {d.name}: markers must be exactly {', '.join(MARKER_NAMES)}")
+    idle = [name for i, name in enumerate(parameters) if i not in set(nodes.parameter)]
+    if idle:
+        raise BodyModelError(f"body {d.name}: no frame is moved by parameter {', '.join(idle)}")
+    missing, extra = sorted(set(MARKER_NAMES) - set(d.markers)), set(d.markers) - set(MARKER_NAMES)
+    if missing or extra:
+        raise BodyModelError(
+            f"body {d.name}: markers must be exactly {', '.join(MARKER_NAMES)}; "
+            f"missing: {', '.join(missing) or 'none'}, others: {', '.join(sorted(extra)) or 'none'}"
+        )
 
     marker_places = []
     for name in MARKER_NAMES:
@@ -197,8 +202,10 @@ def _limits(d: BodyDescription) -> tuple[FloatArray, FloatArray, FloatArray]:
             limits[:, i] = np.deg2rad(entry["limits"]) + neutral[i]
         if "walking" in entry:
             walking[:, i] = entry["walking"]
-    if np.any(limits[0] >= limits[1]) or np.any(walking[0] >= walking[1]):
-        raise BodyModelError(f"body {d.name}: a lower limit is not below its upper limit")
+    wrong = (limits[0] >= limits[1]) | (walking[0] >= walking[1])
+    if wrong.any():
+        name = list(d.parameters)[int(wrong.argmax())]
+        raise BodyModelError(f"body {d.name}: {name}: a lower limit is not below its upper limit")
     return limits, walking, neutral
 
 

@@ -111,8 +111,13 @@ class BodyModel:
         for name, value in list(vars(self).items()):
             if isinstance(value, np.ndarray):
                 object.__setattr__(self, name, locked(value, value.dtype))
-        if np.any(self.cone_length <= 0) or np.any(self.cone_shape[:, :, :2] <= 0):
-            raise BodyModelError(f"body {self.name}: cone lengths and radii must be positive")
+        least = np.minimum(self.cone_length, self.cone_shape[:, :, :2].min(axis=(1, 2)))
+        if np.any(least <= 0):
+            cone = int(least.argmin())
+            raise BodyModelError(
+                f"body {self.name}, cone {self.cone_names[cone]}: a length or radius of "
+                f"{least[cone]:g} m, expected more than 0"
+            )
 
     @property
     def size(self) -> int:

@@ -13,6 +13,9 @@ from markerless_tracker.body.files import read_yaml
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
+STATURE_RANGE_M = (0.5, 2.6)
+"""Least and largest stature of a person."""
+
 
 @dataclass(frozen=True)
 class Subject:
@@ -42,12 +45,15 @@ class Subject:
         for key, shape in self.cones_m.items():
             if np.shape(shape) != (2, 4) or not np.isfinite(np.asarray(shape, dtype=float)).all():
                 raise BodyModelError(
-                    f"subject {self.name}: cone {key} needs two rows of "
+                    f"subject {self.name}: cone {key} is {np.asarray(shape, object).tolist()}, "
+                    "expected two rows of "
                     "[radius x, radius y, offset x, offset y] in metres"
                 )
-            if np.min(np.asarray(shape, dtype=float)[:, :2]) <= 0.0:
+            least_m = float(np.min(np.asarray(shape, dtype=float)[:, :2]))
+            if least_m <= 0.0:
                 raise BodyModelError(
-                    f"subject {self.name}: cone {key} has a radius that is not above 0"
+                    f"subject {self.name}: cone {key} has a radius of {least_m:g} m, "
+                    "expected more than 0"
                 )
 
 
@@ -57,8 +63,9 @@ def subject_from_stature(description: BodyDescription, stature_m: float) -> Subj
     Raises:
         BodyModelError: the stature is not between 0.5 and 2.6 m.
     """
-    if not 0.5 <= stature_m <= 2.6:
-        raise BodyModelError(f"stature is {stature_m} m, expected between 0.5 and 2.6")
+    least_m, most_m = STATURE_RANGE_M
+    if not least_m <= stature_m <= most_m:
+        raise BodyModelError(f"stature is {stature_m} m, expected between {least_m} and {most_m}")
     lengths = {name: float(v["stature"]) * stature_m for name, v in description.lengths.items()}
     return Subject(f"stature {stature_m:g} m", lengths, measured=False)
 

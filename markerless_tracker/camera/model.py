@@ -66,7 +66,10 @@ class CameraModel:
             )
         rotation = self.T_cam_world[:3, :3]
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0:
-            raise CalibrationError(f"{self.name}: its rotation is not a rotation matrix")
+            raise CalibrationError(
+                f"{self.name}: its rotation is {rotation.round(4).tolist()}, "
+                "expected a rotation matrix"
+            )
         width, height = self.size_px
         if width < 1 or height < 1:
             raise CalibrationError(f"{self.name}: image size {width}x{height}, expected positive")

@@ -152,7 +152,8 @@ def _search(group: argparse._ArgumentGroup) -> None:
         "--evaluations",
         type=int,
         metavar="N",
-        help="fitness evaluations per frame (default: depends on the optimizer)",
+        help="fitness evaluations per frame; with preset tuned, a time budget in these "
+        "(default: depends on the optimizer)",
     )
     group.add_argument(
         "--passes",

@@ -32,10 +32,6 @@ class StateWatch(Listener):
         self._executor.spin_once(timeout_sec=seconds)
         return self._values
 
-    def forget(self) -> None:
-        """Discard the values of a tracker that has ended."""
-        self._values = {}
-
     def _hear(self, message: Any) -> None:
         if message.status:
             self._values = {entry.key: entry.value for entry in message.status[0].values}

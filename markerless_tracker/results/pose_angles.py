@@ -10,11 +10,11 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.angles import AngleReader
 from markerless_tracker.body.angles.definitions import JOINTS
+from markerless_tracker.body.angles.reader import wrapped
 from markerless_tracker.geometry import FloatArray
 
 APART_COSINE = 0.7
 """Where the second angle's cosine is larger, reported angles are those of the pose."""
-_TURN = 2.0 * np.pi
 
 
 class PoseAngles:
@@ -50,7 +50,7 @@ class PoseAngles:
         other = own * [1.0, -1.0, 1.0] + np.pi
         far = _off(other - wanted) < _off(own - wanted)
         found[self._triples] = np.where(far[:, None], other, own)
-        return np.asarray(close + _wrapped(found - close))
+        return np.asarray(close + wrapped(found - close))
 
     def apart(self, angles: FloatArray) -> FloatArray:
         """(k,) from 1, where angles (k,), rad, are far from a singularity, to 0 at one."""
@@ -60,9 +60,5 @@ class PoseAngles:
         return found
 
 
-def _wrapped(angles: FloatArray) -> FloatArray:
-    return np.asarray(angles - _TURN * np.round(angles / _TURN))
-
-
 def _off(angles: FloatArray) -> FloatArray:
-    return np.asarray((_wrapped(angles) ** 2).sum(axis=1))
+    return np.asarray((wrapped(angles) ** 2).sum(axis=1))

@@ -36,7 +36,7 @@ class RefineSettings(SettingsGroup):
 
     iterations: int = setting(
         4,
-        "iterations of a contour refinement; a frame has one, or two if the pose moved far",
+        "iterations of a contour refinement; a second one follows swarms, or a pose that moved far",
         least=1,
         most=1000,
     )

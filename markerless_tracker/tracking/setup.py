@@ -118,9 +118,7 @@ def build_tracker(
         start_pose=pose,
         backgrounds=backgrounds,
         shape_known=bool(subject.cones_m),
-        start_markers=(
-            None if named or start is None else _start_markers(description, subject, start)
-        ),
+        start_markers=(None if named or start is None else _start_markers(description, start)),
         person=person,
     )
     return TrackerSetup(make(), make, None if start is None else start.stamp_ns, person)
@@ -160,9 +158,7 @@ def first_row(path: Path) -> _MarkerRow:
     return _MarkerRow(int(track.stamps_ns[row]), named)
 
 
-def _start_markers(
-    description: BodyDescription, subject: Subject, start: _MarkerRow
-) -> StartMarkers:
+def _start_markers(description: BodyDescription, start: _MarkerRow) -> StartMarkers:
     missing = np.full(3, np.nan)
     known = complete_markers(start.markers_m)
     return StartMarkers(

@@ -162,8 +162,8 @@ GOOD = "name: one\nlengths_m: {torso: 0.5, head: 0.3}\n"
         (GOOD + "cones_m: 3", "cones_m must map cones to two rows of four numbers"),
         (GOOD + "cones_m: {torso: wide}", "cones_m must map"),
         (GOOD + "cones_m: {torso: [[1, 2], [3]]}", "cones_m must map"),
-        (GOOD + "cones_m: {torso: [1, 2]}", "cone torso needs two rows"),
-        (GOOD + "cones_m: {torso: [[1, 1, 0, 0], [1, 1, 0, .inf]]}", "cone torso needs two rows"),
+        (GOOD + "cones_m: {torso: [1, 2]}", "cone torso is .*expected two rows"),
+        (GOOD + "cones_m: {torso: [[1, 1, 0, 0], [1, 1, 0, .inf]]}", "torso is .*inf.* two rows"),
         (GOOD + "cones_m: {torso: [[1, 1, 0, 0], [1, 0, 0, 0]]}", "cone torso has a radius"),
     ],
 )

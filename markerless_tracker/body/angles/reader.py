@@ -192,19 +192,20 @@ class _Sequences:
 
 def _smaller(angles: FloatArray) -> FloatArray:
     """Of both solutions (n, 3) the one with the smaller angles."""
-    other = _wrapped(angles * [1.0, -1.0, 1.0] + np.pi)
+    other = wrapped(angles * [1.0, -1.0, 1.0] + np.pi)
     far = (other**2).sum(axis=1) < (angles**2).sum(axis=1)
     return np.where(far[:, None], other, angles)
 
 
-def _wrapped(angles: FloatArray) -> FloatArray:
+def wrapped(angles: FloatArray) -> FloatArray:
+    """Angles within half a turn of 0, rad."""
     return np.asarray(angles - _TURN * np.round(angles / _TURN))
 
 
 def _nearest(angles: FloatArray, last: FloatArray) -> FloatArray:
     """Of both solutions (n, 3) and their full turns, the one nearest to the last angles (n, 3)."""
-    change = _wrapped(angles - last)
-    of_other = _wrapped(angles * [1.0, -1.0, 1.0] + np.pi - last)
+    change = wrapped(angles - last)
+    of_other = wrapped(angles * [1.0, -1.0, 1.0] + np.pi - last)
     far = (of_other**2).sum(axis=1) < (change**2).sum(axis=1)
     return np.asarray(last + np.where(far[:, None], of_other, change))
 
@@ -239,7 +240,7 @@ class _Split:
         weight = part * part * (3.0 - 2.0 * part)
         both = angles[:, 0] + side * angles[:, 2] - self.shown[:, 0] - side * self.shown[:, 2]
         free = np.maximum(2.0 * SPLIT_RAD_S * step_s - np.abs(both), 0.0)
-        most = np.maximum(free, weight**8 * np.abs(_wrapped(own - self._own)))
+        most = np.maximum(free, weight**8 * np.abs(wrapped(own - self._own)))
         held = gap + np.clip(-weight * gap, -most, most)
         held = np.where((weight == 1.0) & (self._held == 0.0), 0.0, held)
         # From one solution to the other the second angle jumps across 90 degrees.

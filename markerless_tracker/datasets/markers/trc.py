@@ -213,12 +213,13 @@ def format_row(index: int, stamp_ns: int, positions_m: FloatArray) -> str:
         positions_m: (m, 3) markers in the world frame (Z up); NaN = missing, written as blanks.
     """
     cells = [cell for point in positions_m for cell in _cells(point)]
-    line = "\t".join([str(index), _seconds(stamp_ns), *cells])
+    line = "\t".join([str(index), seconds(stamp_ns), *cells])
     # OpenSim does not count an empty last cell unless a tab ends it.
     return line if cells and cells[-1] else line + "\t"
 
 
-def _seconds(stamp_ns: int) -> str:
+def seconds(stamp_ns: int) -> str:
+    """A stamp in s, to the nanosecond."""
     sign = "-" if stamp_ns < 0 else ""
     return f"{sign}{abs(stamp_ns) // 10**9}.{abs(stamp_ns) % 10**9:09d}"
 

@@ -112,13 +112,3 @@ class ExposureMeter:
 def _logs(values: NDArray[np.float64]) -> NDArray[np.float64]:
     usable = (values >= _DARK) & (values <= _BRIGHT)
     return np.where(usable, np.log(np.where(usable, values, 1.0)), np.nan)
-
-
-def exposure_gain(image: Image, mean: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Brightness of the image relative to the background's, (c,) float32; 1 if it has no mode.
-
-    Args:
-        image: (h, w, c) uint8.
-        mean: (h, w, c) float32, the background.
-    """
-    return ExposureMeter(mean).gain(image)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from markerless_tracker.body import STATURE_RANGE_M
 from markerless_tracker.datasets.background import MAX_FRAMES
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.ros import declared
@@ -95,7 +96,7 @@ _FILES = (
 
 
 RANGES: Mapping[str, tuple[float, float]] = {
-    "stature": (0.5, 2.5),
+    "stature": STATURE_RANGE_M,
     "scale": (0.01, 1.0),
     "sync_tolerance": (0.0, 1.0),
     "learn_background_sets": (2, MAX_FRAMES),

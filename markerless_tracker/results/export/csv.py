@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from markerless_tracker.datasets.markers.trc import seconds
 from markerless_tracker.results.export.axes import to_file
-from markerless_tracker.results.export.new_file import new_file, number, seconds
+from markerless_tracker.results.export.new_file import new_file, number
 from markerless_tracker.results.read import ResultReader
 
 COLUMNS = ("time", "joint", "x", "y", "z", "sd", "state")

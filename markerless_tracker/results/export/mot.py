@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from markerless_tracker.datasets.markers.trc import seconds
 from markerless_tracker.results.export.coordinates import Coordinates, motion_columns
-from markerless_tracker.results.export.new_file import new_file, number, seconds
+from markerless_tracker.results.export.new_file import new_file, number
 from markerless_tracker.results.read import ResultReader
 from markerless_tracker.results.stored_result import stored_body
 

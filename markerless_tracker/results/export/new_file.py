@@ -32,9 +32,3 @@ def new_file(path: Path, *, binary: bool = False) -> Iterator[IO[Any]]:
 def number(value: float, digits: int) -> str:
     """A number with that many decimals, without a negative zero; empty for NaN."""
     return f"{round(float(value), digits) + 0.0:.{digits}f}" if value == value else ""
-
-
-def seconds(stamp_ns: int) -> str:
-    """A stamp in s, to the nanosecond."""
-    sign = "-" if stamp_ns < 0 else ""
-    return f"{sign}{abs(stamp_ns) // 10**9}.{abs(stamp_ns) % 10**9:09d}"

@@ -11,9 +11,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.datasets.markers.trc import seconds
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.export.coordinates import BACK, Coordinates, ModelJoint
-from markerless_tracker.results.export.new_file import new_file, seconds
+from markerless_tracker.results.export.new_file import new_file
 from markerless_tracker.results.export.skeleton import MOST_ROTATIONS, Skeleton
 from markerless_tracker.results.export.trc import write_renamed_trc
 from markerless_tracker.results.read import ResultReader

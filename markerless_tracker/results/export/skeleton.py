@@ -13,10 +13,9 @@ FIRST_COUPLED = 6
 """Kinds of nodes from here on rotate together with their neighbours, about no axis of their own."""
 ANATOMICAL: FloatArray = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """(3, 3) OpenSim's axes of a segment, x forward, y up, z right, in the world, body neutral."""
-BALL_ORDER = "ZXY"
-"""Rotations of a ball joint, each about the axis as moved by those before: flexion, adduction,
+BALL_AXES = (2, 0, 1)
+"""Axes of a ball joint's rotations, each as moved by those before: z flexion, x adduction, y
 rotation (Rajagopal et al. 2016)."""
-_BALL_AXES = (2, 0, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +47,7 @@ class Segment:
             have rotated.
         node: the body's node whose position is that of the joint and which the segment turns with.
         R_segment_node: (3, 3) rotation from that node's axes to the segment's.
-        ball: whether the joint's rotations are those of `BALL_ORDER` between the anatomical axes of
+        ball: whether the joint's rotations are those of `BALL_AXES` between the anatomical axes of
             parent and segment, since no axes belong to the body's parameters.
         R_parent_anatomical, R_segment_anatomical: (3, 3) anatomical axes in parent and segment.
     """
@@ -141,7 +140,7 @@ def skeleton(body: BodyModel) -> Skeleton:
             signs = (1.0, -1.0, -1.0) if name.startswith("l_") else (1.0, 1.0, 1.0)
             moves = tuple(
                 Move(move.name, move.parameter, True, sign * np.eye(3)[axis])
-                for move, sign, axis in zip(entry.moves, signs, _BALL_AXES, strict=True)
+                for move, sign, axis in zip(entry.moves, signs, BALL_AXES, strict=True)
             )
         finished.append(
             Segment(

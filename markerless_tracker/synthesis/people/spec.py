@@ -25,8 +25,6 @@ LOWER = ("trousers", "shorts", "skirt")
 UPPER = ("shirt", "jacket")
 
 
-_HAIR_SHARES = {"female": (0.05, 0.2, 0.2, 0.35, 0.2), "male": (0.15, 0.5, 0.3, 0.05, 0.0)}
-_LOWER_SHARES = {"female": (0.62, 0.13, 0.25), "male": (0.8, 0.2, 0.0)}
 _SLEEVES, _SLEEVE_SHARES = (0.0, 0.35, 0.45, 0.97), (0.1, 0.3, 0.3, 0.3)
 
 

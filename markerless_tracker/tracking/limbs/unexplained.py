@@ -44,13 +44,13 @@ class Unexplained:
         return tuple(self.areas_m2)
 
 
-def limbs_unexplained(
+def look_unexplained(
     body: BodyModel,
     pose: FloatArray,
     observations: Mapping[str, Observation],
     rig: CameraRig,
-) -> tuple[str, ...]:
-    """Limbs that may belong to unexplained regions of silhouette, the likeliest first.
+) -> Unexplained:
+    """Regions of silhouette that a body does not explain, and the limbs that may belong there.
 
     A region counts by its area for the limb nearest to it, by half of it for the second, by a third
     for the third of those that are long enough to lie there.
@@ -61,16 +61,6 @@ def limbs_unexplained(
         observations: the silhouettes.
         rig: the cameras.
     """
-    return look_unexplained(body, pose, observations, rig).limbs
-
-
-def look_unexplained(
-    body: BodyModel,
-    pose: FloatArray,
-    observations: Mapping[str, Observation],
-    rig: CameraRig,
-) -> Unexplained:
-    """As `limbs_unexplained`, with the regions."""
     if not body.limbs:
         return Unexplained({}, {})
     axes = _axes(body, pose)

@@ -200,7 +200,8 @@ class FittingProcess:
                 segmenter = self._local.segmenter(name)
                 if segmenter is not None:
                     segmenter.check(image)
-            raise ImageError(f"{', '.join(images)}: larger images than the calibration says")
+            sizes = ", ".join(f"{n} {i.shape[1]}x{i.shape[0]} px" for n, i in images.items())
+            raise ImageError(f"{sizes}: more pixels than the calibration's images have")
         sent = {n: v if isinstance(v, Observation) else places[n] for n, v in views.items()}
         return Handed(views, SetOfViews(number, stamp_ns, sent))
 

@@ -148,5 +148,5 @@ def test_the_most_used_parameters_come_first_and_ranges_are_known() -> None:
         "result_file",
     ]  # fmt: skip
     ranges = {setting.name: (setting.min, setting.max) for setting in held_settings()}
-    assert ranges["stature"] == (0.5, 2.5) and ranges["sync_tolerance"] == (0.0, 1.0)
+    assert ranges["stature"] == (0.5, 2.6) and ranges["sync_tolerance"] == (0.0, 1.0)
     assert set(ranges) <= set(parameter_names())
