@@ -82,7 +82,7 @@ class Apf(Optimizer):
         return self.best_x
 
     @property
-    def particle_sd_ratio(self) -> FloatArray:
+    def particle_sd(self) -> FloatArray:
         """(d,) standard deviation of the last layer's particles, weighted."""
         around = self._particles - self._weights @ self._particles
         return np.asarray(np.sqrt(self._weights @ around**2))

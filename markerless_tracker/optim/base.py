@@ -44,8 +44,8 @@ class Optimizer(ABC):
         return self.best_x
 
     @property
-    def particle_sd_ratio(self) -> FloatArray:
-        """(d,) standard deviation of the particles, of their own bests if they keep any."""
+    def particle_sd(self) -> FloatArray:
+        """(d,) standard deviation of the particles, or of their own bests, in parameter units."""
         return np.zeros_like(self.best_x)
 
     @property

@@ -148,7 +148,7 @@ class Mcpso(Optimizer):
         self._phi = 0.5
 
     @property
-    def particle_sd_ratio(self) -> FloatArray:
+    def particle_sd(self) -> FloatArray:
         """(d,) standard deviation of all particles' own best positions, the master's included."""
         return np.asarray(np.concatenate([self._subs.best, self._master.best]).std(axis=0))
 

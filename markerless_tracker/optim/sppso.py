@@ -105,7 +105,7 @@ class Sppso(Optimizer):
         self._next = 0
 
     @property
-    def particle_sd_ratio(self) -> FloatArray:
+    def particle_sd(self) -> FloatArray:
         """(d,) standard deviation of the particles' own best positions."""
         return self._swarm.sd
 

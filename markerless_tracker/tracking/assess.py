@@ -33,7 +33,7 @@ class Found:
         settling: whether that start needs further frames.
         turned: whether the body was turned round: it does not continue the last pose, either.
         jumped: parameters that were found elsewhere.
-        mended: whether a limb was found so far away that it was in a wrong place before.
+        recovered: whether a limb was found so far away that it was in a wrong place before.
     """
 
     search: FrameSearch
@@ -44,7 +44,7 @@ class Found:
     settling: bool = False
     turned: bool = False
     jumped: IntArray | None = None
-    mended: bool = False
+    recovered: bool = False
 
 
 class Assessor:

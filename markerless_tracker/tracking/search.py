@@ -258,7 +258,7 @@ class FrameSearch:
         )
         optimizer = ALGORITHMS[plan.algorithm](problem, **plan.options)
         best = optimizer.run(evaluator, early=True)
-        self._note(stage, optimizer.evaluations, optimizer.particle_sd_ratio)
+        self._note(stage, optimizer.evaluations, optimizer.particle_sd)
         if optimizer.memory is not None:
             searcher.particle_sets[stage.name] = optimizer.memory
         return np.asarray(evaluator.poses(best[None])[0])

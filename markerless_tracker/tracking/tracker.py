@@ -22,7 +22,7 @@ from markerless_tracker.tracking.evidence.prepared import Lookahead, Outlook, Pr
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
-from markerless_tracker.tracking.limbs.watch import MENDED_M, Recovered
+from markerless_tracker.tracking.limbs.watch import RECOVERED_M, Recovered
 from markerless_tracker.tracking.limits import LIMB_RAD_S, check_pose, joint_speeds
 from markerless_tracker.tracking.motion import MotionModel
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
@@ -145,11 +145,11 @@ class Tracker:
         self.step(blank, 0)
         pose = self._motion.pose
         seen = Seen(0, blank, decide(blank, self._cameras, self.body, pose), blank)
-        search = self._searcher.frame(seen.believed, 0, pose)
+        search = self._searcher.frame(seen.used, 0, pose)
         search.run(frame_stages(self.body, self.config, pose, self.body.sigma))
         if self.config.refinement != "none":
             self._assessor.limbs.recover(self._searcher, search.contours, seen, pose)
-        self._assessor.warm_up(Found(search, 0, seen.believed), self.body, self._body.limits)
+        self._assessor.warm_up(Found(search, 0, seen.used), self.body, self._body.limits)
         self.reset()
         self._body.warm_up(self._searcher_for, blank, self._motion.pose)
         self.reset()
@@ -213,10 +213,10 @@ class Tracker:
         """Find the pose that explains the views of one time.
 
         Args:
-            views: camera name to its image (as `Segmenter.observe` takes it) or to a ready-made
-                observation; cameras may be missing. Or what `prepare` made of them.
+            views: camera name to its image, (h, w, 3) uint8 BGR or (h, w) grey, not rectified, or
+                to a ready-made observation; cameras may be missing. Or what `prepare` made of them.
             stamp_ns: time of the images; the search widens with the time since the last step.
-            effort: fraction of the frames, 0 to 1, searched beside the refinement; see `Effort`.
+            effort: fraction of the frames, 0 to 1, that swarms and limb searches may search.
 
         Raises:
             ConfigError: no such effort.
@@ -266,14 +266,14 @@ class Tracker:
         """The evidence near the predicted pose (p,); of the whole views without a track."""
         if self._starter is not None:
             observed = self.evidence.whole(evidence, stamp_ns)
-            believed, notes = self._views.sort(observed, self.body, None)
-            return Seen(stamp_ns, observed, believed, believed, notes)
+            used, notes = self._views.sort(observed, self.body, None)
+            return Seen(stamp_ns, observed, used, used, notes)
         observed, left_out = self.evidence.gather(evidence, stamp_ns, self.body, predicted)
         expected = predicted if self.state is TrackState.TRACKING else None
         imaged, notes = self._views.sort(observed, self.body, expected)
         lost = self.state is TrackState.LOST
-        believed = imaged if lost else decide(imaged, self._cameras, self.body, predicted)
-        return Seen(stamp_ns, observed, believed, imaged, notes, left_out)
+        used = imaged if lost else decide(imaged, self._cameras, self.body, predicted)
+        return Seen(stamp_ns, observed, used, imaged, notes, left_out)
 
     def _outlook(self, number: int) -> Outlook:
         searching, motion = self._starter is not None, copy.copy(self._motion)
@@ -281,11 +281,10 @@ class Tracker:
 
     def _search_room(self, starter: Starter, seen: Seen) -> Found | None:
         """Search the whole views for a person; None if there is none."""
-        if not anybody(seen.believed):
+        if not anybody(seen.used):
             starter.reset()
             return None
-        start = starter.step(seen.believed, seen.stamp_ns)
-        if start is None:
+        if (start := starter.step(seen.used, seen.stamp_ns)) is None:
             return None
         self._searcher = self._searcher_for(start.searcher.body)
         self._body.take_found(start.searcher.body, settled=start.settled)
@@ -300,12 +299,12 @@ class Tracker:
 
     def _search_near(self, predicted: FloatArray, seen: Seen) -> Found | None:
         """Search near a predicted pose (p,); None if there is no person."""
-        believed, stamp_ns = seen.believed, seen.stamp_ns
-        if not anybody(believed):
+        used, stamp_ns = seen.used, seen.stamp_ns
+        if not anybody(used):
             return None
         if self._body.awaits_first_frame:
             at = self._motion.pose
-            start = self._body.fit_first_frame(self._searcher_for, believed, stamp_ns, at)
+            start = self._body.fit_first_frame(self._searcher_for, used, stamp_ns, at)
             if start is None:
                 return None
             predicted = start
@@ -313,7 +312,7 @@ class Tracker:
         speeds = joint_speeds(self._searcher.body, self._motion.pose)
         limits = self._motion.reachable(stamp_ns, self._searcher.limits, speeds)
         search = self._searcher.frame(
-            believed, stamp_ns, predicted, limits=limits, reach_m=self._searcher.tracked_reach_m
+            used, stamp_ns, predicted, limits=limits, reach_m=self._searcher.tracked_reach_m
         )
         sigma = self.body.sigma * self._motion.widening(stamp_ns)
         self._effort.search(search, self.body, self.config, predicted, sigma)
@@ -327,8 +326,8 @@ class Tracker:
         corrected = self._motion.reachable(stamp_ns, limits, np.full_like(speeds, LIMB_RAD_S))
         search.pose = recovered.placed(self.body, limits, corrected)
         return Found(
-            search, stamp_ns, believed, notes,
-            turned=recovered.turned, jumped=jumped, mended=recovered.moved_m > MENDED_M,
+            search, stamp_ns, used, notes,
+            turned=recovered.turned, jumped=jumped, recovered=recovered.moved_m > RECOVERED_M,
         )  # fmt: skip
 
     def _learn(self, found: Found) -> None:
@@ -337,7 +336,9 @@ class Tracker:
         self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
         if not tracked or found.anew:
             return
-        moved = self._body.fit_tracked_frame(found.search, turned=found.turned, mended=found.mended)
+        moved = self._body.fit_tracked_frame(
+            found.search, turned=found.turned, recovered=found.recovered
+        )
         if moved is not None:
             self._searcher = self._searcher_for(self.body)
             self._motion.shift(moved, self._body.limits)

@@ -74,8 +74,8 @@ def test_particles_scatter_less_where_costs_tell_them_where_to_be(name):
         problem(d=2, particles=60, iterations=1 if name == "pf" else 6, sigma=0.3)
     )
     search.run(lambda x: 30.0 * (x[:, 0] - 1.8) ** 2)
-    assert search.particle_sd_ratio.shape == (2,)
-    assert 0.0 < search.particle_sd_ratio[0] < 0.7 * search.particle_sd_ratio[1]
+    assert search.particle_sd.shape == (2,)
+    assert 0.0 < search.particle_sd[0] < 0.7 * search.particle_sd[1]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -119,7 +119,7 @@ def learn_background(
     more frames. For a single image `background.sigma_still` is assumed.
 
     Args:
-        frames: one or more images of the same size and channels.
+        frames: one or more images, uint8, (h, w, 3) BGR or (h, w) grey, of the same size.
         settings: `background.modes`, `background.sigma_min` and `background.sigma_still`.
         camera: name for error messages.
         note: the model's note; by default the number of frames.

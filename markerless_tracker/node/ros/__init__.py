@@ -1,4 +1,1 @@
-"""ROS code shared by both nodes: messages, images, camera info, QoS, stamps, parameters, logs.
-
-Independent of the tracker and the player.
-"""
+"""ROS code shared by all nodes: messages, images, camera info, QoS, stamps, parameters, logs."""

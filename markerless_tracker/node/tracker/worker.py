@@ -21,7 +21,7 @@ from markerless_tracker.node.tracker.announcer import CompilingLines, ready_line
 from markerless_tracker.node.tracker.learning import Learning, OpenRequest
 from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
 from markerless_tracker.node.tracker.pace.effort import EffortRule, Lateness
-from markerless_tracker.node.tracker.pace.start_gate import StartGate
+from markerless_tracker.node.tracker.pace.start_time import StartTimeGate
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
 from markerless_tracker.records import Observation, TrackResult
@@ -73,7 +73,7 @@ class TrackerHandle:
 
     Attributes:
         tracker: steps on the images.
-        start_ns: see `StartGate`.
+        start_ns: see `StartTimeGate`.
         decode: makes the tracker's image or observation of a camera's view.
         waits: whether the tracker has no backgrounds; sets are dropped until they are learned.
         warm_up: compiles what runs beside the tracker.
@@ -189,7 +189,7 @@ class TrackWorker:
         activity = "waiting for learn_background" if handle.waits else "waiting for images"
         self._status.became_ready(activity, now_s=self._clock())
         self._inform(ready_line(activity, kernels.done, self._clock() - begun_s))
-        gate = StartGate(handle.start_ns)
+        gate = StartTimeGate(handle.start_ns)
         ahead = Ahead(
             self._sets, partial(self._evidence, handle), poll_s=_POLL_S, clock=self._clock
         )
@@ -235,7 +235,7 @@ class TrackWorker:
         return images, handle.tracker.prepare(images, matched.stamp_ns)
 
     def _handle(
-        self, handle: TrackerHandle, gate: StartGate, taken: Taken, waited_s: float
+        self, handle: TrackerHandle, gate: StartTimeGate, taken: Taken, waited_s: float
     ) -> TrackedSet | None:
         """Track a set; None if it was dropped or failed."""
         matched = taken.matched

@@ -13,7 +13,7 @@ class Seen:
     Attributes:
         stamp_ns: its time.
         observed: what each camera saw.
-        believed: the observations that are used; near the predicted body undecided pixels are
+        used: the observations that are used; near the predicted body undecided pixels are
             decided.
         imaged: the same, with the undecided pixels that imaging alone left.
         notes: a line for each camera that is left out from now on, or used again.
@@ -22,7 +22,7 @@ class Seen:
 
     stamp_ns: int
     observed: Mapping[str, Observation]
-    believed: Mapping[str, Observation]
+    used: Mapping[str, Observation]
     imaged: Mapping[str, Observation]
     notes: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()

@@ -54,16 +54,16 @@ class ViewWatch:
             cover = float(observation.mask.sum()) / (width * height)
             if cover > MOST_COVER:
                 reasons[camera.name] = f"silhouette over {cover:.0%} of the frame"
-        believed = {name: seen for name, seen in observed.items() if name not in reasons}
-        empty = [name for name, seen in believed.items() if not seen.mask_words.any()]
+        used = {name: seen for name, seen in observed.items() if name not in reasons}
+        empty = [name for name, seen in used.items() if not seen.mask_words.any()]
         # No silhouette in any view: the person left, no camera is wrong.
-        if expected is not None and len(empty) < len(believed):
+        if expected is not None and len(empty) < len(used):
             points = markers(body, expected)
             for name in empty:
                 if self._in_frame(points, name) >= IN_FRAME:
                     reasons[name] = "no person where the other views show one"
-                    del believed[name]
-        return believed, self._changes(reasons)
+                    del used[name]
+        return used, self._changes(reasons)
 
     def _in_frame(self, points: FloatArray, name: str) -> float:
         camera = self._rig[name]
@@ -82,6 +82,6 @@ class ViewWatch:
         )
 
 
-def anybody(believed: Mapping[str, Observation]) -> bool:
+def anybody(used: Mapping[str, Observation]) -> bool:
     """Whether any view shows any silhouette."""
-    return any(observation.mask_words.any() for observation in believed.values())
+    return any(observation.mask_words.any() for observation in used.values())

@@ -39,7 +39,7 @@ ROTATION_NS = 100_000_000
 """One limb that is not lost is searched elsewhere this often: every sixth frame at 60 frames/s."""
 WAIT_NS = 16_000_000
 """Time before a limb near unexplained silhouette is searched again, after a search without gain."""
-MENDED_M = 0.10
+RECOVERED_M = 0.10
 """A limb that is found so far from its last place was wrong there."""
 _DOUBLINGS = 4
 """That time doubles with each search without gain, so often."""
@@ -84,11 +84,11 @@ class Recovered:
         Args:
             body: the body.
             limits: (2, p) of what does not jump.
-            corrected: (2, p) the same of limbs that were nearly in their places (`MENDED_M`).
+            corrected: (2, p) the same of limbs that were nearly in their places (`RECOVERED_M`).
         """
         pose, jumped = np.clip(self.pose, *limits), self.jumped(body)
         pose[jumped] = self.pose[jumped]
-        if not self.turned and self.moved_m <= MENDED_M:
+        if not self.turned and self.moved_m <= RECOVERED_M:
             pose[jumped] = np.clip(pose, *corrected)[jumped]
         return np.asarray(pose)
 
@@ -188,7 +188,7 @@ class LimbWatch:
             one: whether there is time for one thing alone: what compares the whole body's poses, or
                 one of the limbs, in turn.
         """
-        body, stamp_ns, observations = searcher.body, seen.stamp_ns, seen.believed
+        body, stamp_ns, observations = searcher.body, seen.stamp_ns, seen.used
         if not body.limbs:
             return Recovered(pose)
         unexplained = look_unexplained(body, pose, observations, self._rig)

@@ -30,9 +30,9 @@ PIECES = 2
 than others. A piece is one step's sums over one of the frames that are fitted to."""
 
 SearcherFor = Callable[[BodyModel], Searcher]
-MENDED_FRAMES = 30
+RECOVERED_FRAMES = 30
 """Frames after a fit of the lengths in which a limb that is found elsewhere makes it doubtful."""
-MOST_MENDED = 6
+MOST_RECOVERED = 6
 """Fits of the lengths that begin anew for that reason."""
 
 
@@ -92,7 +92,7 @@ class BodyEstimate:
         self._reported = False
         self._lengths: BodyFitting | None = None
         self._later: LaterFits | None = None
-        self._since_fit = self._mended = 0
+        self._since_fit = self._recovered = 0
         if self._person is not None and self._fits_sections and self._config.fit_lengths:
             self._begin_lengths(self._person)
 
@@ -147,14 +147,14 @@ class BodyEstimate:
             self.sections_fitted, self.sized = True, None
 
     def fit_tracked_frame(
-        self, search: FrameSearch, *, turned: bool = False, mended: bool = False
+        self, search: FrameSearch, *, turned: bool = False, recovered: bool = False
     ) -> FloatArray | None:
         """Use a tracked frame for what remains to be fitted, if it agrees with the body.
 
         Args:
             search: the frame's.
             turned: whether the body was turned round.
-            mended: whether a limb was found elsewhere: it was in a wrong place before.
+            recovered: whether a limb was found elsewhere: it was in a wrong place before.
 
         Returns:
             If `body` has changed: how far (p,) its poses lie from those tracked so far.
@@ -162,7 +162,7 @@ class BodyEstimate:
         if turned:
             return self.turned()
         self._since_fit += 1
-        if mended:
+        if recovered:
             self._fit_lengths_anew()
         agrees = _agrees(search)
         if agrees and self._later is not None:
@@ -204,9 +204,9 @@ class BodyEstimate:
         """Drop the frames that lengths are being fitted to, or were shortly before."""
         if self._person is None or not (self._fits_sections and self._config.fit_lengths):
             return
-        recent = self._lengths is not None or self._since_fit <= MENDED_FRAMES
-        if recent and self._mended < MOST_MENDED:
-            self._mended += 1
+        recent = self._lengths is not None or self._since_fit <= RECOVERED_FRAMES
+        if recent and self._recovered < MOST_RECOVERED:
+            self._recovered += 1
             self._begin_lengths(self._person)
         elif self._later is not None:
             self._later, self._revision = LaterFits(self._person), None

@@ -14,6 +14,7 @@ from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.hull import Hull, find_hulls
+from markerless_tracker.tracking.start.in_view import InViewGate
 from markerless_tracker.tracking.start.own_evidence import OwnEvidence
 from markerless_tracker.tracking.start.population import FramePopulation, Population
 from markerless_tracker.tracking.start.postures import put_at
@@ -25,7 +26,6 @@ from markerless_tracker.tracking.start.sizing import (
     first_statures_m,
     stature_cost,
 )
-from markerless_tracker.tracking.start.start_gate import StartGate
 from markerless_tracker.tracking.start.two_headings import HeadingFit, TwoHeadings
 
 GENERATIONS = 7
@@ -107,13 +107,13 @@ class Starter:
         self._sized = sized
         self._fit_shape = fit_shape
         self._last_pose = last_pose
-        self._start_gate = StartGate()
+        self._in_view = InViewGate()
         self._rejections = Rejections()
         self.reset()
 
     def reset(self) -> None:
         """Forget the person so far; objects that were rejected stay known."""
-        self._start_gate.reset()
+        self._in_view.reset()
         self._population: Population | None = None
         self._searcher: Searcher | None = None
         self._headings = TwoHeadings(0.0)
@@ -159,7 +159,7 @@ class Starter:
                 continue
             # A search takes long: not for a person that is hardly in view.
             stands = put_at(self._body, hull, self._body.neutral)
-            if not self._start_gate.enough(self._body, stands, looking, stamp_ns):
+            if not self._in_view.enough(self._body, stands, looking, stamp_ns):
                 continue
             observations = hulls_silhouettes(observed, self._cameras, hull)
             found = self._search(hull, observations, stamp_ns)
@@ -169,7 +169,7 @@ class Starter:
             frame, population = found
             assert self._searcher is not None
             best = population.poses[0]
-            if not self._start_gate.enough(self._searcher.body, best, looking, stamp_ns):
+            if not self._in_view.enough(self._searcher.body, best, looking, stamp_ns):
                 continue
             self._population = population
             self._headings = TwoHeadings(float(population.headings[0]))

@@ -12,7 +12,7 @@ from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import (
-    MENDED_M,
+    RECOVERED_M,
     ROTATION_NS,
     WAIT_NS,
     LimbWatch,
@@ -146,7 +146,7 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
 
 @pytest.mark.parametrize(
     ("moved_m", "turned", "allowed"),
-    [(0.5 * MENDED_M, False, 0.2), (2.0 * MENDED_M, False, 1.0), (0.0, True, 1.0)],
+    [(0.5 * RECOVERED_M, False, 0.2), (2.0 * RECOVERED_M, False, 1.0), (0.0, True, 1.0)],
 )
 def test_a_limb_jumps_only_from_where_it_was_wrong(standing, moved_m, turned, allowed) -> None:
     body = standing[0].body

@@ -10,8 +10,8 @@ from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 from markerless_tracker.tracking.person.body_fitting import EVERY, FRAMES, POLISH
 from markerless_tracker.tracking.person.estimate import (
-    MENDED_FRAMES,
-    MOST_MENDED,
+    MOST_RECOVERED,
+    RECOVERED_FRAMES,
     BodyEstimate,
 )
 from markerless_tracker.tracking.search import Searcher
@@ -28,7 +28,7 @@ def walk():
     """Observations of a walking person, as many as a fit needs and some more."""
     scene = SyntheticScene(body="person31", motion="walk", size_px=(164, 123), seed=2)
     taken = []
-    for index in range(LAST + MOST_MENDED):
+    for index in range(LAST + MOST_RECOVERED):
         _, masks, _ = scene.frame(index)
         seen = {
             name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
@@ -79,23 +79,23 @@ def test_lengths_can_be_left_alone(walk, settings, subject) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mended", "last"),
+    ("recovered", "last"),
     [
         pytest.param(range(SETTLING_FRAMES + 1, SETTLING_FRAMES + 2), LAST + 1, id="once"),
-        pytest.param(range(LAST + MOST_MENDED), LAST + MOST_MENDED - 1, id="always"),
+        pytest.param(range(LAST + MOST_RECOVERED), LAST + MOST_RECOVERED - 1, id="always"),
     ],
 )
 def test_the_fit_begins_anew_when_a_limb_was_found_elsewhere(
-    walk, monkeypatch, mended: range, last: int
+    walk, monkeypatch, recovered: range, last: int
 ) -> None:
     scene, taken = walk
     config = TrackerConfig(threads=1, search_again=False)
     tracker = build_tracker(scene.rig, config, stature=1.65).tracker
     fit = BodyEstimate.fit_tracked_frame
-    stamps = [taken[index][0] for index in mended]
+    stamps = [taken[index][0] for index in recovered]
 
-    def told(self, search, *, turned: bool, mended: bool):
-        return fit(self, search, turned=turned, mended=now in stamps)
+    def told(self, search, *, turned: bool, recovered: bool):
+        return fit(self, search, turned=turned, recovered=now in stamps)
 
     monkeypatch.setattr(BodyEstimate, "fit_tracked_frame", told)
     lengths = []
@@ -105,7 +105,9 @@ def test_the_fit_begins_anew_when_a_limb_was_found_elsewhere(
     assert changes(np.array(lengths)) == [last]
 
 
-@pytest.mark.parametrize(("since", "anew"), [(MENDED_FRAMES, True), (MENDED_FRAMES + 1, False)])
+@pytest.mark.parametrize(
+    ("since", "anew"), [(RECOVERED_FRAMES, True), (RECOVERED_FRAMES + 1, False)]
+)
 def test_a_fit_is_doubtful_for_a_while_when_a_limb_is_found_elsewhere(
     walk, since: int, anew: bool
 ) -> None:
@@ -120,5 +122,5 @@ def test_a_fit_is_doubtful_for_a_while_when_a_limb_is_found_elsewhere(
     estimate = tracker._body
     estimate._since_fit = since - 1
     for index in range(TAKEN):
-        estimate.fit_tracked_frame(search, mended=index == 0)
+        estimate.fit_tracked_frame(search, recovered=index == 0)
     assert (SIZES.of(estimate.body) != lengths[-1]).any() == anew

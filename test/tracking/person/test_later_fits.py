@@ -125,7 +125,7 @@ def test_frames_with_a_limb_in_a_wrong_place_are_forgotten(
     for number in range(FIRST + 1):
         estimate.fit_tracked_frame(tracked(kneeling(0.5 * (number % 2))))
     assert estimate._revision is not None
-    estimate.fit_tracked_frame(tracked(kneeling(0.0)), mended=True)
+    estimate.fit_tracked_frame(tracked(kneeling(0.0)), recovered=True)
     assert estimate._revision is None and estimate.body is GENERIC
 
 

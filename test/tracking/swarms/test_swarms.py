@@ -87,7 +87,7 @@ def test_they_find_the_same(views, name, options, part, wide) -> None:
     found, written, refused = both(views, name, options, part=part, wide=wide)
     np.testing.assert_array_equal(found.found, written.best_x)
     assert found.found_cost[0] == written.best_cost
-    np.testing.assert_array_equal(found.best.std(axis=0), written.particle_sd_ratio)
+    np.testing.assert_array_equal(found.best.std(axis=0), written.particle_sd)
     assert found.found_cost[0] < np.inf if wide == 1.0 else refused > 10 or part == "l_arm"
 
 

@@ -1,4 +1,1 @@
-"""What is counted of each camera.
-
-Filled by the synchronizer, reported in `state`.
-"""
+"""Inputs of the cameras, images or evidence, and what is counted of each for `state`."""

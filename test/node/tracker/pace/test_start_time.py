@@ -1,6 +1,6 @@
 import pytest
 
-from markerless_tracker.node.tracker.pace.start_gate import StartGate
+from markerless_tracker.node.tracker.pace.start_time import StartTimeGate
 
 FRAME_NS = 16_666_667
 
@@ -15,6 +15,6 @@ FRAME_NS = 16_666_667
         (FRAME_NS // 2, [0, 4_166_667, 8_333_333], [False, False, True]),
     ],
 )
-def test_start_gate(start_ns: int | None, stamps: list[int], admitted: list[bool]) -> None:
-    gate = StartGate(start_ns)
+def test_start_time(start_ns: int | None, stamps: list[int], admitted: list[bool]) -> None:
+    gate = StartTimeGate(start_ns)
     assert [gate.admits(stamp) for stamp in stamps] == admitted

@@ -24,7 +24,7 @@ GAP_NS = 500_000_000
 """After so long without a person in two cameras' views the next one is another visit."""
 
 
-class StartGate:
+class InViewGate:
     """Allows a start at once if three cameras see the person, else after a while."""
 
     def __init__(self) -> None:

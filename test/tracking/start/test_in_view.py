@@ -9,10 +9,10 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.synthesis.rig import ring_rig
 from markerless_tracker.tracking import TrackerConfig, build_tracker
-from markerless_tracker.tracking.start.start_gate import (
+from markerless_tracker.tracking.start.in_view import (
     GAP_NS,
     PATIENCE_NS,
-    StartGate,
+    InViewGate,
     fraction_in_view,
 )
 
@@ -52,22 +52,22 @@ def test_a_third_camera_is_waited_for_a_while(body) -> None:
     assert (
         fraction_in_view(body, aside, rig, 2) == 1.0 > 0.5 > fraction_in_view(body, aside, rig, 3)
     )
-    assert StartGate().enough(body, pose, rig, 0)
+    assert InViewGate().enough(body, pose, rig, 0)
     # Others do not look: two are all there are.
-    assert StartGate().enough(body, pose, rig.cameras[:2], 0)
-    start_gate = StartGate()
+    assert InViewGate().enough(body, pose, rig.cameras[:2], 0)
+    gate = InViewGate()
     for stamp_ns in range(5, 5 + PATIENCE_NS, GAP_NS):
-        assert not start_gate.enough(body, aside, rig, stamp_ns)
-    assert start_gate.enough(body, aside, rig, 5 + PATIENCE_NS)
-    start_gate.reset()
-    assert not start_gate.enough(body, aside, rig, 6 + PATIENCE_NS)
-    assert not start_gate.enough(body, standing(body, 9.0), rig, 9 * PATIENCE_NS)
+        assert not gate.enough(body, aside, rig, stamp_ns)
+    assert gate.enough(body, aside, rig, 5 + PATIENCE_NS)
+    gate.reset()
+    assert not gate.enough(body, aside, rig, 6 + PATIENCE_NS)
+    assert not gate.enough(body, standing(body, 9.0), rig, 9 * PATIENCE_NS)
 
 
 def test_the_next_person_is_waited_for_as_the_first_was(body) -> None:
     """The first leaves without an empty frame in between: things stay in view."""
     rig, away, aside = ring_rig(4), standing(body, 9.0), standing(body, 2.6)
-    gate = StartGate()
+    gate = InViewGate()
     for stamp_ns in range(0, PATIENCE_NS, GAP_NS):
         assert not gate.enough(body, aside, rig, stamp_ns)
         assert not gate.enough(body, away, rig, stamp_ns)
@@ -81,7 +81,7 @@ def test_the_next_person_is_waited_for_as_the_first_was(body) -> None:
 
 def test_a_recording_that_begins_anew_is_another_visit(body) -> None:
     rig, aside = ring_rig(4), standing(body, 2.6)
-    gate = StartGate()
+    gate = InViewGate()
     for stamp_ns in range(0, PATIENCE_NS + 1, GAP_NS):
         gate.enough(body, aside, rig, stamp_ns)
     assert not gate.enough(body, aside, rig, PATIENCE_NS - 1)

@@ -5,7 +5,7 @@ START_TOLERANCE_NS = 4_000_000
 frames are further apart (8.3 ms at 120 fps)."""
 
 
-class StartGate:
+class StartTimeGate:
     """Drops sets before the start row's time, once.
 
     A stream that begins later than that time, or a start without a time, begins with its first
