@@ -102,7 +102,7 @@ def test_another_numba_stores_its_kernels_beside(monkeypatch: pytest.MonkeyPatch
     file = PACKAGE / "fitness" / "raster" / "kernels.py"
     digest = source_digest.__wrapped__
     mine = digest(file)
-    monkeypatch.setattr(compiled, "numba_version", "0.58.1")
+    monkeypatch.setattr(compiled, "numba_version", "0.0.1")
     assert digest(file) != mine
 
 
