@@ -53,6 +53,18 @@ def floor_disc(scene, name, mask):
     return disc
 
 
+def with_shadow(scene, masks, points):
+    """Observations in which points (n, 3) of the room are undecided beside the person."""
+    seen = {}
+    for name, mask in masks.items():
+        u, v = np.round(project_camera(points, scene.rig[name])).astype(int).T
+        framed = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
+        shadow = np.zeros_like(mask)
+        shadow[v[framed], u[framed]] = True
+        seen[name] = observe(name, mask | shadow, shadow & ~mask)
+    return seen
+
+
 def test_undecided_legs_in_two_views_do_not_carve(person) -> None:
     scene, masks = person
     nothing = {name: np.zeros_like(mask) for name, mask in masks.items()}
@@ -110,13 +122,7 @@ def test_a_larger_shadow_does_not_hide_the_person(person, gap_m) -> None:
         axis=-1,
     ).reshape(-1, 3)
     wall = grid + [side, scene.markers(0)[0][1], 0.1]
-    seen = {}
-    for name, mask in masks.items():
-        u, v = np.round(project_camera(wall, scene.rig[name])).astype(int).T
-        framed = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
-        shadow = np.zeros_like(mask)
-        shadow[v[framed], u[framed]] = True
-        seen[name] = observe(name, mask | shadow, shadow & ~mask)
+    seen = with_shadow(scene, masks, wall)
     hull = next(find_hulls(cameras(scene), seen))
     assert np.linalg.norm((hull.trunk_m.mean(axis=0) - plain.trunk_m.mean(axis=0))[:2]) < 0.2
     assert hull.points_m[:, 0].max() < plain.points_m[:, 0].max() + ASIDE_M + 3 * FINE_M
@@ -128,13 +134,7 @@ def test_a_shadow_beside_the_person_is_left_out(person) -> None:
     pelvis = scene.markers(0)[0]
     grid = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 60)] * 3), axis=-1).reshape(-1, 3)
     patch = pelvis * [1.0, 1.0, 0.0] + [0.45, 0.0, 0.12] + grid * [0.45, 0.15, 0.12]
-    seen = {}
-    for name, mask in masks.items():
-        u, v = np.round(project_camera(patch, scene.rig[name])).astype(int).T
-        framed = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
-        shadow = np.zeros_like(mask)
-        shadow[v[framed], u[framed]] = True
-        seen[name] = observe(name, mask | shadow, shadow & ~mask)
+    seen = with_shadow(scene, masks, patch)
     hull = next(find_hulls(cameras(scene), seen))
     aside = hull.points_m[:, 0] - hull.trunk_m[:, 0].mean() > 0.6
     assert not aside.any()
