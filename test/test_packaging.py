@@ -124,6 +124,13 @@ def test_ros_is_an_extra_only(wheel: zipfile.ZipFile) -> None:
     assert all('extra == "ros"' in line.replace("'", '"') for line in ros)
 
 
+def test_all_is_every_extra_of_users_but_ros(wheel: zipfile.ZipFile) -> None:
+    text = wheel.read(f"{NAME}-{__version__}.dist-info/METADATA").decode().replace("'", '"')
+    found = re.findall(r'^Requires-Dist: ([\w-]+).*extra == "(\w+)"', text, re.MULTILINE)
+    wanted = {name for name, extra in found if extra in {"cluster", "formats", "plots", "view"}}
+    assert len(wanted) >= 6 and {name for name, extra in found if extra == "all"} == wanted
+
+
 def test_lock_pins_every_direct_dependency(project_root: Path) -> None:
     lock = (project_root / "requirements" / "lock.txt").read_text(encoding="utf-8")
     pinned = {

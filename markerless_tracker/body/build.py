@@ -103,7 +103,8 @@ def build_body(description: BodyDescription, subject: Subject) -> BodyModel:
             _look(frames, _get(entry, "parent", where), where), chain, where
         )
     del frames["world"]
-    idle = [name for i, name in enumerate(parameters) if i not in set(nodes.parameter)]
+    moving = set(nodes.parameter)
+    idle = [name for i, name in enumerate(parameters) if i not in moving]
     if idle:
         raise BodyModelError(f"body {d.name}: no frame is moved by parameter {', '.join(idle)}")
     missing, extra = sorted(set(MARKER_NAMES) - set(d.markers)), set(d.markers) - set(MARKER_NAMES)

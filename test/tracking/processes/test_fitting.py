@@ -123,7 +123,7 @@ def test_what_the_tracker_raises_is_raised_here_and_the_next_set_is_tracked(
     with pytest.raises(CalibrationError, match="cam99"):
         process.prepare({"cam99": frames[0].images["cam01"]}, 0)
     large = {name: np.tile(image, (3, 1, 1)) for name, image in frames[0].images.items()}
-    with pytest.raises(ImageError, match="cam01"):
+    with pytest.raises(ImageError, match=r"cam01.* \d+x\d+"):
         process.prepare(large, 0)
     with pytest.raises(ConfigError, match="effort"):
         process.step(frames[0].images, frames[0].stamp_ns, 2.0)

@@ -7,7 +7,6 @@ from markerless_tracker.camera import project_camera
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking.start.hull import (
-    ASIDE_M,
     FINE_M,
     FLOOR_M,
     FOOT_M,
@@ -110,22 +109,24 @@ def test_a_shadow_without_a_person_is_no_hull(person) -> None:
     assert not list(find_hulls(cameras(scene), seen))
 
 
-@pytest.mark.parametrize("gap_m", [0.0, 0.1], ids=["touches", "near"])
-def test_a_larger_shadow_does_not_hide_the_person(person, gap_m) -> None:
-    """A low wall of undecided points that reaches far aside, of more volume than the person."""
+@pytest.mark.parametrize(
+    ("gap_m", "size_m", "low_m"),
+    [
+        pytest.param(0.1, (2.0, 0.2, 0.5), 0.1, id="near"),
+        pytest.param(0.0, (2.5, 0.6, 0.3), 0.8, id="touches"),
+    ],
+)
+def test_a_larger_shadow_does_not_hide_the_person(person, gap_m, size_m, low_m) -> None:
+    """A wall of undecided points that reaches far aside, of more volume than the person."""
     scene, masks = person
     nothing = {name: np.zeros_like(mask) for name, mask in masks.items()}
     plain = next(find_hulls(cameras(scene), {n: observe(n, masks[n], nothing[n]) for n in masks}))
-    side = plain.points_m[:, 0].max() + gap_m
-    grid = np.stack(
-        np.meshgrid(np.linspace(0, 2, 150), np.linspace(-0.1, 0.1, 30), np.linspace(0, 0.5, 50)),
-        axis=-1,
-    ).reshape(-1, 3)
-    wall = grid + [side, scene.markers(0)[0][1], 0.1]
-    seen = with_shadow(scene, masks, wall)
-    hull = next(find_hulls(cameras(scene), seen))
+    side = float(plain.points_m[:, 0].max())
+    grid = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 80)] * 3), axis=-1).reshape(-1, 3)
+    corner = [side + gap_m, scene.markers(0)[0][1] - 0.5 * size_m[1], low_m]
+    hull = next(find_hulls(cameras(scene), with_shadow(scene, masks, corner + grid * size_m)))
     assert np.linalg.norm((hull.trunk_m.mean(axis=0) - plain.trunk_m.mean(axis=0))[:2]) < 0.2
-    assert hull.points_m[:, 0].max() < plain.points_m[:, 0].max() + ASIDE_M + 3 * FINE_M
+    assert hull.points_m[:, 0].max() < side + 0.5 * size_m[0]
 
 
 def test_a_shadow_beside_the_person_is_left_out(person) -> None:

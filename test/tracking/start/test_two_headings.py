@@ -18,7 +18,7 @@ STANDS = np.zeros(3)
 
 
 def fit(cost: float, trunk_m: np.ndarray = STANDS) -> HeadingFit:
-    return HeadingFit(None, np.zeros(1), cost, trunk_m)  # type: ignore[arg-type]
+    return HeadingFit(None, np.zeros(1), cost, trunk_m)
 
 
 def changes(
