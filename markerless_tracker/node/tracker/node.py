@@ -226,8 +226,14 @@ class TrackerNode(GivenNode):
             setup.start_stamp_ns,
             view_reader(scaled, self._inputs),
             waits=any(setup.tracker.segmenter(name) is None for name in self._image_cameras),
-            warm_up=partial(self._time_offsets.warm_up, setup.tracker.body),
+            warm_up=partial(self._warm_up, setup.tracker.body),
         )
+
+    def _warm_up(self, body: BodyModel) -> None:
+        """Compile what runs beside the tracker."""
+        if self._time_offsets is not None:
+            self._time_offsets.warm_up(body)
+        self._report.warm_up(body)
 
     # outputs
 

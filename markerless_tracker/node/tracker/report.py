@@ -56,6 +56,11 @@ class RunReport:
             self._doubts = calibration_doubts(rig)
             return self._doubts
 
+    def warm_up(self, body: BodyModel) -> None:
+        """Compile what a result needs, for bodies of this kind."""
+        if self._record is not None:
+            self._record.static.warm_up(body)
+
     def add(self, result: TrackResult, body: BodyModel) -> None:
         """Take a result, and the body as it is now."""
         with self._lock:

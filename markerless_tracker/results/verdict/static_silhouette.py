@@ -1,7 +1,8 @@
 """Silhouette that never moves with any limb: furniture or a machine that the background lacks.
 
-Now and then the silhouettes are compared with the tracked body. Pixels that are person throughout,
-and lie beside the body in most of the comparisons, are no person's.
+Now and then, seldom while the tracker is overloaded, the silhouettes are compared with the tracked
+body. Pixels that are person throughout, and lie beside the body in most of the comparisons, are
+no person's.
 """
 
 from dataclasses import dataclass
@@ -18,7 +19,8 @@ from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.search import pixels_per_m
 
 EVERY_NS, LATER_EVERY_NS = 60_000_000, 2_000_000_000
-"""Time between the first `MANY` comparisons, and between those after them."""
+"""Time between the first `MANY` comparisons, and between those after them and while the tracker's
+effort is below 1."""
 MANY = 12
 LEAST = 6
 """Comparisons without which nothing is said."""
@@ -55,11 +57,16 @@ class StaticSilhouette:
         self._last_ns: int | None = None
         self._comparisons = 0
 
+    def warm_up(self, body: BodyModel) -> None:
+        """Compile what a comparison needs, for bodies of this kind."""
+        body_masks(body, body.neutral, list(self._cameras.values()))
+
     def add(self, result: TrackResult, body: BodyModel) -> dict[str, NDArray[np.bool_]]:
         """Take a frame; returns, by camera, what the body covers (h, w), empty if passed over."""
         if result.state is not TrackState.TRACKING or result.pose is None:
             return {}
-        every_ns = EVERY_NS if self._comparisons < MANY else LATER_EVERY_NS
+        seldom = self._comparisons >= MANY or result.effort < 1.0
+        every_ns = LATER_EVERY_NS if seldom else EVERY_NS
         # Stamps may be set back.
         if self._last_ns is not None and abs(result.stamp_ns - self._last_ns) < every_ns:
             return {}

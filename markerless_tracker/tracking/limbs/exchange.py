@@ -4,10 +4,13 @@ Legs or arms that were tracked into each other's place explain the silhouettes n
 as long as the step goes on. No search of one limb alone finds both again.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.limbs.crossed import in_each_others_place, is_crossed
 from markerless_tracker.tracking.start.mirror import mirror_of
 
 PAIRS = ("legs", "arms")
@@ -19,6 +22,21 @@ LEAST_GAIN = 0.004
 """Least rise of f_s. Where the legs pass each other both ways fit alike."""
 CLOSE = 0.018
 """As of `LimbSearch.compared`: limbs in their place cost more when they are exchanged."""
+
+
+class Exchange(NamedTuple):
+    """An exchange that is due.
+
+    Attributes:
+        name: of the pair.
+        pose: (p,) with the pair exchanged.
+        least_gain: rise of f_s from which on it is taken: a pair that is crossed no more need not
+            be any better.
+    """
+
+    name: str
+    pose: FloatArray
+    least_gain: float
 
 
 class PairExchange:
@@ -34,8 +52,8 @@ class PairExchange:
 
     def due(
         self, body: BodyModel, pose: FloatArray, limits: FloatArray, stamp_ns: int
-    ) -> tuple[str, FloatArray] | None:
-        """A pair's name and the pose (p,) with it exchanged, within limits (2, p), if it is due."""
+    ) -> Exchange | None:
+        """The exchange of a pair in a pose (p,), within limits (2, p), if one is due."""
         if self._tried_ns is not None and 0 <= stamp_ns - self._tried_ns < EVERY_NS:
             return None
         for turn in range(len(PAIRS)):
@@ -44,17 +62,19 @@ class PairExchange:
             if other is not None:
                 self._tried_ns = stamp_ns
                 self._next = PAIRS.index(name) + 1
-                return name, other
+                return other
         return None
 
 
-def _exchanged(
-    name: str, body: BodyModel, pose: FloatArray, limits: FloatArray
-) -> FloatArray | None:
-    """The pose (p,) with a pair exchanged, unless that changes nothing."""
+def _exchanged(name: str, body: BodyModel, pose: FloatArray, limits: FloatArray) -> Exchange | None:
+    """A pair exchanged in a pose (p,), unless that changes nothing."""
     if name not in body.subspaces:
         return None
     pair, other = body.subspaces[name], pose.copy()
     other[pair] = np.clip(mirror_of(body).of(pose)[pair], *limits[:, pair])
+    least_gain = LEAST_GAIN
+    if is_crossed(body, pose, name):
+        other = in_each_others_place(body, pose, name, other, limits)
+        least_gain = LEAST_GAIN if is_crossed(body, other, name) else 0.0
     moved_m = np.linalg.norm(markers(body, other) - markers(body, pose), axis=1)
-    return other if moved_m.max() >= LEAST_M else None
+    return Exchange(name, other, least_gain) if moved_m.max() >= LEAST_M else None

@@ -25,7 +25,7 @@ from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import LimbState, Observation, TrackState
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.aimed import most_aimed
-from markerless_tracker.tracking.limbs.exchange import CLOSE, LEAST_GAIN, PairExchange
+from markerless_tracker.tracking.limbs.exchange import CLOSE, PairExchange
 from markerless_tracker.tracking.limbs.facing import FacingWatch
 from markerless_tracker.tracking.limbs.search import LimbSearch
 from markerless_tracker.tracking.limbs.unexplained import look_unexplained
@@ -214,8 +214,8 @@ class LimbWatch:
             if turned is not None:
                 return Recovered(turned, turned=True)
         found = []
-        if pair is not None and search.takes(pair[1], LEAST_GAIN, CLOSE):
-            found.append(pair[0])
+        if pair is not None and search.takes(pair.pose, pair.least_gain, CLOSE):
+            found.append(pair.name)
         for name in due:
             rng = keyed_generator(searcher.config.seed, stamp_ns, f"{name} elsewhere")
             limb = body.subspaces[name]

@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from markerless_tracker.records import TrackState
-from markerless_tracker.results.verdict.static_silhouette import LEAST, StaticSilhouette
+from markerless_tracker.results.verdict import static_silhouette
+from markerless_tracker.results.verdict.static_silhouette import (
+    LATER_EVERY_NS,
+    LEAST,
+    StaticSilhouette,
+)
 
 
 def furnished(masks: dict[str, Any], side: int) -> dict[str, Any]:
@@ -72,3 +77,26 @@ def test_silhouettes_of_regions_count_as_those_of_whole_images(
             assert not cut[name].is_whole
         parts.add(replace(seen, observations=cut), scene.body)
     assert parts.found_m2() == whole.found_m2() != {}
+
+
+def test_an_overloaded_tracker_compares_seldom(scene: Any, result: Any, masks: Any) -> None:
+    check = StaticSilhouette(scene.rig)
+    for index in range(LEAST):
+        seen = result(index, shown=furnished(masks[index], 24))
+        assert bool(check.add(replace(seen, effort=0.5), scene.body)) == (index == 0)
+    late = result(0, shown=furnished(masks[0], 24))
+    late = replace(late, effort=0.5, stamp_ns=late.stamp_ns + LATER_EVERY_NS)
+    assert check.add(late, scene.body)
+
+
+def test_a_comparison_compiles_nothing_after_the_warm_up(
+    scene: Any, result: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The node is told to warm up before the first set comes."""
+    drawn = []
+    monkeypatch.setattr(
+        static_silhouette, "body_masks",
+        lambda body, pose, cameras: drawn.append((body, len(cameras))) or {},
+    )  # fmt: skip
+    StaticSilhouette(scene.rig).warm_up(scene.body)
+    assert drawn == [(scene.body, len(list(scene.rig)))]

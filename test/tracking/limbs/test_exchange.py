@@ -6,12 +6,20 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, markers
+from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
-from markerless_tracker.tracking.limbs.exchange import EVERY_NS, LEAST_M, PAIRS, PairExchange
+from markerless_tracker.tracking.limbs.crossed import in_each_others_place, is_crossed
+from markerless_tracker.tracking.limbs.exchange import (
+    EVERY_NS,
+    LEAST_GAIN,
+    LEAST_M,
+    PAIRS,
+    PairExchange,
+)
 from markerless_tracker.tracking.limbs.watch import LimbWatch, Recovered
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.mirror import Mirror
@@ -90,7 +98,8 @@ def test_the_pairs_are_tried_in_turn_where_it_changes_anything(walking: Walking)
     assert [one and one[0] for one in tried] == [PAIRS[0], PAIRS[1], PAIRS[0]]
     other = tried[PAIRS.index(walking.pair)]
     assert other is not None
-    np.testing.assert_allclose(markers(body, other[1]), markers(body, walking.swapped), atol=0.01)
+    np.testing.assert_allclose(markers(body, other.pose), markers(body, walking.swapped), atol=0.01)
+    assert other.least_gain == LEAST_GAIN
     assert exchange.due(body, walking.pose, body.limits, stamps[-1] + EVERY_NS - 1) is None
     # Time that was set back begins anew.
     assert exchange.due(body, walking.pose, body.limits, 0) is not None
@@ -106,3 +115,58 @@ def test_a_pair_alone_in_another_place_is_tried_every_time(walking: Walking) -> 
     for stamp in (0, EVERY_NS):
         tried = exchange.due(body, pose, body.limits, stamp)
         assert tried is not None and tried[0] == walking.pair
+
+
+@pytest.fixture(scope="module")
+def standing() -> Walking:
+    """A person who stands with the legs apart, and the same silhouettes with crossed legs."""
+    scene = SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=3)
+    body, apart, rig = scene.body, scene.body.neutral.copy(), scene.rig
+    for name, angle in (("l_hip_x", 0.15), ("r_hip_x", 0.15)):
+        side = markers(body, apart)[MARKER_NAMES.index(f"{name[0].upper()}Ankle"), 1]
+        trial = apart.copy()
+        trial[body.index(name)] += angle
+        moved = markers(body, trial)[MARKER_NAMES.index(f"{name[0].upper()}Ankle"), 1]
+        sign = 1.0 if abs(moved) > abs(side) else -1.0
+        apart[body.index(name)] += sign * angle
+    masks = body_masks(body, apart, list(rig))
+    seen = {
+        name: Observation.from_mask(name, 0, mask.astype(np.uint8), np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+    }
+    crossed = in_each_others_place(body, apart, "legs", apart, body.limits)
+    return Walking("legs", scene, seen, apart, crossed)
+
+
+def test_crossed_legs_take_each_others_place(standing: Walking) -> None:
+    body, rows = standing.scene.body, [MARKER_NAMES.index(name) for name in ENDS["legs"]]
+    assert not is_crossed(body, standing.pose, "legs")
+    assert is_crossed(body, standing.swapped, "legs")
+    apart, crossed = (markers(body, pose)[rows] for pose in (standing.pose, standing.swapped))
+    np.testing.assert_allclose(crossed, apart[::-1], atol=0.07)
+    # Exchanged angles would leave them crossed.
+    mirrored = standing.swapped.copy()
+    mirrored[body.subspaces["legs"]] = Mirror(body).of(mirrored)[body.subspaces["legs"]]
+    assert is_crossed(body, mirrored, "legs")
+
+
+def test_what_is_crossed_no_more_need_not_be_better(standing: Walking) -> None:
+    body = standing.scene.body
+    due = PairExchange().due(body, standing.swapped, body.limits, 0)
+    assert due is not None and due.name == "legs" and due.least_gain == 0.0
+    assert not is_crossed(body, due.pose, "legs")
+    due = PairExchange().due(body, standing.pose, body.limits, 0)
+    assert due is None or due.least_gain == LEAST_GAIN
+
+
+def test_legs_that_a_start_crossed_are_found(standing: Walking) -> None:
+    assert standing.off_m(standing.swapped) > 0.2
+    found = recovered(standing, standing.swapped)
+    assert found.names[:1] == ("legs",)
+    assert standing.off_m(found.pose) < 0.05
+    assert "legs" not in recovered(standing, standing.pose).names
+
+
+def test_arms_before_the_trunk_are_not_crossed_at_the_elbows() -> None:
+    scene = SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=3)
+    assert not is_crossed(scene.body, scene.body.neutral, "arms")

@@ -1,0 +1,66 @@
+"""Crossed legs or arms, and where each goes if the two take each other's place.
+
+A leg on the other leg's side, with the other one on its side, leaves the silhouette that an
+uncrossed pair leaves, but for the thighs. People seldom stand so. Exchanging the joints' angles, as
+in a mirror, does not help: what is crossed stays crossed.
+"""
+
+from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body.model import MARKER_NAMES
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.optim import Prior, refine
+from markerless_tracker.tracking.confidence import slopes
+
+_JOINTS = {"legs": ("Hip", "Knee", "Ankle"), "arms": ("Shoulder", "Elbow", "Wrist")}
+_STEPS = 8
+_PLACE_M = 0.02
+"""Standard deviation of a joint from the other one's place: the rest is the angles' own prior."""
+
+
+def is_crossed(body: BodyModel, pose: FloatArray, pair: str) -> bool:
+    """Whether both joints of the left limb lie to the right of the right limb's, at a pose (p,).
+
+    Args:
+        body: the body.
+        pose: (p,).
+        pair: "legs" or "arms".
+    """
+    root, *joints = _JOINTS[pair]
+    points = dict(zip(MARKER_NAMES, markers(body, pose), strict=True))
+    leftward = points[f"L{root}"] - points[f"R{root}"]
+    return all(float((points[f"L{j}"] - points[f"R{j}"]) @ leftward) < 0.0 for j in joints)
+
+
+def in_each_others_place(
+    body: BodyModel, pose: FloatArray, pair: str, begin: FloatArray, limits: FloatArray
+) -> FloatArray:
+    """A pose (p,) whose left limb lies where the right one was, and the other way round.
+
+    By damped least squares over the pair's parameters, as far as limits (2, p) allow.
+
+    Args:
+        body: the body.
+        pose: (p,) as it is.
+        pair: "legs" or "arms".
+        begin: (p,) a pose with the pair where the squares' descent begins.
+        limits: (2, p).
+    """
+    _, *joints = _JOINTS[pair]
+    moved = [MARKER_NAMES.index(side + joint) for side in "LR" for joint in joints]
+    places = [MARKER_NAMES.index(side + joint) for side in "RL" for joint in joints]
+    goal_m = markers(body, pose)[places]
+    parameters, other = body.subspaces[pair], begin.copy()
+
+    def equations(values: FloatArray, _: float) -> tuple[FloatArray, FloatArray]:
+        other[parameters] = values
+        off_m = (markers(body, other)[moved] - goal_m).ravel()
+        by_marker = slopes(body, other)[0].reshape(-1, 3, body.size)
+        slope = by_marker[moved][:, :, parameters].reshape(off_m.size, -1)
+        return slope.T @ slope / _PLACE_M**2, slope.T @ off_m / _PLACE_M**2
+
+    usual = Prior(body.prior_mean[parameters], 1.0 / body.prior_sd[parameters] ** 2)
+    other[parameters] = refine(
+        equations, begin[parameters], priors=(usual,), bounds=limits[:, parameters],
+        iterations=_STEPS, truncation=(1.0, 1.0),
+    )  # fmt: skip
+    return other
