@@ -14,6 +14,8 @@ from rclpy.parameter import Parameter
 
 from markerless_tracker.errors import TrackerError
 
+READY_S = 600.0  # the first start compiles
+
 
 @pytest.mark.parametrize(
     ("change", "says"),
@@ -96,6 +98,30 @@ def test_arguments_outside_ros_args_are_refused() -> None:
         init_context(["seed:=1"])
     with pytest.raises(TrackerError, match="ROS arguments: "):
         init_context(["--ros-args", "-p", "seed"])
+
+
+def test_the_report_is_compiled_before_the_node_is_ready(
+    world: Any, ros_context: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from markerless_tracker.node.tracker.node import TrackerNode
+    from markerless_tracker.results.verdict.static_silhouette import StaticSilhouette
+
+    warmed: list[str] = []
+    monkeypatch.setattr(
+        StaticSilhouette, "warm_up", lambda *_: warmed.append(node.get_parameter("body").value)
+    )
+    given = {key: str(value) for key, value in world.parameters().items()}
+    overrides = [Parameter(name, value=value) for name, value in given.items()]
+    node = TrackerNode(context=ros_context, parameter_overrides=overrides)
+    try:
+        end_s = time.monotonic() + READY_S
+        while not node._status.ready and node.fatal is None and time.monotonic() < end_s:
+            time.sleep(0.05)
+        assert node.fatal is None and node._status.ready
+        assert warmed == ["balan31"]
+    finally:
+        node.close()
+        node.destroy_node()
 
 
 def test_a_signal_while_compiling_leaves_nothing_in_shared_memory(
