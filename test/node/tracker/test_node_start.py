@@ -107,9 +107,7 @@ def test_the_report_is_compiled_before_the_node_is_ready(
     from markerless_tracker.results.verdict.static_silhouette import StaticSilhouette
 
     warmed: list[str] = []
-    monkeypatch.setattr(
-        StaticSilhouette, "warm_up", lambda *_: warmed.append(node.get_parameter("body").value)
-    )
+    monkeypatch.setattr(StaticSilhouette, "warm_up", lambda _, body: warmed.append(body.name))
     given = {key: str(value) for key, value in world.parameters().items()}
     overrides = [Parameter(name, value=value) for name, value in given.items()]
     node = TrackerNode(context=ros_context, parameter_overrides=overrides)

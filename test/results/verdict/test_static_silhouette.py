@@ -89,10 +89,9 @@ def test_an_overloaded_tracker_compares_seldom(scene: Any, result: Any, masks: A
     assert check.add(late, scene.body)
 
 
-def test_a_comparison_compiles_nothing_after_the_warm_up(
-    scene: Any, result: Any, monkeypatch: pytest.MonkeyPatch
+def test_the_warm_up_draws_the_body_as_a_comparison_does(
+    scene: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The node is told to warm up before the first set comes."""
     drawn = []
     monkeypatch.setattr(
         static_silhouette, "body_masks",
