@@ -5,6 +5,8 @@ import numpy as np
 from markerless_tracker.compiled import kernel
 
 _NEAREST_M = 1e-6
+_INVERSE_STEPS = 5
+"""Of `without_lens`: as many as OpenCV's."""
 
 
 @kernel
@@ -19,6 +21,23 @@ def lens(a, b, distortion):  # type: ignore[no-untyped-def]
         a * radial + 2.0 * p1 * ab + p2 * (r2 + 2.0 * a * a),
         b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * ab,
     )
+
+
+@kernel
+def without_lens(a, b, distortion):  # type: ignore[no-untyped-def]
+    """The inverse of `lens`, by fixed-point iterations: converges for usual lenses."""
+    k1, k2, k3 = distortion[0], distortion[1], distortion[4]
+    p1, p2 = distortion[2], distortion[3]
+    x, y = a, b
+    for _ in range(_INVERSE_STEPS):
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        xy = x * y
+        x, y = (
+            (a - 2.0 * p1 * xy - p2 * (r2 + 2.0 * x * x)) / radial,
+            (b - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * xy) / radial,
+        )
+    return x, y
 
 
 @kernel

@@ -24,6 +24,7 @@ from markerless_tracker.body.angles.swing import straightness, twists
 from markerless_tracker.body.kinematics import carried, move_axes
 from markerless_tracker.body.model import is_translation
 from markerless_tracker.body.parts import cones_of
+from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contour import ContourFrame, OutlineRows, outline_rows
 from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
@@ -113,26 +114,33 @@ def disagreement_m(contours: ContourFrame, rows: OutlineRows) -> float:
         contours: residuals collected at the pose.
         rows: the same, one by one.
     """
-    ends = np.cumsum(contours.residuals.count)
-    squares = []
-    for rotation, begin, end in zip(
-        contours.views.arrays.rotation, ends - contours.residuals.count, ends, strict=True
-    ):
-        weight = rows.weight[begin:end]
-        slopes = rows.gradient[begin:end] @ rotation[:2].T
-        normal = slopes.T @ (weight[:, None] * slopes)
-        if _is_invertible(normal):
-            shift = np.linalg.solve(normal, slopes.T @ (weight * rows.value[begin:end]))
-            squares.append(float(shift @ shift) / 2.0)
-    return float(np.sqrt(np.mean(squares))) if squares else 0.0
-
-
-def _is_invertible(normal: FloatArray) -> bool:
-    """Whether a symmetric, not negative matrix (2, 2) has rank 2 in floating point."""
-    trace = float(normal[0, 0] + normal[1, 1])
-    determinant = float(normal[0, 0] * normal[1, 1] - normal[0, 1] * normal[1, 0])
+    rotation = contours.views.arrays.rotation
+    normal, right = np.zeros((len(rotation), 2, 2)), np.zeros((len(rotation), 2))
+    _sum_shifts(rows.view, rows.gradient, rows.weight, rows.value, rotation, normal, right)
+    trace = normal[:, 0, 0] + normal[:, 1, 1]
+    determinant = normal[:, 0, 0] * normal[:, 1, 1] - normal[:, 0, 1] * normal[:, 1, 0]
     # The determinant is the product of the eigenvalues, the trace is at least the larger one.
-    return determinant > 2.0 * float(np.finfo(np.float64).eps) * trace**2
+    known = determinant > 2.0 * float(np.finfo(np.float64).eps) * trace**2
+    if not known.any():
+        return 0.0
+    shifts = np.linalg.solve(normal[known], right[known][:, :, None])
+    return float(np.sqrt(np.mean(shifts**2)))
+
+
+@kernel
+def _sum_shifts(view, gradient, weight, value, rotation, normal, right):  # type: ignore[no-untyped-def]
+    """Add the normal equations (v, 2, 2) and (v, 2) of shifts along the axes of v images."""
+    for n in range(view.size):
+        r = rotation[view[n]]
+        x = gradient[n, 0] * r[0, 0] + gradient[n, 1] * r[0, 1] + gradient[n, 2] * r[0, 2]
+        y = gradient[n, 0] * r[1, 0] + gradient[n, 1] * r[1, 1] + gradient[n, 2] * r[1, 2]
+        a, b = normal[view[n]], right[view[n]]
+        a[0, 0] += weight[n] * x * x
+        a[0, 1] += weight[n] * x * y
+        a[1, 0] += weight[n] * x * y
+        a[1, 1] += weight[n] * y * y
+        b[0] += weight[n] * value[n] * x
+        b[1] += weight[n] * value[n] * y
 
 
 def excesses_m(body: BodyModel, rows: OutlineRows) -> tuple[dict[str, float], float]:
@@ -188,16 +196,41 @@ def slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     root = body.frames[body.root_frame]
     points = np.concatenate([markers(body, pose), nodes[root, None, :, 3]])
     moved = np.flatnonzero(body.node_kind >= 0)
-    slides, parameter = is_translation(body.node_kind[moved]), body.node_parameter[moved]
-    axes = move_axes(body, nodes, moved)
-    arms = np.cross(axes, points[:, None] - nodes[moved, :, 3])
-    moves = np.where(slides[:, None], axes, arms)
-    hang = carried(body, moved)[[*body.marker_node, root]]
-    moves *= hang[:, :, None]
-    turning = axes * (hang[-1] * ~slides)[:, None]
-    slopes, rotations = np.zeros((len(points), body.size, 3)), np.zeros((body.size, 3))
-    for n, k in enumerate(parameter.tolist()):
-        slopes[:, k] += moves[:, n]
-        rotations[k] += turning[n]
-    by_marker = slopes[:-1].transpose(0, 2, 1).reshape(-1, body.size)
-    return by_marker, np.concatenate([slopes[-1].T, rotations.T])
+    out = np.zeros((len(points) + 1, 3, body.size))
+    _fill_slopes(
+        points, move_axes(body, nodes, moved), np.ascontiguousarray(nodes[moved, :, 3]),
+        is_translation(body.node_kind[moved]), body.node_parameter[moved],
+        carried(body, moved)[[*body.marker_node, root]], out,
+    )  # fmt: skip
+    return out[:-2].reshape(-1, body.size), out[-2:].reshape(-1, body.size)
+
+
+@kernel
+def _fill_slopes(points, axes, origins, slides, parameter, hang, out):  # type: ignore[no-untyped-def]
+    """Add the derivatives of k points and of the last one's rotation to out (k + 1, 3, p).
+
+    Args:
+        points: (k, 3).
+        axes, origins: (m, 3) of the joints' nodes, world frame.
+        slides: (m,) whether a node translates; else it rotates.
+        parameter: (m,) index of each node's parameter.
+        hang: (k, m) not 0 where a node moves a point.
+        out: zeros.
+    """
+    last = points.shape[0] - 1
+    for k in range(last + 1):
+        for m in range(slides.size):
+            if hang[k, m] == 0.0:
+                continue
+            x, y, z = axes[m, 0], axes[m, 1], axes[m, 2]
+            if not slides[m]:
+                if k == last:
+                    for i in range(3):
+                        out[last + 1, i, parameter[m]] += axes[m, i]
+                # A turn about the axis moves a point P by axis x (P - origin).
+                u, v = points[k, 0] - origins[m, 0], points[k, 1] - origins[m, 1]
+                w = points[k, 2] - origins[m, 2]
+                x, y, z = y * w - z * v, z * u - x * w, x * v - y * u
+            out[k, 0, parameter[m]] += x
+            out[k, 1, parameter[m]] += y
+            out[k, 2, parameter[m]] += z

@@ -4,7 +4,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.sizes import PROPORTION_SD, Sizes
-from markerless_tracker.fitness.contour import OutlineRows, surface
+from markerless_tracker.fitness.contour import OutlineRows, length_slopes
 from markerless_tracker.fitness.shape import Sections
 from markerless_tracker.geometry import FloatArray
 
@@ -72,11 +72,9 @@ class BodyUnknowns:
             rows: the residuals.
             points: (n, 3) their places on the body, world.
         """
-        by_length = [
-            np.einsum("ni,ni->n", rows.gradient, surface(other, pose, rows) - points) / _STEP
-            for other in longer
-        ]
-        return np.column_stack([*by_length, self._sections.slopes(self.body, pose, rows)])
+        by_length = length_slopes(longer, pose, rows, points, _STEP)
+        by_section = self._sections.slopes(self.body, pose, rows)
+        return np.concatenate([by_length, by_section], axis=1)
 
     def take(self, step: FloatArray) -> FloatArray:
         """Change the unknowns by a step (size,); returns the one that bounds leave of it."""

@@ -3,6 +3,7 @@
 Contour refinement sums normal equations without rows. Fits of lengths and sections need rows.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel, cone_transforms, transforms
 from markerless_tracker.body.kinematics import carried, move_axes
 from markerless_tracker.body.model import IntArray, is_translation
-from markerless_tracker.compiled import kernel
+from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.arrays import floor_share
 from markerless_tracker.fitness.contour.floor import SLACK_M, robust_weight
 from markerless_tracker.fitness.contour.frame import ContourFrame
@@ -117,17 +118,66 @@ def pose_slopes(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatAr
     return out
 
 
+def length_slopes(
+    longer: Sequence[BodyModel],
+    pose: FloatArray,
+    rows: OutlineRows,
+    points: FloatArray,
+    step: float,
+) -> FloatArray:
+    """Derivatives (n, k) of the residuals by k lengths, as quotients of differences.
+
+    Args:
+        longer: the body with one length changed by `step`, for each.
+        pose: (p,).
+        rows: the residuals.
+        points: (n, 3) their places on the body, world frame.
+        step: of a length, in its own measure.
+    """
+    placed = np.stack([cone_transforms(body, pose) for body in longer])
+    lengths = np.stack([body.cone_length for body in longer])
+    out = np.empty((len(rows.cone), len(longer)))
+    _length_slopes(
+        placed, longer[0].cone_shape, lengths, rows.cone, rows.place, rows.gradient, points,
+        1.0 / step, out,
+    )  # fmt: skip
+    return out
+
+
+@inlined
+def _on_cone(c, place, shape, length):  # type: ignore[no-untyped-def]
+    """The point (x, y, z) at a place (5,) on cone c, in the cone's frame."""
+    near, far = 1.0 - place[4], place[4]
+    x = near * (shape[c, 0, 2] + shape[c, 0, 0] * place[0])
+    x += far * (shape[c, 1, 2] + shape[c, 1, 0] * place[2])
+    y = near * (shape[c, 0, 3] + shape[c, 0, 1] * place[1])
+    y += far * (shape[c, 1, 3] + shape[c, 1, 1] * place[3])
+    return x, y, far * length[c]
+
+
+@kernel
+def _length_slopes(  # type: ignore[no-untyped-def]
+    placed, shape, lengths, cone, place, gradient, points, per_step, out
+):
+    """Fill out (n, k) as `length_slopes` does; placed (k, c, 3, 4), lengths (k, c)."""
+    for n in range(cone.size):
+        c = cone[n]
+        for k in range(placed.shape[0]):
+            x, y, z = _on_cone(c, place[n], shape, lengths[k])
+            slope = 0.0
+            for i in range(3):
+                t = placed[k, c, i]
+                moved = t[0] * x + t[1] * y + t[2] * z + t[3] - points[n, i]
+                slope += gradient[n, i] * moved
+            out[n, k] = per_step * slope
+
+
 @kernel
 def _surface(placed, shape, length, cone, place, out):  # type: ignore[no-untyped-def]
     """Fill out (n, 3) with the points at places (n, 5) on cones (n,) at transforms (c, 3, 4)."""
     for n in range(cone.size):
         c = cone[n]
-        x = y = z = 0.0
-        for end in range(2):
-            share = place[n, 4] if end == 1 else 1.0 - place[n, 4]
-            x += share * (shape[c, end, 2] + shape[c, end, 0] * place[n, 2 * end])
-            y += share * (shape[c, end, 3] + shape[c, end, 1] * place[n, 2 * end + 1])
-            z += share * end * length[c]
+        x, y, z = _on_cone(c, place[n], shape, length)
         for i in range(3):
             t = placed[c, i]
             out[n, i] = t[0] * x + t[1] * y + t[2] * z + t[3]

@@ -20,6 +20,7 @@ UNDECIDED_PX = 2.0
 # Pixels within that distance.
 _AROUND = np.arange(-int(UNDECIDED_PX), int(UNDECIDED_PX) + 1)
 _NEAR_UNDECIDED = (np.hypot(_AROUND[:, None], _AROUND) <= UNDECIDED_PX).astype(np.uint8)
+_ALL_FREE = np.empty((0, 0), dtype=np.bool_)
 _SAME_PX = 0.5
 _FAR_PX = np.float32(1e4)
 _SMALLEST_EDGE_PX = 12
@@ -101,22 +102,12 @@ def silhouette_contour(
             distance, window, _window(observation, undecided.view(np.uint8), box), margin
         )
     chain, spacing = _edge_pixels(window, spacing_px)
-    at = chain + (left, top)
-    normal = np.empty(at.shape)
-    steepest(distance, chain, normal)
-    length = np.linalg.norm(normal, axis=1)
-    inner = (at > 0).all(axis=1) & (at < (width - 1, height - 1)).all(axis=1) & (length > 0)
-    if free is not None:
-        inner &= free[chain[:, 1], chain[:, 0]]
-    normal = normal[inner] / length[inner, None]
-    return SilhouetteContour(
-        known,
-        left,
-        top,
-        at[inner] + 0.5 * normal,
-        normal,
-        spacing[inner],
-    )
+    points, normals, kept = np.empty((len(chain), 2)), np.empty((len(chain), 2)), spacing.copy()
+    count = edge_points(
+        distance, _ALL_FREE if free is None else free, chain, spacing, left, top, width, height,
+        points, normals, kept,
+    )  # fmt: skip
+    return SilhouetteContour(known, left, top, points[:count], normals[:count], kept[:count])
 
 
 def _edge_pixels(mask: NDArray[np.uint8], spacing_px: float) -> tuple[NDArray[Any], FloatArray]:
@@ -211,18 +202,46 @@ def keep_same(wider, inner_left, inner_top, beside, left, top, known, free):  # 
 
 
 @kernel
-def steepest(distance, pixels, out):  # type: ignore[no-untyped-def]
-    """Fill out (n, 2) with gradients of distances (h, w) at pixels (n, 2), by Sobel's 5x5."""
-    height, width = distance.shape
+def edge_points(  # type: ignore[no-untyped-def]
+    distance, free, pixels, spacing, left, top, width, height, points, normals, kept
+):
+    """Fill the points of an edge and their outward normals; returns their number.
+
+    Normals are the gradients of the distance, by Sobel's 5x5. Where there is none, at the border
+    of the frame and beside undecided pixels, there is no point.
+
+    Args:
+        distance: (h, w) of a window of the frame.
+        free: (h, w) whether a pixel is not beside undecided ones; (0, 0) if none is.
+        pixels, spacing: (n, 2) along the edge, in the window; (n,) px of edge that each stands for.
+        left, top: of the window in the frame.
+        width, height: of the frame.
+        points, normals, kept: (n, 2), (n, 2) and (n,), filled as in `SilhouetteContour`.
+    """
+    rows, columns = distance.shape
+    count = 0
     for n in range(pixels.shape[0]):
+        column, row = pixels[n, 0], pixels[n, 1]
+        u, v = column + left, row + top
+        if not (0 < u < width - 1 and 0 < v < height - 1):
+            continue
+        if free.size > 0 and not free[row, column]:
+            continue
         along_u, along_v = 0.0, 0.0
         for i in range(5):
-            v = min(max(pixels[n, 1] + i - 2, 0), height - 1)
+            y = min(max(row + i - 2, 0), rows - 1)
             for j in range(5):
-                u = min(max(pixels[n, 0] + j - 2, 0), width - 1)
-                along_u += _SMOOTH[i] * _RISE[j] * distance[v, u]
-                along_v += _RISE[i] * _SMOOTH[j] * distance[v, u]
-        out[n, 0], out[n, 1] = along_u, along_v
+                x = min(max(column + j - 2, 0), columns - 1)
+                along_u += _SMOOTH[i] * _RISE[j] * distance[y, x]
+                along_v += _RISE[i] * _SMOOTH[j] * distance[y, x]
+        length = np.sqrt(along_u * along_u + along_v * along_v)
+        if length > 0.0:
+            normals[count, 0], normals[count, 1] = along_u / length, along_v / length
+            points[count, 0] = u + 0.5 * normals[count, 0]
+            points[count, 1] = v + 0.5 * normals[count, 1]
+            kept[count] = spacing[n]
+            count += 1
+    return count
 
 
 def join_edges(edges: Sequence[SilhouetteContour]) -> ContourViews:

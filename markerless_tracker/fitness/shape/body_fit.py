@@ -19,6 +19,7 @@ from markerless_tracker.fitness.contour import (
     eliminated,
     floor_rows,
     joined_rows,
+    length_slopes,
     normal_equations,
     outline_rows,
     pose_slopes,
@@ -177,13 +178,10 @@ class BodyFit:
         floor = floor_rows(body, frame.pose, self._floor_precision / AMONG)
         rows = joined_rows(replace(outline, weight=weight), floor)
         points = surface(body, frame.pose, rows)
-        by_length = [
-            np.einsum("ni,ni->n", rows.gradient, surface(other, frame.pose, rows) - points) / _STEP
-            for other in longer
-        ]
+        by_length = length_slopes(longer, frame.pose, rows, points, _STEP)
         by_pose = pose_slopes(body, frame.pose, rows)
         by_section = self._sections.slopes(body, frame.pose, rows)
-        slopes = np.column_stack([by_pose, *by_length, by_section])
+        slopes = np.concatenate([by_pose, by_length, by_section], axis=1)
         hessian, slope = normal_equations(slopes, rows.weight, rows.value)
         precision = 1.0 / (AMONG * body.prior_sd**2)
         off = frame.pose - body.prior_mean

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
+from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contour import OutlineRows
 from markerless_tracker.geometry import FloatArray
 
@@ -79,20 +80,40 @@ class Sections:
 
     def slopes(self, body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
         """Derivatives (n, k) of residuals by the numbers, of a body at a pose (p,)."""
-        axes = cone_transforms(body, pose)[rows.cone, :, :2]
-        along = np.einsum("ni,nij->nj", rows.gradient, axes)
         out = np.zeros((len(rows.cone), self._size))
-        every = np.arange(len(out))
-        for end, share in ((0, 1.0 - rows.place[:, 4]), (1, rows.place[:, 4])):
-            cos, sin = rows.place[:, 2 * end], rows.place[:, 2 * end + 1]
-            slopes = (cos * along[:, 0], sin * along[:, 1], along[:, 0], along[:, 1])
-            for entry, slope in enumerate(slopes):
-                index = self._index[rows.cone, end, entry]
-                free = index >= 0
-                value = share * slope * self._sign[rows.cone, end, entry]
-                # No index occurs twice in a row: a row has one entry of each kind.
-                out[every[free], index[free]] += value[free]
+        _fill_slopes(
+            cone_transforms(body, pose), rows.cone, rows.place, rows.gradient, self._index,
+            self._sign, out,
+        )  # fmt: skip
         return out
+
+
+@kernel
+def _fill_slopes(placed, cone, place, gradient, index, sign, out):  # type: ignore[no-untyped-def]
+    """Fill out (n, k), zeros, with the derivatives of n residuals by k numbers.
+
+    Args:
+        placed: (c, 3, 4) the cones' transforms.
+        cone, place, gradient: of `OutlineRows`.
+        index, sign: (c, 2, 4) number of each entry of the sections, or -1, and its sign.
+    """
+    for n in range(cone.size):
+        c = cone[n]
+        x = y = 0.0
+        for i in range(3):
+            x += gradient[n, i] * placed[c, i, 0]
+            y += gradient[n, i] * placed[c, i, 1]
+        for end in range(2):
+            share = place[n, 4] if end == 1 else 1.0 - place[n, 4]
+            for entry in range(4):
+                k = index[c, end, entry]
+                if k < 0:
+                    continue
+                along = share * (y if entry % 2 else x)
+                if entry < 2:
+                    # Radii count by the cosine and the sine of the place's angle.
+                    along *= place[n, 2 * end + entry]
+                out[n, k] += sign[c, end, entry] * along
 
 
 def _limbs(body: BodyModel) -> list[int]:

@@ -8,12 +8,11 @@ is another one for each camera, and mostly lit.
 from collections.abc import Iterable
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.camera import CameraModel
-from markerless_tracker.camera.lens import pixel
+from markerless_tracker.camera.lens import pixel, without_lens
 from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.raster.mask_words import has
 from markerless_tracker.geometry import FloatArray
@@ -45,17 +44,9 @@ class FloorView(NamedTuple):
 
 def floor_points(pixels: FloatArray, camera: CameraModel) -> FloatArray:
     """Points (n, 3) m where the rays of pixels (n, 2) meet the floor; NaN where they do not."""
-    points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
-    if points.size == 0:
-        # OpenCV returns None.
-        return np.empty((0, 3))
-    rays = cv2.undistortPoints(points, camera.matrix, camera.distortion).reshape(-1, 2)
-    placed = camera.T_world_cam
-    directions = np.column_stack([rays, np.ones(len(rays))]) @ placed[:3, :3].T
-    centre = placed[:3, 3]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along = np.where(directions[:, 2] * centre[2] < 0.0, -centre[2] / directions[:, 2], np.nan)
-    return np.asarray(centre + along[:, None] * directions)
+    points = np.empty((len(pixels), 3))
+    _meet_floor(pixels, camera.matrix, camera.distortion, camera.T_world_cam, points)
+    return points
 
 
 def lit_elsewhere(points: FloatArray, others: Iterable[FloorView]) -> NDArray[np.bool_]:
@@ -71,6 +62,21 @@ def lit_elsewhere(points: FloatArray, others: Iterable[FloorView]) -> NDArray[np
             view.width, view.person, view.undecided, view.hidden, lit, dark,
         )  # fmt: skip
     return lit & ~dark
+
+
+@kernel
+def _meet_floor(pixels, matrix, distortion, placed, points):  # type: ignore[no-untyped-def]
+    """Fill points (n, 3) with those of `floor_points`; placed (4, 4): camera to world."""
+    for i in range(pixels.shape[0]):
+        b = (pixels[i, 1] - matrix[1, 2]) / matrix[1, 1]
+        a = (pixels[i, 0] - matrix[0, 2] - matrix[0, 1] * b) / matrix[0, 0]
+        a, b = without_lens(a, b, distortion)
+        down = placed[2, 0] * a + placed[2, 1] * b + placed[2, 2]
+        # Rays that lead away from the floor do not meet it.
+        along = -placed[2, 3] / down if down * placed[2, 3] < 0.0 else np.nan
+        for k in range(3):
+            ray = placed[k, 0] * a + placed[k, 1] * b + placed[k, 2]
+            points[i, k] = placed[k, 3] + along * ray
 
 
 @kernel

@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.camera import CameraModel, project_camera
+from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation
 
 _POINTS_PER_CONE = 6
+_FAR_PX = 1e4
+"""A line with a point farther off is not drawn."""
 HAND_M = 0.07
 """Side of a square: a smaller patch of person pixels is no limb that continues elsewhere."""
 
@@ -184,13 +187,34 @@ def _near(
     """(count,) which components come near to the body; the first is the background's."""
     kept = np.zeros(count, dtype=np.bool_)
     # Mostly the points of the lines themselves meet all components, and nothing need be drawn.
-    points = _drawn(observation, lines)[1].reshape(-1, 2)
-    inside = ((points >= 0) & (points < (observation.width, observation.height))).all(axis=1)
-    kept[labels[points[inside, 1], points[inside, 0]]] = True
+    _meet(lines.pixels, observation.offset_px, labels, kept)
     if not kept[1:].all():
         kept[np.unique(labels[_thick_body(observation, lines, margin_px)])] = True
     kept[0] = False
     return kept
+
+
+@kernel
+def _meet(pixels, offset, labels, kept):  # type: ignore[no-untyped-def]
+    """Mark the components (count,) that points (c, n, 2) lie in, px of the frame.
+
+    labels (h, w) are those of a region at `offset`; lines with a point that is far off, or not
+    finite, are left out.
+    """
+    height, width = labels.shape
+    for c in range(pixels.shape[0]):
+        drawn = True
+        for n in range(pixels.shape[1]):
+            u, v = pixels[c, n, 0] - offset[0], pixels[c, n, 1] - offset[1]
+            # Not for NaN either.
+            drawn = drawn and abs(u) <= _FAR_PX and abs(v) <= _FAR_PX
+        if not drawn:
+            continue
+        for n in range(pixels.shape[1]):
+            u = np.int64(np.rint(pixels[c, n, 0] - offset[0]))
+            v = np.int64(np.rint(pixels[c, n, 1] - offset[1]))
+            if 0 <= u < width and 0 <= v < height:
+                kept[labels[v, u]] = True
 
 
 def _only(
@@ -221,5 +245,5 @@ def _drawn(
     """Which lines (c,) can be drawn, and their points (k, n, 2) in whole pixels of the region."""
     pixels = lines.pixels - observation.offset_px
     # Not for NaN either.
-    which = np.asarray((np.abs(pixels) <= 1e4).all(axis=(1, 2)))
+    which = np.asarray((np.abs(pixels) <= _FAR_PX).all(axis=(1, 2)))
     return which, np.round(pixels[which]).astype(np.int32)

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import cone_transforms, load_body
-from markerless_tracker.fitness.contour.outline_rows import outline_rows, pose_slopes, surface
+from markerless_tracker.fitness.contour.outline_rows import (
+    length_slopes,
+    outline_rows,
+    pose_slopes,
+    surface,
+)
 from markerless_tracker.fitness.shape import Sections
 from markerless_tracker.synthesis import ring_rig
 
@@ -94,6 +99,23 @@ def test_normal_equations_are_the_refinements(frame) -> None:
     np.testing.assert_allclose(
         slopes.T @ (rows.weight * rows.value), sums.slope, atol=1e-9 * np.abs(sums.slope).max()
     )
+
+
+def test_slopes_by_the_lengths(frame) -> None:
+    rows = outline_rows(frame)
+    step = 1e-4
+    longer = [
+        replace(BODY, node_fixed=BODY.node_fixed * (1.0 + step)),
+        replace(BODY, cone_length=BODY.cone_length * (1.0 + step)),
+    ]
+    points = surface(BODY, POSE, rows)
+    slopes = length_slopes(longer, POSE, rows, points, step)
+    for k, body in enumerate(longer):
+        moved = slow_surface(body, POSE, rows.cone, rows.place) - points
+        np.testing.assert_allclose(
+            slopes[:, k], (moved * rows.gradient).sum(axis=1) / step, atol=1e-8
+        )
+    assert (np.abs(slopes).max(axis=0) > 0.01).all()
 
 
 def test_slopes_by_the_sections(frame) -> None:

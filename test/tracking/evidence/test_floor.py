@@ -1,5 +1,7 @@
 """A pixel whose floor point another camera sees in full light is no shadow on the floor."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -50,8 +52,17 @@ def test_a_floor_point_is_found_again_from_its_pixel(rig) -> None:
         np.testing.assert_allclose(found, FLOOR, atol=1e-6)
 
 
-def test_no_pixels_have_no_points(rig) -> None:
-    assert floor_points(np.empty((0, 2)), next(iter(rig))).shape == (0, 3)
+def test_through_a_lens_the_rays_are_opencvs(rig) -> None:
+    camera = replace(rig.cameras[0], distortion=np.array([-0.3, 0.12, 0.002, -0.001, -0.02]))
+    pixels = np.random.default_rng(0).uniform((0, 0), camera.size_px, (50, 2))
+    rays = cv2.undistortPoints(pixels[:, None], camera.matrix, camera.distortion)[:, 0]
+    directions = np.column_stack([rays, np.ones(50)]) @ camera.T_world_cam[:3, :3].T
+    down = directions[:, 2] < 0
+    centre = camera.T_world_cam[:3, 3]
+    expected = centre - centre[2] / directions[down, 2:] * directions[down]
+    found = floor_points(pixels, camera)
+    np.testing.assert_allclose(found[down], expected, rtol=1e-9, atol=1e-9)
+    assert np.isnan(found[~down]).all() and down.any()
 
 
 def test_rays_that_do_not_meet_the_floor_have_no_point(rig) -> None:
