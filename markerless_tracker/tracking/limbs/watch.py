@@ -206,7 +206,8 @@ class LimbWatch:
         if not due and pair is None and not facing:
             return Recovered(pose)
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
-        own = OwnEvidence(searcher, seen.imaged, stamp_ns, frame)
+        reach_m = searcher.tracked_reach_m
+        own = OwnEvidence(searcher, seen.imaged, stamp_ns, frame, reach_m=reach_m)
         recombiner = Recombiner(body, searcher.limits)
         search = LimbSearch(recombiner, frame, own, pose, searcher.config.min_improvement)
         if facing:

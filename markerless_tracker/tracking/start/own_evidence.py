@@ -7,6 +7,9 @@ against every other one: a leg that was found wrong on a floor of its trousers' 
 from collections.abc import Mapping
 from functools import cached_property
 
+import numpy as np
+
+from markerless_tracker.fitness.contour import REACH_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.evidence.undecided import decide
@@ -22,6 +25,7 @@ class OwnEvidence:
         imaged: the evidence, with the undecided pixels that imaging left.
         stamp_ns: its time.
         frame: the evidence as decided so far; it serves all poses where nothing was undecided.
+        reach_m: as of `FrameSearch`, for evidence made here.
 
     Attributes:
         body: the body.
@@ -34,11 +38,15 @@ class OwnEvidence:
         imaged: Mapping[str, Observation],
         stamp_ns: int,
         frame: FramePopulation,
+        *,
+        reach_m: float = REACH_M,
     ) -> None:
         self._searcher = searcher
         self._imaged = imaged
         self._stamp_ns = stamp_ns
         self._frame = frame
+        self._reach_m = reach_m
+        self._last: tuple[FloatArray, FramePopulation] | None = None
         self.body = searcher.body
         self.differs = any(seen.undecided_words is not None for seen in imaged.values())
 
@@ -47,7 +55,7 @@ class OwnEvidence:
         """The evidence that no body decided: undecided pixels count for no pose."""
         if not self.differs:
             return self._frame
-        return FramePopulation(self._searcher, self._imaged, self._stamp_ns, self._frame.near)
+        return self._population(self._imaged, self._frame.near)
 
     def cost(self, pose: FloatArray) -> float:
         """1 - f_s of a pose (p,)."""
@@ -67,8 +75,17 @@ class OwnEvidence:
         return found, self.cost(found)
 
     def _decided(self, pose: FloatArray) -> FramePopulation:
+        """The evidence that the body at a pose (p,) decides; that of the last pose is kept."""
         if not self.differs:
             return self._frame
-        searcher = self._searcher
-        decided = decide(self._imaged, searcher.cameras, searcher.body, pose)
-        return FramePopulation(searcher, decided, self._stamp_ns, pose)
+        if self._last is None or not np.array_equal(self._last[0], pose):
+            decided = decide(self._imaged, self._searcher.cameras, self.body, pose)
+            self._last = pose.copy(), self._population(decided, pose)
+        return self._last[1]
+
+    def _population(
+        self, observations: Mapping[str, Observation], near: FloatArray
+    ) -> FramePopulation:
+        return FramePopulation(
+            self._searcher, observations, self._stamp_ns, near, reach_m=self._reach_m
+        )

@@ -10,7 +10,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.fitness import Evaluator
-from markerless_tracker.fitness.contour import ContourFrame
+from markerless_tracker.fitness.contour import REACH_M, ContourFrame
 from markerless_tracker.fitness.threads import side_by_side, usable_threads
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
@@ -79,6 +79,7 @@ class FramePopulation:
         stamp_ns: keys the draws, together with the seed.
         near: (p,) a pose whose root is near the body.
         contours: the frame's contour evidence, if it was made already.
+        reach_m: as of `FrameSearch`, if it was not.
 
     Attributes:
         near: as given.
@@ -92,12 +93,15 @@ class FramePopulation:
         near: FloatArray,
         *,
         contours: ContourFrame | None = None,
+        reach_m: float = REACH_M,
     ) -> None:
         self._searcher = searcher
         self._stamp_ns = stamp_ns
         self.near = near
-        frame = searcher.frame(observations, stamp_ns, near) if contours is None else contours
-        self._frame: FrameSearch | ContourFrame = frame
+        frame: FrameSearch | ContourFrame | None = contours
+        if frame is None:
+            frame = searcher.frame(observations, stamp_ns, near, reach_m=reach_m)
+        self._frame = frame
         self._costs = searcher.fitness.prepare(
             frame.views, Comparison.whole(near, len(searcher.body.cone_names))
         )
