@@ -9,8 +9,9 @@ from markerless_tracker.tracking.config import TrackerConfig
 TRAINING_RATE_HZ = 60.0
 """Frame rate at which the published sigmas, changes of a parameter between frames, hold."""
 LIMB_SPEED_M_S = 2.0
-"""Speed of a hand or foot relative to its prediction: widens the image regions. A faster one costs
-a second, wider region."""
+LIMB_ACCELERATION_M_S2 = 60.0
+"""Greatest speed and acceleration of a hand or foot relative to its prediction, which widen the
+image regions. A faster one costs a second, wider region."""
 
 
 class MotionModel:
@@ -78,7 +79,9 @@ class MotionModel:
         elapsed_ns = self._elapsed_ns(stamp_ns)
         if elapsed_ns == 0 or not self._tracked:
             return None
-        return self._config.region.margin_m + LIMB_SPEED_M_S * (elapsed_ns * 1e-9)
+        elapsed_s = elapsed_ns * 1e-9
+        speed_m_s = min(LIMB_SPEED_M_S, 0.5 * LIMB_ACCELERATION_M_S2 * elapsed_s)
+        return self._config.region.margin_m + speed_m_s * elapsed_s
 
     def update(
         self, pose: FloatArray, stamp_ns: int, *, tracked: bool, jumped: IntArray | None = None
