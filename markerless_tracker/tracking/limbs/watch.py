@@ -29,6 +29,9 @@ from markerless_tracker.tracking.limbs.exchange import CLOSE, PairExchange
 from markerless_tracker.tracking.limbs.facing import FacingWatch
 from markerless_tracker.tracking.limbs.search import LimbSearch
 from markerless_tracker.tracking.limbs.unexplained import look_unexplained
+from markerless_tracker.tracking.limbs.walking import CLOSE as WALKING_CLOSE
+from markerless_tracker.tracking.limbs.walking import LEAST_GAIN as WALKING_GAIN
+from markerless_tracker.tracking.limbs.walking import WalkingWatch
 from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.own_evidence import OwnEvidence
@@ -56,7 +59,7 @@ class Recovered:
     Attributes:
         pose: (p,) the estimate.
         names: of the limbs that were taken from elsewhere; `legs` and `arms` are exchanged.
-        turned: whether the person faces the other way; nothing of the body is where it was.
+        turned: whether the person faces another way; nothing of the body is where it was.
         moved_m: how far the limbs' joints were from where they were found, at most.
     """
 
@@ -69,7 +72,7 @@ class Recovered:
     def notes(self) -> tuple[str, ...]:
         """What the user should know, one line each."""
         if self.turned:
-            return ("the person faces the other way: turned round",)
+            return ("the person faces another way: turned round",)
         return tuple(f"{name}: found elsewhere" for name in self.names)
 
     def jumped(self, body: BodyModel) -> IntArray:
@@ -135,6 +138,7 @@ class LimbWatch:
         self._waits: dict[str, _Wait] = {}
         self._exchange = PairExchange()
         self._facing = FacingWatch()
+        self._walking = WalkingWatch()
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -195,15 +199,16 @@ class LimbWatch:
         if not unexplained.limbs:
             self._waits.clear()
         due = self._due(body, stamp_ns, unexplained.areas_m2)
-        pair, facing = None, False
+        pair, facing, walking = None, False, []
         self._turn += 1
         if not one or self._turn % 2:
             pair = self._exchange.due(body, pose, searcher.limits, stamp_ns)
             facing = self._facing.due(stamp_ns)
+            walking = self._walking.due(body, pose, searcher.limits, stamp_ns)
+        whole = facing or pair is not None or bool(walking)
         if one and due:
-            whole = facing or pair is not None
             due = [] if whole else [due[self._turn // 2 % len(due)]]
-        if not due and pair is None and not facing:
+        if not due and not whole:
             return Recovered(pose)
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
         reach_m = searcher.tracked_reach_m
@@ -214,6 +219,9 @@ class LimbWatch:
             turned = self._facing.compare(search, body, searcher.limits)
             if turned is not None:
                 return Recovered(turned, turned=True)
+        for other in walking:
+            if search.takes(other, WALKING_GAIN, WALKING_CLOSE):
+                return Recovered(search.pose, turned=True)
         found = []
         if pair is not None and search.takes(pair.pose, pair.least_gain, CLOSE):
             found.append(pair.name)

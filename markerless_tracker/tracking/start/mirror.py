@@ -19,7 +19,7 @@ _CHANGE_RAD = 0.2
 _OTHER = {"L": "R", "R": "L"}
 _IN_A_MIRROR = np.array([1.0, -1.0, 1.0])
 _FACING_THE_OTHER_WAY = np.array([-1.0, -1.0, 1.0])
-_TRUNK = [MARKER_NAMES.index(name) for name in ("Pelvis", "Neck")]
+TRUNK = [MARKER_NAMES.index(name) for name in ("Pelvis", "Neck")]
 """Rows of the pelvis and the neck among the markers."""
 
 
@@ -53,23 +53,32 @@ class TurnedRound:
 
     def __init__(self, body: BodyModel) -> None:
         self._body = body
-        self._yaw = body.index("pelvis_rz")
-        self._at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
+        root = [body.index("pelvis_rz"), *(body.index(f"pelvis_t{axis}") for axis in "xyz")]
         alone = [
             (i, i)
             for i, name in enumerate(body.parameter_names)
-            if not name.startswith(("l_", "r_")) and i not in (*self._at, self._yaw)
+            if not name.startswith(("l_", "r_")) and i not in root
         ]
         pairs = [*_limb_pairs(body), *alone]
         self._exchange = _Exchange(body, body.neutral, pairs, _FACING_THE_OTHER_WAY)
 
     def of(self, pose: FloatArray) -> FloatArray:
         """A pose (p,), turned about the middle of its trunk; limits may be broken."""
-        out = self._exchange.of(pose)
-        out[self._yaw] += np.pi
-        moved_m = markers(self._body, out) - markers(self._body, pose)
-        out[self._at] -= moved_m[_TRUNK].mean(axis=0)
-        return out
+        return turned_by(self._body, self._exchange.of(pose), np.pi, about=pose)
+
+
+def turned_by(
+    body: BodyModel, pose: FloatArray, angle_rad: float, *, about: FloatArray
+) -> FloatArray:
+    """A pose (p,) turned about the vertical; limits may be broken.
+
+    The middle of its trunk is where the pose `about` (p,) has it.
+    """
+    out = pose.copy()
+    out[body.index("pelvis_rz")] += angle_rad
+    moved_m = markers(body, out) - markers(body, about)
+    out[[body.index(f"pelvis_t{axis}") for axis in "xyz"]] -= moved_m[TRUNK].mean(axis=0)
+    return out
 
 
 class _Exchange:

@@ -78,6 +78,6 @@ def test_a_tracker_that_starts_the_wrong_way_turns_the_person_round(scene) -> No
         seen, true = observed(scene, frame)
         result = tracker.step(seen, round(frame * 1e9 / 60))
         warnings += result.warnings
-    assert "the person faces the other way: turned round" in warnings
+    assert "the person faces another way: turned round" in warnings
     ways = [heading(markers(body, pose)) for pose in (result.pose, true)]
     assert heading_difference(*ways) < 0.4
