@@ -170,9 +170,9 @@ class FramePopulation:
                 np.minimum(gaps_m2, _farthest_m2(points, points[i]), out=gaps_m2)
         return np.asarray(children[chosen])
 
-    def propagated(self, population: Population) -> Population:
-        """The population of the frame before, refined in this one."""
-        return self.selected(self.refined(population.poses, *_PROPAGATE))
+    def propagated(self, population: Population, *, far: bool = False) -> Population:
+        """The population of the frame before, which may be long ago, refined in this one."""
+        return self.selected(self.refined(population.poses, *(_INITIALISE if far else _PROPAGATE)))
 
     def costs(self, poses: FloatArray) -> FloatArray:
         """1 - f_s (n,) of poses (n, p); infinite where there is none."""

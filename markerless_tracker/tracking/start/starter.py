@@ -1,7 +1,7 @@
 """The automatic start: a person is found in one frame, the heading is confirmed over some more."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,10 @@ _SHAPE_SLACK = 0.01
 _RESIZED_AFTER = 3
 _FINER_AFTER = 1
 """Frames after the second look: one frame need not wait for both."""
+GAP_NS = 150_000_000
+"""Frames farther apart than this: a person has moved on, farther than poses are refined. Live it is
+the time that the first search takes."""
+_GAP_GENERATIONS = 2
 _FITS = 0.85
 """From this f_s on a generation that gains less than `_GAIN` is the last one."""
 _GAIN = 0.002
@@ -115,6 +119,7 @@ class Starter:
         """Forget the person so far; objects that were rejected stay known."""
         self._in_view.reset()
         self._population: Population | None = None
+        self._stamp_ns = 0
         self._searcher: Searcher | None = None
         self._headings = TwoHeadings(0.0)
         self._sure = False
@@ -125,13 +130,19 @@ class Starter:
         if self._population is None or self._searcher is None:
             return self._begin(observed, stamp_ns)
         population = self._population
+        far = not 0 <= stamp_ns - self._stamp_ns <= GAP_NS
+        if far:
+            population = self._moved(population, observed)
         best = self._best(population).poses[0]
         imaged, notes = self._select(observed, self._searcher.body, best)
         observations = imaged
         if any(seen.undecided_words is not None for seen in imaged.values()):
             observations = self._decide(imaged, best)
         frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
-        population = frame.propagated(population)
+        population = frame.propagated(population, far=far)
+        if far:
+            self._headings.restart()
+            population = _improved(frame, population, range(1, 1 + _GAP_GENERATIONS))
         if len(self._headings) == 1 and not self._sure:
             population = self._second_look(frame, population, observations)
         elif len(self._headings) == 1 + _FINER_AFTER:
@@ -140,7 +151,7 @@ class Starter:
         if 1.0 - population.costs[0] < LEAST_FIT:
             self.reset()
             return None
-        self._population = population
+        self._population, self._stamp_ns = population, stamp_ns
         own = OwnEvidence(self._searcher, imaged, stamp_ns, frame)
         self._note(own, frame, population, stamp_ns)
         if self._headings.change():
@@ -171,13 +182,23 @@ class Starter:
             best = population.poses[0]
             if not self._in_view.enough(self._searcher.body, best, looking, stamp_ns):
                 continue
-            self._population = population
+            self._population, self._stamp_ns = population, stamp_ns
             self._headings = TwoHeadings(float(population.headings[0]))
             self._sure = _is_sure(population)
             own = OwnEvidence(self._searcher, observations, stamp_ns, frame)
             self._note(own, frame, population, stamp_ns)
             return StartEstimate(self._searcher, population.poses[0], observations, False)
         return None
+
+    def _moved(self, population: Population, observed: Mapping[str, Observation]) -> Population:
+        """A population moved to where the person is now."""
+        hull = next(find_hulls(self._cameras, observed), None)
+        if hull is None:
+            return population
+        assert self._searcher is not None
+        body = self._searcher.body
+        poses = np.array([put_at(body, hull, pose) for pose in population.poses])
+        return replace(population, poses=poses)
 
     def _decide(
         self, observations: Mapping[str, Observation], pose: FloatArray

@@ -53,6 +53,7 @@ class TwoHeadings:
         self._first_rad = heading_rad
         self._leading = 0
         self._changed = False
+        self._counted_from = SIZED_FROM
         self._fits: list[tuple[HeadingFit | None, HeadingFit | None]] = []
         self._stamps_ns: list[int] = []
 
@@ -80,6 +81,14 @@ class TwoHeadings:
         """Of the heading that leads, in the frames in which it had a pose."""
         return [fit for fits in self._fits if (fit := fits[self._leading]) is not None]
 
+    def restart(self) -> None:
+        """Count only the frames after the next one, which is far from those before, if it is early.
+
+        What came to lead was searched for longer: it would be compared with poses left behind.
+        """
+        if len(self) <= SIZED_FROM:
+            self._counted_from = max(SIZED_FROM, len(self) + 1)
+
     def note(self, stamp_ns: int, fits: tuple[HeadingFit | None, HeadingFit | None]) -> None:
         """Take a frame.
 
@@ -97,7 +106,7 @@ class TwoHeadings:
             Whether it leads from now on.
         """
         lead, other = self._leading, 1 - self._leading
-        pairs = [(fits[lead], fits[other]) for fits in self._fits[SIZED_FROM:]]
+        pairs = [(fits[lead], fits[other]) for fits in self._fits[self._counted_from :]]
         if self._changed or not pairs or pairs[-1][1] is None:
             return False
         gains = [a.cost - b.cost for a, b in pairs[-COMPARED:] if a and b]
@@ -110,9 +119,9 @@ class TwoHeadings:
 
     def _walks_along(self, heading_rad: float) -> float:
         """Cosine of the angle from a heading to the way that the person walks; 0 if none does."""
-        first, last = self._fits[SIZED_FROM], self._fits[-1]
+        first, last = self._fits[self._counted_from], self._fits[-1]
         moves = [b.trunk_m - a.trunk_m for a, b in zip(first, last, strict=True) if a and b]
-        seconds = (self._stamps_ns[-1] - self._stamps_ns[SIZED_FROM]) * 1e-9
+        seconds = (self._stamps_ns[-1] - self._stamps_ns[self._counted_from]) * 1e-9
         if not moves or seconds <= 0.0:
             return 0.0
         along, across = np.mean(moves, axis=0)[:2]

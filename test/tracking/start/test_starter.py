@@ -169,3 +169,22 @@ def test_some_blind_cameras_are_left_out_and_said(walk) -> None:
     result = tracker.step({**seen, "cam01": blind(seen)["cam01"]}, stamp)
     assert "cam01" not in result.iou and error_mm(result, points) < 60.0
     assert any(w.startswith("cam01: left out") for w in result.warnings)
+
+
+def test_who_walks_on_during_the_first_search_is_found_again() -> None:
+    """Live the first search takes the time of some dozen sets."""
+    scene = SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=2)
+    tracker = tracker_of(scene)
+    for frame in (0, 1, 28, 30, 32, 34, 36, 38, 40, 42):
+        _, masks, _ = scene.frame(frame)
+        seen = {
+            name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+            for name, mask in masks.items()
+        }
+        result = tracker.step(seen, scene.stamp_ns(frame))
+        assert result.state is TrackState.TRACKING
+        true = scene.markers(frame)
+        assert error_mm(result, true) < 120.0
+        assert heading_difference(heading(result.markers_m), heading(true)) < 0.5
+    moved_m = np.linalg.norm(scene.markers(28) - scene.markers(1), axis=1).mean()
+    assert moved_m > 0.3

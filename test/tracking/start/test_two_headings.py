@@ -90,3 +90,17 @@ def test_poses_of_the_leading_heading() -> None:
     both.note(0, (first, opposite))
     both.note(1, (None, opposite))
     assert both.leading_fits == [first] and len(both) == 2
+
+
+@pytest.mark.parametrize("gap_at", [1, 2, 3])
+def test_a_frame_after_a_gap_early_on_does_not_count(gap_at) -> None:
+    """In that frame the leading heading is far off; from then on it is the better one."""
+    both = TwoHeadings(0.0)
+    for number in range(SETTLING_FRAMES):
+        if number == gap_at:
+            both.restart()
+        costs = (0.3, 0.1) if number == gap_at else (0.1, 0.105)
+        both.note(number * FRAME_NS, (fit(costs[0]), fit(costs[1])))
+        # Later on a frame more or less is no longer decisive for a restart.
+        assert both.change() == (number == gap_at > SIZED_FROM)
+    assert both.over
