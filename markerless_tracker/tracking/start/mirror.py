@@ -1,4 +1,4 @@
-"""A pose with the limbs of both sides exchanged: as in a mirror, or facing the other way."""
+"""A pose turned about the vertical, or with the limbs exchanged as in a mirror, or both."""
 
 from functools import lru_cache
 
