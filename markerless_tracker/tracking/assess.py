@@ -8,9 +8,10 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.fitness.contour import outline_rows
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
-from markerless_tracker.tracking.confidence import confidence_of, slopes
+from markerless_tracker.tracking.confidence import confidence_of, disagreement_m, slopes
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.watch import LimbWatch
@@ -106,6 +107,7 @@ class Assessor:
         self.found(found, body, limits)
         # A pose that has nothing to do with the evidence has no confidence.
         slopes(body, found.search.pose)
+        disagreement_m(found.search.contours, outline_rows(found.search.contours))
 
     def found(self, found: Found, body: BodyModel, limits: FloatArray) -> TrackResult:
         """The result of a frame with a pose.

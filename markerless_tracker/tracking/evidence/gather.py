@@ -206,7 +206,7 @@ class EvidenceMaker:
         """Begin to compile the imaging (`wait` ends it); returns made-up observations.
 
         All but the first are of regions, as when the body is tracked. The silhouette is a
-        rectangle, with undecided pixels around it and known ones above.
+        rectangle, with undecided pixels around it and known ones above, and a pixel in the corner.
         """
         if self._process is not None:
             # It compiles while this process compiles what comes after the imaging.
@@ -216,6 +216,7 @@ class EvidenceMaker:
             width, height = camera.size_px
             mask = np.zeros((height, width), dtype=np.uint8)
             mask[height // 4 : height // 2, width // 4 : width // 2] = 1
+            mask[0, 0] = 1
             around = mask == 0
             around[: height // 4] = False
             left, right = width // 8, width - width // 8
