@@ -25,7 +25,10 @@ def lens(a, b, distortion):  # type: ignore[no-untyped-def]
 
 @kernel
 def without_lens(a, b, distortion):  # type: ignore[no-untyped-def]
-    """The inverse of `lens`, by fixed-point iterations: converges for usual lenses."""
+    """The inverse of `lens`, by OpenCV's fixed-point iterations, for compiled loops.
+
+    They converge for usual lenses.
+    """
     k1, k2, k3 = distortion[0], distortion[1], distortion[4]
     p1, p2 = distortion[2], distortion[3]
     x, y = a, b

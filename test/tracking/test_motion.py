@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.motion import LIMB_SPEED_M_S, MotionModel
+from markerless_tracker.tracking.motion import (
+    LIMB_ACCELERATION_M_S2,
+    LIMB_SPEED_M_S,
+    MotionModel,
+)
 
 FRAME_NS = 16_666_667
 FREE = np.array([[-np.inf] * 3, [np.inf] * 3])
@@ -69,6 +73,14 @@ def test_the_region_grows_with_the_time_while_tracked(motion):
     assert motion.region_margin_m(0) is None
     motion.lose()
     assert motion.region_margin_m(10**9) is None
+
+
+def test_in_a_short_time_the_region_grows_as_a_limb_can_accelerate(motion):
+    moved(motion, 0.0, 0)
+    short_s = 0.02
+    grown_m = motion.region_margin_m(round(short_s * 1e9)) - 0.2
+    assert grown_m == pytest.approx(0.5 * LIMB_ACCELERATION_M_S2 * short_s**2)
+    assert grown_m < LIMB_SPEED_M_S * short_s
 
 
 def test_a_shift_keeps_limits_and_velocity(motion):

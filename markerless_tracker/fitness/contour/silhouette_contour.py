@@ -212,7 +212,7 @@ def edge_points(  # type: ignore[no-untyped-def]
 
     Args:
         distance: (h, w) of a window of the frame.
-        free: (h, w) whether a pixel is not beside undecided ones; (0, 0) if none is.
+        free: (h, w) whether a pixel is not beside undecided ones; (0, 0) if all are free.
         pixels, spacing: (n, 2) along the edge, in the window; (n,) px of edge that each stands for.
         left, top: of the window in the frame.
         width, height: of the frame.

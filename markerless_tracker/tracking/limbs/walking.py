@@ -67,7 +67,7 @@ class WalkingWatch:
         return [np.clip(other, *limits) for other in found]
 
     def _way_rad(self, trunk_m: FloatArray, stamp_ns: int) -> float | None:
-        """The way of walking, about the vertical; None for who stands or was seen too briefly."""
+        """Direction of walking, about the vertical; None if the person stands or for too short."""
         if self._trunks and stamp_ns <= self._trunks[-1][0]:
             self._trunks.clear()
         self._trunks.append((stamp_ns, trunk_m))

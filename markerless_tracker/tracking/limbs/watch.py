@@ -221,6 +221,8 @@ class LimbWatch:
                 return Recovered(turned, turned=True)
         for other in walking:
             if search.takes(other, WALKING_GAIN, WALKING_CLOSE):
+                # Its sums belong to the heading so far.
+                self._facing.reset()
                 return Recovered(search.pose, turned=True)
         found = []
         if pair is not None and search.takes(pair.pose, pair.least_gain, CLOSE):

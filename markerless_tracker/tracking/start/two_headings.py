@@ -82,9 +82,10 @@ class TwoHeadings:
         return [fit for fits in self._fits if (fit := fits[self._leading]) is not None]
 
     def restart(self) -> None:
-        """Count only the frames after the next one, which is far from those before, if it is early.
+        """Let the next frame not count, nor those before it; only among the first frames.
 
-        What came to lead was searched for longer: it would be compared with poses left behind.
+        To be called after a gap in time: in that frame both headings are far from the person, and
+        which of the two is found again there is chance.
         """
         if len(self) <= SIZED_FROM:
             self._counted_from = max(SIZED_FROM, len(self) + 1)

@@ -38,7 +38,7 @@ def bag(walk, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def ask(peer: Any, service: str) -> Any:
     client = peer.node.create_client(Trigger, service)
     peer.until(client.service_is_ready, service)
-    # The service is found before it has found who asks: its answer could be lost.
+    # A service that has not yet discovered its client answers into the void.
     found_s = time.monotonic()
     peer.until(lambda: time.monotonic() - found_s > 0.5, "half a second")
     future = client.call_async(Trigger.Request())

@@ -65,6 +65,20 @@ def test_a_pose_is_refined_in_its_own_evidence(legs_undecided) -> None:
     assert cost == own.cost(found)
 
 
+def test_the_evidence_of_a_pose_is_decided_once(legs_undecided, monkeypatch) -> None:
+    searcher, seen, true, wrong = legs_undecided
+    _, own = own_of(searcher, seen, wrong)
+    poses = []
+
+    def counted(imaged, cameras, body, pose):
+        poses.append(pose)
+        return decide(imaged, cameras, body, pose)
+
+    monkeypatch.setattr("markerless_tracker.tracking.start.own_evidence.decide", counted)
+    first, again, other = own.cost(true), own.cost(true.copy()), own.cost(wrong)
+    assert first == again != other and len(poses) == 2
+
+
 def test_without_undecided_pixels_all_poses_share_the_evidence(legs_undecided) -> None:
     searcher, seen, true, wrong = legs_undecided
     two_classes = decide(seen, searcher.cameras, searcher.body, true)

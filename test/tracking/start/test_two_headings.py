@@ -101,6 +101,6 @@ def test_a_frame_after_a_gap_early_on_does_not_count(gap_at) -> None:
             both.restart()
         costs = (0.3, 0.1) if number == gap_at else (0.1, 0.105)
         both.note(number * FRAME_NS, (fit(costs[0]), fit(costs[1])))
-        # Later on a frame more or less is no longer decisive for a restart.
+        # From the fourth frame on a restart changes nothing.
         assert both.change() == (number == gap_at > SIZED_FROM)
     assert both.over
