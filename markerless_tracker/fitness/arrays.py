@@ -101,11 +101,14 @@ def body_arrays(body: BodyModel) -> BodyArrays:
 
 
 TOE_SHARE = 0.25
-"""Feet of most bodies are fixed to their shanks: toes point into the floor at the end of a step."""
+"""Feet of most bodies are fixed to their shanks: toes, or an upright foot's whole sole, point into
+the floor at the end of a step."""
 
 
 def floor_share(body: BodyModel) -> FloatArray:
-    """How much each end (c, 2) of a cone counts where it lies below the floor: toes less."""
+    """How much each end (c, 2) of a cone counts where it lies below the floor: of a foot the toes,
+    or the sole, less.
+    """
     toes = [name.endswith("foot") for name in body.cone_names]
     return np.array([(1.0, TOE_SHARE if toe else 1.0) for toe in toes])
 

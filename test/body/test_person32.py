@@ -1,4 +1,4 @@
-"""person32: person31 with a trunk that bends to the side."""
+"""person32: person31 with a trunk that bends to the side, and with upright feet."""
 
 import numpy as np
 import pytest
@@ -29,10 +29,26 @@ def test_it_is_person31_with_one_more_joint() -> None:
     pose = PLAIN.neutral + rng.uniform(-0.3, 0.3, PLAIN.size)
     longer = np.insert(pose, BEND, 0.0)
     np.testing.assert_allclose(markers(BODY, longer), markers(PLAIN, pose), atol=1e-12)
+    others = [c for c, name in enumerate(BODY.cone_names) if not name.endswith("foot")]
     np.testing.assert_allclose(
-        cone_transforms(BODY, longer), cone_transforms(PLAIN, pose), atol=1e-12
+        cone_transforms(BODY, longer)[others], cone_transforms(PLAIN, pose)[others], atol=1e-12
     )
+    np.testing.assert_array_equal(BODY.cone_shape[others], PLAIN.cone_shape[others])
     assert BEND in BODY.subspaces["torso"] and BEND in BODY.subspaces["torso_head"]
+
+
+@pytest.mark.parametrize("side", ["l", "r"])
+def test_sections_of_a_foot_are_parallel_to_its_sole(side) -> None:
+    """A shank that stands upright has a level sole, from behind the ankle to in front of it."""
+    foot = BODY.cone_names.index(f"{side}_foot")
+    ankle = named(BODY, BODY.neutral)[side.upper() + "Ankle"]
+    place = cone_transforms(BODY, BODY.neutral)[foot]
+    radius, _, ahead, aside = BODY.cone_shape[foot, 1]
+    ends = [[ahead + end * radius, aside, BODY.cone_length[foot]] for end in (-1.0, 1.0)]
+    toe, heel = (place[:, :3] @ end + place[:, 3] - ankle for end in ends)
+    assert toe[2] == pytest.approx(heel[2]) and -0.08 < toe[2] < -0.05
+    assert -0.07 < heel[0] < -0.04 and 0.16 < toe[0] < 0.20
+    np.testing.assert_allclose([toe[1], heel[1]], 0.0, atol=1e-9)
 
 
 def test_a_positive_bend_is_to_the_left() -> None:
