@@ -30,11 +30,11 @@ from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Confidence
 
-MEASURED_M = 0.0055
+MEASURED_M = 0.0025
 """Error, per axis, of a joint's centre in a body whose lengths were measured."""
-UNMEASURED_M = 0.015
+UNMEASURED_M = 0.013
 """The same with lengths that were fitted, or that are those of a stature."""
-DISAGREEMENT = 2.7
+DISAGREEMENT = 2.0
 """Error of a pose relative to the disagreement of the views that remains after the fit."""
 CORRELATED = 9.0
 """Factor of the residuals' correlation length: a generic section is wrong along a whole limb, some
