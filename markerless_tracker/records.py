@@ -237,6 +237,7 @@ class TrackResult:
         limbs: per limb, how well it is tracked; empty without an estimate.
         exposure: per camera whose image came, its brightness relative to its background's, by
             channel.
+        settling: whether the automatic start needs further sets, near to this one in time.
     """
 
     stamp_ns: int
@@ -253,6 +254,7 @@ class TrackResult:
     confidence: Confidence | None = None
     limbs: Mapping[str, LimbState] = field(default_factory=dict)
     exposure: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    settling: bool = False
 
     def __post_init__(self) -> None:
         for name in ("pose", "markers_m"):

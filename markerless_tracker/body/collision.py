@@ -8,6 +8,7 @@ rule: the second cone keeps its elliptic section, and both cones are reduced by 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -123,7 +124,6 @@ class Feasibility:
         self.body = body
         self.limits = np.array(limits, dtype=np.float64)
         self.rule = rule
-        self._spheres = fill_with_spheres(body)
         pairs = body.collisions if rule != "none" else np.empty((0, 2), dtype=np.int64)
         self._pairs = np.array(pairs)
         self._known: dict[bytes, tuple[IntArray, NDArray[np.bool_], IntArray]] = {}
@@ -171,6 +171,10 @@ class Feasibility:
         if not test_points(centre[None, rest], others)[0]:
             return every._replace(limits=np.full(self.limits.shape, np.nan))
         return every._replace(pairs=pairs[moved])
+
+    @cached_property
+    def _spheres(self) -> Spheres:
+        return fill_with_spheres(self.body)
 
     def _parts(self, active: IntArray) -> tuple[IntArray, NDArray[np.bool_], IntArray]:
         """Nodes that parameters move, pairs of cones that they do, and the other parameters."""

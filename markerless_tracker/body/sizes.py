@@ -69,7 +69,14 @@ class Sizes:
         Raises:
             BodyModelError: the stature is not between 0.5 and 2.6 m.
         """
-        return build_body(self._description, subject_from_stature(self._description, stature_m))
+        subject = subject_from_stature(self._description, stature_m)
+        share = stature_m / MEAN_STATURE_M - 1.0
+        arrays = {
+            name: getattr(self._generic, name) + share * slope
+            for name, slope in self._with_stature.items()
+        }
+        lengths_m = fitted_lengths(self._description, subject)
+        return replace(self._generic, **arrays, lengths_m=lengths_m)
 
     def of(self, body: BodyModel) -> FloatArray:
         """The free lengths (k,) of a body, m: the mean of both sides."""
@@ -104,6 +111,23 @@ class Sizes:
         by_name = dict(zip(self.names, map(float, lengths_m), strict=True))
         named = {name: by_name[_side_free(name)] for name in self._description.lengths}
         return Subject("fitted", named, measured=False)
+
+    @cached_property
+    def _generic(self) -> BodyModel:
+        """The generic body of the mean stature."""
+        return build_body(
+            self._description, subject_from_stature(self._description, MEAN_STATURE_M)
+        )
+
+    @cached_property
+    def _with_stature(self) -> Mapping[str, FloatArray]:
+        """What the arrays grow by when the stature doubles; all depend on it linearly."""
+        double = subject_from_stature(self._description, 1.5 * MEAN_STATURE_M)
+        taller = build_body(self._description, double)
+        return {
+            name: (getattr(taller, name) - getattr(self._generic, name)) / 0.5
+            for name in (*_LINEAR, "cone_shape")
+        }
 
     @cached_property
     def _base(self) -> BodyModel:

@@ -146,4 +146,5 @@ class Assessor:
             warnings=warnings,
             confidence=confidence,
             limbs=limbs,
+            settling=found.settling,
         )

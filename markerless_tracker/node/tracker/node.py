@@ -24,6 +24,7 @@ from markerless_tracker.node.tracker.announcer import Announcer
 from markerless_tracker.node.tracker.cameras.build import make_inputs, view_reader
 from markerless_tracker.node.tracker.changes import FIXED, LIVE, LiveSettings
 from markerless_tracker.node.tracker.pace.states import StatePace
+from markerless_tracker.node.tracker.pace.waiting import kept_sets
 from markerless_tracker.node.tracker.publishing.files import Pictures, ResultFile
 from markerless_tracker.node.tracker.publishing.results import ResultPublishers
 from markerless_tracker.node.tracker.report import RunReport, sets_line
@@ -36,6 +37,7 @@ from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, Tr
 from markerless_tracker.records import TrackState
 from markerless_tracker.tracking import Tracker
 from markerless_tracker.tracking.processes.fitting import FittingProcess
+from markerless_tracker.tracking.processes.images import set_bytes
 
 STATE_PERIOD_S = 0.5
 
@@ -227,6 +229,7 @@ class TrackerNode(GivenNode):
             view_reader(scaled, self._inputs),
             waits=any(setup.tracker.segmenter(name) is None for name in self._image_cameras),
             warm_up=partial(self._warm_up, setup.tracker.body),
+            kept=kept_sets(set_bytes(rig)),
         )
 
     def _warm_up(self, body: BodyModel) -> None:

@@ -2,7 +2,6 @@
 
 from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from statistics import median_low
 from threading import Condition
 from typing import Generic, NamedTuple, TypeVar
@@ -13,6 +12,7 @@ from markerless_tracker.node.tracker.cameras.counts import (
     CameraCounts,
     SyncCounts,
 )
+from markerless_tracker.node.tracker.pace.waiting import MatchedSet, WaitingSets
 
 View = TypeVar("View")
 
@@ -33,35 +33,14 @@ class _Entry(NamedTuple, Generic[View]):
     view: View
 
 
-@dataclass(frozen=True)
-class MatchedSet(Generic[View]):
-    """One view of every camera that sends.
-
-    Attributes:
-        stamp_ns: the earliest of their stamps.
-        views: by camera, in the order of the cameras.
-        arrived_s: when the last of them came, in the caller's clock.
-        restarted: stamps were set back since the last set handed out (a bag was played again).
-        replaced: complete sets that this one replaced since the last set handed out.
-        period_s: time since the set before it was complete, 0 for the first.
-    """
-
-    stamp_ns: int
-    views: Mapping[str, View]
-    arrived_s: float
-    restarted: bool
-    replaced: int = 0
-    period_s: float = 0.0
-
-
 class Synchronizer(Generic[View]):
     """Collects views as they arrive and hands out the newest complete set.
 
     Each camera's views are kept in the order they arrived. The middleware keeps each camera's
     order, so once a set is complete, whatever arrived before its members can never be completed
     and is dropped. Views are matched by equal stamps, not by their age: one stamp far in the future
-    cannot block the next sets. At most one complete set waits, and at most `depth` views per
-    camera, however slow the consumer is.
+    cannot block the next sets. At most one complete set waits (some more while they are kept, see
+    `keep`), and at most `depth` views per camera, however slow the consumer is.
 
     A set that is not newer than the last one is late and dropped. After `RESTART_SETS` of them in a
     row, in order, time was set back, and sets are handed out from there on.
@@ -98,7 +77,7 @@ class Synchronizer(Generic[View]):
         self._heard_s: dict[str, float] = {}
         self._first_s: float | None = None
         self._since: dict[str, Counter[str]] = {name: Counter() for name in cameras}
-        self._waiting: MatchedSet[View] | None = None
+        self._waiting: WaitingSets[View] = WaitingSets()
         self._newest_ns: int | None = None
         self._late_ns: list[int] = []
         self._last_late_ns: int | None = None
@@ -123,8 +102,7 @@ class Synchronizer(Generic[View]):
     def held(self) -> int:
         """Views kept at this moment."""
         with self._changed:
-            waiting = len(self._waiting.views) if self._waiting is not None else 0
-            return waiting + sum(len(queue) for queue in self._pending.values())
+            return self._waiting.views + sum(map(len, self._pending.values()))
 
     @property
     def late_ns(self) -> int | None:
@@ -175,12 +153,24 @@ class Synchronizer(Generic[View]):
             return True
 
     def take(self, timeout_s: float = 0.0) -> MatchedSet[View] | None:
-        """The newest complete set, once; waits up to `timeout_s` for one, None if none came."""
+        """The newest complete set, or the earliest that was kept, once.
+
+        Waits up to `timeout_s` for one; None if none came.
+        """
         with self._changed:
-            if self._waiting is None and timeout_s > 0.0:
+            if not self._waiting and timeout_s > 0.0:
                 self._changed.wait(timeout_s)
-            taken, self._waiting = self._waiting, None
-            return taken
+            return self._waiting.take()
+
+    def keep(self, at_most: int) -> None:
+        """Keep so many complete sets from now on, or 0: no more; see `WaitingSets`."""
+        with self._changed:
+            self._waiting.keep(at_most)
+
+    def drop_older(self) -> None:
+        """Drop the complete sets that wait but for the newest."""
+        with self._changed:
+            self._counts["skipped"] += self._waiting.drop_older()
 
     def wake(self) -> None:
         """Make a waiting `take` return."""
@@ -226,7 +216,7 @@ class Synchronizer(Generic[View]):
             counts = SyncCounts(**self._counts)
             self._counts.clear()
             self._counter.reset()
-            self._waiting = None
+            self._waiting.clear()
             return counts
 
     def _left_out(self, now_s: float) -> frozenset[str]:
@@ -280,15 +270,11 @@ class Synchronizer(Generic[View]):
         restarted = self._newest_ns is not None and stamp_ns <= self._newest_ns
         if restarted:
             self._counts["restarts"] += 1
-        replaced = 0
-        if self._waiting is not None:
-            self._counts["skipped"] += 1
-            replaced = self._waiting.replaced + 1
-            restarted = restarted or self._waiting.restarted
         self._counts["complete"] += 1
         self._newest_ns = stamp_ns
         views = {name: entry.view for name, entry in members.items()}
-        self._waiting = MatchedSet(stamp_ns, views, now_s, restarted, replaced, period_s)
+        matched = MatchedSet(stamp_ns, views, now_s, restarted, period_s=period_s)
+        self._counts["skipped"] += self._waiting.put(matched)
 
     def _accepts(self, stamp_ns: int) -> bool:
         """Whether a set is the next in time, by itself or after time was set back."""

@@ -22,9 +22,10 @@ from markerless_tracker.node.tracker.learning import Learning, OpenRequest
 from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
 from markerless_tracker.node.tracker.pace.effort import EffortRule, Lateness
 from markerless_tracker.node.tracker.pace.start_time import StartTimeGate
+from markerless_tracker.node.tracker.pace.waiting import AT_MOST, MatchedSet
 from markerless_tracker.node.tracker.status import TrackerStatus
-from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
-from markerless_tracker.records import Observation, TrackResult
+from markerless_tracker.node.tracker.synchronizer import Synchronizer
+from markerless_tracker.records import Observation, TrackResult, TrackState
 
 Images = Mapping[str, NDArray[np.uint8] | Observation]
 
@@ -77,6 +78,7 @@ class TrackerHandle:
         decode: makes the tracker's image or observation of a camera's view.
         waits: whether the tracker has no backgrounds; sets are dropped until they are learned.
         warm_up: compiles what runs beside the tracker.
+        kept: sets that are kept while a person is searched for.
     """
 
     tracker: Stepper
@@ -84,6 +86,7 @@ class TrackerHandle:
     decode: Callable[[str, Any], NDArray[np.uint8] | Observation]
     waits: bool = False
     warm_up: Callable[[], None] = lambda: None
+    kept: int = AT_MOST
 
 
 class TrackWorker:
@@ -189,6 +192,7 @@ class TrackWorker:
         activity = "waiting for learn_background" if handle.waits else "waiting for images"
         self._status.became_ready(activity, now_s=self._clock())
         self._inform(ready_line(activity, kernels.done, self._clock() - begun_s))
+        self._sets.keep(handle.kept)
         gate = StartTimeGate(handle.start_ns)
         ahead = Ahead(
             self._sets, partial(self._evidence, handle), poll_s=_POLL_S, clock=self._clock
@@ -248,6 +252,7 @@ class TrackWorker:
             if self._reset.is_set():
                 self._reset.clear()
                 handle.tracker.reset()
+                self._sets.keep(handle.kept)
                 self._status.restarted()
             if not gate.admits(matched.stamp_ns):
                 self._status.dropped("before_start")
@@ -280,12 +285,20 @@ class TrackWorker:
             self._status.set_failed(one_line(error))
             self._trouble(matched.stamp_ns, error)
             return None
+        self._keep_for(result, handle.kept)
         self._status.tracked(result, arrived_s=matched.arrived_s, finished_s=finished_s)
         tracked = TrackedSet(result, images, handle.tracker.body)
         if learning is not None:
             learning.saw(result.state)
             self._learn(handle, learning, matched.stamp_ns)
         return tracked
+
+    def _keep_for(self, result: TrackResult, kept: int) -> None:
+        """Keep the sets that come while a person is searched for; without a person, the newest."""
+        searching = result.state is TrackState.SEARCHING
+        self._sets.keep(kept if searching or result.settling else 0)
+        if searching:
+            self._sets.drop_older()
 
     def _give(self, matched: MatchedSet[Any], tracked: TrackedSet | None) -> None:
         """Publish a set's result and that the set was dealt with."""
@@ -319,6 +332,7 @@ class TrackWorker:
         try:
             if learning.finish_if_complete(handle.tracker):
                 self._waits = False
+                self._sets.keep(handle.kept)
                 self._status.restarted()
         except Exception as error:
             learning.refuse(one_line(error))

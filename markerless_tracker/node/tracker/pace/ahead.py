@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from threading import Event
 from typing import Any
 
-from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
+from markerless_tracker.node.tracker.pace.waiting import MatchedSet
+from markerless_tracker.node.tracker.synchronizer import Synchronizer
 
 _RECENT = 5
 """Fits, and sets made ahead, by whose times the next set is taken."""

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
-from markerless_tracker.node.tracker.synchronizer import MatchedSet, Synchronizer
+from markerless_tracker.node.tracker.pace.waiting import MatchedSet
+from markerless_tracker.node.tracker.synchronizer import Synchronizer
 
 
 class Bench:
