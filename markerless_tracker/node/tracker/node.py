@@ -230,6 +230,7 @@ class TrackerNode(GivenNode):
             waits=any(setup.tracker.segmenter(name) is None for name in self._image_cameras),
             warm_up=partial(self._warm_up, setup.tracker.body),
             kept=kept_sets(set_bytes(rig)),
+            searches=self._settings.start_file is None,
         )
 
     def _warm_up(self, body: BodyModel) -> None:

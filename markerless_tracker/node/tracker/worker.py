@@ -79,6 +79,7 @@ class TrackerHandle:
         waits: whether the tracker has no backgrounds; sets are dropped until they are learned.
         warm_up: compiles what runs beside the tracker.
         kept: sets that are kept while a person is searched for.
+        searches: whether the tracker begins with that, and not from a start pose.
     """
 
     tracker: Stepper
@@ -87,6 +88,7 @@ class TrackerHandle:
     waits: bool = False
     warm_up: Callable[[], None] = lambda: None
     kept: int = AT_MOST
+    searches: bool = True
 
 
 class TrackWorker:
@@ -161,10 +163,7 @@ class TrackWorker:
             self._request.open(learning)
 
     def stop(self, timeout_s: float) -> bool:
-        """Finish the set at hand and end; returns whether the thread ended in time.
-
-        Before the worker is ready the thread is not waited for: it may be compiling.
-        """
+        """End after the set at hand, or at once while compiling; returns whether it ended."""
         self._stop.set()
         self._sets.wake()
         if self._thread.ident is not None:
@@ -192,7 +191,7 @@ class TrackWorker:
         activity = "waiting for learn_background" if handle.waits else "waiting for images"
         self._status.became_ready(activity, now_s=self._clock())
         self._inform(ready_line(activity, kernels.done, self._clock() - begun_s))
-        self._sets.keep(handle.kept)
+        self._sets.keep(handle.searches * handle.kept)
         gate = StartTimeGate(handle.start_ns)
         ahead = Ahead(
             self._sets, partial(self._evidence, handle), poll_s=_POLL_S, clock=self._clock
@@ -252,7 +251,7 @@ class TrackWorker:
             if self._reset.is_set():
                 self._reset.clear()
                 handle.tracker.reset()
-                self._sets.keep(handle.kept)
+                self._sets.keep(handle.searches * handle.kept)
                 self._status.restarted()
             if not gate.admits(matched.stamp_ns):
                 self._status.dropped("before_start")
@@ -332,7 +331,7 @@ class TrackWorker:
         try:
             if learning.finish_if_complete(handle.tracker):
                 self._waits = False
-                self._sets.keep(handle.kept)
+                self._sets.keep(handle.searches * handle.kept)
                 self._status.restarted()
         except Exception as error:
             learning.refuse(one_line(error))

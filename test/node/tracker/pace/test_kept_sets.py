@@ -55,12 +55,14 @@ def until(condition: Callable[[], Any]) -> None:
 class Worker:
     """A worker that tracks what is offered."""
 
-    def __init__(self, kept: int) -> None:
+    def __init__(self, kept: int, *, searches: bool = True) -> None:
         self.tracker = SearchingTracker()
         self.sets: Synchronizer[int] = Synchronizer(("a",))
         self.published: list[int] = []
         status = TrackerStatus()
-        handle = TrackerHandle(self.tracker, None, lambda name, view: np.zeros(1), kept=kept)
+        handle = TrackerHandle(
+            self.tracker, None, lambda name, view: np.zeros(1), kept=kept, searches=searches
+        )
         self.worker = TrackWorker(
             self.sets,
             status,
@@ -84,11 +86,11 @@ class Worker:
 
 
 @pytest.fixture
-def make_worker() -> Iterator[Callable[[int], Worker]]:
+def make_worker() -> Iterator[Callable[..., Worker]]:
     made = []
 
-    def make(kept: int) -> Worker:
-        made.append(Worker(kept))
+    def make(kept: int, *, searches: bool = True) -> Worker:
+        made.append(Worker(kept, searches=searches))
         return made[-1]
 
     yield make
@@ -97,7 +99,7 @@ def make_worker() -> Iterator[Callable[[int], Worker]]:
         assert worker.worker.stop(60)
 
 
-def test_sets_that_come_during_the_start_are_kept(make_worker: Callable[[int], Worker]) -> None:
+def test_sets_that_come_during_the_start_are_kept(make_worker: Callable[..., Worker]) -> None:
     worker = make_worker(10)
     worker.tracker.settling = True
     worker.take_during_a_step(*STAMPS)
@@ -105,7 +107,7 @@ def test_sets_that_come_during_the_start_are_kept(make_worker: Callable[[int], W
     assert worker.published == STAMPS and worker.sets.counts.skipped == 0
 
 
-def test_no_more_are_kept_than_the_memory_holds(make_worker: Callable[[int], Worker]) -> None:
+def test_no_more_are_kept_than_the_memory_holds(make_worker: Callable[..., Worker]) -> None:
     worker = make_worker(2)
     worker.tracker.settling = True
     worker.take_during_a_step(*STAMPS)
@@ -114,7 +116,7 @@ def test_no_more_are_kept_than_the_memory_holds(make_worker: Callable[[int], Wor
 
 
 def test_sets_that_came_while_nobody_was_found_are_skipped(
-    make_worker: Callable[[int], Worker],
+    make_worker: Callable[..., Worker],
 ) -> None:
     worker = make_worker(10)
     worker.tracker.state = TrackState.SEARCHING
@@ -124,7 +126,7 @@ def test_sets_that_came_while_nobody_was_found_are_skipped(
 
 
 def test_a_tracked_person_is_tracked_in_the_newest_set(
-    make_worker: Callable[[int], Worker],
+    make_worker: Callable[..., Worker],
 ) -> None:
     worker = make_worker(10)
     worker.take_during_a_step(*STAMPS[:1])
@@ -133,3 +135,10 @@ def test_a_tracked_person_is_tracked_in_the_newest_set(
     worker.take_during_a_step(*STAMPS[1:])
     until(lambda: len(worker.published) == 4)
     assert worker.published == [*STAMPS[:3], STAMPS[-1]]
+
+
+def test_from_a_start_pose_the_newest_set_is_tracked(make_worker: Callable[..., Worker]) -> None:
+    worker = make_worker(10, searches=False)
+    worker.take_during_a_step(*STAMPS)
+    until(lambda: len(worker.published) == 3)
+    assert worker.published == [*STAMPS[:2], STAMPS[-1]]
