@@ -59,8 +59,8 @@ class WaitingSets(Generic[View]):
     An automatic start searches its first set for about a second, and needs further sets that lie
     near to the first and to each other. So they are kept meanwhile and handed out in their order.
     If there are too many, every other of the later ones is dropped, and the next lie twice as far
-    apart.
-    Then the worker catches up: there are fewer and fewer places, until only the newest set waits.
+    apart. Then the worker catches up: there are fewer and fewer places, until only the newest set
+    waits.
     """
 
     def __init__(self) -> None:
@@ -96,8 +96,9 @@ class WaitingSets(Generic[View]):
         before = len(self._sets) + 1
         self._newest_ns = matched.stamp_ns
         if not self._keeping:
+            # Sets of a time that was set back do not continue those that wait.
             left = -(-(self._caught_up_ns - matched.stamp_ns) // PLACE_NS)
-            self._places = max(1, min(self._places, left))
+            self._places = 1 if matched.restarted else max(1, min(self._places, left))
         if self._sets and not self._spaced():
             matched = matched.replacing(self._sets.pop())
         self._sets.append(matched)

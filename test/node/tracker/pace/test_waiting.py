@@ -165,3 +165,16 @@ def test_places_are_lost_with_time() -> None:
         behind_ns = (number - 5) * SPACING_NS
         assert len(waiting) <= max(1, 8 - behind_ns // PLACE_NS)
     assert len(waiting) == 1
+
+
+def test_sets_of_a_time_that_was_set_back_end_the_catching_up() -> None:
+    waiting: WaitingSets[str] = WaitingSets()
+    waiting.keep(AT_MOST)
+    for stamp in range(5000, 6000, 100):
+        waiting.put(a_set(stamp))
+    waiting.keep(0)
+    waiting.put(a_set(100, restarted=True))
+    waiting.put(a_set(200))
+    matched = waiting.take()
+    assert matched is not None and matched.stamp_ns == 200 * MS and matched.restarted
+    assert len(waiting) == 0
