@@ -128,7 +128,7 @@ def test_a_slow_worker_catches_up_all_the_same() -> None:
 EVENTS = st.sampled_from(["put", "take", "keep", "end", "drop"])
 
 
-@given(st.lists(st.tuples(EVENTS, st.integers(1, 400))), st.integers(1, 5))
+@given(st.lists(st.tuples(EVENTS, st.integers(1, 400)), max_size=120), st.integers(1, 14))
 def test_sets_are_bounded_in_order_and_all_accounted_for(
     events: list[tuple[str, int]], at_most: int
 ) -> None:
