@@ -2,6 +2,7 @@
 
 Two passes over the rows, downward and upward. In each, what comes from the two rows before is found
 for a whole row at once, which the compiler vectorises; what comes from the pixel before follows.
+Sums are cast to 32 bits: a vector holds twice as many of them as of 64, with a minimum of its own.
 Distances outward and inward take the same passes: at each pixel one of the two is 0.
 """
 
@@ -67,8 +68,8 @@ def measure(mask, rows, out):  # type: ignore[no-untyped-def]
 def _go_right(outward, inward):  # type: ignore[no-untyped-def]
     before_out, before_in = _FAR, _FAR
     for j in range(_BESIDE, outward.size - _BESIDE):
-        before_out = min(outward[j], before_out + _STEP)
-        before_in = min(inward[j], before_in + _STEP)
+        before_out = min(outward[j], np.int32(before_out + _STEP))
+        before_in = min(inward[j], np.int32(before_in + _STEP))
         outward[j] = before_out
         inward[j] = before_in
 
@@ -78,8 +79,8 @@ def _go_left(outward, inward):  # type: ignore[no-untyped-def]
     after_out, after_in = _FAR, _FAR
     for k in range(_BESIDE, outward.size - _BESIDE):
         j = np.uint64(outward.size - 1 - k)
-        after_out = min(outward[j], after_out + _STEP)
-        after_in = min(inward[j], after_in + _STEP)
+        after_out = min(outward[j], np.int32(after_out + _STEP))
+        after_in = min(inward[j], np.int32(after_in + _STEP))
         outward[j] = after_out
         inward[j] = after_in
 
@@ -118,5 +119,5 @@ def _take_rows(next_row, second_row, row):  # type: ignore[no-untyped-def]
     for j in range(row.size - 2 * _BESIDE):
         knight = min(min(second_row[j + 1], second_row[j + 3]), min(next_row[j], next_row[j + 4]))
         diagonal = min(next_row[j + 1], next_row[j + 3])
-        near = min(diagonal + _DIAGONAL, next_row[j + 2] + _STEP)
-        row[j + 2] = min(row[j + 2], min(near, knight + _KNIGHT))
+        near = min(np.int32(diagonal + _DIAGONAL), np.int32(next_row[j + 2] + _STEP))
+        row[j + 2] = min(row[j + 2], min(near, np.int32(knight + _KNIGHT)))

@@ -89,6 +89,79 @@ def _beyond(distance, limit, row, marks):  # type: ignore[no-untyped-def]
         row[j] = marks[j]
 
 
+# `is_shadow` of many pixels, with choices between two values in place of branches: the compiler
+# makes vector instructions of that, and they take a tenth of the time.
+@compiled(error_model="numpy")
+def _split_marked(blue, green, red, first_b, first_g, first_r, gain, rule, marks, row):  # type: ignore[no-untyped-def]
+    """Fill a stretch of a row: shadow or foreground where it is marked, else 0.
+
+    Args:
+        blue, green, red: (n,) uint8.
+        first_b, first_g, first_r: (n,) means of the first Gaussians, of `coarse`.
+        gain: 3 float32, brightness relative to the background's in those steps.
+        rule: as of `is_shadow`.
+        marks: (n,) uint8, not 0 where a pixel is not background.
+        row: (n,) uint8, written.
+    """
+    zero, one, white = np.float32(0.0), np.float32(1.0), np.float32(255.0)
+    turn, never = np.float32(360.0), np.float32(np.inf)
+    sixth, third, second_third = np.float32(60.0), np.float32(120.0), np.float32(240.0)
+    shadow, foreground, background = np.uint8(SHADOW), np.uint8(FOREGROUND), np.uint8(0)
+    gain_b, gain_g, gain_r = gain
+    darkest, faintest, saturation_max, hue_max_deg, chroma_min = rule
+    for j in range(row.size):
+        mark, b, g, r = marks[j], np.float32(blue[j]), np.float32(green[j]), np.float32(red[j])
+        mean_b = gain_b * np.float32(first_b[j])
+        mean_g = gain_g * np.float32(first_g[j])
+        mean_r = gain_r * np.float32(first_r[j])
+        mean_b = mean_b if mean_b < white else white
+        mean_g = mean_g if mean_g < white else white
+        mean_r = mean_r if mean_r < white else white
+        value = b if b > g else g
+        value = value if value > r else r
+        least = b if b < g else g
+        least = least if least < r else r
+        mean_value = mean_b if mean_b > mean_g else mean_g
+        mean_value = mean_value if mean_value > mean_r else mean_r
+        mean_least = mean_b if mean_b < mean_g else mean_g
+        mean_least = mean_least if mean_least < mean_r else mean_r
+        chroma, mean_chroma = value - least, mean_value - mean_least
+        # Where a divisor is 0 the result does not count.
+        by_value = value if value > zero else one
+        by_mean_value = mean_value if mean_value > zero else one
+        by_chroma = chroma if chroma > zero else one
+        by_mean_chroma = mean_chroma if mean_chroma > zero else one
+        blue_red, red_green, green_blue = b - r, r - g, g - b
+        along = blue_red if value == g else red_green
+        start = third if value == g else second_third
+        along = green_blue if value == r else along
+        start = zero if value == r else start
+        hue = start + sixth * along / by_chroma
+        turned = hue + turn
+        hue = turned if hue < zero else hue
+        blue_red, red_green, green_blue = mean_b - mean_r, mean_r - mean_g, mean_g - mean_b
+        along = blue_red if mean_value == mean_g else red_green
+        start = third if mean_value == mean_g else second_third
+        along = green_blue if mean_value == mean_r else along
+        start = zero if mean_value == mean_r else start
+        mean_hue = start + sixth * along / by_mean_chroma
+        turned = mean_hue + turn
+        mean_hue = turned if mean_hue < zero else mean_hue
+        apart = abs(hue - mean_hue)
+        other_way = turn - apart
+        apart = apart if apart < other_way else other_way
+        without_hue = zero if chroma == mean_chroma else never
+        apart = apart if chroma > zero else without_hue
+        apart = apart if mean_chroma > zero else without_hue
+        apart = zero if mean_chroma * value < chroma_min * mean_value else apart
+        more_saturated = chroma / by_value - mean_chroma / by_mean_value
+        label = shadow if apart <= hue_max_deg else foreground
+        label = label if more_saturated <= saturation_max else foreground
+        label = label if value >= darkest * mean_value else foreground
+        label = label if value <= faintest * mean_value else foreground
+        row[j] = label if mark != 0 else background
+
+
 @compiled()
 def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
     """Label a part of a colour image: 0 background, 127 shadow, 255 foreground.
@@ -103,44 +176,54 @@ def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels
         left, top: the part's first column and row in the image.
         labels: (a, b) uint8, written.
     """
-    one = np.float32(1.0)
+    one, white = np.float32(1.0), np.float32(255.0)
     level = np.float32(1.0 / LEVELS)
-    white = np.float32(255.0)
     modes = mean.shape[0]
     rows, columns = labels.shape
-    gain_b, gain_g, gain_r = gain[0], gain[1], gain[2]
+    steps = (gain[0] * level, gain[1] * level, gain[2] * level)
     distance = np.empty(columns, dtype=np.float32)
     # Groups of eight background pixels are skipped at once.
     marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
     words = marks.view(np.uint64)
     for i in range(rows):
         v = top + i
-        split = planes[:, i]
         # First whole rows without branches: most pixels are background of the first Gaussian.
         distance[:] = 0.0
         for c in range(3):
             base = first[0, c, v, left : left + columns]
             narrow = first[1, c, v, left : left + columns]
-            _add_square(split[c], base, narrow, gain[c] * level, distance)
+            _add_square(planes[c, i], base, narrow, steps[c], distance)
         row = labels[i]
         _beyond(distance, unit * unit, row, marks)
-        for word in range(words.size):
+        word = 0
+        while word < words.size:
             if words[word] == 0:
+                word += 1
                 continue
-            for j in range(8 * word, min(8 * word + 8, columns)):
+            begin = 8 * word
+            while word < words.size and words[word] != 0:
+                word += 1
+            end = min(8 * word, columns)
+            begin_u, end_u = left + begin, left + end
+            # Slices of one dimension: the compiler knows that their elements lie side by side.
+            _split_marked(
+                planes[0, i, begin:end], planes[1, i, begin:end], planes[2, i, begin:end],
+                first[0, 0, v, begin_u:end_u], first[0, 1, v, begin_u:end_u],
+                first[0, 2, v, begin_u:end_u], steps, rule, marks[begin:end], row[begin:end],
+            )  # fmt: skip
+            if modes == 1:
+                continue
+            for j in range(begin, end):
                 if marks[j] == 0:
                     continue
-                b = np.float32(split[0, j])
-                g = np.float32(split[1, j])
-                r = np.float32(split[2, j])
-                mean_b = min(gain_b * level * np.float32(first[0, 0, v, left + j]), white)
-                mean_g = min(gain_g * level * np.float32(first[0, 1, v, left + j]), white)
-                mean_r = min(gain_r * level * np.float32(first[0, 2, v, left + j]), white)
-                label = SHADOW if is_shadow(b, g, r, mean_b, mean_g, mean_r, rule) else FOREGROUND
+                b = np.float32(planes[0, i, j])
+                g = np.float32(planes[1, i, j])
+                r = np.float32(planes[2, i, j])
+                label = row[j]
                 for k in range(1, modes):
-                    mean_b = min(gain_b * mean[k, 0, v, left + j], white)
-                    mean_g = min(gain_g * mean[k, 1, v, left + j], white)
-                    mean_r = min(gain_r * mean[k, 2, v, left + j], white)
+                    mean_b = min(gain[0] * mean[k, 0, v, left + j], white)
+                    mean_g = min(gain[1] * mean[k, 1, v, left + j], white)
+                    mean_r = min(gain[2] * mean[k, 2, v, left + j], white)
                     x = (b - mean_b) * scale[k, 0, v, left + j]
                     y = (g - mean_g) * scale[k, 1, v, left + j]
                     z = (r - mean_r) * scale[k, 2, v, left + j]

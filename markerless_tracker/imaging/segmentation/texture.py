@@ -77,12 +77,15 @@ def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[
         noise: variance of the sensor's noise.
     """
     for j in range(out.size):
-        n = down * across[j]
+        # n times a sum of squares fits into 31 bits up to a radius of `MOST_RADIUS`. Without the
+        # casts the products have 64 bits, for which processors have few vector instructions.
+        n = np.int32(down * across[j])
         share = np.float32(1.0) / np.float32(n)
-        # n times a sum of squares fits into 31 bits up to a radius of `MOST_RADIUS`.
-        var_a = np.float32(n * aa[j] - a[j] * a[j]) * share * share
-        cov = np.float32(n * ab[j] - a[j] * b[j]) * share * share
-        var_b = np.float32(n * bb[j] - b[j] * b[j]) * share * share
+        square_a, square_b = np.int32(a[j] * a[j]), np.int32(b[j] * b[j])
+        product = np.int32(a[j] * b[j])
+        var_a = np.float32(np.int32(np.int32(n * aa[j]) - square_a)) * share * share
+        cov = np.float32(np.int32(np.int32(n * ab[j]) - product)) * share * share
+        var_b = np.float32(np.int32(np.int32(n * bb[j]) - square_b)) * share * share
         p = np.float32(a[j]) / max(np.float32(b[j]), np.float32(1e-6))
         pattern = p * p * var_b
         rest = var_a - np.float32(2.0) * p * cov + pattern - noise
@@ -160,67 +163,60 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
 
 
 @compiled()
-def _spread_run(row, start, stop, step, out):  # type: ignore[no-untyped-def]
-    """Windows without a pattern take over light along a run of a row, from the window at start."""
-    near = row[start]
-    j = start + step
-    taken = 0
-    while j != stop and taken < SPREAD_PX:
-        own = row[j] - np.float32(UNKNOWN)
-        if abs(own - near) > np.float32(STEP):
-            return
-        out[j] = own
-        near = own
-        taken += 1
-        j += step
+def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
+    """Windows of a row without a pattern take over light from the row before, if it is similar.
+
+    Args:
+        row: (n,) light of the row.
+        near: (n,) light that the row before passes on, 0 = none; becomes that of this row.
+        steps: (n,) how many rows have passed it on; likewise.
+        out: (n,) written where light is taken over.
+    """
+    zero, one = np.float32(0.0), np.float32(1.0)
+    # Choices between two values at a time, which the compiler vectorises.
+    for j in range(row.size):
+        p, before, passed, kept = row[j], near[j], steps[j], out[j]
+        own = p - np.float32(UNKNOWN)
+        change = own - before
+        change = change if change > zero else -change
+        plain = one if p >= np.float32(UNKNOWN) else zero
+        taken = plain if change <= np.float32(STEP) else zero
+        taken = taken if before > zero else zero
+        taken = taken if passed < np.float32(SPREAD_PX) else zero
+        out[j] = own if taken > zero else kept
+        lit_itself = p if p > zero else zero
+        lit_itself = zero if plain > zero else lit_itself
+        near[j] = own if taken > zero else lit_itself
+        steps[j] = passed + one if taken > zero else zero
 
 
 @compiled()
-def spread_light(light, spread):  # type: ignore[no-untyped-def]
+def _spread_down_and_up(light, spread):  # type: ignore[no-untyped-def]
+    """Windows without a pattern take over light along columns; see `spread_light`."""
+    rows, columns = light.shape
+    near = np.zeros(columns, dtype=np.float32)
+    steps = np.zeros(columns, dtype=np.float32)
+    for i in range(rows):
+        _spread_row(light[i], near, steps, spread[i])
+    near[:] = 0.0
+    steps[:] = 0.0
+    for i in range(rows - 1, -1, -1):
+        _spread_row(light[i], near, steps, spread[i])
+
+
+def spread_light(light: NDArray[np.float32], spread: NDArray[np.float32]) -> None:
     """Windows without a pattern take over the light of windows next to them if theirs is similar.
 
     First along rows, then along columns, `SPREAD_PX` each, so that a result depends on a bounded
     neighbourhood. light (a, b) is changed; spread (a, b) is written.
     """
-    rows, columns = light.shape
-    spread[:] = light
-    for i in range(rows):
-        row = light[i]
-        j = 0
-        while j < columns:
-            if row[j] < np.float32(UNKNOWN):
-                j += 1
-                continue
-            begin = j
-            while j < columns and row[j] >= np.float32(UNKNOWN):
-                j += 1
-            if begin > 0 and row[begin - 1] > np.float32(0.0):
-                _spread_run(row, begin - 1, j, 1, spread[i])
-            if j < columns and row[j] > np.float32(0.0):
-                _spread_run(row, j, begin - 1, -1, spread[i])
-    light[:] = spread
-    nears = np.zeros(columns, dtype=np.float32)
-    steps_of = np.zeros(columns, dtype=np.int32)
-    for upward in range(2):
-        nears[:] = 0.0
-        for k in range(rows):
-            i = k if upward == 0 else rows - 1 - k
-            _spread_row(light[i], nears, steps_of, spread[i])
-
-
-@compiled()
-def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
-    """A row of light takes over light from the row before; as `_spread_run`, without branches."""
-    for j in range(row.size):
-        p = row[j]
-        own = p - np.float32(UNKNOWN)
-        plain = p >= np.float32(UNKNOWN)
-        same = abs(own - near[j]) <= np.float32(STEP)
-        taken = plain & same & (near[j] > np.float32(0.0)) & (steps[j] < np.int32(SPREAD_PX))
-        out[j] = own if taken else out[j]
-        passed_on = own if taken else np.float32(0.0)
-        near[j] = passed_on if plain else max(p, np.float32(0.0))
-        steps[j] = steps[j] + np.int32(1) if taken else np.int32(0)
+    # Along rows each step needs the one before; along columns many are made at once.
+    turned = np.asarray(cv2.transpose(light), dtype=np.float32)
+    found = turned.copy()
+    _spread_down_and_up(turned, found)
+    light[...] = cv2.transpose(found)
+    spread[...] = light
+    _spread_down_and_up(light, spread)
 
 
 @compiled()

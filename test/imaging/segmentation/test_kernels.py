@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from markerless_tracker.imaging import ImagingSettings
+from markerless_tracker.imaging.segmentation import kernels
 from markerless_tracker.imaging.segmentation.kernels import coarse, label_colour, label_grey
 from markerless_tracker.imaging.segmentation.shadow import shadow_rule
 
@@ -54,6 +55,26 @@ def scene(seed: int, *, channels: int = 3) -> tuple[np.ndarray, np.ndarray, np.n
     image[other] = rng.uniform(0.0, 255.0, (int(other.sum()), channels))
     scale = rng.uniform(0.01, 0.3, mean.shape).astype(np.float32)
     return np.clip(np.rint(image), 0, 255).astype(np.uint8), mean, scale
+
+
+@pytest.mark.parametrize("removal", [True, False])
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 40))
+@settings(max_examples=30, deadline=None)
+def test_marked_pixels_are_split_as_one_by_one(removal: bool, seed: int, count: int) -> None:
+    rule = shadow_rule(ImagingSettings.from_mapping({"shadow.removal": removal}))
+    rng = np.random.default_rng(seed)
+    # Few levels: black, grey, and channels that are alike occur often.
+    image = rng.choice(np.array([0, 1, 40, 90, 91, 255], np.uint8), (3, count))
+    levels = rng.choice(np.array([0, 40, 90, 100, 180, 255]), (3, count))
+    means = (levels * kernels.LEVELS).astype(np.uint16)
+    gain = tuple(np.float32(g / kernels.LEVELS) for g in (1.0, 1.0, rng.choice([1.0, 1.2])))
+    marks = np.where(rng.random(count) < 0.9, 255, 0).astype(np.uint8)
+    found = np.full(count, 7, np.uint8)
+    kernels._split_marked(*image, *means, gain, rule, marks, found)
+    for j in range(count):
+        base = np.minimum(np.array(gain, np.float32) * means[:, j].astype(np.float32), 255.0)
+        shadow = kernels.is_shadow(*image[:, j].astype(np.float32), *base, rule)
+        assert found[j] == (0 if not marks[j] else kernels.SHADOW if shadow else 255)
 
 
 @pytest.mark.parametrize("removal", [True, False])

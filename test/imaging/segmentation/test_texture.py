@@ -202,15 +202,19 @@ def test_light_spreads_over_plain_windows(seed: int, rows: int, columns: int) ->
     np.testing.assert_array_equal(spread, expected)
 
 
-@pytest.mark.parametrize("step", [1, -1])
-def test_light_spreads_by_a_limited_distance(step: int) -> None:
-    row = np.full(3 * SPREAD_PX, UNKNOWN + 0.5, dtype=np.float32)
-    start, stop = (0, row.size) if step == 1 else (row.size - 1, -1)
-    row[start] = 0.5
-    out = row.copy()
-    texture._spread_run(row, start, stop, step, out)
-    np.testing.assert_array_equal(out[::step][: SPREAD_PX + 1], np.float32(0.5))
-    np.testing.assert_array_equal(out[::step][SPREAD_PX + 1 :], np.float32(UNKNOWN + 0.5))
+@pytest.mark.parametrize("along", ["right", "left", "down", "up"])
+def test_light_spreads_by_a_limited_distance(along: str) -> None:
+    line = np.full(3 * SPREAD_PX, UNKNOWN + 0.5, dtype=np.float32)
+    line[0] = 0.5
+    expected = line.copy()
+    expected[: SPREAD_PX + 1] = 0.5
+    if along in ("left", "up"):
+        line, expected = line[::-1], expected[::-1]
+    shape = (1, line.size) if along in ("right", "left") else (line.size, 1)
+    light = np.ascontiguousarray(line).reshape(shape)
+    spread = np.empty_like(light)
+    spread_light(light, spread)
+    np.testing.assert_array_equal(spread.ravel(), expected)
 
 
 @few
@@ -218,7 +222,7 @@ def test_light_spreads_by_a_limited_distance(step: int) -> None:
 def test_a_row_takes_over_from_the_row_before(seed: int) -> None:
     light = random_light(np.random.default_rng(seed), 30, 40)
     near = np.zeros(40, dtype=np.float32)
-    steps = np.zeros(40, dtype=np.int32)
+    steps = np.zeros(40, dtype=np.float32)
     out = light.copy()
     for row, written in zip(light, out, strict=True):
         texture._spread_row(row, near, steps, written)
