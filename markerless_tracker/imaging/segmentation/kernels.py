@@ -34,16 +34,18 @@ def coarse(
 
 @compiled(inline="always")
 def hue_deg(blue, green, red, value, chroma):  # type: ignore[no-untyped-def]
-    """Hue in degrees, [0, 360), as OpenCV defines it; ``chroma`` = max - min > 0."""
-    if value == red:
-        hue = np.float32(60.0) * (green - blue) / chroma
-    elif value == green:
-        hue = np.float32(120.0) + np.float32(60.0) * (blue - red) / chroma
-    else:
-        hue = np.float32(240.0) + np.float32(60.0) * (red - green) / chroma
-    if hue < np.float32(0.0):
-        hue += np.float32(360.0)
-    return hue
+    """Hue in degrees, [0, 360), as OpenCV defines it; ``chroma`` = max - min > 0.
+
+    Choices between two values in place of branches: loops with it can be vectorised.
+    """
+    blue_red, red_green, green_blue = blue - red, red - green, green - blue
+    along = blue_red if value == green else red_green
+    start = np.float32(120.0) if value == green else np.float32(240.0)
+    along = green_blue if value == red else along
+    start = np.float32(0.0) if value == red else start
+    hue = start + np.float32(60.0) * along / chroma
+    turned = hue + np.float32(360.0)
+    return turned if hue < np.float32(0.0) else hue
 
 
 @compiled(inline="always")
@@ -105,7 +107,6 @@ def _split_marked(blue, green, red, first_b, first_g, first_r, gain, rule, marks
     """
     zero, one, white = np.float32(0.0), np.float32(1.0), np.float32(255.0)
     turn, never = np.float32(360.0), np.float32(np.inf)
-    sixth, third, second_third = np.float32(60.0), np.float32(120.0), np.float32(240.0)
     shadow, foreground, background = np.uint8(SHADOW), np.uint8(FOREGROUND), np.uint8(0)
     gain_b, gain_g, gain_r = gain
     darkest, faintest, saturation_max, hue_max_deg, chroma_min = rule
@@ -131,22 +132,8 @@ def _split_marked(blue, green, red, first_b, first_g, first_r, gain, rule, marks
         by_mean_value = mean_value if mean_value > zero else one
         by_chroma = chroma if chroma > zero else one
         by_mean_chroma = mean_chroma if mean_chroma > zero else one
-        blue_red, red_green, green_blue = b - r, r - g, g - b
-        along = blue_red if value == g else red_green
-        start = third if value == g else second_third
-        along = green_blue if value == r else along
-        start = zero if value == r else start
-        hue = start + sixth * along / by_chroma
-        turned = hue + turn
-        hue = turned if hue < zero else hue
-        blue_red, red_green, green_blue = mean_b - mean_r, mean_r - mean_g, mean_g - mean_b
-        along = blue_red if mean_value == mean_g else red_green
-        start = third if mean_value == mean_g else second_third
-        along = green_blue if mean_value == mean_r else along
-        start = zero if mean_value == mean_r else start
-        mean_hue = start + sixth * along / by_mean_chroma
-        turned = mean_hue + turn
-        mean_hue = turned if mean_hue < zero else mean_hue
+        hue = hue_deg(b, g, r, value, by_chroma)
+        mean_hue = hue_deg(mean_b, mean_g, mean_r, mean_value, by_mean_chroma)
         apart = abs(hue - mean_hue)
         other_way = turn - apart
         apart = apart if apart < other_way else other_way
