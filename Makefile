@@ -14,7 +14,7 @@ WORKERS ?= 2
 # Variables of another ROS environment would mix its libraries with those of .venv.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH
 unexport RMW_IMPLEMENTATION
-# The tests start hundreds of processes: stored bytecode saves each a third of a second.
+# The tests start hundreds of processes, each of which would compile all modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help

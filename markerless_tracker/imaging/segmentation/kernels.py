@@ -92,7 +92,8 @@ def _beyond(distance, limit, row, marks):  # type: ignore[no-untyped-def]
 
 
 # `is_shadow` of many pixels, with choices between two values in place of branches: the compiler
-# makes vector instructions of that, and they take a tenth of the time.
+# makes vector instructions of that. Where half of the pixels are marked they take a quarter of the
+# time of branches.
 @compiled(error_model="numpy")
 def _split_marked(blue, green, red, first_b, first_g, first_r, gain, rule, marks, row):  # type: ignore[no-untyped-def]
     """Fill a stretch of a row: shadow or foreground where it is marked, else 0.

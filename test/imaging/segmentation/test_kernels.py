@@ -57,15 +57,19 @@ def scene(seed: int, *, channels: int = 3) -> tuple[np.ndarray, np.ndarray, np.n
     return np.clip(np.rint(image), 0, 255).astype(np.uint8), mean, scale
 
 
-@pytest.mark.parametrize("removal", [True, False])
+@pytest.mark.parametrize("chosen", [{}, {"shadow.removal": False}, {"shadow.chroma_min": 0.0}])
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 40))
 @settings(max_examples=30, deadline=None)
-def test_marked_pixels_are_split_as_one_by_one(removal: bool, seed: int, count: int) -> None:
-    rule = shadow_rule(ImagingSettings.from_mapping({"shadow.removal": removal}))
+def test_marked_pixels_are_split_as_one_by_one(
+    chosen: dict[str, object], seed: int, count: int
+) -> None:
+    rule = shadow_rule(ImagingSettings.from_mapping(chosen))
     rng = np.random.default_rng(seed)
     # Few levels: black, grey, and channels that are alike occur often.
     image = rng.choice(np.array([0, 1, 40, 90, 91, 255], np.uint8), (3, count))
     levels = rng.choice(np.array([0, 40, 90, 100, 180, 255]), (3, count))
+    image[:, ::3], levels[:, ::2] = image[:1, ::3], levels[:1, ::2]
+    image[:, 1::3] = rng.choice(np.array([90, 91], np.uint8), image[:, 1::3].shape)
     means = (levels * kernels.LEVELS).astype(np.uint16)
     gain = tuple(np.float32(g / kernels.LEVELS) for g in (1.0, 1.0, rng.choice([1.0, 1.2])))
     marks = np.where(rng.random(count) < 0.9, 255, 0).astype(np.uint8)
