@@ -63,7 +63,7 @@ inlined: Decorator = compiled(error_model="numpy", inline="always")
 @cache
 def source_digest(file: Path, package: Path = PACKAGE) -> str:
     """Digest of what compiles the kernels of a file and from what, part of stored files' names."""
-    parts = [numba_version.encode(), *(s.read_bytes() for s in kernel_sources(file, package))]
+    parts = [numba_version.encode(), *(_text(s).encode() for s in kernel_sources(file, package))]
     return hashlib.sha256(b"\0".join(parts)).hexdigest()[:12]
 
 
@@ -87,21 +87,32 @@ def kernel_sources(file: Path, package: Path = PACKAGE) -> list[Path]:
     return sorted(found)
 
 
-def _imported(package: Path, file: Path) -> Iterator[tuple[Path, list[str]]]:
+# A file is read and searched once: many kernels are compiled from the same ones.
+
+
+@cache
+def _text(source: Path) -> str:
+    return source.read_text(encoding="utf-8")
+
+
+@cache
+def _imported(package: Path, file: Path) -> tuple[tuple[Path, tuple[str, ...]], ...]:
     """Modules of the package that a module imports from, and the names it takes."""
-    text = file.read_text(encoding="utf-8")
-    for module, one, several in re.findall(_IMPORT.format(package.name), text, re.MULTILINE):
-        above, names = package.joinpath(*module.split(".")), re.findall(r"\w+", one or several)
-        if above.with_suffix(".py").is_file():
-            yield above.with_suffix(".py"), names
-        for name in names:
-            if (above / f"{name}.py").is_file():
-                yield above / f"{name}.py", []
+    imported: list[tuple[Path, tuple[str, ...]]] = []
+    pattern = _IMPORT.format(package.name)
+    for module, one, several in re.findall(pattern, _text(file), re.MULTILINE):
+        above = package.joinpath(*module.split("."))
+        names = tuple(re.findall(r"\w+", one or several))
+        candidates = [(above.with_suffix(".py"), names)]
+        candidates += [(above / f"{name}.py", ()) for name in names]
+        imported += [candidate for candidate in candidates if candidate[0].is_file()]
+    return tuple(imported)
 
 
-def _compiles(source: Path, names: list[str]) -> bool:
+@cache
+def _compiles(source: Path, names: tuple[str, ...]) -> bool:
     """Whether kernels that import these names from a module depend on its text."""
-    text = source.read_text(encoding="utf-8")
+    text = _text(source)
     return "compiled import" in text or any(
         name.isupper() or f"class {name}(NamedTuple)" in text for name in names
     )

@@ -28,6 +28,19 @@ def rodrigues_from_rotation(rotation: Any) -> FloatArray:
     return np.asarray(axis / length * 2.0 * np.arctan2(length, w))
 
 
+def rotation_from_euler(axes: str, angles_rad: Any) -> FloatArray:
+    """Rotation matrix (3, 3) of turns about a frame's own axes, one after the other.
+
+    Args:
+        axes: ``x``, ``y`` or ``z`` for each turn; the later ones are about axes already turned.
+        angles_rad: an angle for each.
+    """
+    rotation = np.eye(3)
+    for axis, angle in zip(axes, angles_rad, strict=True):
+        rotation = rotation @ rotation_from_rodrigues(float(angle) * np.eye(3)["xyz".index(axis)])
+    return rotation
+
+
 def skew(vector: Any) -> FloatArray:
     """Matrix (3, 3) with ``skew(a) @ b == cross(a, b)``."""
     x, y, z = np.asarray(vector, dtype=np.float64).reshape(3)

@@ -15,6 +15,7 @@ from markerless_tracker.geometry import (
     quaternion_from_rotation,
     rodrigues_from_rotation,
     roll_pitch_yaw,
+    rotation_from_euler,
     rotation_from_quaternion,
     rotation_from_rodrigues,
     skew,
@@ -34,6 +35,21 @@ def test_rotations_are_rotations_and_those_of_opencv(v: np.ndarray) -> None:
     np.testing.assert_allclose(r @ r.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(r) == pytest.approx(1)
     np.testing.assert_allclose(r, cv2.Rodrigues(v)[0], atol=1e-9)
+
+
+@given(st.permutations("xyz"), vector)
+def test_turns_about_a_frames_own_axes_are_those_of_scipy(order: list[str], a: np.ndarray) -> None:
+    axes = "".join(order)
+    expected = Rotation.from_euler(axes.upper(), a).as_matrix()
+    np.testing.assert_allclose(rotation_from_euler(axes, a), expected, atol=1e-9)
+
+
+def test_any_number_of_turns_and_as_many_angles() -> None:
+    np.testing.assert_array_equal(rotation_from_euler("", []), np.eye(3))
+    twice = rotation_from_euler("xyx", [0.5, 0.0, 0.25])
+    np.testing.assert_allclose(twice, rotation_from_euler("x", [0.75]), atol=1e-12)
+    with pytest.raises(ValueError, match="shorter"):
+        rotation_from_euler("xyz", [0.1, 0.2])
 
 
 @given(direction, st.floats(-3, 3))

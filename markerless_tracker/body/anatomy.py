@@ -7,12 +7,11 @@ are those of a swing and a twist.
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body.angles.swing import set_rotation, swing_joints
 from markerless_tracker.body.kinematics import transforms
 from markerless_tracker.body.model import MARKER_NAMES, BodyModel
-from markerless_tracker.geometry import FloatArray
+from markerless_tracker.geometry import FloatArray, rotation_from_euler
 
 _NEGATIVE = ("r_hip_x", "l_knee", "r_knee", "l_shoulder_y", "l_elbow", "r_elbow")
 """Parameters of the published 31 whose sign is opposite to the anatomical one."""
@@ -60,11 +59,9 @@ def _from_rest(body: BodyModel, joint: str, x: float, y: float, z: float) -> Flo
     out = 1.0 if joint.startswith("l_") else -1.0
     tilt, twist = (_SHOULDER_TILT_RAD, -z) if joint.endswith("shoulder") else (0.0, z)
     # In axes x forward, y left, z up.
-    turned = Rotation.from_rotvec([-out * tilt, 0.0, 0.0]) * Rotation.from_euler(
-        "YXZ", [-y, out * (tilt + x), twist]
-    )
+    turned = rotation_from_euler("xyxz", [-out * tilt, -y, out * (tilt + x), twist])
     axes = np.round(transforms(body, body.neutral)[body.frames[joint], :, :3])
-    return np.asarray(axes.T @ turned.as_matrix() @ axes)
+    return np.asarray(axes.T @ turned @ axes)
 
 
 def heading(markers_m: FloatArray) -> float:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from scipy.optimize import least_squares
 
 from markerless_tracker.body import kinematics
 from markerless_tracker.body.files import read_yaml
@@ -44,6 +43,9 @@ def pose_from_markers(
     Raises:
         BodyModelError: LHip, RHip or Neck is missing, or the three lie on one line.
     """
+    # Only a start from markers needs it, and it takes long to import.
+    from scipy.optimize import least_squares
+
     known = complete_markers(markers_m)
     for needed in ("LHip", "RHip", "Neck"):
         if needed not in known:

@@ -5,7 +5,6 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.datasets.folder import VideoRecording
@@ -21,7 +20,7 @@ from markerless_tracker.datasets.upright.axes import upright, upright_points
 from markerless_tracker.datasets.video.images import VIDEO_SUFFIXES
 from markerless_tracker.datasets.video.rates import stamp_of
 from markerless_tracker.errors import CalibrationError, DatasetError
-from markerless_tracker.geometry import FloatArray, transform
+from markerless_tracker.geometry import FloatArray, rotation_from_euler, transform
 
 CAMERAS = ("54138969", "55011271", "58860488", "60457274")
 METADATA = "metadata.xml"
@@ -154,7 +153,7 @@ def _camera(
     where: str, name: str, size_px: tuple[int, int], pose: FloatArray, lens: FloatArray
 ) -> CameraModel:
     # Rx Ry Rz; the position is the camera's, in the world.
-    rotation = Rotation.from_euler("XYZ", pose[:3]).as_matrix()
+    rotation = rotation_from_euler("xyz", pose[:3])
     fx, fy, cx, cy, k1, k2, k3, p1, p2 = lens.tolist()
     try:
         return CameraModel(

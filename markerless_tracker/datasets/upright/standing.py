@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.datasets.recording import Recording
@@ -148,6 +147,9 @@ def _moving(image: Image, background: FloatArray) -> NDArray[np.bool_]:
 
 def _lowest(rig: CameraRig, sets: Sequence[Mapping[str, NDArray[np.bool_]]]) -> Iterator[float]:
     """Lowest height (m) of the largest lump of the visual hull of each set that has a person."""
+    # Few recordings need it, and it takes a moment to import.
+    from scipy import ndimage
+
     steps = np.arange(-RADIUS_M, RADIUS_M, SPACING_M)
     points = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
     places, looking = {}, np.zeros(len(points), dtype=np.int8)

@@ -11,12 +11,11 @@ import xml.etree.ElementTree as ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body import MARKER_NAMES, BodyModel, markers, transforms
 from markerless_tracker.body.angles.segments import segment_axes, segment_nodes
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.geometry import FloatArray
+from markerless_tracker.geometry import FloatArray, rotation_from_euler
 
 JOINTS = (
     "waist",
@@ -80,7 +79,7 @@ class Human:
         }
         up = links["pelvis"].T @ links["thorax"][:, 2]
         values = {"waist": float(np.arctan2(up[0], up[2]))}
-        torso = links["pelvis"] @ Rotation.from_rotvec([0.0, values["waist"], 0.0]).as_matrix()
+        torso = links["pelvis"] @ rotation_from_euler("y", [values["waist"]])
         r, y, p = _xzy(torso.T @ links["head"])
         values |= {"r_head": float(r), "y_head": float(y), "p_head": -float(p)}
         for side, sign in _SIDES.items():

@@ -5,9 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from markerless_tracker.geometry import FloatArray
+from markerless_tracker.geometry import FloatArray, quaternion_from_rotation, rotation_from_euler
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,17 +54,18 @@ def read_joints(urdf: str) -> tuple[UrdfJoints, UrdfJoints]:
 
 
 def _arrays(joints: list[ElementTree.Element]) -> UrdfJoints:
-    rotations = Rotation.from_euler("xyz", _triples(joints, "origin", "rpy", "0 0 0"))
+    turns = _triples(joints, "origin", "rpy", "0 0 0")
+    rotations = np.array([rotation_from_euler("zyx", rpy[::-1]) for rpy in turns]).reshape(-1, 3, 3)
     axes = _triples(joints, "axis", "xyz", "1 0 0")
     slides = np.array([joint.get("type") == "prismatic" for joint in joints])
-    x, y, z, w = rotations.as_quat().T
-    still, turned = np.column_stack([w, x, y, z]), np.column_stack([np.zeros(len(axes)), axes])
+    still = np.array([quaternion_from_rotation(rotation) for rotation in rotations]).reshape(-1, 4)
+    turned = np.column_stack([np.zeros(len(axes)), axes])
     return UrdfJoints(
         links=tuple((_text(j, "parent", "link"), _text(j, "child", "link")) for j in joints),
         names=tuple(_text(j, "mimic", "joint") or str(j.get("name")) for j in joints),
         multipliers=np.array([float(_text(j, "mimic", "multiplier") or 1.0) for j in joints]),
         origins_m=_triples(joints, "origin", "xyz", "0 0 0"),
-        slides_m=slides[:, None] * rotations.apply(axes),
+        slides_m=slides[:, None] * np.einsum("nij,nj->ni", rotations, axes),
         turns=np.where(slides, 0.0, 0.5),
         still=still,
         turned=_product(still, turned),
