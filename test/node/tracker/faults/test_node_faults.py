@@ -174,6 +174,7 @@ def test_two_trackers_in_two_namespaces_are_told_apart(
             topics = {t for t, _ in peer.node.get_publisher_names_and_types_by_node(
                 "tracker", f"/{side}")}  # fmt: skip
             assert {f"/{side}/state", f"/{side}/joint_states"} <= topics
+            peer.until(lambda node=node: node.fatal is not None, "what keeps it from tracking")
             assert "nothing for cam01" in str(node.fatal)
     finally:
         for node in nodes:
