@@ -41,10 +41,10 @@ def unpack_mask(words: MaskWords, width: int) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What one camera's image says about the body, in that camera's own (distorted) pixels.
+    """The evidence of one camera's image, in that camera's own (distorted) pixels.
 
-    A pixel is person, background or undecided: it differs from the background as a shadow on it
-    would. Undecided pixels do not count.
+    A pixel is person, background or undecided. Undecided pixels differ from the background as a
+    shadow on it would; they do not count.
 
     Attributes:
         camera: the camera's name.
@@ -55,8 +55,7 @@ class Observation:
         edges: (h, w) uint8, edge strength M = value / 255, in the same region.
         undecided_words: the undecided pixels, packed likewise; none if left out. No pixel is
             person and undecided.
-        exposure: brightness of the image relative to its background's, by channel; None if the
-            maker of the observation does not tell it.
+        exposure: brightness of the image relative to its background, by channel; None if unknown.
     """
 
     camera: str

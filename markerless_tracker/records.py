@@ -39,16 +39,16 @@ CONTOUR = "contour"
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What a search compares with the evidence: for a pose of p parameters and a body of c cones.
+    """The comparison of a search, for a pose of p parameters and a body of c cones.
 
     Attributes:
         active: (d,) indices of the parameters that vary.
-        centre: (p,) pose that the other parameters stay at.
+        centre: (p,) pose; the other parameters are held at it.
         silhouette_weight, edge_weight: weights of f_s and f_e.
         silhouette_cones, edge_cones: (c,) cones that each term uses.
 
     Raises:
-        SearchError: the centre is no pose, or an active parameter is not one of it.
+        SearchError: the centre is no pose, or an active parameter is not in it.
     """
 
     active: NDArray[np.int64]
@@ -98,12 +98,12 @@ class SearchPlan:
         sigma: (p,) standard deviation of the first sample in m or rad; only the active ones are
             read. For 'contour' that of the prior about the centre.
         particles: particles per iteration; 0 for 'contour'.
-        iterations: iterations, of a swarm the initial sample being the first.
+        iterations: number of iterations; the initial sample of a swarm is the first.
         min_improvement: where stages compete, a result is taken if f rises by more than this.
         options: the algorithm's own settings by name.
 
     Raises:
-        SearchError: nothing to spend.
+        SearchError: there is no budget.
     """
 
     algorithm: str
@@ -137,7 +137,7 @@ class Stage:
         plan: how it is searched.
 
     Raises:
-        SearchError: the two are of poses of another size.
+        SearchError: comparison and plan are for poses of different sizes.
     """
 
     name: str
@@ -162,7 +162,7 @@ class Stage:
 
 
 class TrackState(Enum):
-    """Where the tracker stands."""
+    """State of a track."""
 
     SEARCHING = "SEARCHING"
     TRACKING = "TRACKING"
@@ -171,7 +171,7 @@ class TrackState(Enum):
 
 @dataclass(frozen=True)
 class LimbState:
-    """How well one limb is tracked.
+    """State of the track of one limb.
 
     Attributes:
         state: TRACKING or LOST.
@@ -188,15 +188,15 @@ class LimbState:
 
 @dataclass(frozen=True, eq=False)
 class Confidence:
-    """How sure a pose of p parameters is: standard deviations, in m and rad.
+    """Uncertainty of a pose of p parameters: standard deviations, in m and rad.
 
     Attributes:
         pose_sd: (p,) of each parameter.
         markers_sd_m: (15, 3) of each marker, along the world's axes.
         root_covariance: (6, 6) of the root frame: x, y, z, and small rotations about the
             world's x, y and z axis.
-        pose_covariance: (p, p) of the parameters, `pose_sd` the roots of its diagonal; None =
-            nothing is known but the deviations.
+        pose_covariance: (p, p) of the parameters; `pose_sd` are the roots of its diagonal. None =
+            only the standard deviations are known.
     """
 
     pose_sd: NDArray[np.float64]
@@ -211,7 +211,7 @@ class Confidence:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """(p, p) covariance of the parameters; diagonal where no more is known."""
+        """(p, p) covariance of the parameters; diagonal if only the deviations are known."""
         if self.pose_covariance is not None:
             return self.pose_covariance
         return np.diag(self.pose_sd**2)
@@ -219,7 +219,7 @@ class Confidence:
 
 @dataclass(frozen=True, eq=False)
 class TrackResult:
-    """What `Tracker.step` found in one set of images.
+    """The result of `Tracker.step` for one set of images.
 
     Attributes:
         stamp_ns: time of the images.
@@ -231,13 +231,12 @@ class TrackResult:
         evaluations: evaluations of the objective that the swarms spent on this frame.
         refinements: iterations of contour refinement spent on this frame.
         effort: as given to `Tracker.step`.
-        observations: the evidence each camera gave.
-        warnings: what the user should know about this frame, one line each.
-        confidence: how sure the pose is, None without contour refinement.
-        limbs: per limb, how well it is tracked; empty without an estimate.
-        exposure: per camera whose image came, its brightness relative to its background's, by
-            channel.
-        settling: whether the automatic start needs further sets, near to this one in time.
+        observations: the evidence of each camera.
+        warnings: messages for the user about this frame, one line each.
+        confidence: uncertainty of the pose; None without contour refinement.
+        limbs: state of each limb; empty without an estimate.
+        exposure: per camera with an image, its brightness relative to its background, by channel.
+        settling: whether the automatic start needs further sets that are near to this one in time.
     """
 
     stamp_ns: int

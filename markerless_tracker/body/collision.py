@@ -151,7 +151,7 @@ class Feasibility:
     def constraints(
         self, active: IntArray, centre: FloatArray, *, forgive: bool = False
     ) -> Constraints:
-        """What `around` tests, for compiled searches; arguments as there."""
+        """The constraints that `around` tests, for compiled searches; same arguments."""
         # Copies: kernels are compiled once more for arrays that are read-only.
         active = np.array(active, dtype=np.int64)
         moving, moved, rest = self._parts(active)

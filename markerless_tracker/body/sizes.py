@@ -121,7 +121,7 @@ class Sizes:
 
     @cached_property
     def _with_stature(self) -> Mapping[str, FloatArray]:
-        """What the arrays grow by when the stature doubles; all depend on it linearly."""
+        """Changes of the arrays when the stature doubles; all depend on it linearly."""
         double = subject_from_stature(self._description, 1.5 * MEAN_STATURE_M)
         taller = build_body(self._description, double)
         return {

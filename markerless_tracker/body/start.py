@@ -37,8 +37,8 @@ def pose_from_markers(
         body: the body.
         markers_m: positions (3,) by name.
         limits: (2, p) instead of the body's own.
-        likely: what markers do not show is as the body's prior of poses has it, instead of as near
-            to neutral as can be, all joints alike.
+        likely: whether the body's prior of poses determines what markers do not show; otherwise all
+            joints are as near to neutral as possible.
 
     Raises:
         BodyModelError: LHip, RHip or Neck is missing, or the three lie on one line.

@@ -30,8 +30,8 @@ _SHARPENED = 2.0
 _CORRECTED, _WRONG_IN_BORDER = 1.0, 0.6
 _SEEDS = 8
 """Single markers from which the board is followed where all together do not fit."""
-_REACH = 1.6
-"""How far new corners are from known ones, in squares."""
+_NEAR_SQUARES = 1.6
+"""New corners lie nearer than this to known ones, in squares."""
 _WINDOW = 0.25
 _WINDOW_PX = (2, 44)
 """Half the window in which a corner is searched, in squares, and its limits."""
@@ -117,7 +117,7 @@ class CharucoFinder:
         for _ in range(_ROUNDS):
             if plane is None:
                 return None
-            near = np.linalg.norm(corners[:, None] - known, axis=2).min(axis=1) < _REACH
+            near = np.linalg.norm(corners[:, None] - known, axis=2).min(axis=1) < _NEAR_SQUARES
             expected, spacing = mapped(plane, corners), self._print.spacing(plane)
             expected = np.where(np.isfinite(seen), seen, expected)
             numbers = np.flatnonzero(near & inside(expected, image))

@@ -1,7 +1,7 @@
-"""What is unusual about a calibration: units, axes, cameras that see nothing in common.
+"""Doubts about a calibration: units, axes, cameras without a common field of view.
 
-None of it is an error: a rig may be unusual. But each is the sign of a common mistake, and can be
-said before any image is read.
+None of them is an error, since a rig may be unusual. But each is the sign of a common mistake, and
+can be reported before any image is read.
 """
 
 import numpy as np
@@ -26,9 +26,9 @@ _DEPTHS_M = np.geomspace(0.5, 20.0, 24)
 
 
 def calibration_doubts(rig: CameraRig) -> tuple[str, ...]:
-    """A line for each thing that is unusual; empty if nothing is."""
+    """One line per doubt; empty if there is none."""
     found = [*_distances(rig)]
-    # Where the units are wrong, nothing else can be said in metres.
+    # If the units are wrong, no other doubt can be judged in metres.
     if not found:
         found += _axes(rig) or [*_upside_down(rig), *_below_the_floor(rig)]
         found += _nothing_in_common(rig)

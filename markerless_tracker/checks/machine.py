@@ -161,8 +161,8 @@ def _profile(environment: Mapping[str, str], names: tuple[str, ...], shipped: Pa
 
 def _discovery(environment: Mapping[str, str]) -> Finding:
     domain = environment.get("ROS_DOMAIN_ID") or "0"
-    reach = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or "SUBNET"
-    text = f"domain {domain}, range {reach}"
-    if reach in ("LOCALHOST", "OFF") or environment.get("ROS_LOCALHOST_ONLY") == "1":
+    range_ = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or "SUBNET"
+    text = f"domain {domain}, range {range_}"
+    if range_ in ("LOCALHOST", "OFF") or environment.get("ROS_LOCALHOST_ONLY") == "1":
         return Finding("discovery", GREEN, "", f"{text}: this machine only")
     return Finding("discovery", GREEN, "", text)

@@ -17,7 +17,7 @@ from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.viewing.live import LiveRecording
 from markerless_tracker.viewing.rerun_file import require_rerun
 
-NOTHING_HEARD = 3
+NOTHING_RECEIVED = 3
 """Exit status when no tracker was heard."""
 
 
@@ -46,15 +46,15 @@ def run_node(args: argparse.Namespace) -> int:
     from markerless_tracker.node.spectator import Spectator
 
     results = 0
-    heard_any = False
+    any_received = False
     pictures: dict[str, Image] = {}
     with StopSignals() as stop, Spectator() as spectator:
         recording = LiveRecording(args.rrd) if shows else None
         tell(Console(stderr=True), "listening; Ctrl-C ends")
-        for heard in spectator.listen(until=lambda: stop.asked, seconds=args.seconds):
+        for heard in spectator.listen(until=lambda: stop.received, seconds=args.seconds):
             if heard is None:
                 continue
-            heard_any = True
+            any_received = True
             results += heard.markers_m is not None
             pictures.update(heard.pictures)
             if recording is not None:
@@ -81,10 +81,10 @@ def run_node(args: argparse.Namespace) -> int:
         for path in files:
             print(path)
         print(f"{results} results, pictures of {', '.join(pictures) or 'no camera'}")
-    if heard_any:
+    if any_received:
         return 0
     tell(Console(stderr=True), "no tracker was heard: is it running, in this ROS_DOMAIN_ID?")
-    return NOTHING_HEARD
+    return NOTHING_RECEIVED
 
 
 def _has_display() -> bool:

@@ -1,4 +1,4 @@
-"""Projected body against image evidence: the costs that searches minimise."""
+"""Compares the projected body with image evidence: the costs that searches minimise."""
 
 from markerless_tracker.fitness.arrays import Views, lay_out_views
 from markerless_tracker.fitness.evaluator import (

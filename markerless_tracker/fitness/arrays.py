@@ -19,10 +19,10 @@ from markerless_tracker.records import MaskWords, Observation
 
 
 class BodyArrays(NamedTuple):
-    """The arrays of a `BodyModel` that kernels need; shapes as documented there.
+    """The arrays of a `BodyModel` that kernels need; shapes as in `BodyModel`.
 
     Attributes:
-        floor_share: (c, 2) as of the function of that name.
+        floor_share: (c, 2) returned by the function of that name.
     """
 
     parent: NDArray[np.int64]
@@ -38,7 +38,7 @@ class BodyArrays(NamedTuple):
 
 
 class ViewArrays(NamedTuple):
-    """v views. Bit masks and edge maps cover the full frames and lie one after the other.
+    """The arrays of v views. Bit masks and edge maps cover the full frames, one after the other.
 
     Attributes:
         rotation, translation: (v, 3, 3) and (v, 3), world to camera.
@@ -49,7 +49,7 @@ class ViewArrays(NamedTuple):
         mask: observed silhouettes, flat, column after column of words (see `raster.bits`); view i
             starts at mask_start[i].
         edges: edge maps, flat; view i starts at edge_start[i].
-        observed: (v,) silhouette pixels.
+        observed: (v,) number of silhouette pixels.
         known: pixels that are not undecided, flat as `mask`.
     """
 
@@ -85,7 +85,7 @@ def body_arrays(body: BodyModel) -> BodyArrays:
         raise BodyModelError(
             f"body {body.name}: {len(body.cone_names)} cones, expected {LANES} at the most"
         )
-    # Copies: kernels are compiled once more for arrays that are read-only.
+    # Copied, since read-only arrays would make numba compile the kernels once more.
     return BodyArrays(
         body.node_parent.copy(),
         body.node_fixed.copy(),
@@ -101,14 +101,12 @@ def body_arrays(body: BodyModel) -> BodyArrays:
 
 
 TOE_SHARE = 0.25
-"""Feet of most bodies are fixed to their shanks: toes, or an upright foot's whole sole, point into
-the floor at the end of a step."""
+"""Weight of the toes, or of an upright foot's whole sole, below the floor. Most bodies' feet are
+fixed to their shanks, so that they point into the floor at the end of a step."""
 
 
 def floor_share(body: BodyModel) -> FloatArray:
-    """How much each end (c, 2) of a cone counts where it lies below the floor: of a foot the toes,
-    or the sole, less.
-    """
+    """Weight of each end (c, 2) of a cone below the floor: `TOE_SHARE` for toes or sole, else 1."""
     toes = [name.endswith("foot") for name in body.cone_names]
     return np.array([(1.0, TOE_SHARE if toe else 1.0) for toe in toes])
 
@@ -117,7 +115,7 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
     """Views of the cameras that have an observation, in the order of the cameras.
 
     Raises:
-        ImageError: no camera has one, or a frame's size is not its calibration's.
+        ImageError: no camera has one, or the size of a frame differs from its calibration.
     """
     seen = [camera for camera in cameras if camera.name in observations]
     if not seen:
@@ -151,7 +149,7 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
 
 
 def _in_full_frame(observation: Observation, words: MaskWords) -> MaskWords:
-    """A packed mask of an observation's region as one of the full frame."""
+    """A packed mask of an observation's region, extended to the full frame."""
     (width, height), (left, top) = observation.size_px, observation.offset_px
     if (observation.width, observation.height) == (width, height):
         return words
@@ -169,12 +167,12 @@ def _edges(observation: Observation) -> NDArray[np.uint8]:
 
 @cache
 def _no_edges(size_px: tuple[int, int]) -> NDArray[np.uint8]:
-    """An edge map (h, w) without edges; not to be changed."""
+    """An edge map (h, w) without edges; must not be changed."""
     return np.zeros(size_px[::-1], dtype=np.uint8)
 
 
 def _joined(edges: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """Edge maps of views, one after the other; none of them is copied if all are without edges."""
+    """Edge maps of views, joined; not copied if no map has edges."""
     sizes = [edge.size for edge in edges]
     if all(edge is _no_edges(edge.shape[::-1]) for edge in edges):
         return _no_edges((sum(sizes), 1)).ravel()

@@ -39,7 +39,7 @@ _CONE_S = 0.4e-6
 
 @dataclass(frozen=True)
 class ViewTerms:
-    """How well a pose explains one view.
+    """The terms of the fitness of a pose in one view.
 
     Attributes:
         silhouette, edges: f_s and f_e in [0, 1].
@@ -63,7 +63,7 @@ class Fitness:
         edge_rule: 'sides' samples both sides of every cone, 'visible' the parts that no nearer cone
             hides, 'outline' the parts on the outline of the whole body.
         edge_term: 'ssd': f_e = 1 - mean (1 - M)²; 'mean': f_e = mean M.
-        edge_spacing_px: distance between samples along a side (at least four a side).
+        edge_spacing_px: distance between samples along a side, which has at least four.
         edge_step_px: for 'outline', distance outward of a sample at which no cone may cover the
             pixel.
         cost: 'overlap': sum of the weights - f (SPPSO); 'bidirectional', 'one_sided': H-MCPSO's
@@ -161,7 +161,7 @@ class Fitness:
         edge_cones: NDArray[np.bool_],
         cost: CostRule,
     ) -> Objective:
-        """What points are compared with; which cones move is found once."""
+        """The objective of points; the split into moving and static cones is cached."""
         key = (active.tobytes(), silhouette_cones.tobytes(), edge_cones.tobytes())
         if key not in self._splits:
             self._splits[key] = split_cones(
@@ -198,11 +198,11 @@ class Evaluator:
     prints no formula; this reading [R] is 1 - f_s, so that with the squared term it equals
     'overlap'.
 
-    Called with points (n, d) of the active parameters, returns costs (n,); NaN for points that are
-    not finite. Cones that these do not move are drawn when the evaluator is made.
+    Called with points (n, d) of the active parameters, it returns costs (n,); NaN for points that
+    are not finite. Cones that the active parameters do not move are drawn in the constructor.
 
     Attributes:
-        objective: the same, for compiled searches.
+        objective: the same comparison, for compiled searches.
     """
 
     def __init__(self, fitness: Fitness, views: Views, comparison: Comparison) -> None:
@@ -221,7 +221,7 @@ class Evaluator:
         )  # fmt: skip
 
     def poses(self, points: FloatArray) -> FloatArray:
-        """Full poses (n, p) of points (n, d): the other parameters stay at its centre."""
+        """Full poses (n, p) of points (n, d); the other parameters are those of the centre."""
         poses = np.tile(self._comparison.centre, (len(points), 1))
         poses[:, self._comparison.active] = points
         return poses

@@ -14,9 +14,9 @@ EDGE_TOP = 255.0
 
 
 class CostRule(NamedTuple):
-    """Weights of the silhouette and edge terms; whether edges are squared; the silhouette's cost.
+    """Weights of the silhouette and edge terms; whether edges are squared; whether it is one-sided.
 
-    One-sided: the fraction of the projected pixels that is observed takes the place of f_s.
+    The one-sided cost uses the observed fraction of the projected pixels instead of f_s.
     """
 
     silhouette_weight: float
@@ -61,9 +61,9 @@ def view_cost(counts, observed, rule):  # type: ignore[no-untyped-def]
 
 @kernel
 def least_cost(counts, observed, rule):  # type: ignore[no-untyped-def]
-    """Least cost of a view in which parts with these counts (4,) are drawn.
+    """Lower bound of the cost of a view, given the counts (4,) of the parts drawn so far.
 
-    At best the other parts cover all other observed pixels and nothing besides
+    In the best case the other parts cover exactly the remaining observed pixels
     (docs/early-termination.md).
     """
     seen = np.float64(observed)

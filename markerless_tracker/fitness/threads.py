@@ -1,7 +1,7 @@
-"""Threads for large batches of evaluations: when they save time, and where they come from.
+"""Threads for large batches of evaluations, and the decision when they save time.
 
-Compiled kernels release the interpreter's lock, so that threads of Python do; numba's own would
-need every kernel compiled a second time, and take one caller at a time.
+Compiled kernels release the interpreter's lock, so Python threads suffice. Numba's own threads
+would need every kernel compiled a second time, and serve one caller at a time.
 """
 
 import os
@@ -33,22 +33,22 @@ def side_by_side(work: Callable[[int], object], threads: int) -> None:
 
 @cache
 def _pool(threads: int, process: int) -> ThreadPoolExecutor:
-    """The pool of a process: one that was forked has none of its parent's threads."""
+    """The pool of a process; keyed by process, since a forked process has none of the threads."""
     return ThreadPoolExecutor(max_workers=threads, thread_name_prefix="fitness")
 
 
 def worth_waking(work_s: float, threads: int) -> bool:
-    """Whether several threads finish sooner than one that takes `work_s` alone.
+    """Whether several threads finish sooner than one thread, which takes `work_s`.
 
-    Waking threads costs between some 10 and some 100 µs, so small batches run on one thread.
-    The answer may differ between machines; results do not depend on the number of threads.
+    Waking threads costs some 10 to some 100 µs, so small batches run on one thread. The answer may
+    differ between machines; results do not depend on the number of threads.
     """
     return threads > 1 and work_s * (1.0 - 1.0 / threads) > _MARGIN * launch_cost_s(threads)
 
 
 @cache
 def launch_cost_s(threads: int) -> float:
-    """Time to wake that many threads on this machine; measured once."""
+    """Time to wake `threads` threads on this machine; measured once."""
     costs = []
     for _ in range(_LAUNCHES):
         # Threads sleep between batches.

@@ -1,4 +1,4 @@
-"""From camera images to evidence: background, silhouette, edge map."""
+"""Makes evidence from camera images: background, silhouette, edge map."""
 
 from markerless_tracker.imaging.background import (
     BackgroundModel,

@@ -10,7 +10,7 @@ from markerless_tracker.imaging.settings import ImagingSettings
 
 
 def edge_radius_px(settings: ImagingSettings) -> int:
-    """Radius of mask and image on which a pixel's edge strength depends, px."""
+    """Radius of the mask and image region that a pixel's edge strength depends on, px."""
     return settings.edges.margin_px + settings.edges.blur_px // 2 + 1
 
 
@@ -51,7 +51,7 @@ def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
 
 
 def _gradient_strength(grey: Image, settings: ImagingSettings) -> Image:
-    """Sobel gradient of a grey image (h, w), thresholded as `edges.form` says, 0..255."""
+    """Sobel gradient of a grey image (h, w), thresholded by `edges.form`, 0..255."""
     strength = np.empty_like(grey)
     threshold = 8.0 * settings.edges.gradient
     if settings.edges.form == "published":

@@ -15,15 +15,15 @@ FloatImage = NDArray[np.float32]
 
 
 def check_image(image: Any, what: str, *, size_px: tuple[int, int] | None = None) -> Image:
-    """Return the image if it is uint8 (h, w) or (h, w, 3), not empty, and of that size.
+    """Return the image if it is uint8 (h, w) or (h, w, 3), not empty, and of the given size.
 
     Args:
         image: the value to check.
         what: name for the error message (camera or file).
-        size_px: expected (width, height); any if None.
+        size_px: expected (width, height); None = any.
 
     Raises:
-        ImageError: it is none; the message says what came.
+        ImageError: it is not; the message describes the value.
     """
     if not isinstance(image, np.ndarray):
         raise ImageError(f"{what}: got {type(image).__name__}, expected an image array")
@@ -45,7 +45,7 @@ def check_image(image: Any, what: str, *, size_px: tuple[int, int] | None = None
 
 
 def grey_of(image: Image) -> Image:
-    """The image (h, w) or (h, w, c) in grey (h, w); three equal channels keep their value."""
+    """The image (h, w) or (h, w, c) as grey (h, w); three equal channels keep their value."""
     if image.ndim == 2:
         return image
     if image.shape[2] == 1:
@@ -56,8 +56,8 @@ def grey_of(image: Image) -> Image:
 def scale_image(image: Image, size_px: tuple[int, int]) -> Image:
     """The image at ``size_px`` = (width, height); the same object if it already has that size.
 
-    Area averaging: a pixel's centre (u, v) goes to ((u + 0.5) s - 0.5, ...), as
-    `CameraModel.scaled` moves the principal point.
+    By area averaging: a pixel's centre (u, v) moves to ((u + 0.5) s - 0.5, ...), like the principal
+    point in `CameraModel.scaled`.
 
     Raises:
         ImageError: not an image, or a size below one pixel.

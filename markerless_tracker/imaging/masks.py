@@ -11,6 +11,6 @@ SOLID = np.ones((3, 3), dtype=np.uint8)
 
 
 def disc(side_px: int) -> Mask:
-    """A round structuring element of that side."""
+    """A round structuring element with a given side."""
     shape = cv2.MORPH_ELLIPSE if side_px > 3 else cv2.MORPH_CROSS
     return np.asarray(cv2.getStructuringElement(shape, (side_px, side_px)), dtype=np.uint8)

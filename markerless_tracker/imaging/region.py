@@ -32,7 +32,7 @@ class Region(NamedTuple):
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
     def grown(self, px: int, size_px: tuple[int, int]) -> "Region":
-        """Grown by that much on every side, clipped to an image of (width, height)."""
+        """The region grown by `px` on every side, clipped to an image of (width, height)."""
         return Region(
             max(self.left - px, 0),
             max(self.top - px, 0),
@@ -41,11 +41,11 @@ class Region(NamedTuple):
         )
 
     def relative_to(self, other: "Region") -> "Region":
-        """The same pixels, counted from the other region's top left corner."""
+        """The same region, relative to the other region's top left corner."""
         return self.moved(-other.left, -other.top)
 
     def moved(self, right_px: int, down_px: int) -> "Region":
-        """Shifted by that many columns and rows."""
+        """The region shifted by columns and rows."""
         return Region(
             self.left + right_px, self.top + down_px, self.right + right_px, self.bottom + down_px
         )

@@ -260,8 +260,8 @@ class EdgeMapSettings(SettingsGroup):
 class ImagingSettings(GroupedSettings):
     """Settings of the imaging room, in groups.
 
-    Lengths ending in ``_px`` are pixels of the image as the segmenter gets it, areas are shares of
-    that image, sigmas and gradients are grey levels of 0..255.
+    Lengths ending in ``_px`` are pixels of the image that is segmented, areas are fractions of that
+    image, sigmas and gradients are grey levels of 0..255.
 
     Raises:
         ConfigError: a value of the wrong type, out of its range or not among its choices.

@@ -8,9 +8,9 @@ from types import MappingProxyType
 from markerless_tracker.records import TrackState
 
 QUIET_S = 2.0
-"""Time without images, sets or results after which that is reported."""
+"""Time without images, sets or results after which their absence is reported."""
 PROCESSING = "processing images"
-"""Activity of a tracker that deals with images as they come."""
+"""Activity of a tracker that processes images as they come."""
 NEWS: Mapping[TrackState, str] = MappingProxyType(
     {
         TrackState.TRACKING: "person found",
@@ -18,7 +18,7 @@ NEWS: Mapping[TrackState, str] = MappingProxyType(
         TrackState.SEARCHING: "searching for a person",
     }
 )
-"""What a state means, in the diagnostics and in the log."""
+"""The words for a state in the diagnostics and in the log."""
 
 _NOTHING = "no image from any camera"
 
@@ -41,15 +41,15 @@ class Facts:
         state: of the last result.
         cameras: names of all cameras.
         silent: cameras without a usable image for `QUIET_S`.
-        left_out: cameras without which sets are complete.
+        left_out: cameras that sets are complete without.
         refusals: camera -> reason why its last image could not be used.
         ready_age_s: since it became ready.
-        set_age_s: since a set of images was complete.
+        set_age_s: since the last complete set of images.
         result_age_s: since the last result.
-        offsets_ns: camera -> offset of its stamps from the others'.
+        offsets_ns: camera -> offset of its stamps from those of the others.
         tolerance_s: `sync_tolerance`.
         repeating: whether images arrive whose stamps repeat the previous ones.
-        last_error: of the last set that could not be tracked, empty if there was none since.
+        last_error: error of the last set; empty if it was tracked.
         clock_missing: whether `use_sim_time` is set and no /clock is received.
     """
 

@@ -1,4 +1,4 @@
-"""What a running tracker publishes, for a viewer in another process."""
+"""Receives the outputs of a running tracker, for a viewer in another process."""
 
 import time
 from collections import deque
@@ -22,15 +22,15 @@ from markerless_tracker.node.ros.stamps import stamp_of
 
 _WAIT_S = 0.1
 _OVERLAP = "iou/"
-"""Keys of `state` begin with this, then comes a camera's name."""
+"""Prefix of the keys of `state` with a camera's overlap; the camera's name follows."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Heard:
-    """The contents of one message; what it does not contain is empty.
+class TrackerMessage:
+    """The contents of one message; attributes of other topics are empty.
 
     Attributes:
-        stamp_ns: time of the images that it is about.
+        stamp_ns: time of the images.
         markers_m: (15, 3) of `marker_poses`, m, world frame.
         angles_rad: joint -> angle, of `joint_states`.
         state: SEARCHING, TRACKING or LOST, of `state`.
@@ -49,19 +49,19 @@ class Heard:
 class Spectator(Listener):
     """Subscribes to a tracker's outputs; a context manager.
 
-    The cameras are those of `state`; the tracker draws their overlays while they are subscribed.
+    The cameras are those of `state`. The tracker draws their overlays while they have subscribers.
     """
 
     def __init__(self) -> None:
         super().__init__("spectator")
-        self._heard: deque[Heard] = deque()
+        self._received: deque[TrackerMessage] = deque()
         self._overlays: dict[str, Any] = {}
 
     def _subscribe_all(self) -> None:
         create = self._node.create_subscription
-        create(DiagnosticArray, "state", self._hear_state, latched_qos())
-        create(PoseArray, "marker_poses", self._hear_markers, output_qos())
-        create(JointState, "joint_states", self._hear_angles, output_qos())
+        create(DiagnosticArray, "state", self._on_state, latched_qos())
+        create(PoseArray, "marker_poses", self._on_markers, output_qos())
+        create(JointState, "joint_states", self._on_angles, output_qos())
 
     @property
     def cameras(self) -> tuple[str, ...]:
@@ -70,22 +70,22 @@ class Spectator(Listener):
 
     def listen(
         self, *, until: Callable[[], bool], seconds: float | None = None
-    ) -> Iterator[Heard | None]:
-        """What is heard, as it comes; None now and then while nothing comes.
+    ) -> Iterator[TrackerMessage | None]:
+        """The messages as they come; None at intervals while no message comes.
 
         Args:
-            until: ends it.
-            seconds: ends it after that time, too.
+            until: ends the iteration when it returns True.
+            seconds: longest duration; None = unlimited.
         """
         end_s = None if seconds is None else time.monotonic() + seconds
         while not until() and (end_s is None or time.monotonic() < end_s):
             self._executor.spin_once(timeout_sec=_WAIT_S)
-            if not self._heard:
+            if not self._received:
                 yield None
-            while self._heard:
-                yield self._heard.popleft()
+            while self._received:
+                yield self._received.popleft()
 
-    def _hear_state(self, message: Any) -> None:
+    def _on_state(self, message: Any) -> None:
         values = {pair.key: pair.value for status in message.status for pair in status.values}
         overlap = {
             key.removeprefix(_OVERLAP): float(value)
@@ -95,8 +95,8 @@ class Spectator(Listener):
         for name in overlap:
             if name not in self._overlays:
                 self._overlays[name] = self._subscribe(name)
-        self._heard.append(
-            Heard(
+        self._received.append(
+            TrackerMessage(
                 stamp_ns=stamp_of(message),
                 state=values.get("state", ""),
                 overlap={name: value for name, value in overlap.items() if np.isfinite(value)},
@@ -106,21 +106,23 @@ class Spectator(Listener):
     def _subscribe(self, camera: str) -> Any:
         topic = f"debug/{camera}/overlay"
 
-        def hear(message: Any) -> None:
+        def take(message: Any) -> None:
             try:
                 picture = decode_image(message, topic)
             except ImageError as error:
                 self._node.get_logger().warning(str(error))
                 return
-            self._heard.append(Heard(stamp_ns=stamp_of(message), pictures={camera: picture}))
+            self._received.append(
+                TrackerMessage(stamp_ns=stamp_of(message), pictures={camera: picture})
+            )
 
-        return self._node.create_subscription(ImageMessage, topic, hear, image_qos(depth=2))
+        return self._node.create_subscription(ImageMessage, topic, take, image_qos(depth=2))
 
-    def _hear_markers(self, message: Any) -> None:
+    def _on_markers(self, message: Any) -> None:
         places = [pose.position for pose in message.poses]
         markers = np.array([(p.x, p.y, p.z) for p in places]).reshape(-1, 3)
-        self._heard.append(Heard(stamp_ns=stamp_of(message), markers_m=markers))
+        self._received.append(TrackerMessage(stamp_ns=stamp_of(message), markers_m=markers))
 
-    def _hear_angles(self, message: Any) -> None:
+    def _on_angles(self, message: Any) -> None:
         angles = dict(zip(message.name, message.position, strict=False))
-        self._heard.append(Heard(stamp_ns=stamp_of(message), angles_rad=angles))
+        self._received.append(TrackerMessage(stamp_ns=stamp_of(message), angles_rad=angles))

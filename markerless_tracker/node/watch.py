@@ -1,4 +1,4 @@
-"""Subscription to the `state` of a running tracker from another process."""
+"""Receives the `state` of a running tracker in another process."""
 
 from typing import Any
 
@@ -25,13 +25,13 @@ class StateWatch(Listener):
 
         from markerless_tracker.node.ros.qos import latched_qos
 
-        self._node.create_subscription(DiagnosticArray, "state", self._hear, latched_qos())
+        self._node.create_subscription(DiagnosticArray, "state", self._on_state, latched_qos())
 
     def listen(self, seconds: float) -> dict[str, str]:
-        """Wait up to that many seconds for a message; the last values, {} before the first."""
+        """Wait at most `seconds` for a message; returns the last values, {} before the first."""
         self._executor.spin_once(timeout_sec=seconds)
         return self._values
 
-    def _hear(self, message: Any) -> None:
+    def _on_state(self, message: Any) -> None:
         if message.status:
             self._values = {entry.key: entry.value for entry in message.status[0].values}

@@ -1,4 +1,4 @@
-"""Optimisers: they know bounds, draws, costs and feasibility, and no body or image."""
+"""Optimisers of functions under bounds and constraints; they know neither body nor image."""
 
 from markerless_tracker.optim.apf import ESTIMATES, Apf
 from markerless_tracker.optim.base import Evaluate, Optimizer

@@ -6,9 +6,9 @@ adds N(0, α^(M-m) Σ) and weighs by p^β_m, β_m such that about half of the pa
 layer starts from the last frame's layer 1. log p is minus the cost.
 
 Readings [R]: particles that break a constraint are rejected, not drawn again, and count as
-evaluated. Ours: the last frame's particles are kept relative to the estimate that was made of them,
-so that whatever else moves the estimate (prediction, refinement) takes them along; the survival
-rate counts particles that were not rejected; β is sought up to 1e5 and 1 where that is not enough.
+evaluated. Ours: the last frame's particles are kept relative to their estimate, so that they follow
+when prediction or refinement moves it; the survival rate counts particles that were not rejected; β
+is searched up to 1e5, and 1 if that is not enough.
 """
 
 import numpy as np
@@ -74,7 +74,7 @@ class Apf(Optimizer):
 
     @property
     def estimate(self) -> FloatArray:
-        """(d,) as asked for; the best point where a mean is not feasible."""
+        """(d,) the configured estimate; the best point if a mean is not feasible."""
         if self._mean and np.isfinite(self.best_cost):
             mean = self._weights @ self._particles
             if self.problem.feasible(mean[None])[0]:
@@ -106,7 +106,7 @@ class Apf(Optimizer):
 
     def _tell(self, points: FloatArray, costs: FloatArray) -> None:
         self._layer -= 1
-        # A layer of which nothing is left is passed over.
+        # A layer without any particle of finite cost is skipped.
         if np.isfinite(costs).any():
             self._particles = points.copy()
             self._weights = weights_from_costs(costs, self._sharpness(costs))

@@ -1,4 +1,4 @@
-"""Base of every optimiser: budget, best so far, bad costs, the loop."""
+"""Base of every optimiser: the budget, the best point, invalid costs, the loop."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -17,16 +17,16 @@ Evaluate = Callable[..., FloatArray]
 class Optimizer(ABC):
     """Minimises by alternating `ask` and `tell`.
 
-    A subclass writes `_ask` (the points to evaluate next, (n, d)) and `_tell` (what it makes of
-    their costs). This class counts evaluations, replaces non-finite costs by infinity and counts
-    them, lets no point that is marked infeasible win, and keeps the best.
+    A subclass writes `_ask` (the points to evaluate next, (n, d)) and `_tell` (which uses their
+    costs). This class counts evaluations, replaces non-finite costs by infinity and counts them,
+    rejects points that are marked infeasible, and keeps the best.
 
     Attributes:
         problem: bounds, centre, sigma, feasibility, random source and budget.
         best_x: (d,) best point so far; the centre until one is found.
         best_cost: its cost; infinite until one is found.
         evaluations: points evaluated so far.
-        bad_costs: how many of them had a cost that was not finite.
+        bad_costs: number of points with a cost that was not finite.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -50,7 +50,7 @@ class Optimizer(ABC):
 
     @property
     def memory(self) -> ParticleSet | None:
-        """What the next frame's search may start from; None for most algorithms."""
+        """Particles from which the next frame's search may start; None for most algorithms."""
         return None
 
     @property
@@ -72,7 +72,7 @@ class Optimizer(ABC):
         return self._asked
 
     def tell(self, costs: FloatArray) -> None:
-        """Take the costs (n,) of the points asked for.
+        """Take the costs (n,) of the points returned by `ask`.
 
         Raises:
             SearchError: called out of order or with another number of costs.
@@ -98,7 +98,7 @@ class Optimizer(ABC):
     def cutoff_costs(self) -> FloatArray | None:
         """Cutoff per point (n,): an evaluation may stop once its cost exceeds it; None = no cutoff.
 
-        A particle swarm only learns from a particle that beats its own best.
+        In a particle swarm a cost matters only if it is lower than the particle's own best.
         """
         return None
 
@@ -107,8 +107,8 @@ class Optimizer(ABC):
 
         Args:
             evaluate: costs of points.
-            early: pass `cutoff_costs` as well. An evaluation may then stop once its cost exceeds
-                its cutoff and return a lower bound. The result of the run is the same.
+            early: whether to pass `cutoff_costs`, too. An evaluation may then stop once its cost
+                exceeds its cutoff and return a lower bound. The result of the run is the same.
         """
         while not self.finished:
             points = self.ask()
@@ -118,8 +118,8 @@ class Optimizer(ABC):
 
     @abstractmethod
     def _ask(self) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Points (n, d), and which of them (n,) may not win because they break a constraint."""
+        """Points (n, d), and which of them (n,) violate a constraint and cannot become the best."""
 
     @abstractmethod
     def _tell(self, points: FloatArray, costs: FloatArray) -> None:
-        """Use the costs (n,) of the points (n, d); infinite where a point cannot win."""
+        """Use the costs (n,) of the points (n, d); infinite for points that cannot be the best."""

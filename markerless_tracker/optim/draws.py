@@ -1,4 +1,4 @@
-"""Random draws keyed by what they are for, independent of all other draws."""
+"""Random generators keyed by seed, stamp and stage, independent of all other draws."""
 
 import zlib
 

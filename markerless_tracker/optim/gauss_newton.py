@@ -1,7 +1,8 @@
 """Damped Gauss-Newton with Gaussian priors, bounds, and a truncation that shrinks.
 
-For robust least squares whose normal equations the caller sums: contour refinement. The step is
-compiled: it is the same with any number of a library's threads, and can be part of a compiled loop.
+It is made for robust least squares whose normal equations the caller sums, such as contour
+refinement. The step is compiled, so that its result does not depend on a library's number of
+threads, and it can be part of a compiled loop.
 """
 
 from collections.abc import Callable
@@ -21,7 +22,7 @@ Equations = Callable[[FloatArray, float], tuple[FloatArray, FloatArray]]
 DAMPING = 1e-3
 """Fraction of its diagonal that is added to JᵀWJ."""
 SOLVED, SINGULAR, NOT_FINITE = 0, 1, 2
-"""What became of a step."""
+"""Outcomes of a step."""
 _STATES = ("solved", "singular", "not finite")
 _ACTIVE_SETS = 10
 
@@ -62,8 +63,8 @@ def damped_step(
 ) -> FloatArray:
     """The step (p,) of (H + damping diag H) step = -slope that keeps x + step within bounds (2, p).
 
-    Parameters that a solution would take out of bounds are held on them and the rest is solved
-    again; those that the slope there pulls back inside are released (primal-dual active sets,
+    Parameters that a solution would take out of bounds are held on them, and the others are solved
+    again. Held parameters that the slope pulls back inside are released (primal-dual active sets,
     Hintermüller, Ito and Kunisch 2002).
 
     Raises:
@@ -81,7 +82,7 @@ def damped_step(
 
 @kernel
 def solve_step(hessian, slope, x, bounds, damping, scratch):  # type: ignore[no-untyped-def]
-    """Fill scratch.step as `damped_step` says; the hessian's diagonal is damped in place.
+    """Fill scratch.step with the step of `damped_step`; the hessian's diagonal is damped in place.
 
     Returns:
         SOLVED, or why there is no step: SINGULAR or NOT_FINITE.
@@ -126,7 +127,7 @@ def solve_step(hessian, slope, x, bounds, damping, scratch):  # type: ignore[no-
 
 @kernel
 def _solve_free(hessian, slope, x, bounds, scratch):  # type: ignore[no-untyped-def]
-    """Solve for the free parameters, the others on their bounds; False if that is singular.
+    """Solve for the free parameters, the others on their bounds; False if they are singular.
 
     By a Cholesky factor whose inner loops run along rows, so that they are vectorised.
     """
@@ -189,9 +190,9 @@ def refine(
 
     Args:
         equations: the data's normal equations.
-        start: (p,) where to begin.
+        start: (p,) initial point.
         priors: added to the data's equations.
-        bounds: (2, p), kept.
+        bounds: (2, p) of the point.
         iterations: number of steps; the truncation shrinks geometrically over them.
         truncation: residuals beyond it are outliers, in the first and in the last step.
 
@@ -199,8 +200,8 @@ def refine(
         The refined point (p,). A step whose equations cannot be solved ends the refinement.
     """
     x = np.clip(start, bounds[0], bounds[1])
-    for reach in truncations(*truncation, iterations):
-        hessian, slope = equations(x, float(reach))
+    for bound in truncations(*truncation, iterations):
+        hessian, slope = equations(x, float(bound))
         hessian, slope = hessian.copy(), slope.copy()
         for prior in priors:
             hessian[np.diag_indices_from(hessian)] += prior.precision
@@ -209,6 +210,6 @@ def refine(
             step = damped_step(hessian, slope, x, bounds, DAMPING)
         except SearchError:
             return x
-        # A sum may round to beyond a bound.
+        # Rounding may put the sum beyond a bound.
         x = np.clip(x + step, bounds[0], bounds[1])
     return x

@@ -1,4 +1,4 @@
-"""Multi-swarm cooperative particle swarm: sub-swarms and a master that is drawn to their best.
+"""Multi-swarm cooperative particle swarm: sub-swarms, and a master that their best attracts.
 
 Saini et al., PLoS ONE 10(5):e0127833, 2015, Eqs 1-7 and Algorithm 1, after Niu et al., "MCPSO: A
 multi-swarm cooperative particle swarm optimizer", 2007. H-MCPSO is this swarm in each of its
@@ -38,7 +38,7 @@ def migration_factor(sub_cost: float, master_cost: float) -> float:
 
 
 def swarm_sizes(particles: int, sub_swarms: int) -> tuple[int, ...]:
-    """Particles of each sub-swarm, then of the master: as equal as sub-swarms of one size allow.
+    """Particles of each sub-swarm, then of the master; as equal as possible.
 
     Table 4 of the paper at 20 particles: 7 7 6, 5 5 5 5, 4 4 4 4 4, 3 3 3 3 3 5 [R].
 
@@ -154,7 +154,7 @@ class Mcpso(Optimizer):
 
     @property
     def cutoff_costs(self) -> FloatArray:
-        """Own best cost of each particle that was asked for."""
+        """Own best cost of each particle returned by `ask`."""
         if self._iteration == 1:
             return np.concatenate([self._subs.cutoff_costs, self._master.cutoff_costs])
         return (self._subs if self._subs_next else self._master).cutoff_costs
@@ -210,7 +210,7 @@ class Mcpso(Optimizer):
             self._iteration += 1
 
     def _migrate(self) -> None:
-        """Compare, then let each sub-swarm's best take the place of the master's worst."""
+        """Find the migration factor; then replace the master's worst by the sub-swarms' bests."""
         subs, master = self._subs, self._master
         self._phi = migration_factor(float(subs.best_costs.min()), float(master.best_costs.min()))
         for span in self._spans:

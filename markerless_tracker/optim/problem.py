@@ -37,7 +37,7 @@ class Problem:
         particles, iterations: the budget is their product, the first sample being an iteration.
         feasible: constraints, bounds included.
         rng: the source of all random draws.
-        memory: what the same search left in the last frame, for algorithms that go on from it.
+        memory: particles of the same search in the last frame, for algorithms that continue it.
     """
 
     bounds: FloatArray
@@ -71,5 +71,5 @@ class Problem:
 
 
 def everything_feasible(points: FloatArray) -> NDArray[np.bool_]:
-    """No constraint at all."""
+    """All points are feasible: no constraint."""
     return np.ones(len(points), dtype=np.bool_)

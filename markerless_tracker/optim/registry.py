@@ -16,7 +16,7 @@ ALGORITHMS: dict[str, Callable[..., Optimizer]] = {
     "apf": Apf,
     "pf": Pf,
 }
-"""What `SearchPlan.algorithm` may name; its `options` are the class' keyword arguments.
+"""The names for `SearchPlan.algorithm`; its `options` are keyword arguments of the class.
 
 A program may replace an entry by an `Optimizer` of its own (examples/own_optimizer.py).
 HPSO, H-MCPSO and GLPSO are stages of these: see `tracking.stages`.
@@ -25,5 +25,5 @@ _SHIPPED = dict(ALGORITHMS)
 
 
 def is_replaced(name: str) -> bool:
-    """Whether an entry of `ALGORITHMS` is not the package's; its compiled twin is not its equal."""
+    """Whether an entry of `ALGORITHMS` was replaced, so that the compiled swarm is not equal."""
     return ALGORITHMS[name] is not _SHIPPED.get(name)

@@ -6,18 +6,18 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim.problem import Problem
 
 ATTEMPTS = 10
-"""How often a particle that breaks a constraint is drawn or moved anew (SPPSO, section 3)."""
+"""Number of attempts to draw or move a particle that violates a constraint (SPPSO, section 3)."""
 
 
 def gaussian_sample(problem: Problem, *, confined: bool = False) -> FloatArray:
     """Positions (n, d) drawn from N(centre, diag(sigma²)) (SPPSO Eq 1).
 
-    A particle that breaks a constraint is drawn again, at most `ATTEMPTS` times in all, then put
-    at the centre.
+    A particle that violates a constraint is drawn again, at most `ATTEMPTS` times in total, then
+    put at the centre.
 
     Args:
         problem: the search.
-        confined: draws beyond the bounds are put on them first.
+        confined: whether draws beyond the bounds are moved onto them first.
     """
     n, d = problem.particles, problem.centre.size
     x = np.empty((n, d))

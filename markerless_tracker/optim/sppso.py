@@ -81,7 +81,7 @@ class Sppso(Optimizer):
     """SPPSO's swarm.
 
     Every attempt to satisfy the constraints restarts from the particle's saved position and
-    velocity with fresh draws. After the last failed one the particle moves nevertheless; it is
+    velocity with new draws. After the last failed attempt the particle moves nevertheless; it is
     evaluated and counted, but cannot become a best.
 
     Args:
@@ -111,7 +111,7 @@ class Sppso(Optimizer):
 
     @property
     def cutoff_costs(self) -> FloatArray:
-        """Each particle's own best cost; one that broke a constraint cannot win at all."""
+        """Each particle's own best cost; -inf for a particle that violates a constraint."""
         return self._swarm.cutoff_costs[self._rows]
 
     @property

@@ -1,4 +1,4 @@
-"""Particles with velocities and own bests, moved under constraints: the state of a swarm."""
+"""The state of a swarm: particles with velocities and own bests, moved under constraints."""
 
 from collections.abc import Callable
 
@@ -11,11 +11,11 @@ from markerless_tracker.optim.sampling import ATTEMPTS
 
 Rows = NDArray[np.int64]
 Step = Callable[[Rows], tuple[FloatArray, FloatArray]]
-"""New positions and velocities of some particles, with fresh draws at each call."""
+"""New positions and velocities of given particles, with new draws at each call."""
 
 
 def confine(x: FloatArray, v: FloatArray, bounds: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Put positions (n, d) that left the bounds (2, d) on them, where they stop (v = 0)."""
+    """Move positions (n, d) beyond the bounds (2, d) onto them; their velocity becomes 0."""
     inside = np.clip(x, bounds[0], bounds[1])
     return inside, np.where(inside == x, v, 0.0)
 
@@ -25,8 +25,8 @@ class Swarm:
 
     Attributes:
         x, v, best: (n, d) positions, velocities, best positions so far.
-        best_costs: (n,) their costs; infinite until one is known.
-        infeasible: (n,) particles whose last move broke a constraint.
+        best_costs: (n,) costs of the best positions; infinite as long as unknown.
+        infeasible: (n,) particles whose last move violates a constraint.
     """
 
     def __init__(self, x: FloatArray, v: FloatArray) -> None:
@@ -37,16 +37,17 @@ class Swarm:
     def move(
         self, problem: Problem, step: Step, rows: slice = np.s_[:], *, confined: bool = True
     ) -> None:
-        """Move some particles, or all.
+        """Move the particles of `rows`.
 
-        A move that breaks a constraint is tried again from where the particle was, with fresh
-        draws, at most `ATTEMPTS` times; after the last it moves nevertheless and is infeasible.
+        A move that violates a constraint is tried again from the particle's position, with new
+        draws, at most `ATTEMPTS` times. After the last attempt the particle moves nevertheless and
+        is marked as infeasible.
 
         Args:
             problem: the search.
             step: proposes moves.
             rows: the particles to move.
-            confined: whether particles that leave the bounds stop on them.
+            confined: whether particles beyond the bounds are moved onto them and stop.
         """
         x, v = self.x.copy(), self.v.copy()
         todo = np.arange(len(x))[rows]
@@ -62,7 +63,7 @@ class Swarm:
 
     @property
     def cutoff_costs(self) -> FloatArray:
-        """(n,) own best costs; one that broke a constraint cannot win at all."""
+        """(n,) own best costs; -inf for a particle that violates a constraint."""
         return np.where(self.infeasible, -np.inf, self.best_costs)
 
     @property
@@ -71,12 +72,12 @@ class Swarm:
         return np.asarray(self.best.std(axis=0))
 
     def learn(self, costs: FloatArray, rows: slice = np.s_[:]) -> None:
-        """Update the own bests of some particles, or of all, by the costs (n,) of their places."""
+        """Update the own bests of the particles of `rows`, given their costs (n,)."""
         better = np.zeros(len(self.x), dtype=np.bool_)
         better[rows] = costs < self.best_costs[rows]
         self.best[better] = self.x[better]
         self.best_costs[better] = costs[better[rows]]
 
     def leader(self, start: int = 0, stop: int | None = None) -> int:
-        """Index of the particle with the best own best, of those from start to stop."""
+        """Index of the particle from start to stop with the lowest own best cost."""
         return start + int(np.argmin(self.best_costs[start:stop]))

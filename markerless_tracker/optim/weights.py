@@ -1,4 +1,4 @@
-"""Weighted particles: from costs to weights, drawing by weight, how many survive."""
+"""Weighted particles: weights from costs, drawing by weight, the survival rate."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,10 @@ def survival(weights: FloatArray) -> float:
 
 
 def annealed_sharpness(costs: FloatArray, rate: float) -> float:
-    """The sharpness β at which that fraction of the particles with finite costs (n,) survives.
+    """The sharpness β at which a fraction `rate` of the particles with finite costs (n,) survives.
 
-    By bisection. Where even `SHARPEST` leaves more (all costs are nearly equal), β = 1.
+    Found by bisection. If more survive even with `SHARPEST`, since all costs are nearly equal, β is
+    1.
     """
     finite = costs[np.isfinite(costs)]
     if finite.size == 0 or survival(weights_from_costs(finite, SHARPEST)) > rate:

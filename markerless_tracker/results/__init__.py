@@ -1,4 +1,1 @@
-"""Runs over recordings, results on disk and their score.
-
-What `track`, `evaluate` and the node need.
-"""
+"""Runs over recordings, results on disk and their scores, for `track`, `evaluate` and the node."""

@@ -1,4 +1,4 @@
-"""A file that grows by whole records while others may read it."""
+"""A file that grows by whole records while other processes may read it."""
 
 import os
 from pathlib import Path
@@ -9,7 +9,7 @@ from markerless_tracker.errors import DatasetError
 class AppendedFile:
     """A new file; every record reaches the operating system before `append` returns.
 
-    The end of the process, however sudden, therefore loses no record. Nothing is kept in memory.
+    So a sudden end of the process loses no record. Nothing is kept in memory.
 
     Args:
         path: the file; an earlier one is replaced.
@@ -41,7 +41,7 @@ class AppendedFile:
         self.size += len(record)
 
     def rewrite(self, offset: int, record: bytes) -> None:
-        """Replace as many bytes from an offset on.
+        """Replace bytes at an offset with a record.
 
         Raises:
             DatasetError: they cannot be written.
@@ -54,7 +54,7 @@ class AppendedFile:
             raise not_written(self.path, error) from error
 
     def cut(self, size: int) -> None:
-        """Take away what was appended after the file had that many bytes."""
+        """Truncate the file to a size."""
         self._file.seek(size)
         self._file.truncate()
         self.size = size
@@ -75,10 +75,10 @@ def not_written(path: Path, error: OSError) -> DatasetError:
 
 
 def check_writable(path: Path) -> None:
-    """Make sure that a file can be written, without changing what it holds.
+    """Check that a file can be written, without changing its content.
 
     Raises:
-        DatasetError: it cannot.
+        DatasetError: it cannot be written.
     """
     try:
         exists = path.exists()

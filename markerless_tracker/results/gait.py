@@ -1,9 +1,9 @@
 """Gait events and parameters of a person who walks, from the ankles and the pelvis.
 
 Events by the coordinates of the foot relative to the pelvis along the direction of progress (Zeni,
-Richards and Higginson, Gait & Posture 27, 2008): foot strike where the foot is farthest ahead, foot
-off where it is farthest behind. The ankles stand for heel and toes, so that foot off, and with it
-the stance, is less certain than foot strike.
+Richards and Higginson, Gait & Posture 27, 2008): foot strike when the foot is farthest ahead, foot
+off when it is farthest behind. The ankles are used instead of heel and toes, so that foot off, and
+the stance with it, is less certain than foot strike.
 """
 
 from collections.abc import Sequence
@@ -23,9 +23,9 @@ METHOD = (
 )
 """How the events are found, for people."""
 LEAST_SPEED_M_S = 0.3
-"""Speed of the pelvis from which on a person walks."""
+"""Least speed of the pelvis of a walking person."""
 LEAST_FPS = 15.0
-"""Lowest rate of a result whose events are found."""
+"""Lowest rate of a result for which events are found."""
 
 _CUTOFF_HZ, _PROGRESS_HZ = 6.0, 0.8
 _LONGEST_GAP_S, _LEAST_S = 0.15, 1.0
@@ -60,7 +60,7 @@ class Stride:
         from_s, to_s: times of the strikes.
         length_m: distance of the ankle between them, on the floor.
         speed_m_s: distance that the pelvis covers on the floor, by time.
-        stance: fraction of the time until the foot is off; NaN if that was not seen.
+        stance: fraction of the time before foot off; NaN if foot off was not found.
     """
 
     side: str
@@ -84,7 +84,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Gait:
-    """What was found while the person walked.
+    """Events and strides while the person walked.
 
     Attributes:
         events: in order of time.
@@ -166,7 +166,7 @@ def _smoothed(values: FloatArray, fps: float, cutoff_hz: float) -> FloatArray:
 
 
 def _walks(pelvis: FloatArray, fps: float) -> list[slice]:
-    """Where the pelvis moves on over the floor for long enough."""
+    """Parts in which the pelvis moves over the floor for long enough."""
     moving = np.linalg.norm(_velocity(pelvis, fps), axis=1) >= LEAST_SPEED_M_S
     edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(np.int8)))
     pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)

@@ -1,7 +1,7 @@
-"""NAME.jsonl, the journal of a run: everything of NAME.json while it is not there yet.
+"""NAME.jsonl, the journal of a run: the content of NAME.json before that file exists.
 
-Each line is a JSON object. One with `stamp_ns` is a frame; any other holds entries of the summary,
-a later one replaces entries of an earlier one.
+Each line is a JSON object. An object with `stamp_ns` is a frame; any other holds entries of the
+summary, which replace earlier entries.
 """
 
 import json
@@ -51,7 +51,7 @@ class Journal:
         self._file.append((json.dumps(entries) + "\n").encode())
 
     def cut(self, size: int) -> None:
-        """Take away the lines that were added after the journal had that many bytes."""
+        """Truncate the journal to a size."""
         self._file.cut(size)
 
     def compose(self, path: Path) -> None:
@@ -80,7 +80,7 @@ class Journal:
 
 
 def read_summary(name: Path) -> dict[str, Any]:
-    """What NAME.json holds, or NAME.jsonl where the run did not end: settings, `frames`, the rest.
+    """The content of NAME.json, or of NAME.jsonl if the run did not end: settings, `frames`, etc.
 
     Args:
         name: path of the result without suffix.
@@ -93,7 +93,7 @@ def read_summary(name: Path) -> dict[str, Any]:
 
 
 def open_summary(name: Path) -> tuple[dict[str, Any], Iterator[dict[str, Any]]]:
-    """The entries of a result but its frames, and the frames one after the other.
+    """The entries of a result except its frames, and the frames one after the other.
 
     Memory does not grow with the frames, unless another program has changed the layout of
     NAME.json.

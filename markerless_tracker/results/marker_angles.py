@@ -1,4 +1,4 @@
-"""Joint angles that markers determine, from the markers alone: for a result and its reference.
+"""Joint angles computed from markers only, for a result and its reference.
 
 Definitions as of the reported angles (docs/joint-angles.md), with segments from markers: the
 pelvis' z axis is the line of the hips, its y axis the line from Pelvis to Neck made perpendicular.

@@ -1,8 +1,8 @@
-"""Joint angles of a pose alone, near reported ones.
+"""Joint angles determined by a pose only, near the reported angles.
 
-Reported angles are continuous in time: near 90 degrees of abduction they may share a rotation
-between the first and the third angle otherwise than the pose does (docs/joint-angles.md). Files
-whose readers turn a model by the angles need those of the pose.
+Reported angles are continuous in time. Near 90 degrees of abduction (gimbal lock) their split of a
+rotation between the first and the third angle may differ from that of the pose
+(docs/joint-angles.md). Files whose readers move a model by the angles need those of the pose.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from markerless_tracker.body.angles.reader import wrapped
 from markerless_tracker.geometry import FloatArray
 
 APART_COSINE = 0.7
-"""Where the second angle's cosine is larger, reported angles are those of the pose."""
+"""If the second angle's cosine is larger, reported angles equal those of the pose."""
 
 
 class PoseAngles:

@@ -1,4 +1,4 @@
-"""Reading of results: NAME.trc and NAME.json side by side, a chunk at a time."""
+"""Reads results: NAME.trc and NAME.json together, a chunk at a time."""
 
 from collections.abc import Iterator
 from pathlib import Path

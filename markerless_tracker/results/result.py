@@ -1,6 +1,6 @@
 """A result on disk: NAME.trc with the 15 markers, NAME.json with everything else.
 
-NAME.subject.yaml holds the sizes of the tracked body, fitted ones included, for the next recording
+NAME.subject.yaml holds the sizes of the tracked body, including fitted ones, for the next recording
 of the same person.
 """
 
@@ -38,13 +38,13 @@ _MISSING = np.full((len(MARKER_NAMES), 3), np.nan)
 class ResultWriter:
     """Writes each result as it comes; also usable as a context manager.
 
-    While a run goes on, NAME.trc has every row so far and NAME.jsonl, the journal, everything
-    else. `close` makes NAME.json of the journal and removes it. Memory does not grow with the
-    frames. Files of an earlier result stay until the first row comes.
+    During a run, NAME.trc has every row so far and NAME.jsonl, the journal, everything else.
+    `close` makes NAME.json of the journal and removes the journal. Memory does not grow with the
+    frames. Files of an earlier result are kept until the first row comes.
 
-    A stamp that is not later than the one before begins NAME.2.trc, then NAME.3.trc: the rows of
-    one file are in the order of time, and none that was written is ever removed. The frames in
-    NAME.json then carry `segment`, the number of their file.
+    If a stamp is not later than the one before, NAME.2.trc begins, then NAME.3.trc: the rows of a
+    file are in the order of time, and no written row is ever removed. The frames in NAME.json then
+    have `segment`, the number of their file.
 
     Args:
         name: path without suffix; the folder is made.
@@ -106,7 +106,7 @@ class ResultWriter:
         try:
             self.close()
         except DatasetError:
-            # What came first says more.
+            # The first error is more informative.
             if kind is None:
                 raise
 
@@ -130,7 +130,7 @@ class ResultWriter:
         self._notes.update(notes)
 
     def close(self) -> None:
-        """Complete the files; without any frame an earlier result stays.
+        """Complete the files; without any frame an earlier result is kept.
 
         Raises:
             DatasetError: a file cannot be completed; the rows and the journal stay as they are.
@@ -181,7 +181,7 @@ class ResultWriter:
             trc = TrcStream(self.trc_path, MARKER_NAMES, self._rate())
             self._journal, self._trc = Journal(self.journal_path), trc
             self._journal.add(self._summary())
-            # From here on the journal is what there is to read.
+            # From here on readers use the journal.
             self.json_path.unlink(missing_ok=True)
             number = 2
             while (path := path_of(self._name, f".{number}.trc")).exists():
@@ -195,7 +195,7 @@ class ResultWriter:
         self._segment += 1
         self._angles.reset()
         with suppress(DatasetError):
-            # Its rows are there; only the short form of its header has no room.
+            # Its rows are written; only the final header has not been written.
             trc.finish(self._rate())
         return self._trc
 
@@ -209,7 +209,7 @@ class ResultWriter:
 
     def _write_subject(self) -> None:
         if not self._tracked:
-            # No body was fitted; a file of an earlier run would pass for this one's.
+            # No body was fitted; a file of an earlier run would be mistaken for one of this run.
             self.subject_path.unlink(missing_ok=True)
             return
         shapes = zip(self.body.cone_names, self.body.cone_shape, strict=True)

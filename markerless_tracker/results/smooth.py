@@ -31,9 +31,9 @@ CUTOFF_HZ = 6.0
 """Usual cutoff for joint positions in walking (Winter 2009)."""
 LEAST_CUTOFF_HZ = 0.1
 FILL_CUTOFF_HZ = 15.0
-"""Cutoff where gaps are filled without smoothing: frames beside a gap stay nearly as they are."""
+"""Cutoff if gaps are filled without smoothing, so that frames beside a gap hardly change."""
 _RUN_GAP_S = 0.3
-# Weights of single frames stay moderate, whatever deviations they report.
+# Largest ratio of variances, which limits the weights of single frames.
 _VARIANCE_RATIO = 10.0
 _UNKNOWN_SD = 0.02
 _TURN_RAD, _TURN_DEG = 2.0 * np.pi, 360.0
@@ -42,7 +42,7 @@ _STEP = 1e-6
 
 @dataclass(frozen=True)
 class Smoothing:
-    """What is done with a finished result.
+    """Settings of the smoothing of a finished result.
 
     Attributes:
         cutoff_hz: cutoff frequency; None leaves frames with a pose as they are.
@@ -65,9 +65,9 @@ class Smoothing:
             raise ConfigError(f"fill-gaps is {self.fill_s} s, expected from 0 to 10")
 
     def check_rate(self, fps: float) -> None:
-        """Make sure that frames at a rate (1/s) have motion at the cutoff frequency.
+        """Check that frames at a rate (1/s) can show motion at the cutoff frequency.
 
-        Frames show no motion above half their rate (Nyquist): there nothing can be smoothed.
+        They show no motion above half their rate (Nyquist).
 
         Raises:
             ConfigError: the cutoff is above half the rate.
@@ -135,10 +135,10 @@ def smooth_result(name: Path, smoothing: Smoothing) -> int:
     """Smooth a finished result in place: NAME.trc and NAME.json.
 
     Frames in a gap of at most `fill_s` between two tracked ones get a pose, `filled` in NAME.json
-    and deviations that grow towards the middle of the gap; their state stays as it was. Frames with
-    a pose keep their deviations: errors of neighbouring frames are alike, so that a mean over them
-    is hardly surer. Each smoothed frame has `velocities_m_s` by marker. Longer gaps divide the
-    result: nothing is smoothed across them.
+    and deviations that grow towards the middle of the gap; their state does not change. Frames with
+    a pose keep their deviations: errors of neighbouring frames are correlated, so that a mean over
+    them is hardly more certain. Each smoothed frame has `velocities_m_s` by marker. Longer gaps
+    divide the result: nothing is smoothed across them.
 
     Args:
         name: path of the result without suffix.
@@ -148,7 +148,7 @@ def smooth_result(name: Path, smoothing: Smoothing) -> int:
         Number of frames filled.
 
     Raises:
-        DatasetError: the result cannot be read or written; it then stays as it was.
+        DatasetError: the result cannot be read or written; it has not changed then.
     """
     result = read_result(name)
     changed, filled = smoothed(result, smoothing)
@@ -235,7 +235,7 @@ def _angles_of(reader: PoseAngles, pose: FloatArray, smoothed_deg: FloatArray) -
 
 
 def _runs(times_s: FloatArray, known: NDArray[np.bool_], gap_s: float) -> Iterator[slice]:
-    """Slices that begin and end with a known frame and have no gap longer than that inside."""
+    """Slices that begin and end with a known frame and contain no gap longer than `gap_s`."""
     rows = np.flatnonzero(known)
     if not rows.size:
         return
@@ -247,7 +247,7 @@ def _runs(times_s: FloatArray, known: NDArray[np.bool_], gap_s: float) -> Iterat
 
 
 def _short_gaps(times_s: FloatArray, known: NDArray[np.bool_], fill_s: float) -> NDArray[np.bool_]:
-    """(n,) frames without a pose whose gap, between its neighbours, is at most that long."""
+    """(n,) frames without a pose in gaps, between known frames, of at most `fill_s`."""
     rows = np.flatnonzero(known)
     after = np.searchsorted(rows, np.arange(known.size)).clip(1, max(rows.size - 1, 1))
     if rows.size < 2:
@@ -293,7 +293,7 @@ def _markers_sd(body: BodyModel, pose: FloatArray, sd: FloatArray) -> FloatArray
 def _updates(
     result: StoredResult, filled: NDArray[np.bool_], speeds: FloatArray, row: int
 ) -> dict[str, Any]:
-    """What changes in a frame's entry of the JSON file."""
+    """The changed values of a frame's entry in the JSON file."""
     if not np.isfinite(result.parameters[row]).all():
         return {}
     names = result.marker_names

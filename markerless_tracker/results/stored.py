@@ -1,4 +1,4 @@
-"""What a result's JSON file says about the rows of its marker file."""
+"""The entries of a result's JSON file for the rows of its marker file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ from markerless_tracker.results.journal import read_summary
 
 @dataclass(frozen=True, eq=False)
 class StoredFrames:
-    """Rows of a result's marker file, with what its JSON file says about them.
+    """Rows of a result's marker file, with their entries of its JSON file.
 
     Attributes:
         track: the markers; rows of frames in the state LOST are blank.
@@ -33,8 +33,8 @@ class StoredFrames:
 def stored_frames(path: Path, track: MarkerTrack) -> StoredFrames | None:
     """Frames of the JSON file (or the journal of a run without end) beside a marker file.
 
-    NAME.trc belongs to NAME.json, and NAME.2.trc, where time was set back, to it as well unless
-    there is a NAME.2.json. Frames are matched by stamp.
+    NAME.trc belongs to NAME.json. So does NAME.2.trc, written after time was set back, unless there
+    is a NAME.2.json. Frames are matched by stamp.
 
     Args:
         path: the marker file.
@@ -72,7 +72,7 @@ def stored_frames(path: Path, track: MarkerTrack) -> StoredFrames | None:
 
 
 def summary_of(path: Path) -> tuple[Path, int] | None:
-    """The result's path without suffix, and which of its marker files this is."""
+    """The result's path without suffix, and the number of this marker file."""
     name = path.with_suffix("") if path.suffix.lower() == ".trc" else path
     candidates = [(name, 1)]
     number = name.suffix[1:]

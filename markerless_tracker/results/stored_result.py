@@ -23,7 +23,7 @@ _PER_FRAME = (
 
 @dataclass(frozen=True, eq=False)
 class StoredResult:
-    """What a run found, n frames; world frame (Z up), NaN = unknown.
+    """The result of a run of n frames; world frame (Z up), NaN = unknown.
 
     Attributes:
         source: what was tracked: the path of a recording, or `live`.

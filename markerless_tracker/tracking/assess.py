@@ -1,4 +1,4 @@
-"""From the search of a frame to its result: whether the body is tracked, and how well."""
+"""Makes the result of a frame from its search: whether the body is tracked, and how well."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,11 +29,11 @@ class Found:
         search: the search, with its estimate.
         stamp_ns: time of the frame.
         observations: the evidence that it used.
-        warnings: what the user should know, one line each.
-        anew: whether an automatic start found the pose: it does not continue the last one.
+        warnings: messages for the user, one line each.
+        restarted: whether an automatic start found the pose, so that it does not continue the last.
         settling: whether that start needs further frames.
-        turned: whether the body was turned round: it does not continue the last pose, either.
-        jumped: parameters that were found elsewhere.
+        rotated: whether another heading was found, so that the pose does not continue the last.
+        jumped: indices of parameters that do not continue those of the last pose.
         recovered: whether a limb was found so far away that it was in a wrong place before.
     """
 
@@ -41,15 +41,15 @@ class Found:
     stamp_ns: int
     observations: Mapping[str, Observation]
     warnings: tuple[str, ...] = ()
-    anew: bool = False
+    restarted: bool = False
     settling: bool = False
-    turned: bool = False
+    rotated: bool = False
     jumped: IntArray | None = None
     recovered: bool = False
 
 
 class Assessor:
-    """Keeps the phase of the track and of each limb; makes the results.
+    """Keeps the phase of the track and the states of the limbs; makes the results.
 
     Args:
         rig: the cameras.
@@ -58,7 +58,7 @@ class Assessor:
 
     Attributes:
         track: phase after the last frame.
-        limbs: the limbs' states, and the search for lost ones.
+        limbs: the limbs' states, and the searches for limbs.
     """
 
     def __init__(self, rig: CameraRig, body: BodyModel, config: TrackerConfig) -> None:
@@ -83,7 +83,7 @@ class Assessor:
         self.jump()
 
     def jump(self) -> None:
-        """The next pose does not continue the last one: no smoothing across the gap."""
+        """Restart the smoothing: the next pose does not continue the last one."""
         if self._smooth is not None:
             self._smooth.reset()
 
@@ -103,9 +103,9 @@ class Assessor:
         )  # fmt: skip
 
     def warm_up(self, found: Found, body: BodyModel, limits: FloatArray) -> None:
-        """Compile what `found` needs; arguments as there."""
+        """Compile what `found` needs; same arguments."""
         self.found(found, body, limits)
-        # A pose that has nothing to do with the evidence has no confidence.
+        # `found` skips these if the pose does not match the evidence at all.
         slopes(body, found.search.pose)
         disagreement_m(found.search.contours, outline_rows(found.search.contours))
 
@@ -114,7 +114,7 @@ class Assessor:
 
         Args:
             found: the pose and its evidence.
-            body: the body it was searched with.
+            body: the body of the search.
             limits: (2, p) joint limits.
         """
         search, warnings = found.search, found.warnings
@@ -129,7 +129,7 @@ class Assessor:
         limbs = self.limbs.assess(body, search.pose, found.observations, search.particle_sd_ratio)
         warnings += tuple(f"{name}: lost" for name in self.limbs.lost if name not in lost)
         pose = search.pose
-        if found.anew or found.turned:
+        if found.restarted or found.rotated:
             self.jump()
         if self._smooth is not None:
             pose = np.clip(self._smooth(pose, found.stamp_ns), *limits)

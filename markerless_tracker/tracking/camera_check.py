@@ -1,8 +1,8 @@
-"""Whether a camera disagrees with the others: its silhouettes sit beside the tracked body.
+"""Detects a camera that disagrees with the others: its silhouettes are shifted from the body.
 
 At intervals the pose is refined without one camera. Then the shift of that camera's image is
-estimated that lays the body's outline over its silhouette. A shift that persists over a run is
-neither motion nor segmentation: the calibration of the camera is wrong.
+estimated with which the body's outline fits its silhouette. A shift that persists over a run is due
+neither to motion nor to segmentation: the calibration of the camera is wrong.
 """
 
 from collections.abc import Mapping
@@ -21,30 +21,30 @@ from markerless_tracker.tracking.refinement import pose_prior, refined_on_contou
 from markerless_tracker.tracking.search import Searcher, pixels_per_m, root_m
 
 DISAGREES_M = 0.030
-"""A systematic shift of this much, at the body, is the calibration's."""
+"""Least persistent shift, at the body's distance, that is attributed to the calibration."""
 EVERY_NS, LATER_EVERY_NS = 160_000_000, 800_000_000
-"""Time between the first `MANY_CHECKS` checks, and between those after them."""
+"""Time between the first `MANY_CHECKS` checks, and between later ones."""
 MANY_CHECKS = 12
-"""Number of checks whose median says how large a lasting shift is; later ones may be rarer."""
+"""Number of checks whose median is a reliable shift, so that later checks may be rarer."""
 LEAST_VIEWS = 3
-"""Least number of views: of two that disagree, either may be wrong."""
+"""Least number of views: of two views that disagree, either may be wrong."""
 _FIRST_NS = 300_000_000
 """Time from the first tracked frame to the first check."""
 _LEAST_CHECKS = 3
 _ITERATIONS, _TRUNCATION_M = 4, (0.10, 0.035)
-"""Of the refinement without a camera, first and last truncation."""
+"""Refinement without a camera: its iterations, and the first and last truncation."""
 _SHIFTS, _WIDE_M = 3, 0.10
-"""Steps of a shift's estimate, and their truncation."""
+"""Estimate of a shift: its steps and their truncation."""
 
 
 @dataclass(frozen=True)
 class Shift:
-    """How far one camera's silhouettes lie from the body as the others see it.
+    """Shift of one camera's silhouettes from the body as the other cameras see it.
 
     Attributes:
-        px: (u, v), medians over the checks; at the scale of the images tracked.
-        length_m: its length at the body.
-        checks: frames it was estimated in.
+        px: (u, v), medians over the checks, at the scale of the tracked images.
+        length_m: its length at the body's distance.
+        checks: number of frames in which it was estimated.
     """
 
     px: tuple[float, float]
@@ -53,7 +53,7 @@ class Shift:
 
     @property
     def disagrees(self) -> bool:
-        """Whether it is too large to be chance."""
+        """Whether the shift is too large to be chance."""
         return self.checks >= _LEAST_CHECKS and self.length_m >= DISAGREES_M
 
 
@@ -76,7 +76,7 @@ class CameraCheck:
         self._found: dict[str, list[tuple[float, float, float]]] = {n: [] for n in rig.names}
 
     def add(self, result: TrackResult, body: BodyModel) -> None:
-        """Take a frame; most are passed over."""
+        """Take a frame; most frames are skipped."""
         if result.state is not TrackState.TRACKING or result.pose is None:
             return
         if self._first_ns is None:
@@ -115,7 +115,7 @@ class CameraCheck:
         return out
 
     def _suspect(self) -> None:
-        """Leave out the camera that disagrees most when the others are compared."""
+        """Exclude the camera that disagrees most from the checks of the others."""
         worst = max(self.shifts().items(), key=lambda item: item[1].length_m, default=None)
         if worst is None or worst[0] in self._suspects or not worst[1].disagrees:
             return
@@ -142,7 +142,7 @@ def describe(shifts: Mapping[str, Shift]) -> list[str]:
 def _refined(
     searcher: Searcher, observations: Mapping[str, Observation], result: TrackResult
 ) -> FloatArray:
-    """The result's pose (p,) as these views alone would have it."""
+    """The result's pose (p,) refined on these views only."""
     assert result.pose is not None
     contours = searcher.frame(observations, result.stamp_ns, result.pose).contours
     return refined_on_contours(
@@ -159,10 +159,10 @@ def _refined(
 def _shift(
     searcher: Searcher, observation: Observation, camera: CameraModel, pose: FloatArray
 ) -> tuple[float, float, float] | None:
-    """Shift (u, v) px of one view that lays the body over it, and px per metre.
+    """Shift (u, v) px with which the body fits one view's silhouette, and px per metre.
 
     Weighted least squares on the contours' residuals, repeated with the camera moved by the shift
-    so far, since residuals count the less the larger they are.
+    so far, since larger residuals have less weight.
     """
     to_camera, name = camera.T_cam_world, camera.name
     at = root_m(searcher.body, pose)
@@ -179,7 +179,7 @@ def _shift(
         pixels_per_m={name: pixels_per_m(camera, at)},
         step_px=searcher.config.edges.step_px,
     )
-    # The silhouette stays; only the principal point is moved over it.
+    # The silhouette is fixed; the principal point is moved.
     centre = views.arrays.intrinsics[0, [2, 4]]
     shift = np.zeros(2)
     for _ in range(_SHIFTS):

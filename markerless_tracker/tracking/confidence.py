@@ -1,17 +1,17 @@
 """Uncertainty of a pose: posterior covariance of the contour refinement, and model error.
 
-The inverse normal equations of the contour refinement are the Gauss-Newton approximation of the
-posterior covariance, with the variance of this frame's residuals. That is noise only. Added are the
-disagreement between the views, of which a pose is a compromise, and what images do not show: the
-joint's centre inside the limb and, for a person whose lengths were not measured, the lengths.
+The inverse normal equations of the contour refinement, scaled by the variance of this frame's
+residuals, are the Gauss-Newton approximation of the posterior covariance. It accounts for noise
+only. Two errors are added: the disagreement between the views, and what images do not show, which
+is the joint's centre inside the limb and, if the lengths were not measured, the lengths.
 
 A limb at a wrong optimum has a well-determined pose, so its covariance does not show the error. Its
-residuals do: they stay larger than those of a limb that fits. By how much decides what is added to
-the limb's markers; the trunk's excess is added to all. Undecided pixels give no residuals, hence no
-information.
+residuals do: they are larger than those of a limb that fits. An error proportional to their excess
+is added to the limb's markers; one proportional to the trunk's excess is added to all markers.
+Undecided pixels give no residuals, hence no information.
 
-The outline of a straight limb moves less than the model's error when the limb turns about itself:
-of that rotation only the part counts that a bent knee or elbow shows.
+When a straight limb rotates about its own axis, its outline moves less than the model's error. Of
+that rotation only the part that a bent knee or elbow shows is taken as observed.
 """
 
 from collections.abc import Mapping
@@ -33,22 +33,23 @@ from markerless_tracker.records import Confidence
 MEASURED_M = 0.0025
 """Error, per axis, of a joint's centre in a body whose lengths were measured."""
 UNMEASURED_M = 0.013
-"""The same with lengths that were fitted, or that are those of a stature."""
+"""The same with lengths that were fitted, or derived from a stature."""
 DISAGREEMENT = 2.0
 """Error of a pose relative to the disagreement of the views that remains after the fit."""
 CORRELATED = 9.0
-"""Factor of the residuals' correlation length: a generic section is wrong along a whole limb, some
-half a metre, not along the piece of outline that the refinement takes for independent."""
+"""Factor of the residuals' correlation length. The error of a generic section extends along a whole
+limb, about half a metre, which is longer than the pieces of outline that the refinement treats as
+independent."""
 FITTING_M = 0.007
-"""Root mean square of the residuals of a limb or trunk that fits: its sections are generic."""
+"""Root mean square of the residuals of a limb or trunk that fits, with generic sections."""
 LIMB_ERROR = 15.0
-"""Error of a limb's end relative to how far its residuals exceed those of a limb that fits."""
+"""Error of a limb's end relative to the excess of its residuals over those of a limb that fits."""
 MOST_LIMB_M = 0.30
-"""Largest error that is inferred so: about the length of a segment."""
+"""Largest error that is inferred from the excess: about the length of a segment."""
 TRUNK_ERROR = 2.0
-"""Error of all markers relative to the same excess of the trunk, which has no end to swing."""
+"""Error of all markers relative to the excess of the trunk's residuals."""
 _LEVER_M = 0.25
-"""Length of the limbs that an error of a joint's centre rotates."""
+"""Length of a limb, which converts an error of a joint's centre into an error of its angle."""
 _TRUNCATION_M = 0.06
 _LEAST_SIGMA_M = 0.002
 
@@ -58,7 +59,7 @@ def confidence_of(
 ) -> Confidence | None:
     """Standard deviations of a pose (p,); None if the contours do not determine it.
 
-    Never raises: what cannot be computed is unknown.
+    Never raises: None if it cannot be computed.
 
     Args:
         body: the tracked body.
@@ -105,21 +106,21 @@ def confidence_of(
 
 
 def disagreement_m(contours: ContourFrame, rows: OutlineRows) -> float:
-    """Distance of the views' silhouettes from the body after the fit, m.
+    """Disagreement of the views: distance of their silhouettes from the body after the fit, m.
 
-    Root mean square, over views and both axes of the images, of the shift at the body that would
-    lay its outline over each silhouette.
+    For each view, the shift at the body is estimated with which its outline would fit the
+    silhouette. The result is the root mean square over views and both axes of the images.
 
     Args:
         contours: residuals collected at the pose.
-        rows: the same, one by one.
+        rows: the same residuals, as rows.
     """
     rotation = contours.views.arrays.rotation
     normal, right = np.zeros((len(rotation), 2, 2)), np.zeros((len(rotation), 2))
     _sum_shifts(rows.view, rows.gradient, rows.weight, rows.value, rotation, normal, right)
     trace = normal[:, 0, 0] + normal[:, 1, 1]
     determinant = normal[:, 0, 0] * normal[:, 1, 1] - normal[:, 0, 1] * normal[:, 1, 0]
-    # The determinant is the product of the eigenvalues, the trace is at least the larger one.
+    # The determinant is the product of the eigenvalues; the trace is no less than the larger one.
     known = determinant > 2.0 * float(np.finfo(np.float64).eps) * trace**2
     if not known.any():
         return 0.0
@@ -144,10 +145,10 @@ def _sum_shifts(view, gradient, weight, value, rotation, normal, right):  # type
 
 
 def excesses_m(body: BodyModel, rows: OutlineRows) -> tuple[dict[str, float], float]:
-    """How far residuals exceed those of a body that fits, m: by limb, and of the trunk.
+    """Excess of the residuals over those of a body that fits, m: by limb, and of the trunk.
 
-    Root mean squares over the outline points of a limb; of the trunk, over those of no limb and not
-    of the head.
+    The excess is that of the root mean square over the outline points of a limb. The trunk has the
+    points that belong to no limb and not to the head.
 
     Args:
         body: the body.
@@ -172,9 +173,9 @@ def excesses_m(body: BodyModel, rows: OutlineRows) -> tuple[dict[str, float], fl
 def _spread(
     body: BodyModel, by_marker: FloatArray, errors: Mapping[str, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Variances that errors of limbs' ends (m) add: of the markers (15,), of the pose (p,).
+    """Variances of the markers (15,) and of the pose (p,) due to errors of the limbs' ends (m).
 
-    A marker has its share by how far the limb's parameters move it.
+    The error of a marker is proportional to how far the limb's parameters move it.
     """
     of_markers, of_pose = np.zeros(len(by_marker) // 3), np.zeros(body.size)
     for name, error in errors.items():
@@ -188,9 +189,9 @@ def _spread(
 
 
 def slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives by the parameters at a pose (p,): of the markers (45, p), the root's pose (6, p).
+    """Jacobians at a pose (p,): of the markers (45, p) and of the root's pose (6, p).
 
-    The root's rotation is a small one about the world's axes.
+    The root's rotation is expressed as a rotation vector about the world's axes.
     """
     nodes = transforms(body, pose)
     root = body.frames[body.root_frame]
@@ -207,14 +208,14 @@ def slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @kernel
 def _fill_slopes(points, axes, origins, slides, parameter, hang, out):  # type: ignore[no-untyped-def]
-    """Add the derivatives of k points and of the last one's rotation to out (k + 1, 3, p).
+    """Add the derivatives of k points, and of the last point's rotation, to out (k + 1, 3, p).
 
     Args:
         points: (k, 3).
         axes, origins: (m, 3) of the joints' nodes, world frame.
         slides: (m,) whether a node translates; else it rotates.
         parameter: (m,) index of each node's parameter.
-        hang: (k, m) not 0 where a node moves a point.
+        hang: (k, m) not 0 if a node moves a point.
         out: zeros.
     """
     last = points.shape[0] - 1
@@ -227,7 +228,7 @@ def _fill_slopes(points, axes, origins, slides, parameter, hang, out):  # type: 
                 if k == last:
                     for i in range(3):
                         out[last + 1, i, parameter[m]] += axes[m, i]
-                # A turn about the axis moves a point P by axis x (P - origin).
+                # A rotation about the axis moves a point P by axis x (P - origin).
                 u, v = points[k, 0] - origins[m, 0], points[k, 1] - origins[m, 1]
                 w = points[k, 2] - origins[m, 2]
                 x, y, z = y * w - z * v, z * u - x * w, x * v - y * u

@@ -37,7 +37,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
         "sigma.scale": 1.0,
     },
 }
-"""What each preset sets; everything else keeps its default."""
+"""The settings of each preset; all others keep their defaults."""
 
 _SAINI: Mapping[str, Any] = {"body": "humaneva34", "cost": "bidirectional", "sigma.angle": 0.1}
 PAPERS: Mapping[str, Mapping[str, Any]] = {
@@ -52,7 +52,7 @@ PAPERS: Mapping[str, Mapping[str, Any]] = {
 }
 """Additional settings of the preset 'paper' for each optimiser. All but SPPSO are set as in the
 comparison of Saini et al. (2015), whose swarms start with a variance of 0.01 rad² [R]. The paper
-states no noise for the filters: it is the body's own sigma, as in the filters' own papers."""
+states no noise for the filters: they use the body's own sigma, as in the filters' own papers."""
 
 OPTIMIZERS = tuple(PAPERS)
 """The search algorithms, by name."""
@@ -68,7 +68,7 @@ _LIVE_GROUPS = ("refine", "sigma", "sppso", "pso", "hmcpso", "apf", "pf")
 def live_settings() -> frozenset[str]:
     """Names of the settings that may change between two steps: those of the search.
 
-    The others belong to what is made once: backgrounds, body, limits.
+    The others determine objects that are made once: backgrounds, body, limits.
     """
     names = (entry.name for entry in TrackerConfig.settings())
     return frozenset(n for n in names if n in _LIVE or n.partition(".")[0] in _LIVE_GROUPS)
@@ -81,7 +81,7 @@ def own_evaluations(optimizer: str) -> int:
 
 @dataclass(frozen=True, kw_only=True)
 class TrackerConfig(ImagingSettings):
-    """Every setting that a result depends on, those of the imaging included.
+    """All settings that a result depends on, including those of the imaging.
 
     Raises:
         ConfigError: a value of the wrong type, out of its range or not among its choices.
@@ -179,7 +179,7 @@ class TrackerConfig(ImagingSettings):
 
     @classmethod
     def from_mapping(cls, values: Mapping[Any, Any], preset: str | None = None) -> Self:
-        """A configuration of a preset (named in the values or given) and the values given.
+        """A configuration made of a preset (named in the values or given) and the given values.
 
         Groups may be nested (``{"apf": {"layers": 5}}``) or dotted (``{"apf.layers": 5}``).
 
@@ -192,7 +192,7 @@ class TrackerConfig(ImagingSettings):
             raise ConfigError(f"preset is {name!r}, expected one of {', '.join(PRESETS)}")
         optimizer = values.get("optimizer", "sppso")
         own: dict[str, Any] = {}
-        # Anything else is refused with the other values.
+        # Any other value is refused below, with the other values.
         if isinstance(optimizer, str) and optimizer in PAPERS:
             own = {"evaluations": own_evaluations(optimizer)}
             if name == "paper":

@@ -11,7 +11,7 @@ from markerless_tracker.settings import SettingsGroup, setting
 
 @dataclass(frozen=True, kw_only=True)
 class EdgeSettings(EdgeMapSettings):
-    """The edge map, and the edges of the model that are compared with it."""
+    """The edge map, and the model edges that are compared with it."""
 
     rule: str = setting(
         "outline",
@@ -30,7 +30,7 @@ class EdgeSettings(EdgeMapSettings):
 
 @dataclass(frozen=True, kw_only=True)
 class RefineSettings(SettingsGroup):
-    """Contour refinement, and the limbs' own swarms that go with it."""
+    """Contour refinement, and the limbs' own swarms that complement it."""
 
     NAME = "refine"
 
@@ -154,7 +154,7 @@ class PsoSettings(SettingsGroup):
 
 @dataclass(frozen=True, kw_only=True)
 class HmcpsoSettings(SettingsGroup):
-    """H-MCPSO; its hierarchy is HPSO's too, its sub-swarms are MCPSO's too."""
+    """H-MCPSO; HPSO uses its hierarchy, too, and MCPSO its sub-swarms."""
 
     NAME = "hmcpso"
 

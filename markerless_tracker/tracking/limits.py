@@ -1,4 +1,4 @@
-"""The joint limits of a configuration, and whether a pose keeps them."""
+"""Joint limits of a configuration, greatest speeds of joints, and the check of a start pose."""
 
 import numpy as np
 
@@ -9,24 +9,24 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.config import TrackerConfig
 
 TWIST_RAD_S = 8.0
-"""Greatest speed of the rotation about itself of a limb with a bent knee or elbow."""
+"""Greatest speed of the rotation about its own axis of a limb with a bent knee or elbow."""
 STRAIGHT_TWIST_RAD_S = 3.0
-"""The same of a straight limb, of which images do not show it."""
+"""The same for a straight limb, whose rotation images do not show."""
 NECK_RAD_S = 4.0
-"""Greatest speed of each rotation of the head relative to the trunk: a fast turn to look aside."""
+"""Greatest speed of each rotation of the head relative to the trunk, as in a quick glance aside."""
 ELBOW_RAD_S = 12.0
 """Greatest speed of an elbow: reached in reaching and catching, exceeded in throws only."""
 LIMB_RAD_S = 12.0
-"""Greatest speed of the joints of a limb that was nearly in its place and is found elsewhere."""
+"""Greatest speed of the joints of a limb that is found elsewhere, but near its former place."""
 _NECK = ("head_x", "head_y", "head_z")
 _ELBOWS = ("l_elbow", "r_elbow")
 
 
 def joint_speeds(body: BodyModel, pose: FloatArray) -> FloatArray:
-    """Greatest speeds (p,) that a search allows from a pose (p,), rad/s; infinite where none is.
+    """Greatest speeds (p,) that a search allows from a pose (p,), rad/s; infinite if unlimited.
 
-    Those of limbs about themselves, of the neck and the elbows. Bodies without a swing and a twist,
-    as those published, have none.
+    Limited are the rotations of limbs about their own axes, of the neck and of the elbows. Bodies
+    without swing and twist joints, like the published ones, have no such limits.
     """
     speeds = np.full(body.size, np.inf)
     own = twists(body)
@@ -59,12 +59,12 @@ def joint_limits(body: BodyModel, config: TrackerConfig) -> FloatArray:
 
 
 def check_pose(body: BodyModel, pose: FloatArray, limits: FloatArray | None) -> None:
-    """Raise a BodyModelError unless a start pose is one of the body.
+    """Raise a BodyModelError if a start pose is not valid for the body.
 
     Args:
         body: the body.
         pose: expected (p,) and finite.
-        limits: (2, p) that it must keep, if any.
+        limits: (2, p) within which it must lie, if any.
     """
     if pose.shape != (body.size,) or not np.isfinite(pose).all():
         raise BodyModelError(

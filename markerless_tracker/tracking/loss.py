@@ -1,4 +1,4 @@
-"""Thresholds for losing and regaining the body and each limb: pure functions of a frame's fit."""
+"""Decides whether the body and each limb are lost or regained: pure functions of a frame's fit."""
 
 import math
 from collections.abc import Iterable
@@ -11,25 +11,26 @@ from markerless_tracker.records import TrackState
 from markerless_tracker.tracking.states import Event
 
 LOST_BELOW, REGAINED_ABOVE = 0.40, 0.55
-"""Overlap (IoU) below which a track is lost, and from which on it is regained."""
+"""Overlap (IoU) below which a track is lost, and at or above which it is regained."""
 LOST_FRACTION, REGAINED_FRACTION = 0.75, 0.85
 """The same relative to the mean overlap of the track."""
 LEAST_FIT = 0.62
-"""Least f_s of a pose that is a person's: objects score lower. Bodies are found in, and fitted to,
-no other frames."""
+"""Least f_s of a person's pose: objects score lower. A start needs it, and bodies are fitted only
+to frames that have it."""
 LIMB_LOST_BELOW = 0.55
 LIMB_REGAINED_ABOVE = 0.75
 """Fraction of a limb's axis inside the silhouettes, mean over the views: a limb is lost below the
-first and regained from the second on."""
+first threshold and regained at the second."""
 SCATTERED = 1.5
 """A swarm has not converged if its particle_sd_ratio exceeds the limb's mean by this factor."""
 _MEMORY = 0.05
+"""Weight of a frame in the running mean of a limb's particle_sd_ratio."""
 
 
 def shared_overlap(views: Iterable[ViewTerms]) -> float:
-    """Overlap (IoU) of body and silhouettes in some views together.
+    """Overlap (IoU) of body and silhouettes over several views.
 
-    Views are weighted by the pixels that body or silhouette cover. 1 if no view has any.
+    Views are weighted by the number of pixels that body or silhouette cover. 1 without such pixels.
     """
     seen = list(views)
     pixels = sum(view.pixels for view in seen)
@@ -37,19 +38,19 @@ def shared_overlap(views: Iterable[ViewTerms]) -> float:
 
 
 def silhouette_fit(views: Iterable[ViewTerms]) -> float:
-    """f_s of a pose, mean over some views; compare with `LEAST_FIT`."""
+    """f_s of a pose, mean over the views; compare with `LEAST_FIT`."""
     return float(np.mean([view.silhouette for view in views]))
 
 
 def event_of(overlap: float, mean_overlap: float = 0.0) -> Event:
-    """What a frame with some overlap (IoU of body and silhouettes) says about the body.
+    """The event of a frame, given its overlap (IoU of body and silhouettes).
 
     Two thresholds give hysteresis: a track is lost below the lower one and regained above the
     upper one.
 
     Args:
         overlap: of the frame; NaN disagrees.
-        mean_overlap: of the track's frames so far, 0 if unknown: one that fits well is lost sooner.
+        mean_overlap: of the track's frames so far, 0 if unknown; the higher, the sooner it is lost.
     """
     if overlap >= max(REGAINED_ABOVE, REGAINED_FRACTION * mean_overlap):
         return Event.AGREES
@@ -66,12 +67,12 @@ def next_limb_state(
 ) -> TrackState:
     """State of a limb after a frame.
 
-    A limb outside the silhouettes is lost, one inside them is tracked. In between the state stays,
-    except that a limb whose swarm has not converged is lost.
+    A limb outside the silhouettes is lost, a limb inside them is tracked. In between the state does
+    not change, except that a limb whose swarm has not converged is lost.
 
     Args:
         state: before the frame.
-        inside_fraction: of the limb's axis, how much lies inside the silhouettes.
+        inside_fraction: fraction of the limb's axis inside the silhouettes.
         particle_sd_ratio: of the limb's swarm, see `LimbState`; NaN without a swarm.
         mean_sd_ratio: mean particle_sd_ratio of this limb's tracked frames, NaN if unknown.
     """
@@ -85,7 +86,7 @@ def next_limb_state(
 
 @dataclass
 class LimbTrack:
-    """State of a limb, and what `next_limb_state` depends on.
+    """State of a limb, with what `next_limb_state` needs.
 
     Attributes:
         state: after the last frame.

@@ -7,22 +7,22 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.config import TrackerConfig
 
 TRAINING_RATE_HZ = 60.0
-"""Frame rate at which the published sigmas, changes of a parameter between frames, hold."""
+"""Frame rate for which the published sigmas, changes of a parameter between frames, are valid."""
 LIMB_SPEED_M_S = 2.0
 LIMB_ACCELERATION_M_S2 = 60.0
 """Greatest speed and acceleration of a hand or foot relative to its prediction, which widen the
-image regions. A faster one costs a second, wider region."""
+image regions. For a faster hand or foot a second, wider region is segmented."""
 
 
 class MotionModel:
-    """The pose of the last frame, its velocity, and what follows from them for the next frame.
+    """The pose of the last frame and its velocity, and predictions for the next frame.
 
     Args:
         start: (p,) pose before the first frame.
         config: `prediction`, `sigma.rate_max` and `region.margin_m`.
 
     Attributes:
-        start: (p,) the same.
+        start: (p,) as given.
         pose: (p,) of the last frame.
         velocity_per_ns: (p,) change per nanosecond.
         stamp_ns: time of the last frame; None before the first.
@@ -38,7 +38,7 @@ class MotionModel:
         self._config = config
 
     def reset(self) -> None:
-        """Back to the start pose, at rest, before the first frame."""
+        """Return to the start pose, at rest, before the first frame."""
         self.pose = self.start
         self.velocity_per_ns = np.zeros(self.start.size)
         self.stamp_ns: int | None = None
@@ -54,12 +54,12 @@ class MotionModel:
         return np.asarray(np.clip(moved, *limits))
 
     def reachable(self, stamp_ns: int, limits: FloatArray, speeds: FloatArray) -> FloatArray:
-        """Limits (2, p) of what can be reached by a time from the last, tracked pose.
+        """Limits (2, p) of the poses that can be reached from the last tracked pose by a time.
 
         Args:
             stamp_ns: the time.
             limits: (2, p) joint limits.
-            speeds: (p,) greatest speeds, rad/s and m/s; infinite where there is none.
+            speeds: (p,) greatest speeds, rad/s and m/s; infinite if unlimited.
         """
         elapsed_ns = self._elapsed_ns(stamp_ns)
         if elapsed_ns == 0 or not self._tracked:
@@ -68,7 +68,7 @@ class MotionModel:
         return np.stack([np.maximum(limits[0], around[0]), np.minimum(limits[1], around[1])])
 
     def widening(self, stamp_ns: int) -> float:
-        """Factor of sigma at a time: frames of the training rate since the last one, bounded."""
+        """Factor of sigma at a time: elapsed frames at the training rate, bounded."""
         elapsed_ns = self._elapsed_ns(stamp_ns)
         if elapsed_ns == 0:
             return 1.0
@@ -91,8 +91,9 @@ class MotionModel:
         Args:
             pose: the estimate.
             stamp_ns: its time.
-            tracked: whether it agrees with the silhouettes; if not, its change is no motion.
-            jumped: parameters that were found elsewhere: their change is no motion either.
+            tracked: whether it agrees with the silhouettes; if not, the velocity is set to 0.
+            jumped: indices of parameters that do not continue the last pose; their velocity is set
+                to 0.
         """
         elapsed_ns = self._elapsed_ns(stamp_ns)
         change = pose - self.pose
@@ -105,18 +106,18 @@ class MotionModel:
         self._tracked = tracked
 
     def lose(self) -> None:
-        """A frame shows no person: the pose stays, at rest."""
+        """Note a frame without a person: the pose is kept, at rest."""
         self.velocity_per_ns = np.zeros(self.pose.size)
         self._tracked = False
 
     def shift(self, change: FloatArray, limits: FloatArray) -> None:
-        """Move the last pose (p,) within limits (2, p); its velocity stays."""
+        """Move the last pose (p,) within limits (2, p); its velocity does not change."""
         self.pose = np.clip(self.pose + change, *limits)
 
     def since_s(self, stamp_ns: int) -> float:
-        """Time from the last frame to a time, s; 0 before the first and if time did not go on."""
+        """Time since the last frame, s; 0 before the first, and if time does not advance."""
         return self._elapsed_ns(stamp_ns) * 1e-9
 
     def _elapsed_ns(self, stamp_ns: int) -> int:
-        """Time since the last frame; 0 before the first and if time did not go on."""
+        """Time since the last frame; 0 before the first, and if time does not advance."""
         return 0 if self.stamp_ns is None else max(0, stamp_ns - self.stamp_ns)

@@ -17,18 +17,19 @@ def floor_precision(config: TrackerConfig) -> float:
 
 
 STRAIGHT_TWIST_SD_RAD = 0.05
-"""Standard deviation, in the refinement, of a straight limb's rotation about itself: near the usual
-value, whatever the outline's noise and the sections' error suggest. An arm bent by more than
-`HANGING_RAD` keeps near the predicted value instead, as long as it counts as straight: a forearm
-held in the wrong plane would straighten the elbow."""
+"""Standard deviation, in the refinement, of a straight limb's rotation about its own axis from the
+usual value; noise of the outline and error of the sections would determine it otherwise. For an arm
+bent by more than `HANGING_RAD` that still counts as straight it is the deviation from the predicted
+value: a forearm held in the wrong plane would straighten the elbow."""
 HANGING_RAD = float(np.deg2rad(12.0))
-"""Least flexion of an elbow that shows, in part, the arm's rotation: usual with hanging arms."""
-HEAD_TURN_SD_RAD = 0.04
-"""The same of the head's turn: the outline of a head is that of an egg, nearly round."""
+"""Least flexion of an elbow that partly shows the arm's rotation; usual in hanging arms."""
+HEAD_ROTATION_SD_RAD = 0.04
+"""The same for the head's rotation, whose outline is nearly round."""
 ELBOW_PRECISION = 9.0
-"""Factor of the precision of an elbow's prior: before and behind the trunk the outline shows little
-of a forearm, and the error of generic sections along a whole limb would decide."""
-_HEAD_TURN = "head_z"
+"""Factor of the precision of an elbow's prior. In front of the trunk and behind it the outline
+shows little of a forearm, and the error of generic sections along a whole limb would determine
+it."""
+_HEAD_ROTATION = "head_z"
 _ELBOWS = ("l_elbow", "r_elbow")
 _HIP = "hip"
 _LEAST = 1e-12
@@ -45,19 +46,19 @@ def pose_prior(body: BodyModel, weight: float = 1.0, at: FloatArray | None = Non
     Args:
         body: the body.
         weight: the factor.
-        at: (p,) a pose near the one sought: limbs that are straight there, and the head, keep the
-            usual rotation about themselves, nearly straight arms the one they have there. That is
-            a convention, not knowledge: no deviation follows from it.
+        at: (p,) a pose near the solution. Limbs that are straight in it, and the head, are held
+            near the usual rotation about their own axes; nearly straight arms near their rotation
+            in it. This is a convention, not knowledge: the reported deviations do not use it.
     """
     mean, precision = body.prior_mean, weight / body.prior_sd**2
     joints = swing_joints(body)
     if at is not None and joints:
         precision[[body.index(n) for n in _ELBOWS if n in body.parameter_names]] *= ELBOW_PRECISION
-        # Two Gaussians multiplied: about the usual value, and about that of the pose.
+        # The product of two Gaussians: about the usual value, and about the value in the pose.
         own, held = twists(body), np.zeros(body.size)
         held[own] = weight * straightness(body, at) / STRAIGHT_TWIST_SD_RAD**2
-        if _HEAD_TURN in body.parameter_names:
-            held[body.index(_HEAD_TURN)] = weight / HEAD_TURN_SD_RAD**2
+        if _HEAD_ROTATION in body.parameter_names:
+            held[body.index(_HEAD_ROTATION)] = weight / HEAD_ROTATION_SD_RAD**2
         arms = np.array([not joint.endswith(_HIP) for joint in joints])
         there = np.zeros(body.size)
         there[own] = held[own] * arms * (1.0 - straightness(body, at, HANGING_RAD))
@@ -76,14 +77,14 @@ def refined_on_contours(
     iterations: int,
     truncation_m: tuple[float, float],
 ) -> FloatArray:
-    """Refine a pose (p,) on the contour evidence of a frame; returns the refined one.
+    """Refine a pose (p,) on the contour evidence of a frame; returns the refined pose.
 
     Args:
         contours: the evidence.
-        start: (p,) where to begin.
+        start: (p,) initial pose.
         config: `refine.sigma_m`, the standard deviation of a residual, and `refine.floor_sd_m`.
         priors: added to the data.
-        limits: (2, p), kept.
+        limits: (2, p) of the pose.
         iterations: Gauss-Newton steps.
         truncation_m: residuals beyond it are outliers, in the first and in the last step.
     """

@@ -1,4 +1,4 @@
-"""Searching one frame: runs its stages, each from the estimate so far."""
+"""The search of one frame: runs its stages, each from the estimate of the one before it."""
 
 from collections.abc import Callable, Mapping
 
@@ -7,7 +7,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel, Feasibility
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.fitness import Fitness, Views, ViewTerms
-from markerless_tracker.fitness.contour import REACH_M, ContourFrame
+from markerless_tracker.fitness.contour import RADIUS_M, ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import (
     ALGORITHMS,
@@ -25,16 +25,16 @@ from markerless_tracker.tracking.swarms import SWARMS, SwarmSearch
 
 _NEAREST_M = 0.5
 LIMB_M = 0.12
-"""Truncation of the refinement of a limb that is searched elsewhere, in its first step, m."""
-TRACKED_REACH = 1.3
-"""Outlines of a tracked body are compared up to this multiple of the largest truncation: limbs may
-be nearer to a camera than the pelvis."""
+"""Truncation in the first step of the refinement of a limb that is searched elsewhere."""
+RADIUS_FACTOR = 1.3
+"""Outlines of a tracked body are compared up to this multiple of the largest truncation, since
+limbs may be nearer to a camera than the pelvis."""
 
 
 def make_fitness(
     body: BodyModel, rig: CameraRig, config: TrackerConfig, *, threads: int = 1
 ) -> Fitness:
-    """The fitness of a body in a rig's views, with the terms that a configuration asks for."""
+    """The fitness of a body in a rig's views, with the terms of a configuration."""
     return Fitness(
         body,
         rig.cameras,
@@ -48,7 +48,7 @@ def make_fitness(
 
 
 class Searcher:
-    """Searches frames with one body, however its stages are composed.
+    """Makes the searches of frames with one body.
 
     Args:
         rig: the cameras.
@@ -56,7 +56,7 @@ class Searcher:
         config: settings.
         limits: (2, p) joint limits.
         threads: threads of the fitness; results do not depend on them.
-        mapper: `map`, or a thread pool's.
+        mapper: `map`, or that of a thread pool.
     """
 
     def __init__(
@@ -73,14 +73,14 @@ class Searcher:
         self.config = config
         self.limits = limits
         self.threads = threads
-        # A pool of one thread would only be waited for.
+        # A pool of one thread gains nothing.
         self.mapper = mapper if threads > 1 else map
         self.cameras: Mapping[str, CameraModel] = {camera.name: camera for camera in rig}
         self.feasible = Feasibility(body, limits, config.collision)
         self.fitness = make_fitness(body, rig, config, threads=threads)
-        self.tracked_reach_m = TRACKED_REACH * max(config.refine.truncation_m, LIMB_M)
+        self.tracked_radius_m = RADIUS_FACTOR * max(config.refine.truncation_m, LIMB_M)
         self.particle_sets: dict[str, ParticleSet] = {}
-        """What each stage left in the last frame, where its algorithm goes on from that."""
+        """By stage, the particles of the last frame, if its algorithm continues from them."""
 
     def frame(
         self,
@@ -89,10 +89,10 @@ class Searcher:
         predicted: FloatArray,
         *,
         limits: FloatArray | None = None,
-        reach_m: float = REACH_M,
+        radius_m: float = RADIUS_M,
     ) -> "FrameSearch":
         """The search of one frame; arguments as of `FrameSearch`."""
-        return FrameSearch(self, observations, stamp_ns, predicted, limits, reach_m)
+        return FrameSearch(self, observations, stamp_ns, predicted, limits, radius_m)
 
 
 def make_searcher(
@@ -103,7 +103,7 @@ def make_searcher(
     threads: int,
     mapper: Callable[..., object] = map,
 ) -> Searcher:
-    """A searcher with the joint limits that the configuration asks for; arguments as there."""
+    """A searcher with the joint limits of the configuration; arguments as of `Searcher`."""
     limits = joint_limits(body, config)
     return Searcher(rig, body, config, limits=limits, threads=threads, mapper=mapper)
 
@@ -115,19 +115,19 @@ class FrameSearch:
         searcher: the body, the cameras and the settings.
         observations: the evidence, by camera name.
         stamp_ns: time of the frame; keys the draws, together with the seed.
-        predicted: (p,) pose around which is searched.
-        limits: (2, p), kept, and narrower than the joints' where these cannot be reached in the
-            time; None: the joints'.
-        reach_m: distance from a silhouette, at the body, beyond which outlines are outliers in any
-            case.
+        predicted: (p,) centre of the search.
+        limits: (2, p) of the pose, which may be narrower than the joint limits; None = the joint
+            limits.
+        radius_m: distance from a silhouette, at the body, beyond which outlines are outliers
+            in any case.
 
     Attributes:
         searcher, observations, stamp_ns: the arguments.
         pose: (p,) the estimate so far.
-        evaluations, refinements: what was spent.
+        evaluations, refinements: numbers of evaluations and refinement iterations spent.
         cost: of the estimate, 1 - f, after `run` with a refinement; else infinite.
         particle_sd_ratio: (p,) standard deviation of the particles over that of the first sample,
-            in the last swarm that varied a parameter; NaN without one.
+            in the last swarm that varied a parameter; NaN without such a swarm.
     """
 
     def __init__(
@@ -137,9 +137,9 @@ class FrameSearch:
         stamp_ns: int,
         predicted: FloatArray,
         limits: FloatArray | None = None,
-        reach_m: float = REACH_M,
+        radius_m: float = RADIUS_M,
     ) -> None:
-        self._reach_m = reach_m
+        self._radius_m = radius_m
         self._limits = searcher.limits if limits is None else limits
         self.pose = predicted if limits is None else np.clip(predicted, *limits)
         self._predicted = predicted
@@ -158,12 +158,12 @@ class FrameSearch:
 
     @property
     def views(self) -> Views:
-        """The evidence as the fitness has it."""
+        """The evidence in the layout of the fitness."""
         return self._views
 
     @property
     def contours(self) -> ContourFrame:
-        """The frame's contour evidence, made when first asked for."""
+        """The frame's contour evidence, made on first use."""
         if self._contours is None:
             searcher = self.searcher
             self._contours = ContourFrame(
@@ -173,18 +173,18 @@ class FrameSearch:
                 self._views,
                 pixels_per_m=self._pixels_per_m(),
                 step_px=searcher.config.edges.step_px,
-                reach_m=self._reach_m,
+                radius_m=self._radius_m,
                 mapper=searcher.mapper,
             )
         return self._contours
 
     def run(self, stages: tuple[Stage, ...]) -> FloatArray:
-        """Run stages from the estimate so far; returns the new one (p,).
+        """Run stages from the estimate so far; returns the new estimate (p,).
 
-        Swarms alone: the last one's best, as published. Once there was contour refinement, in this
-        call or before, a stage's result is taken only if it explains the views better: the swarm
-        rescues a refinement that is stuck, the refinement sharpens the swarm. A stage may require a
-        least rise of f.
+        Without contour refinement the result is the best of the last swarm, as published. If there
+        is contour refinement, in this call or an earlier one, a stage's result is taken only if it
+        explains the views better, by at least `min_improvement` of the stage. The swarm corrects a
+        refinement at a wrong optimum; the refinement improves the swarm's precision.
         """
         contour = next((stage for stage in stages if stage.plan.algorithm == CONTOUR), None)
         if contour is not None and self._whole is None:
@@ -210,13 +210,13 @@ class FrameSearch:
         return self.pose
 
     def terms(self) -> dict[str, ViewTerms]:
-        """How well the estimate explains each view."""
+        """The terms of the fitness of the estimate in each view."""
         if self._terms is None or not np.array_equal(self._terms[0], self.pose):
             self._terms = self.pose.copy(), self.searcher.fitness.terms(self._views, self.pose)
         return self._terms[1]
 
     def _swarm(self, stage: Stage) -> tuple[FloatArray, float | None]:
-        """The pose (p,) that a swarm finds, and its cost if that is known."""
+        """The pose (p,) found by a swarm, and its cost if known."""
         searcher, plan = self.searcher, stage.plan
         rng = keyed_generator(searcher.config.seed, self.stamp_ns, stage.name)
         if plan.algorithm not in SWARMS or is_replaced(plan.algorithm):
@@ -235,14 +235,14 @@ class FrameSearch:
         particles = SWARMS[plan.algorithm](search, **plan.options)
         self._note(stage, plan.evaluations, particles.best.std(axis=0))
         pose = centre.copy()
-        # SPPSO keeps the joints' limits, not those of what can be reached in the time.
+        # SPPSO's particles keep the joint limits, but not the narrower ones.
         pose[active] = np.clip(particles.found, *search.bounds)
         cost = float(particles.found_cost[0])
         same = np.array_equal(pose[active], particles.found)
         return pose, cost if same and np.isfinite(cost) else None
 
     def _filter(self, stage: Stage, rng: np.random.Generator) -> FloatArray:
-        """The pose (p,) that an algorithm finds that is not compiled as a whole."""
+        """The pose (p,) found by an algorithm that is not compiled as a whole."""
         searcher, plan = self.searcher, stage.plan
         active, centre = stage.comparison.active, stage.comparison.centre
         evaluator = searcher.fitness.prepare(self._views, stage.comparison)
@@ -265,11 +265,11 @@ class FrameSearch:
 
     @property
     def _forgiving(self) -> bool:
-        """Whether collisions that the centre has already are allowed."""
+        """Whether collisions that the centre already has are allowed."""
         return self.searcher.config.collision == "elliptic"
 
     def _note(self, stage: Stage, evaluations: int, sd: FloatArray) -> None:
-        """Note what a swarm spent, and the standard deviation (d,) of its particles."""
+        """Note the evaluations of a swarm and the standard deviation (d,) of its particles."""
         active = stage.comparison.active
         self.evaluations += evaluations
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -308,7 +308,7 @@ def _same_terms(one: Comparison, other: Comparison) -> bool:
 
 
 def root_m(body: BodyModel, pose: FloatArray) -> FloatArray:
-    """Where the root of a body at a pose (p,) is: (3,) m, world frame."""
+    """Position (3,) of the root of a body at a pose (p,), m, world frame."""
     return pose[[body.index(f"pelvis_t{axis}") for axis in "xyz"]]
 
 

@@ -1,4 +1,4 @@
-"""From files and settings to a tracker, for the node and the offline verbs alike."""
+"""Builds a tracker from files and settings, for the node and the offline verbs alike."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -39,8 +39,8 @@ class TrackerSetup:
 
     Attributes:
         tracker: the tracker.
-        make: makes another tracker that begins as this one did; can be pickled.
-        start_stamp_ns: time that the start pose is meant for; None = the first frame that comes.
+        make: makes another tracker with the same initial state; can be pickled.
+        start_stamp_ns: time of the start pose; None = the first frame that comes.
         person: what is known of a person whose lengths were not measured; None if they were.
     """
 
@@ -52,7 +52,7 @@ class TrackerSetup:
 
 @dataclass(frozen=True)
 class _MarkerRow:
-    """The first row of a marker file that holds anything."""
+    """The first row of a marker file with any marker."""
 
     stamp_ns: int
     markers_m: Mapping[str, FloatArray]
@@ -68,11 +68,11 @@ def build_tracker(
     subject_from: Path | None = None,
     stature: float | None = None,
 ) -> TrackerSetup:
-    """Build a tracker from a start and a subject, from either or from neither.
+    """Build a tracker with or without a start pose, and with or without a subject.
 
     At most one of the last three arguments names the subject. If none does, the lengths are
-    measured on the first row of a TRC start; noisy ones are corrected in the first frame. Without a
-    start the tracker finds the person automatically, and the stature, too.
+    measured on the first row of a TRC start; noisy lengths are corrected in the first frame.
+    Without a start the tracker finds the person, and the stature, automatically.
 
     Args:
         rig: the cameras.
@@ -132,7 +132,7 @@ def _subject(
 ) -> tuple[Subject, Unmeasured | None]:
     """The subject, and what is known of a person whose lengths were not measured.
 
-    From the file, else from the stature, else from the markers, else of mean stature.
+    The subject is that of the file, else of the stature, else of the markers, else of mean stature.
     """
     if subject_file is not None:
         return read_subject(subject_file), None
@@ -143,7 +143,7 @@ def _subject(
 
 
 def first_row(path: Path) -> _MarkerRow:
-    """Named markers (3,) of the first row of a TRC that holds any.
+    """Named markers (3,) of the first row of a TRC with any marker.
 
     Raises:
         DatasetError: the file cannot be read.

@@ -1,9 +1,9 @@
 """A causal low-pass filter whose cutoff rises with the motion.
 
 One Euro filter (Casiez, Roussel and Vogel, CHI 2012): an exponential filter of each parameter whose
-cutoff rises with the parameter's speed. Ours rises with the whole body's motion, too: while a
-person walks, a joint at a point of reversal is not at rest. With its own speed alone, the pelvis of
-a jogging person, whose angles change little, lags by a frame.
+cutoff rises with the parameter's speed. Ours rises with the whole body's motion, too, because a
+joint at a point of reversal is not at rest while the person walks. With each parameter's own speed
+only, the pelvis of a jogging person, whose angles change little, lags by a frame.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.geometry import FloatArray
 
 CUTOFF_HZ = 8.0
-"""Cutoff at rest: lower ones lag a standing, swaying person by more than a frame at 60 Hz."""
+"""Cutoff at rest: a lower cutoff lags a standing, swaying person by more than a frame at 60 Hz."""
 RISE_ANGLE, RISE_PLACE = 4.0, 12.0
 """Hz of cutoff per rad/s and per m/s of the parameter."""
 RISE_MOTION = 200.0
@@ -26,7 +26,7 @@ class OneEuro:
     """Filters the poses of one body.
 
     Args:
-        body: says which parameters are places and which are angles, and where its markers are.
+        body: determines which parameters are positions and which are angles, and the markers.
     """
 
     def __init__(self, body: BodyModel) -> None:
@@ -41,7 +41,7 @@ class OneEuro:
         self._stamp_ns = 0
 
     def __call__(self, pose: FloatArray, stamp_ns: int) -> FloatArray:
-        """The filtered pose (p,) at a stamp; after a gap it begins anew."""
+        """The filtered pose (p,) at a stamp; the filter restarts after a gap."""
         elapsed_ns = stamp_ns - self._stamp_ns
         self._stamp_ns = stamp_ns
         points = markers(self._body, pose)
@@ -61,6 +61,6 @@ class OneEuro:
 
 
 def _gain(cutoff_hz: FloatArray | float, seconds: float) -> FloatArray:
-    """Fraction of a new value that an exponential filter of that cutoff takes."""
+    """Weight of a new value in an exponential filter with a given cutoff."""
     phase = 2.0 * np.pi * np.asarray(cutoff_hz, dtype=np.float64) * seconds
     return np.asarray(phase / (phase + 1.0))

@@ -1,7 +1,7 @@
 """Phases of a track and the transitions between them.
 
-An event says what one frame's silhouettes say about the body; `TRANSITIONS` holds the phase that
-follows. The thresholds that make an event from an overlap are those of `loss`.
+An event classifies one frame; `TRANSITIONS` holds the phase that follows. `loss.event_of` makes the
+event from the frame's overlap.
 """
 
 from collections.abc import Mapping
@@ -13,6 +13,7 @@ from markerless_tracker.records import TrackState
 PATIENCE_NS = 100_000_000
 """Time for which a lost body is searched near its last pose before it is searched everywhere."""
 _MEMORY = 0.05
+"""Weight of a frame in the running mean of the overlap."""
 
 
 class Phase(Enum):
@@ -34,10 +35,10 @@ class Phase(Enum):
 
 
 class Event(Enum):
-    """What a frame says about the body."""
+    """What a frame's silhouettes show about the body."""
 
     NO_PERSON = "NO_PERSON"
-    """No silhouette in any usable view, or none that is a person's."""
+    """There is no silhouette in any usable view, or none of a person."""
     FOUND = "FOUND"
     """The automatic start found a person, and needs further frames."""
     DISAGREES = "DISAGREES"
@@ -81,12 +82,12 @@ TRANSITIONS: Mapping[Phase, Mapping[Event, Phase]] = {
         Event.GIVEN_UP: _S,
     },
 }
-"""The phase after an event, by the phase before it. Pairs that are absent cannot occur."""
+"""The phase after an event, by the phase before it. Absent pairs cannot occur."""
 
 
 @dataclass(frozen=True)
 class Track:
-    """Phase of a track, and what the next transition depends on.
+    """Phase of a track, with what the next transition needs.
 
     Attributes:
         phase: after the last frame.
@@ -110,15 +111,15 @@ class Track:
         """Whether the body was lost for `PATIENCE_NS` at the last frame."""
         if self.lost_since_ns is None or self.stamp_ns is None:
             return False
-        # Stamps may be set back: that gap counts as well.
+        # If stamps run backwards, that gap counts, too.
         return abs(self.stamp_ns - self.lost_since_ns) >= PATIENCE_NS
 
     def after(self, event: Event, stamp_ns: int | None = None, overlap: float = 0.0) -> "Track":
         """The track after an event.
 
         Args:
-            event: what the frame says.
-            stamp_ns: of the frame; None for `Event.GIVEN_UP`, which is no frame.
+            event: of the frame.
+            stamp_ns: of the frame; None for `Event.GIVEN_UP`, which has no frame.
             overlap: of the frame.
 
         Raises:

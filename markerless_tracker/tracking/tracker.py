@@ -1,4 +1,4 @@
-"""`Tracker.step`: from the views of one time to a pose."""
+"""The tracker: `Tracker.step` finds the pose that explains the views of one time."""
 
 import copy
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ from markerless_tracker.tracking.states import Phase, Track
 class Tracker:
     """Tracks one person frame by frame, from a start pose or from an automatic start.
 
-    Knows no clock, no ROS and no files: results depend on the arguments alone, and the same ones
+    Uses no clock, no ROS and no files: results depend on the arguments only. The same arguments
     give the same bytes with any number of threads. Calls must come from one thread at a time.
 
     Args:
@@ -88,7 +88,7 @@ class Tracker:
         # Refuses a budget that cannot be spent before the first frame comes.
         frame_stages(body, config, start, body.sigma)
         threads = config.threads or usable_cores()
-        # One thread is left to the evidence of the next set.
+        # One thread is reserved for the evidence of the next set.
         beside = max(1, threads - 1)
         mapper = ThreadPoolExecutor(min(beside, len(rig))).map if beside > 1 else map
         searcher_for = partial(make_searcher, rig=rig, config=config, mapper=mapper)
@@ -110,7 +110,7 @@ class Tracker:
 
     @property
     def body(self) -> BodyModel:
-        """The tracked body, as far as it has been fitted to the person."""
+        """The present estimate of the person's body."""
         return self._body.body
 
     def reset(self) -> None:
@@ -128,7 +128,7 @@ class Tracker:
         """Use other `live_settings` from the next step on; the track continues.
 
         Raises:
-            ConfigError: the budget cannot be spent; all stays as it was.
+            ConfigError: the budget cannot be spent; nothing has changed then.
         """
         frame_stages(self.body, config, self._motion.pose, self.body.sigma)
         self.config = config
@@ -162,16 +162,16 @@ class Tracker:
             backgrounds: by camera; cameras without one take ready-made observations only.
 
         Raises:
-            ImageError: a background does not fit its camera; all stays as it was.
+            ImageError: a background does not fit its camera; nothing has changed then.
         """
         self.evidence.take_backgrounds(backgrounds)
         self.warm_up()
 
     def regions(self, stamp_ns: int) -> dict[str, Region | None]:
-        """Region of each camera's image that `step` would use at a time; None for all of it.
+        """Region of each camera's image that `step` would use at a time; None = whole image.
 
         It follows from the pose of the set before the last one, so that it is known while the last
-        one is fitted. The whole image is used besides where the region cuts the person off.
+        set is fitted. If the region cuts the person off, the whole image is used, too.
         """
         return self.evidence.regions(self._lookahead.current, stamp_ns)
 
@@ -180,14 +180,14 @@ class Tracker:
         return self.evidence.segmenters.get(camera)
 
     def prepare(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> Prepared:
-        """Make the evidence of the set after the one that `step` deals with now.
+        """Make the evidence of the set after the one that `step` processes now.
 
         May be called from another thread while `step` runs, once per set and in the order of the
-        sets; `step` with what it returns gives the same bytes as `step` with the views. Without a
-        step in progress, or where nothing can be made ahead, it is as good to call `step` alone.
+        sets. `step` with the returned object gives the same bytes as `step` with the views. Without
+        a step in progress, or if nothing can be made ahead, this saves no time.
 
         Args:
-            views: as `step` takes them; the images must not change until their step is done.
+            views: as `step` takes them; the images must not change until their step has ended.
             stamp_ns: time of the images.
 
         Raises:
@@ -214,14 +214,14 @@ class Tracker:
 
         Args:
             views: camera name to its image, (h, w, 3) uint8 BGR or (h, w) grey, not rectified, or
-                to a ready-made observation; cameras may be missing. Or what `prepare` made of them.
+                to a ready-made observation; cameras may be missing. Or the result of `prepare`.
             stamp_ns: time of the images; the search widens with the time since the last step.
             effort: fraction of the frames, 0 to 1, that swarms and limb searches may search.
 
         Raises:
-            ConfigError: no such effort.
-            ImageError, CalibrationError: no view, an unknown camera's, or one that does not fit its
-                calibration or background; names the camera.
+            ConfigError: the effort is not between 0 and 1.
+            ImageError, CalibrationError: there is no view, or a view of an unknown camera, or one
+                that does not fit its calibration or background; names the camera.
         """
         doubt, since_s = bool(self._assessor.limbs.lost), self._motion.since_s(stamp_ns)
         self._effort.begin(effort, doubt=doubt, since_s=since_s)
@@ -263,7 +263,7 @@ class Tracker:
     def _observe(
         self, evidence: Mapping[str, SeenView], stamp_ns: int, predicted: FloatArray
     ) -> Seen:
-        """The evidence near the predicted pose (p,); of the whole views without a track."""
+        """The evidence near the predicted pose (p,); without a track, that of the whole views."""
         if self._starter is not None:
             observed = self.evidence.whole(evidence, stamp_ns)
             used, notes = self._views.sort(observed, self.body, None)
@@ -294,7 +294,7 @@ class Tracker:
             search.run(frame_stages(self.body, self.config, start.pose, self.body.sigma))
         return Found(
             search, seen.stamp_ns, start.observations, seen.notes + start.notes,
-            anew=True, settling=not start.settled, jumped=np.arange(self.body.size),
+            restarted=True, settling=not start.settled, jumped=np.arange(self.body.size),
         )  # fmt: skip
 
     def _search_near(self, predicted: FloatArray, seen: Seen) -> Found | None:
@@ -312,7 +312,7 @@ class Tracker:
         speeds = joint_speeds(self._searcher.body, self._motion.pose)
         limits = self._motion.reachable(stamp_ns, self._searcher.limits, speeds)
         search = self._searcher.frame(
-            used, stamp_ns, predicted, limits=limits, reach_m=self._searcher.tracked_reach_m
+            used, stamp_ns, predicted, limits=limits, radius_m=self._searcher.tracked_radius_m
         )
         sigma = self.body.sigma * self._motion.widening(stamp_ns)
         self._effort.search(search, self.body, self.config, predicted, sigma)
@@ -327,17 +327,17 @@ class Tracker:
         search.pose = recovered.placed(self.body, limits, corrected)
         return Found(
             search, stamp_ns, used, notes,
-            turned=recovered.turned, jumped=jumped, recovered=recovered.moved_m > RECOVERED_M,
+            rotated=recovered.rotated, jumped=jumped, recovered=recovered.moved_m > RECOVERED_M,
         )  # fmt: skip
 
     def _learn(self, found: Found) -> None:
-        """Take a frame into the motion and, while the body is tracked, into its fit."""
+        """Update the motion with a frame and, while the body is tracked, the fit of the body."""
         pose, tracked = found.search.pose, self.state is TrackState.TRACKING
         self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
-        if not tracked or found.anew:
+        if not tracked or found.restarted:
             return
         moved = self._body.fit_tracked_frame(
-            found.search, turned=found.turned, recovered=found.recovered
+            found.search, rotated=found.rotated, recovered=found.recovered
         )
         if moved is not None:
             self._searcher = self._searcher_for(self.body)

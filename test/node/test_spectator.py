@@ -20,7 +20,7 @@ from markerless_tracker.cli.main import main
 from markerless_tracker.node.ros.images import fill_image
 from markerless_tracker.node.ros.qos import latched_qos, output_qos
 from markerless_tracker.node.ros.stamps import time_message
-from markerless_tracker.node.spectator import Heard, Spectator
+from markerless_tracker.node.spectator import Spectator, TrackerMessage
 
 STAMP_NS = 3_050_000_000
 PICTURE = np.arange(48 * 64 * 3, dtype=np.uint8).reshape(48, 64, 3)
@@ -31,7 +31,7 @@ def stamped(message: Any) -> Any:
     return message
 
 
-def kind(heard: Heard) -> str:
+def kind(heard: TrackerMessage) -> str:
     """Name of the attribute that holds what was heard."""
     if heard.markers_m is not None:
         return "markers_m"
@@ -52,7 +52,7 @@ def test_all_outputs_are_heard(peer: Any) -> None:
     values = {"state": "TRACKING", "iou/cam01": "nan", "iou/cam02": "0.9"}
     pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
     state.publish(stamped(DiagnosticArray(status=[DiagnosticStatus(values=pairs)])))
-    found: dict[str, Heard] = {}
+    found: dict[str, TrackerMessage] = {}
 
     def complete() -> bool:
         return len(found) == 4

@@ -133,13 +133,13 @@ def test_refinement_converges_to_the_minimum() -> None:
     assert len(equations.points) == 6
 
 
-def test_the_reach_shrinks_geometrically() -> None:
+def test_the_truncation_shrinks_geometrically() -> None:
     equations = Recorded(np.eye(4), np.zeros(4))
     run(equations, np.ones(4), iterations=4, truncation=(0.16, 0.02))
     np.testing.assert_allclose(equations.truncations, [0.16, 0.08, 0.04, 0.02])
 
 
-def test_a_single_iteration_takes_the_last_reach() -> None:
+def test_a_single_iteration_takes_the_last_truncation() -> None:
     equations = Recorded(np.eye(4), np.zeros(4))
     run(equations, np.ones(4), iterations=1, truncation=(0.16, 0.02))
     assert equations.truncations == [pytest.approx(0.02)]

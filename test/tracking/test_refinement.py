@@ -6,7 +6,7 @@ import pytest
 from markerless_tracker.body import load_body
 from markerless_tracker.tracking.refinement import (
     ELBOW_PRECISION,
-    HEAD_TURN_SD_RAD,
+    HEAD_ROTATION_SD_RAD,
     STRAIGHT_TWIST_SD_RAD,
     pose_prior,
 )
@@ -27,7 +27,7 @@ def test_a_straight_limb_keeps_its_usual_rotation_about_itself() -> None:
         "r_hip_z": pytest.approx(straight),
         "l_shoulder_z": pytest.approx(straight),
         "r_shoulder_z": pytest.approx(straight),
-        "head_z": pytest.approx(1.0 / HEAD_TURN_SD_RAD**2),
+        "head_z": pytest.approx(1.0 / HEAD_ROTATION_SD_RAD**2),
         "l_elbow": pytest.approx(elbow),
         "r_elbow": pytest.approx(elbow),
     }

@@ -202,7 +202,7 @@ def test_each_stage_starts_from_the_estimate_so_far(person, monkeypatch) -> None
     np.testing.assert_array_equal(centres[0], person.pose[person.body.root])
 
 
-def test_refinement_is_told_limits_beliefs_and_reach(person, monkeypatch) -> None:
+def test_refinement_gets_limits_beliefs_and_distance(person, monkeypatch) -> None:
     config = settings(
         **{"refine.truncation_m": 0.2, "refine.truncation_end_m": 0.05, "refine.prior": 3.0}
     )

@@ -19,7 +19,7 @@ class Joint:
 
     Attributes:
         segment: the segment that moves, a name of `SEGMENTS`.
-        reference: the segment relative to which it does, or `GROUND`.
+        reference: the segment relative to which it moves, or `GROUND`.
         names: of the three angles in order; empty for one that has no name.
         order: (3,) axes (0, 1, 2 = x, y, z) of the rotations, each about the axis as moved by those
             before it.
@@ -34,7 +34,7 @@ class Joint:
 
 
 def _sided(side: str) -> tuple[Joint, ...]:
-    # Mirrored, the axes forward and up turn round and the lateral one does not.
+    # A mirror image reverses rotations about the forward and up axes, not about the lateral one.
     s = 1 if side == "r" else -1
     mirrored = (1, s, s)
     return (

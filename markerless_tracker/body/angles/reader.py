@@ -1,10 +1,11 @@
 """Reported joint angles of poses, continuous in time, and their standard deviations.
 
 Three angles describe a rotation in two ways: (a, b, c) and (a + 180, 180 - b, c + 180), each plus
-full turns. The one nearest to the last frame's is reported. Where the second angle is near 90
-degrees the first and the third rotate about one axis: their sum (or difference) is what the pose
-says, and how it is split between them is kept from the last frame, the more the nearer it is to
-90 degrees, and from then on approaches the pose's own split as fast as `SPLIT_RAD_S` allows.
+full turns. The one nearest to the last frame's is reported. If the second angle is near 90 degrees
+(gimbal lock), the first and the third rotate about the same axis, and the pose determines only
+their sum (or difference). Its split between them is then kept from the last frame, the more the
+nearer the second angle is to 90 degrees. Afterwards it approaches the pose's own split as fast as
+`SPLIT_RAD_S` allows.
 """
 
 from dataclasses import dataclass
@@ -18,14 +19,14 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import locked
 
 SPLIT_COSINE = 0.7
-"""The split is kept, in part, where the second angle's cosine is below: within 45 degrees of 90."""
+"""The split is partly kept if the second angle's cosine is lower: within 45 degrees of 90."""
 SPLIT_RAD_S = float(np.deg2rad(600.0))
 """The split changes as far as neither angle gets faster than this, where the sum is slower."""
 _ACROSS_RAD_S = float(np.deg2rad(360.0))
 LEAST_COSINE = 0.1
 """Standard deviations of the first and third angle do not grow beyond this cosine."""
 MOST_SD_RAD = float(np.pi / np.sqrt(3.0))
-"""Standard deviation of an angle of which nothing is known."""
+"""Standard deviation of an unknown angle: that of a uniform distribution over a full turn."""
 _USUAL_STEP_S = 1.0 / 60.0
 _LONGEST_STEP_S = 0.5
 _POSES = 8
@@ -84,7 +85,7 @@ class AngleReader:
         self.reset()
 
     def take(self, body: BodyModel) -> None:
-        """Read poses of this body from now on; the angles go on."""
+        """Read poses of this body from now on; the angles remain continuous."""
         self._body = body
         self._frames = joint_frames(body)
 
@@ -191,7 +192,7 @@ class _Sequences:
 
 
 def _smaller(angles: FloatArray) -> FloatArray:
-    """Of both solutions (n, 3) the one with the smaller angles."""
+    """The solution (n, 3) with the smaller angles, of two."""
     other = wrapped(angles * [1.0, -1.0, 1.0] + np.pi)
     far = (other**2).sum(axis=1) < (angles**2).sum(axis=1)
     return np.where(far[:, None], other, angles)
@@ -203,7 +204,7 @@ def wrapped(angles: FloatArray) -> FloatArray:
 
 
 def _nearest(angles: FloatArray, last: FloatArray) -> FloatArray:
-    """Of both solutions (n, 3) and their full turns, the one nearest to the last angles (n, 3)."""
+    """The solution (n, 3), plus full turns, that is nearest to the last angles (n, 3), of two."""
     change = wrapped(angles - last)
     of_other = wrapped(angles * [1.0, -1.0, 1.0] + np.pi - last)
     far = (of_other**2).sum(axis=1) < (change**2).sum(axis=1)

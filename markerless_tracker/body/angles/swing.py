@@ -12,7 +12,7 @@ from markerless_tracker.body.model import SWING_X, SWING_Y, BodyModel, IntArray
 from markerless_tracker.geometry import FloatArray
 
 BENT_RAD = float(np.deg2rad(30.0))
-"""From here on a bent knee or elbow shows a limb's rotation about itself."""
+"""Least flexion at which a knee or elbow shows a limb's rotation about its own axis."""
 _Z = 2
 _HINGES = {"hip": "knee", "shoulder": "elbow"}
 
@@ -28,7 +28,7 @@ def swing_joints(body: BodyModel) -> tuple[str, ...]:
 
 
 def twists(body: BodyModel) -> IntArray:
-    """Indices of the parameters that twist a limb about itself."""
+    """Indices of the parameters that rotate a limb about its own axis."""
     nodes = [body.frames[name] for name in swing_joints(body)]
     return np.asarray(body.node_parameter[nodes], dtype=np.int64)
 
@@ -36,8 +36,9 @@ def twists(body: BodyModel) -> IntArray:
 def straightness(body: BodyModel, pose: FloatArray, bent_rad: float = BENT_RAD) -> FloatArray:
     """How straight the limbs of `twists` (k,) are at a pose (p,): 1 with a straight knee or elbow.
 
-    0 from a flexion of `bent_rad` on, and for a limb without such a joint. Images of a straight
-    limb do not show its rotation about itself; a bent one shows it by the sine of the flexion.
+    0 for a flexion of at least `bent_rad`, and for a limb without such a joint. Images of a
+    straight limb do not show its rotation about its own axis; a bent limb shows it by the sine of
+    the flexion.
     """
     found = []
     for joint in swing_joints(body):

@@ -43,9 +43,9 @@ from markerless_tracker.geometry import FloatArray
 PRIOR_SD = np.array([*np.deg2rad([2.0, 2.0, 2.0]), 0.03, 0.03, 0.03, 0.01])
 """Standard deviation (7,) of the change of a camera that is wrong: a camera that was touched turns
 more than it moves. What the contours do not determine stays near its value."""
-FIRST_REACH_M = 0.2
+FIRST_TRUNCATION_M = 0.2
 """Residuals beyond it are outliers in the first iteration."""
-LAST_REACH_M = 0.05
+LAST_TRUNCATION_M = 0.05
 """The same in the last iterations."""
 _SCALE = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * ALONG)
 _DAMPING = 1e-6
@@ -120,7 +120,7 @@ class ContourAdjustment:
         for frame, weight in zip(frames, independence(frames), strict=True):
             contours = contours_of(
                 body, rig.cameras, frame.observations, frame.markers_m,
-                step_px=step_px, reach_m=FIRST_REACH_M,
+                step_px=step_px, radius_m=FIRST_TRUNCATION_M,
             )  # fmt: skip
             self._frames.append(_Frame(contours, np.array(frame.pose), float(weight)))
 
@@ -155,7 +155,7 @@ class ContourAdjustment:
         changes = np.where(held, 0.0, self.changes)
         self.cameras = [moved(c, one) for c, one in zip(self._first, changes, strict=True)]
 
-    def run(self, iterations: int, first_m: float = FIRST_REACH_M) -> None:
+    def run(self, iterations: int, first_m: float = FIRST_TRUNCATION_M) -> None:
         """Damped Gauss-Newton steps; the truncation shrinks, the last third has the last one.
 
         Args:
@@ -165,11 +165,11 @@ class ContourAdjustment:
         shrinking = max(1, iterations - iterations // 3 - 1)
         for i in range(iterations):
             share = min(i / shrinking, 1.0)
-            self._iterate(first_m * (LAST_REACH_M / first_m) ** share)
+            self._iterate(first_m * (LAST_TRUNCATION_M / first_m) ** share)
 
     def evaluation(self) -> Evaluation:
         """The equations at the state so far."""
-        sums = self._summed(LAST_REACH_M)
+        sums = self._summed(LAST_TRUNCATION_M)
         count = CHANGES * len(self.cameras)
         cross = sums.hessian[:count, count:]
         both = np.column_stack([cross.T, sums.slope[count:]])
@@ -187,7 +187,7 @@ class ContourAdjustment:
         count = len(self.cameras)
         normal, slope = np.zeros((count, 2, 2)), np.zeros((count, 2))
         for frame in self._frames:
-            rows = self._collect(frame, LAST_REACH_M)
+            rows = self._collect(frame, LAST_TRUNCATION_M)
             points = surface(self.body, frame.pose, rows)
             for number, part in self._parts(frame):
                 along = shift_slopes(self.cameras[number], points[part], rows.gradient[part])
@@ -222,9 +222,9 @@ class ContourAdjustment:
             out.append((pixels[seen], depth[seen] / first.matrix[0, 0]))
         return out
 
-    def _iterate(self, reach_m: float) -> None:
+    def _iterate(self, truncation_m: float) -> None:
         """One step; equations that cannot be solved change nothing."""
-        sums = self._summed(reach_m)
+        sums = self._summed(truncation_m)
         count = CHANGES * len(self.cameras)
         first, free = np.arange(count), self.free.ravel()
         precision = np.tile(1.0 / PRIOR_SD**2, len(self.cameras))
@@ -242,13 +242,13 @@ class ContourAdjustment:
         for frame, part in zip(self._frames, sums.parts, strict=True):
             frame.pose = np.clip(frame.pose - part @ np.append(step, 1.0), *self._limits)
 
-    def _summed(self, reach_m: float) -> _Sums:
+    def _summed(self, truncation_m: float) -> _Sums:
         """Equations of cameras and body, poses eliminated; the cameras' priors are not in them."""
         sums = _Sums(CHANGES * len(self.cameras) + self._body.size)
         self._body.add_priors(sums.hessian, sums.slope)
         longer, body = self._body.longer(), self.body
         for frame in self._frames:
-            rows = self._collect(frame, reach_m)
+            rows = self._collect(frame, truncation_m)
             points = surface(body, frame.pose, rows)
             by_camera = np.zeros((len(points), CHANGES * len(self.cameras)))
             for number, part in self._parts(frame):
@@ -274,13 +274,13 @@ class ContourAdjustment:
             sums.weight += frame.weight * float(rows.weight.sum())
         return sums
 
-    def _collect(self, frame: _Frame, reach_m: float) -> OutlineRows:
+    def _collect(self, frame: _Frame, truncation_m: float) -> OutlineRows:
         """The residuals of a frame with the cameras, body and pose so far."""
         by_name = {camera.name: camera for camera in self.cameras}
         views = frame.contours.views
         for view, name in enumerate(views.names):
             put(views.arrays, view, by_name[name])
-        frame.contours.collect(frame.pose, reach_m, self.body)
+        frame.contours.collect(frame.pose, truncation_m, self.body)
         return outline_rows(frame.contours)
 
     def _parts(self, frame: _Frame) -> list[tuple[int, slice]]:

@@ -78,12 +78,12 @@ def contours_of(
     markers_m: FloatArray,
     *,
     step_px: float,
-    reach_m: float,
+    radius_m: float,
 ) -> ContourFrame:
     """Contour evidence of the cameras that have an observation.
 
     Args:
-        body, step_px, reach_m: as of `ContourFrame`.
+        body, step_px, radius_m: as of `ContourFrame`.
         cameras: the cameras; those without an observation are left out.
         observations: by camera name.
         markers_m: (m, 3) world, of the person; their centre sets the size of a metre in each view.
@@ -97,7 +97,7 @@ def contours_of(
         lay_out_views(list(seen.values()), observations),
         pixels_per_m={name: pixels_per_m(camera, centre) for name, camera in seen.items()},
         step_px=step_px,
-        reach_m=reach_m,
+        radius_m=radius_m,
     )
 
 

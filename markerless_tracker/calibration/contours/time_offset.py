@@ -53,7 +53,7 @@ CERTAIN = 4.0
 LEAST_OFFSET_S = 0.005
 """and from this one on."""
 _SETTLED_S = 0.003
-_REACH_M = 0.1
+_TRUNCATION_M = 0.1
 _OFFSET_SD_S, _SHIFT_SD_PX = 0.1, 3.0
 _SCALE = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2)
 _NUMBERS = 3
@@ -211,9 +211,9 @@ class TimeOffsetEstimate:
         shown = pose - near_s * velocity
         frame = contours_of(
             body, [camera], {camera.name: observation}, markers(body, shown),
-            step_px=self._step_px, reach_m=_REACH_M,
+            step_px=self._step_px, radius_m=_TRUNCATION_M,
         )  # fmt: skip
-        frame.collect(shown, _REACH_M)
+        frame.collect(shown, _TRUNCATION_M)
         rows = outline_rows(frame)
         by_pose = pose_slopes(body, shown, rows)
         by_time = -(by_pose @ velocity)

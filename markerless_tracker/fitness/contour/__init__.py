@@ -1,9 +1,9 @@
 """Distances between the body's outline and the silhouettes' edges, and their normal equations.
 
-`ContourFrame` compares one frame with poses; `outline_rows` gives the residuals one by one.
+`ContourFrame` compares one frame with poses; `outline_rows` gives the residuals as rows.
 """
 
-from markerless_tracker.fitness.contour.frame import REACH_M, ContourFrame, NormalEquations
+from markerless_tracker.fitness.contour.frame import RADIUS_M, ContourFrame, NormalEquations
 from markerless_tracker.fitness.contour.outline_rows import (
     OutlineRows,
     floor_rows,
@@ -21,7 +21,7 @@ from markerless_tracker.fitness.contour.row_kernels import (
 )
 
 __all__ = [
-    "REACH_M",
+    "RADIUS_M",
     "ContourFrame",
     "NormalEquations",
     "OutlineRows",

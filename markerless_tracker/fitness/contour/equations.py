@@ -1,4 +1,4 @@
-"""Residuals and normal equations of all views at a pose, and the refinement of a pose by them."""
+"""Residuals and normal equations of all views at a pose, and the refinement of a pose with them."""
 
 from typing import NamedTuple
 
@@ -108,16 +108,16 @@ def descend(  # type: ignore[no-untyped-def]
 
     Args:
         pose: (p,), changed in place.
-        steps: number of steps; the equations at the other truncations are filled only.
-        truncations: (n,) m, one after the other: residuals beyond it are outliers.
+        steps: number of steps; at further truncations the equations are filled without a step.
+        truncations: (n,) m, of each step: residuals beyond it are outliers.
         precision: factor of the data's equations.
         prior_mean, prior_precision: (k, p) of Gaussian priors.
-        bounds: (2, p), kept.
+        bounds: (2, p) of the pose.
         floor_precision: 1 / m², of the prior that no part lies below the floor; 0 = none.
         body, views, contours: `BodyArrays`, `ViewArrays`, `ContourViews`.
         spacing_m: distance of neighbouring outline points, at the body.
         step_px: distance outward of an outline point at which no cone may cover the pixel.
-        samples, residuals: `Samples`, `Residuals`; those of the last truncation stay.
+        samples, residuals: `Samples`, `Residuals`; filled with those of the last truncation.
         scratch, outlines: working memory.
     """
     hessian, slope, count = scratch.hessian, scratch.slope, views.size.shape[0]
@@ -154,5 +154,5 @@ def descend(  # type: ignore[no-untyped-def]
         if solve_step(hessian, slope, pose, bounds, DAMPING, scratch.step) != SOLVED:
             return
         for a in range(pose.size):
-            # A sum may round to beyond a bound.
+            # Rounding may put the sum beyond a bound.
             pose[a] = min(max(pose[a] + scratch.step.step[a], bounds[0, a]), bounds[1, a])

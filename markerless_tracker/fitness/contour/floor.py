@@ -1,6 +1,7 @@
-"""The floor: no part of the body lies below the world's plane z = 0.
+"""Prior of the floor: no part of the body lies below the world's plane z = 0.
 
-Feet stand in their shadow, where silhouettes end nowhere: without a floor legs grow into it.
+Silhouettes have no lower edge where feet stand in their shadow; without this prior legs would be
+fitted into the shadow.
 """
 
 import numpy as np
@@ -10,9 +11,11 @@ from markerless_tracker.fitness.contour.chain_kernels import add_wrench
 from markerless_tracker.fitness.raster.outline_arrays import LANES
 
 SLACK_M = 0.01
-"""Soles may lie so far below the floor: calibrations and sections are not exact."""
+"""Soles may lie this far below the floor without a residual: calibration and sections are not
+exact."""
 BELIEVED_M = 0.1
-"""What lies deeper counts less and less: the person may stand on another floor than z = 0."""
+"""Scale of the robust weight. Larger depths count less and less: the person may stand on another
+floor than z = 0."""
 
 
 @kernel
@@ -28,9 +31,9 @@ def add_floor(body, world, weight, sums):  # type: ignore[no-untyped-def]
 
     Args:
         body: `BodyArrays`.
-        world: (18 * LANES,) the cones' ends, as `cone_ends` has them.
+        world: (18 * LANES,) the cones' ends, filled by `cone_ends`.
         weight: of each residual, before its robust weight.
-        sums: (m, SUMS) of the parts, changed.
+        sums: (m, SUMS) of the parts, added to.
     """
     for c in range(body.cone_node.size):
         for end in range(2):

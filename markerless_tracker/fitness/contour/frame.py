@@ -25,8 +25,8 @@ from markerless_tracker.records import Observation
 
 SPACING_M = 0.02
 """Distance of neighbouring outline points along the outline, m."""
-REACH_M = 0.3
-"""Distance from a silhouette up to which outlines are compared, unless another is given, m."""
+RADIUS_M = 0.3
+"""Default distance from a silhouette up to which outlines are compared, m."""
 _NO_BOUNDS = np.empty((2, 0))
 
 
@@ -52,12 +52,12 @@ class ContourFrame:
         body: the body.
         cameras: cameras by name.
         observations: the evidence of the views, by camera name.
-        views: the same views as `lay_out_views` gives them.
+        views: the same views, laid out by `lay_out_views`.
         pixels_per_m: size of a metre at the body, px, by camera name.
-        reach_m: distance from a silhouette, at the body, beyond which outlines are outliers in any
-            case.
+        radius_m: distance from a silhouette, at the body, beyond which outlines are outliers
+            in any case.
         step_px: distance outward of an outline point at which no cone may cover the pixel.
-        mapper: `map`, or a thread pool's: for the views.
+        mapper: `map`, or that of a thread pool; applied to the views.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class ContourFrame:
         *,
         pixels_per_m: Mapping[str, float],
         step_px: float = 2.0,
-        reach_m: float = REACH_M,
+        radius_m: float = RADIUS_M,
         mapper: Callable[..., object] = map,
     ) -> None:
         self.body = body
@@ -79,15 +79,15 @@ class ContourFrame:
 
         def edge(name: str) -> SilhouetteContour:
             scale = pixels_per_m[name]
-            return silhouette_contour(observations[name], SPACING_M * scale, reach_m * scale)
+            return silhouette_contour(observations[name], SPACING_M * scale, radius_m * scale)
 
         self.contours = join_edges(list(mapper(edge, views.names)))  # type: ignore[call-overload]
         self._allocate()
 
     def with_body(self, body: BodyModel) -> "ContourFrame":
-        """The same evidence for a body of the same kind, with working memory of its own.
+        """The same evidence for a body of the same kind, with its own working memory.
 
-        Two such frames can be compared with poses at the same time.
+        Two such frames can be used at the same time.
         """
         other = copy.copy(self)
         other.body, other._arrays = body, body_arrays(body)
@@ -95,7 +95,7 @@ class ContourFrame:
         return other
 
     def _allocate(self) -> None:
-        """Make the working memory."""
+        """Allocate the working memory."""
         body, views = self.body, self.views
         count = len(views.names)
         most = int(np.diff(self.contours.point_start).max())
@@ -118,7 +118,7 @@ class ContourFrame:
         return NormalEquations(s.hessian.copy(), s.slope.copy(), float(self.residuals.cost.sum()))
 
     def collect(self, pose: FloatArray, truncation_m: float, body: BodyModel | None = None) -> None:
-        """Fill `samples` and `residuals` at a pose (p,), of another body's shape if given."""
+        """Fill `samples` and `residuals` at a pose (p,), with another body's shape if given."""
         arrays = self._arrays if body is None else body_arrays(body)
         none = np.empty((0, pose.size))
         self._descend(pose, 0, np.array([truncation_m]), 1.0, none, none, _NO_BOUNDS, 0.0, arrays)
@@ -134,10 +134,10 @@ class ContourFrame:
         truncation_m: tuple[float, float],
         floor_precision: float = 0.0,
     ) -> FloatArray:
-        """A pose (p,) refined as `optim.refine` does, in one compiled call.
+        """A pose (p,) refined as by `optim.refine`, in one compiled call.
 
         Args:
-            start: (p,) where to begin.
+            start: (p,) initial pose.
             precision: factor from these normal equations to those of -log p, 1 / m³.
             priors, bounds, iterations: as for `optim.refine`.
             truncation_m: residuals beyond it are outliers, in the first and in the last step.
@@ -164,7 +164,7 @@ class ContourFrame:
         floor_precision: float,
         arrays: BodyArrays,
     ) -> FloatArray:
-        """The pose (p,) after `equations.descend`, to which the arguments go."""
+        """The pose (p,) after `equations.descend`; same arguments."""
         pose = np.array(pose, dtype=np.float64)
         bounds = np.array(bounds, dtype=np.float64)
         descend(

@@ -1,4 +1,4 @@
-"""Nearest outline point of the model to a pixel; points are sorted into bands of rows."""
+"""Search of the model's outline point nearest to a pixel; points are sorted into bands of rows."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ def sort_into_bands(count, height, pixel, start, order):  # type: ignore[no-unty
         b = int(pixel[s, 1]) // BAND_PX + 1
         start[b] -= 1
         order[start[b]] = s
-    # start[b + 1] now holds the begin of band b.
+    # start[b + 1] now holds the start of band b.
     for b in range(bands):
         start[b] = start[b + 1]
     start[bands] = count
@@ -39,7 +39,7 @@ def nearest_facing(u, v, nu, nv, bands, pixel, normal, start, order):  # type: i
     nearest = -1
     home = min(max(np.int64(v) // BAND_PX, 0), bands - 1)
     for away in range(bands):
-        # Least distance in rows of any point of the bands that are `away` bands off.
+        # Least vertical distance of points in the bands that are `away` bands off.
         if away > 0:
             rows = min(v - (home - away + 1) * BAND_PX, (home + away) * BAND_PX - v)
             if rows > 0 and rows * rows >= best:

@@ -1,6 +1,6 @@
-"""The residuals of a contour frame one by one, for fits of more than a pose.
+"""The residuals of a contour frame as rows, for fits of lengths and sections.
 
-Contour refinement sums normal equations without rows. Fits of lengths and sections need rows.
+Contour refinement of a pose sums its normal equations without rows.
 """
 
 from collections.abc import Sequence
@@ -25,8 +25,8 @@ class OutlineRows:
     Attributes:
         view: (n,) index of the residual's view, ascending; -1 for the floor.
         cone: (n,) index of the cone of the residual's outline point.
-        place: (n, 5) the point on the cone, as `Samples.shape`.
-        gradient: (n, 3) of the residual with respect to that world point.
+        place: (n, 5) the point on the cone, as in `Samples.shape`.
+        gradient: (n, 3) of the residual with respect to that point, world frame.
         value: (n,) residual, m.
         weight: (n,) represented length of outline, m, times the robust weight.
     """
@@ -125,14 +125,14 @@ def length_slopes(
     points: FloatArray,
     step: float,
 ) -> FloatArray:
-    """Derivatives (n, k) of the residuals by k lengths, as quotients of differences.
+    """Derivatives (n, k) of the residuals by k lengths, as difference quotients.
 
     Args:
-        longer: the body with one length changed by `step`, for each.
+        longer: for each length, the body with that length changed by `step`.
         pose: (p,).
         rows: the residuals.
-        points: (n, 3) their places on the body, world frame.
-        step: of a length, in its own measure.
+        points: (n, 3) their points on the body, world frame.
+        step: change of a length, in the unit of the lengths' parameters.
     """
     placed = np.stack([cone_transforms(body, pose) for body in longer])
     lengths = np.stack([body.cone_length for body in longer])
@@ -159,7 +159,7 @@ def _on_cone(c, place, shape, length):  # type: ignore[no-untyped-def]
 def _length_slopes(  # type: ignore[no-untyped-def]
     placed, shape, lengths, cone, place, gradient, points, per_step, out
 ):
-    """Fill out (n, k) as `length_slopes` does; placed (k, c, 3, 4), lengths (k, c)."""
+    """Fill out (n, k) as `length_slopes`; placed (k, c, 3, 4), lengths (k, c)."""
     for n in range(cone.size):
         c = cone[n]
         for k in range(placed.shape[0]):
@@ -194,7 +194,7 @@ def _pose_slopes(  # type: ignore[no-untyped-def]
         axes, origins: (m, 3) of the joints' nodes, world frame.
         slides: (m,) whether a node translates; else it rotates.
         parameter: (m,) index of each node's parameter.
-        hang: (c, m) not 0 where a node moves a cone.
+        hang: (c, m) not 0 if a node moves a cone.
         cone: (n,) the residuals' cones.
     """
     for n in range(cone.size):
@@ -204,7 +204,7 @@ def _pose_slopes(  # type: ignore[no-untyped-def]
                 continue
             x, y, z = axes[m, 0], axes[m, 1], axes[m, 2]
             if not slides[m]:
-                # A turn about the axis moves a point P by axis x (P - origin).
+                # A rotation about the axis moves a point P by axis x (P - origin).
                 u, v = points[n, 0] - origins[m, 0], points[n, 1] - origins[m, 1]
                 w = points[n, 2] - origins[m, 2]
                 x, y, z = y * w - z * v, z * u - x * w, x * v - y * u

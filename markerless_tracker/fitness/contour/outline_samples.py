@@ -24,7 +24,7 @@ from markerless_tracker.fitness.raster.tangents import arc_sweep
 from markerless_tracker.geometry import FloatArray
 
 MAX_SAMPLES = 2048
-"""Most outline points of the model in one view; further ones are dropped."""
+"""Largest number of the model's outline points in one view; further points are dropped."""
 
 
 class Samples(NamedTuple):
@@ -52,7 +52,7 @@ class Samples(NamedTuple):
 
 
 def make_samples(views: int) -> Samples:
-    """Allocate room for outline points."""
+    """Allocate the arrays for outline points."""
     s = (views, MAX_SAMPLES)
     return Samples(
         np.empty((*s, 2)), np.empty((*s, 2)), np.empty((*s, 3)), np.empty(s), np.empty(s),
@@ -71,7 +71,7 @@ def _pixel(x, y, z, k, distortion, distorted):  # type: ignore[no-untyped-def]
 
 @inlined
 def _shows(pu, pv, nu, nv, step_px, width, height, bits):  # type: ignore[no-untyped-def]
-    """Whether a point lies in the frame and no cone covers the pixel `step_px` outward of it."""
+    """Whether a point lies in the frame and no cone covers the pixel `step_px` outside of it."""
     seen = False
     if pu >= 0.0 and pv >= 0.0 and pu <= width - 1.0 and pv <= height - 1.0:
         u = np.int64(np.floor(pu + step_px * nu + 0.5))
@@ -86,7 +86,7 @@ def _sample_arc(  # type: ignore[no-untyped-def]
     kept, c, e, sweep, spacing_px, step_px, k, distortion, distorted, width, height, arcs, flat,
     ends, world, bits, pixel, normal, point, depth, length, cone, shape,
 ):  # fmt: skip
-    """Sample an end's arc into one view's arrays of `Samples`; returns the samples' new number."""
+    """Sample an end's arc into one view's arrays of `Samples`; returns their new number."""
     at = 6 * e * LANES + c
     au, av = flat[at + 2 * LANES], flat[at + 3 * LANES]
     bu, bv = flat[at + 4 * LANES], flat[at + 5 * LANES]
@@ -103,7 +103,7 @@ def _sample_arc(  # type: ignore[no-untyped-def]
     xa, ya, za = ends[p + 3 * LANES], ends[p + 4 * LANES], ends[p + 5 * LANES]
     xb, yb, zb = ends[p + 6 * LANES], ends[p + 7 * LANES], ends[p + 8 * LANES]
     for _ in range(n):
-        # (tu, tv): tangent in the image; the outward normal is across it, away from the centre.
+        # (tu, tv): tangent in the image. The outward normal is perpendicular to it.
         tu, tv = k[0] * (cos * bu - sin * au), k[3] * (cos * bv - sin * av)
         mu, mv = k[0] * (cos * au + sin * bu), k[3] * (cos * av + sin * bv)
         norm = np.sqrt(tu * tu + tv * tv)
@@ -138,8 +138,8 @@ def _sample_side(  # type: ignore[no-untyped-def]
     kept, c, side, spacing_px, step_px, k, distortion, distorted, width, height, arcs, ends, world,
     bits, pixel, normal, point, depth, length, cone, shape,
 ):  # fmt: skip
-    """Sample a side; as `_sample_arc`."""
-    # Side 0 leads from the end of end 0's arc to the begin of end 1's, side 1 back.
+    """Sample a side, as `_sample_arc`."""
+    # Side 0 goes from the end of end 0's arc to the start of end 1's arc, side 1 back.
     at_0 = (2 if side == 0 else 0) * LANES + c
     at_1 = (4 if side == 0 else 6) * LANES + c
     c0, s0, c1, s1 = arcs[at_0], arcs[at_0 + LANES], arcs[at_1], arcs[at_1 + LANES]
@@ -198,7 +198,7 @@ def sample_outline(view, views, cones, spacing_px, step_px, scratch, outlines, s
     pixel, normal, point = samples.pixel[view], samples.normal[view], samples.world[view]
     depth, length = samples.depth[view], samples.length[view]
     cone, shape = samples.cone[view], samples.shape[view]
-    # Not a literal, for which functions would be compiled once more.
+    # A literal would make numba compile the functions once more.
     kept = np.int64(0)
     for c in range(cones):
         if forms[c] == HIDDEN:

@@ -1,8 +1,8 @@
 """Distances between the outlines of the model and of the silhouettes, in both directions.
 
-From outline points of the model to the silhouette's edge (its signed distance), and from points of
-the silhouette's edge to the nearest outline point of the model; in metres at the body's depth.
-Each has the gradient with respect to the point of a cone's surface (docs/normal-equations.md).
+Residuals are the signed distances of the model's outline points from the silhouette's edge, and the
+distances of points of the edge from the nearest outline point of the model, in metres at the body's
+depth. Each has a gradient with respect to a point of a cone's surface (docs/normal-equations.md).
 """
 
 from typing import NamedTuple
@@ -37,7 +37,7 @@ class Residuals(NamedTuple):
 
 
 def make_residuals(views: int, points: int) -> Residuals:
-    """Allocate room for residuals: one per outline point and one per edge point."""
+    """Allocate the arrays for residuals: one per outline point and one per edge point."""
     s = (views, MAX_SAMPLES + points)
     return Residuals(
         np.empty(s), np.empty(s), np.empty((*s, 3)), np.empty(s, dtype=np.int64),
@@ -81,7 +81,7 @@ def _world_gradient(r, t, k, d, point, s, du, dv, out, n):  # type: ignore[no-un
     aa = radial + a * a * rate + 2.0 * d[2] * b + 6.0 * d[3] * a
     ab = a * b * rate + 2.0 * d[2] * a + 2.0 * d[3] * b
     bb = radial + b * b * rate + 6.0 * d[2] * b + 2.0 * d[3] * a
-    # d(u, v)/d(a, b), then d(a, b)/d(camera point), then to the world's axes.
+    # d(u, v)/d(a, b), then d(a, b)/d(camera point), then in the world's axes.
     ga = du * (k[0] * aa + k[1] * ab) + dv * k[3] * ab
     gb = du * (k[0] * ab + k[1] * bb) + dv * k[3] * bb
     gx, gy = ga * z, gb * z

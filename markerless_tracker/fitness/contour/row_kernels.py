@@ -9,7 +9,7 @@ from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
 
 _LEAST_PRECISION = 1e-9
-"""Added to that of each parameter: one without prior and residuals stays as it is."""
+"""Added to the precision of each parameter: without prior and residuals it does not change."""
 
 
 def normal_equations(
@@ -35,8 +35,8 @@ def add_pose_prior(
     Args:
         hessian, slope: (p + k, p + k) and (p + k,), changed.
         precision: (p,) 1 / variance.
-        off: (p,) from the prior's mean to the pose.
-        damping: fraction of their diagonal that is added to it.
+        off: (p,) the pose minus the prior's mean.
+        damping: fraction of the diagonal that is added to it.
     """
     pose = np.arange(precision.size)
     hessian[pose, pose] = (hessian[pose, pose] + precision + _LEAST_PRECISION) * (1.0 + damping)
@@ -59,7 +59,7 @@ def eliminated(
         out_hessian, out_slope: (k, k) and (k,), added to.
 
     Returns:
-        (f, k + 1): the step of the first unknowns is minus (these @ [step of the others, 1]).
+        (f, k + 1): matrix M; the step of the first unknowns is -M @ [step of the others, 1].
     """
     inner = np.concatenate([hessian[:first, first:], slope[:first, None]], axis=1)
     _eliminate(hessian[:first, :first].copy(), inner)

@@ -1,9 +1,10 @@
 """Signed distances to the edge of a mask, by chamfer distances of 5x5 (Borgefors 1986).
 
-Two passes over the rows, downward and upward. In each, what comes from the two rows before is found
-for a whole row at once, which the compiler vectorises; what comes from the pixel before follows.
-Sums are cast to 32 bits: a vector holds twice as many of them as of 64, with a minimum of its own.
-Distances outward and inward take the same passes: at each pixel one of the two is 0.
+Two passes over the rows, downward and upward. In each pass the distances through the two rows
+before are found for a whole row at once, which the compiler vectorises; then those through the
+pixel before. Sums are cast to 32 bits, of which a vector holds twice as many as of 64 and for which
+there is a vector minimum. Distances outward and inward are found in the same passes: at each pixel
+one of the two is 0.
 """
 
 import numpy as np
@@ -18,15 +19,15 @@ _KNIGHT = np.int32(round(2.1969 * _UNIT))
 _FAR = np.int32(1 << 29)
 _SIZE = np.float32(1.0 / _UNIT)
 _HALF = np.float32(0.5)
-# Columns of a row beside the mask's, on each side.
+# Additional columns of a row on each side of the mask's columns.
 _BESIDE = 2
 
 
 def signed_distance(mask: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Distances (h, w) to the edge of a mask (h, w) of 0 and 1, px, positive outside.
 
-    The edge runs midway between pixels inside and outside. Distances are at most 2 % too large or
-    small; without any edge they are about 8000 px.
+    The edge runs midway between pixels inside and outside. Distances are wrong by at most 2 %;
+    without any edge they are about 8000 px.
     """
     out = np.empty(mask.shape, np.int32)
     rows = np.empty((2, 3, mask.shape[1] + 2 * _BESIDE), np.int32)
@@ -115,7 +116,7 @@ def _begin(mask, outward, inward):  # type: ignore[no-untyped-def]
 
 @kernel
 def _take_rows(next_row, second_row, row):  # type: ignore[no-untyped-def]
-    """Lower a row (w + 4) to what comes from the two rows beside it on one side."""
+    """Lower a row (w + 4) to the distances through the two rows next to it on one side."""
     for j in range(row.size - 2 * _BESIDE):
         knight = min(min(second_row[j + 1], second_row[j + 3]), min(next_row[j], next_row[j + 4]))
         diagonal = min(next_row[j + 1], next_row[j + 3])

@@ -16,7 +16,7 @@ from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation
 
 UNDECIDED_PX = 2.0
-"""No residual is taken so near to undecided pixels."""
+"""There are no residuals within this distance of undecided pixels."""
 # Pixels within that distance.
 _AROUND = np.arange(-int(UNDECIDED_PX), int(UNDECIDED_PX) + 1)
 _NEAR_UNDECIDED = (np.hypot(_AROUND[:, None], _AROUND) <= UNDECIDED_PX).astype(np.uint8)
@@ -77,11 +77,11 @@ def silhouette_contour(
 ) -> SilhouetteContour:
     """Signed distances around a silhouette, and points along its edge, about `spacing_px` apart.
 
-    The window is the silhouette's bounding box and `margin_px`, at least 24 px. The edge
-    runs midway between pixels inside and outside; where the silhouette leaves the frame, and
-    around specks, there are no points. The border of person and undecided pixels is no edge: there
-    are no points within `UNDECIDED_PX` of undecided pixels, and distances are very large where
-    that border is the nearest.
+    The window is the silhouette's bounding box and a margin of `margin_px`, at least 24 px. The
+    edge runs midway between pixels inside and outside. There are no points where the silhouette
+    leaves the frame, and around specks. The border between person and undecided pixels is no edge:
+    there are no points within `UNDECIDED_PX` of undecided pixels, and distances are very large
+    where that border is nearer than any edge.
     """
     mask, undecided = observation.mask.view(np.uint8), observation.undecided
     width, height = observation.size_px
@@ -111,7 +111,8 @@ def silhouette_contour(
 
 
 def _edge_pixels(mask: NDArray[np.uint8], spacing_px: float) -> tuple[NDArray[Any], FloatArray]:
-    """Pixels (n, 2) along the edges of a mask (h, w) of 0 and 1; length of edge (n,) px of each.
+    """Pixels (n, 2) along the edges of a mask (h, w) of 0 and 1, and the edge length (n,) px of
+    each.
 
     Neighbours are about `spacing_px` apart; the edges of specks are left out.
     """
@@ -131,9 +132,9 @@ def _edge_pixels(mask: NDArray[np.uint8], spacing_px: float) -> tuple[NDArray[An
 def _window(
     observation: Observation, part: NDArray[np.uint8], box: tuple[int, int, int, int]
 ) -> NDArray[np.uint8]:
-    """A window (left, top, right, bottom) of the frame, of an array (h, w) of the region.
+    """A window (left, top, right, bottom) of the frame, cut from an array (h, w) of the region.
 
-    0 outside of the region.
+    It is 0 outside of the region.
     """
     left, top, right, bottom = box
     u, v = observation.offset_px
@@ -151,27 +152,27 @@ def _without_undecided(
     distance: NDArray[np.float32],
     person: NDArray[np.uint8],
     undecided: NDArray[np.uint8],
-    reach_px: int,
+    radius_px: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Distances (h, w), very large where the nearest edge borders on undecided pixels.
 
-    Also the pixels farther than `UNDECIDED_PX` from undecided ones. The nearest edge is one of
-    person and background if it does not matter which of the two undecided pixels are.
+    Also returns which pixels are farther than `UNDECIDED_PX` from undecided pixels. A distance is
+    valid if it is the same with all undecided pixels as person and with all as background.
 
     Args:
-        distance: (h, w) to the edge of the person alone.
+        distance: (h, w) to the edge of the person, with undecided pixels as background.
         person, undecided: (h, w), 0 or 1.
-        reach_px: larger distances may be those to the edge of the person alone.
+        radius_px: larger distances need not be corrected.
     """
     free = np.ones(person.shape, dtype=np.bool_)
     left, top, width, height = cv2.boundingRect(undecided)
     if width == 0:
         return distance, free
-    # Distances up to `reach_px` differ so near to undecided pixels only, and follow from pixels
-    # that are as near again.
+    # Distances up to `radius_px` differ only within that radius of undecided pixels, and depend
+    # only on pixels within that radius again.
     columns, rows = person.shape[1], person.shape[0]
-    patch = Region(left, top, left + width, top + height).grown(reach_px, (columns, rows))
-    around = patch.grown(reach_px, (columns, rows))
+    patch = Region(left, top, left + width, top + height).grown(radius_px, (columns, rows))
+    around = patch.grown(radius_px, (columns, rows))
     wider = signed_distance(np.ascontiguousarray((person | undecided)[around.slices]))
     beside = np.asarray(cv2.dilate(undecided[patch.slices], _NEAR_UNDECIDED), np.uint8)
     known = distance.copy()
@@ -182,15 +183,16 @@ def _without_undecided(
 
 @kernel
 def keep_same(wider, inner_left, inner_top, beside, left, top, known, free):  # type: ignore[no-untyped-def]
-    """Keep the known distances of a patch that are the wider mask's, too, and free of undecided.
+    """Keep the distances of a patch that are valid; set the others very large. Fill `free`.
 
     Args:
         wider: distances to the edge of person and undecided pixels together, around the patch.
-        inner_left, inner_top: where the patch lies in it.
+        inner_left, inner_top: the patch's corner in `wider`.
         beside: (a, b) of the patch, not 0 within `UNDECIDED_PX` of undecided pixels.
-        left, top: where the patch lies in `known` and `free`.
+        left, top: the patch's corner in `known` and `free`.
         known: (h, w) distances to the edge of the person, changed in the patch.
-        free: (h, w) whether a pixel is not beside undecided ones, filled in the patch.
+        free: (h, w) whether a pixel is farther than `UNDECIDED_PX` from undecided pixels, filled in
+            the patch.
     """
     for i in range(beside.shape[0]):
         for j in range(beside.shape[1]):
@@ -207,13 +209,13 @@ def edge_points(  # type: ignore[no-untyped-def]
 ):
     """Fill the points of an edge and their outward normals; returns their number.
 
-    Normals are the gradients of the distance, by Sobel's 5x5. Where there is none, at the border
-    of the frame and beside undecided pixels, there is no point.
+    Normals are the gradients of the distance, by Sobel's 5x5 kernel. There are no points where the
+    gradient is 0, at the border of the frame, and beside undecided pixels.
 
     Args:
         distance: (h, w) of a window of the frame.
-        free: (h, w) whether a pixel is not beside undecided ones; (0, 0) if all are free.
-        pixels, spacing: (n, 2) along the edge, in the window; (n,) px of edge that each stands for.
+        free: (h, w) whether a pixel is not beside undecided pixels; (0, 0) if all are free.
+        pixels, spacing: (n, 2) along the edge, in the window; (n,) px of edge that each represents.
         left, top: of the window in the frame.
         width, height: of the frame.
         points, normals, kept: (n, 2), (n, 2) and (n,), filled as in `SilhouetteContour`.

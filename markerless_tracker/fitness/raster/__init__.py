@@ -1,6 +1,7 @@
 """Projected cones as bits: their outlines, filled and counted against silhouettes and edge maps.
 
-Kernels import each other from their own modules: stored kernels are named after what those import.
+Kernels import each other from their own modules, since the names of stored kernels depend on the
+modules that they import.
 """
 
 from markerless_tracker.fitness.raster.edge_samples import OUTLINE, SIDES, VISIBLE, EdgeRule

@@ -67,7 +67,7 @@ def sample_side(  # type: ignore[no-untyped-def]
         and max(pu, qu) <= width - 1.0 - border
         and max(pv, qv) <= height - 1.0 - border
     ):
-        # As below, without branches: the side is away from the frame's border.
+        # The same as below without branches, for a side away from the frame's border.
         if which == VISIBLE:
             out_u, out_v = 0.5, 0.5
         for i in range(samples):

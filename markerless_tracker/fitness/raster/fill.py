@@ -20,7 +20,7 @@ def fill_outline(c, count, out, width, height, bits, used):  # type: ignore[no-u
         out: one thread's `Outlines`, filled by `find_outlines`; its left and right are written.
         width, height: of the frame, px.
         bits: (words * height,) frame.
-        used: (words, 2) first and last row that hold bits in each column of words, widened.
+        used: (words, 2) first and last row with bits in each column of words; extended.
     """
     if not (out.box[c] <= width - 1.0 and out.box[LANES + c] >= 0.0):
         return
@@ -82,7 +82,7 @@ def wipe(words, height, bits, used):  # type: ignore[no-untyped-def]
 
 @kernel
 def count_and_wipe(words, height, bits, mask, known, start, used):  # type: ignore[no-untyped-def]
-    """Set bits that the mask holds too, and set bits that are known; clears them.
+    """Number of set bits that the mask has, too, and of set bits that are known; clears the bits.
 
     mask, known: flat, from `start` on.
     """
@@ -102,7 +102,7 @@ def count_and_wipe(words, height, bits, mask, known, start, used):  # type: igno
 def count_beside_and_wipe(  # type: ignore[no-untyped-def]
     words, height, bits, mask, known, static, start, used
 ):
-    """As `count_and_wipe`, of the set bits that are not among those of `static`, flat likewise."""
+    """As `count_and_wipe`, for the set bits that are not set in `static`, which is flat, too."""
     overlap = np.uint64(0)
     projected = np.uint64(0)
     for w in range(words):

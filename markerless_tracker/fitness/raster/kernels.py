@@ -76,7 +76,7 @@ class StaticLayer(NamedTuple):
     Attributes:
         moving: nodes that are computed for every pose, parents first.
         nodes: (m, 3, 4) transforms of all nodes at the search's centre.
-        bits: the static parts' silhouette, as `ViewArrays.mask`; empty if everything moves.
+        bits: the static parts' silhouette, in the layout of `ViewArrays.mask`; empty if all move.
         counts: (v, 4) counts of the static parts, without edge samples that may be hidden.
         sample_start: (v + 1,) edge samples of view i that may be hidden begin at sample_start[i].
         samples: (s, 2) word * 64 + bit that hides each sample, and its contribution.
@@ -93,14 +93,14 @@ class StaticLayer(NamedTuple):
 
 
 class Objective(NamedTuple):
-    """What the poses of one search are compared with, as kernels read it.
+    """The comparison of one search, in the layout of the kernels.
 
     Attributes:
         active: (d,) indices of the parameters that vary.
         centre: (p,) values of the others.
         body: all nodes, and the cones that are drawn for every pose.
         views: the evidence.
-        silhouette_cones: (c,) whether each of these cones is part of the silhouette.
+        silhouette_cones: (c,) whether each cone of `body` is part of the silhouette.
         edge_cones: (c, 2) whether its sides, and the edge of its far end, are sampled.
         rule, cost: how edges are sampled, and the weights of the terms.
         static: the cones that are drawn once.
@@ -132,7 +132,7 @@ def cone_ends(pose, body, nodes, world):  # type: ignore[no-untyped-def]
 
 @kernel
 def place_cones(body, nodes, world):  # type: ignore[no-untyped-def]
-    """As `cone_ends`, from known transforms of the nodes (m, 3, 4)."""
+    """As `cone_ends`, given the transforms of the nodes (m, 3, 4)."""
     for c in range(body.cone_node.size):
         node = body.cone_node[c]
         for i in range(3):
@@ -153,7 +153,7 @@ def place_cones(body, nodes, world):  # type: ignore[no-untyped-def]
 
 @kernel
 def _nearest_first(cones, ends, order):  # type: ignore[no-untyped-def]
-    """Sort cones by depth of their middles, so that filled cones hide those that follow."""
+    """Sort cones by depth of their middles, so that filled cones hide later ones."""
     for i in range(1, cones):
         c = order[i]
         depth = ends[2 * LANES + c] + ends[11 * LANES + c]

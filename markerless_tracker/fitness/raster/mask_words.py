@@ -43,7 +43,7 @@ def cut_words(frame, left, top, width, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def paste_words(frame, left, top, width, out):  # type: ignore[no-untyped-def]
-    """As `cut_words`, of a part that may go beyond the frame; 0 there."""
+    """As `cut_words`, for a part that may extend beyond the frame; it is 0 there."""
     height, count = frame.shape
     shift, first = np.uint64(left & 63), left >> 6
     for v in range(out.shape[0]):
@@ -60,7 +60,7 @@ def paste_words(frame, left, top, width, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def spread(words, v, w):  # type: ignore[no-untyped-def]
-    """Word w of row v, and the bits whose left, right, upper or lower neighbour is set."""
+    """Word w of row v, grown by the bits whose left, right, upper or lower neighbour is set."""
     height, count = words.shape
     word = words[v, w]
     out = word | (word << _ONE) | (word >> _ONE)
@@ -77,7 +77,7 @@ def spread(words, v, w):  # type: ignore[no-untyped-def]
 
 @kernel
 def grow_across(words, px, width):  # type: ignore[no-untyped-def]
-    """Grow a mask by so many pixels to the left and to the right."""
+    """Grow a mask by `px` pixels to the left and to the right."""
     height, count = words.shape
     for v in range(height):
         done = 1
@@ -105,7 +105,7 @@ def grow_across(words, px, width):  # type: ignore[no-untyped-def]
 
 @kernel
 def grow_square(words, px, width):  # type: ignore[no-untyped-def]
-    """Grow a mask by a square of that radius."""
+    """Grow a mask by a square of radius `px`."""
     grow_across(words, px, width)
     height, count = words.shape
     done = 1
@@ -126,13 +126,13 @@ def grow_square(words, px, width):  # type: ignore[no-untyped-def]
 
 @kernel
 def grow_rows(words, half_widths, width, out):  # type: ignore[no-untyped-def]
-    """Set in `out` a mask grown by a shape; changes the mask.
+    """Fill `out` with a mask grown by a shape; changes the mask.
 
     Args:
         words: (h, k).
         half_widths: (2 r + 1,) of each row of the shape, px; -1 for an empty row.
         width: of the mask, px.
-        out: (h, k), empty.
+        out: (h, k), zeros.
     """
     height, count = words.shape
     radius = half_widths.size // 2
@@ -152,7 +152,7 @@ def grow_rows(words, half_widths, width, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def flood(words, within, open_rows):  # type: ignore[no-untyped-def]
-    """Grow a mask to all pixels of `within` that are joined to it there by sides.
+    """Grow a mask to all pixels of `within` that are 4-connected to it within `within`.
 
     Args:
         words, within: (h, k).
@@ -187,13 +187,13 @@ def flood(words, within, open_rows):  # type: ignore[no-untyped-def]
 
 @kernel
 def _flood_word(words, within, v, w):  # type: ignore[no-untyped-def]
-    """Grow one word from its neighbours, then along itself; whether it has changed."""
+    """Grow one word from its neighbours, then along itself; returns whether it has changed."""
     free = within[v, w]
     if free == words[v, w]:
         return False
     before = words[v, w]
     found = before | (spread(words, v, w) & free)
-    # Along a run of free pixels, to either side, in doubled steps.
+    # Along a run of free pixels, to either side, in steps that double.
     if found != before:
         up, down, left, right = found, found, free, free
         for i in range(6):

@@ -2,7 +2,7 @@
 
 An outline is a closed polygon: around end 1, down one side, around end 0, up the other side. The
 sides are the common tangents of the end ellipses; the ends are sampled. All cones are computed
-side by side (`outline_arrays`). Derivation: docs/outlines-of-cones.md.
+in parallel (`outline_arrays`). Derivation: docs/outlines-of-cones.md.
 """
 
 import numpy as np
@@ -43,7 +43,7 @@ def scan_edges(cones, count, height, u, v, first, slope, box):  # type: ignore[n
     for c in range(n):
         box[c], box[LANES + c] = np.inf, -np.inf
         box[2 * LANES + c], box[3 * LANES + c] = np.inf, -np.inf
-    # Several short loops: a loop over many arrays is not vectorised, as any two might overlap.
+    # Several short loops: a loop over many arrays is not vectorised, since any two may overlap.
     for i in range(count):
         at, before = i * LANES, (i - 1 if i > 0 else count - 1) * LANES
         for c in range(n):

@@ -1,4 +1,4 @@
-"""Working memory of outlines: all cones of a body side by side.
+"""Working memory of outlines: all cones of a body in parallel.
 
 A quantity is a row of `LANES` numbers, one per cone. The compiler vectorises each loop over cones.
 """
@@ -14,7 +14,7 @@ from markerless_tracker.geometry import FloatArray
 LANES = 64
 """Numbers in a row; the largest number of cones of a body."""
 ARC_POINTS = 7
-"""Points of an end's arc, both tangent points included."""
+"""Points of an end's arc, including both tangent points."""
 SIDE_POINTS = 2
 """Points inside a side, if the lens distorts; otherwise there are none."""
 MAX_POINTS = 2 * (ARC_POINTS + SIDE_POINTS)
@@ -22,7 +22,7 @@ MAX_POINTS = 2 * (ARC_POINTS + SIDE_POINTS)
 NEAR_M = 0.1
 """Least distance from the camera's plane; nearer cones are not drawn in that view."""
 HIDDEN, TAPERED, ONLY_END = 0, 1, 2
-"""Forms of an outline: not drawn; both ends visible; ONLY_END + e: end e hides everything else."""
+"""Forms of an outline: not drawn; both ends visible; ONLY_END + e: end e hides the whole cone."""
 
 VECTOR_LANES = 8
 """Loops run over a multiple of this number of lanes, without a remainder."""
@@ -36,16 +36,15 @@ class Outlines(NamedTuple):
         ends: 18 rows: row 9 e + 3 m + i holds coordinate i (m, camera frame) of end e's centre
             (m = 0) and of its two radius vectors (m = 1, 2).
         flat: 12 rows: row 6 e + 2 m + i holds their images to first order, at focal length 1.
-        arcs: 8 rows: from row 4 e on cos and sin of the angle at which end e's arc begins and of
-            that at which it ends. End 1's arc leads from side 0 to side 1, end 0's back. Side 0
-            lies to the right of the direction from end 0 to end 1 in the image (v down).
+        arcs: 8 rows: from row 4 e on cos and sin of the angles at which end e's arc begins and
+            ends. End 1's arc goes from side 0 to side 1, end 0's arc back. Side 0 lies to the right
+            of the direction from end 0 to end 1 in the image (v down).
         form: one row: HIDDEN, TAPERED, or ONLY_END + e; in that case the arc is a full circle.
         u, v: MAX_POINTS rows each, the polygons' points, px.
         first: MAX_POINTS rows, the first pixel row at or below each point, 0 .. height.
         slope: MAX_POINTS rows, du/dv of the edge that leads to each point.
         box: 4 rows, least and largest u (px), least and largest `first`.
-        left, right: begin and end of the polygon that is being filled in each row of the frame,
-            px.
+        left, right: begin and end, in each row of the frame, of the polygon being filled, px.
     """
 
     ends: FloatArray
@@ -62,13 +61,13 @@ class Outlines(NamedTuple):
 
 
 def make_outlines(threads: int, height: int) -> Outlines:
-    """Allocate working memory for some threads and frames of at most `height` rows.
+    """Allocate working memory for several threads and frames of at most `height` rows.
 
-    Every attribute gets a first axis, the thread.
+    The first axis of every attribute is the thread.
     """
 
     def rows(count: int) -> FloatArray:
-        # Lanes without a cone are computed as well; ones keep their values finite.
+        # Lanes without a cone are computed, too; ones keep their values finite.
         return np.ones((threads, count * LANES))
 
     return Outlines(

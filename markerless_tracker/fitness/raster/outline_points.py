@@ -22,7 +22,7 @@ _THIRD_0, _THIRD_1 = np.sqrt(3.0), 2.0 - np.sqrt(3.0)
 
 @inlined
 def place_point(cos, sin, at, to, ends, u, v):  # type: ignore[no-untyped-def]
-    """Image at focal length 1 of the point at an angle of an end, into u and v at `to`."""
+    """Put the image, at focal length 1, of the point at an angle on an end into u and v at `to`."""
     inverse = 1.0 / (ends[at + 2 * LANES] + cos * ends[at + 5 * LANES] + sin * ends[at + 8 * LANES])
     u[to] = (ends[at] + cos * ends[at + 3 * LANES] + sin * ends[at + 6 * LANES]) * inverse
     v[to] = (ends[at + LANES] + cos * ends[at + 4 * LANES] + sin * ends[at + 7 * LANES]) * inverse
@@ -30,14 +30,14 @@ def place_point(cos, sin, at, to, ends, u, v):  # type: ignore[no-untyped-def]
 
 @kernel
 def place_arc(cones, e, row, ends, flat, arcs, u, v):  # type: ignore[no-untyped-def]
-    """Place the points of end e's arc, from a row on: ends, middle, and thirds of both halves."""
+    """Fill the points of end e's arc, from a row on: ends, middle, and thirds of both halves."""
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
     at, row_of_arc, to = 9 * e * LANES, 4 * e * LANES, row * LANES
     for c in range(n):
         ca, sa = arcs[row_of_arc + c], arcs[row_of_arc + LANES + c]
         cb, sb = arcs[row_of_arc + 2 * LANES + c], arcs[row_of_arc + 3 * LANES + c]
         sense = -1.0 if clockwise(6 * e * LANES + c, flat) else 1.0
-        # The middle lies across the chord and along the sum; the longer of both is well defined.
+        # The middle is normal to the chord and along the sum; the longer one is well-conditioned.
         hc, hs = cb - ca, sb - sa
         mc, ms = ca + cb, sa + sb
         across = hc * hc + hs * hs > mc * mc + ms * ms
@@ -65,7 +65,7 @@ def place_arc(cones, e, row, ends, flat, arcs, u, v):  # type: ignore[no-untyped
 
 @kernel
 def place_side(cones, e, row, ends, arcs, u, v):  # type: ignore[no-untyped-def]
-    """Place the inner points of the side that begins at end e, from a row on."""
+    """Fill the inner points of the side that begins at end e, from a row on."""
     o = 1 - e
     at, to = (4 * e + 2) * LANES, 4 * o * LANES
     for c in range(cones):

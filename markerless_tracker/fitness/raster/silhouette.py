@@ -39,7 +39,7 @@ def body_words(
     height = int(views.size[:, 1].max())
     outlines = make_outlines(1, height)
     world = np.ones(18 * LANES)
-    # A copy: for poses that may not be written the kernel would be compiled once more.
+    # Copied, since a read-only pose would make numba compile the kernel once more.
     cone_ends(np.array(pose), arrays, np.empty((body.node_parent.size, 3, 4)), world)
     packed = {}
     for view, camera in enumerate(cameras):

@@ -27,15 +27,15 @@ from markerless_tracker.fitness.terms import (
 )
 from markerless_tracker.geometry import FloatArray
 
-# Sides of a cone that are sampled, the far end's edge included.
+# Sides of a cone that are sampled, including the far end's edge.
 _SIDES = 3
-# Room beyond the samples of a side across the frame.
+# Spare rows in addition to the samples of a side across the frame.
 _SPARE = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Cones:
-    """Some cones of a body: arrays, whether each is part of the silhouette, its sampled edges."""
+    """A subset of a body's cones: arrays, whether each is in the silhouette, its sampled edges."""
 
     arrays: BodyArrays
     silhouette: NDArray[np.bool_]
@@ -44,13 +44,13 @@ class Cones:
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """Which cones a search moves: the same in every frame.
+    """The cones that a search moves, and the others; the same in every frame.
 
     Attributes:
         active: (d,) indices of the parameters that vary.
         moving: nodes that they move, parents first.
         drawn: the cones that are drawn for every pose.
-        rest: those that are drawn once.
+        rest: the cones that are drawn once.
     """
 
     active: IntArray
@@ -69,8 +69,8 @@ def split_cones(
 ) -> Split:
     """The cones that the active parameters (d,) move, and the others.
 
-    Which edges are visible depends on the order of all cones in depth: if visible edges are
-    sampled, no cone is static.
+    If visible edges are sampled, no cone is static, since visibility depends on the depth order of
+    all cones.
 
     Args:
         body: the body.
@@ -92,7 +92,7 @@ def split_cones(
             np.flatnonzero(needed & ~moves[body.cone_node]),
         )
     )
-    # A copy: kernels are compiled once more for arrays that are read-only.
+    # Copied, since read-only arrays would make numba compile the kernels once more.
     return Split(np.array(active, dtype=np.int64), np.flatnonzero(moves), drawn, rest)
 
 
@@ -133,7 +133,7 @@ def draw_static(
 
 
 def _some(arrays: BodyArrays, cones: NDArray[np.int64]) -> BodyArrays:
-    """The arrays of a body with some of its cones."""
+    """The arrays of a body with a subset of its cones."""
     return arrays._replace(
         cone_node=arrays.cone_node[cones],
         cone_fixed=arrays.cone_fixed[cones],
@@ -153,7 +153,7 @@ def _draw_static(  # type: ignore[no-untyped-def]
         return
     out = outlines_of(outlines, 0)
     nothing = bits[:0]
-    # Not literals, for which functions would be compiled once more.
+    # Literals would make numba compile the functions once more.
     kept, first = np.int64(0), np.int64(0)
     for view in range(views.size.shape[0]):
         width, height, words = views.size[view, 0], views.size[view, 1], views.words[view]

@@ -123,5 +123,5 @@ def arc_sweep(e, c, flat, form, arcs):  # type: ignore[no-untyped-def]
 
 @inlined
 def clockwise(at, flat):  # type: ignore[no-untyped-def]
-    """Whether arcs of the end whose rows of flat begin at `at` run towards smaller angles."""
+    """Whether the arc of the end whose rows in flat begin at `at` runs towards smaller angles."""
     return flat[at + 2 * LANES] * flat[at + 5 * LANES] > flat[at + 3 * LANES] * flat[at + 4 * LANES]

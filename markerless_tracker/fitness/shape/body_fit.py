@@ -31,16 +31,16 @@ from markerless_tracker.fitness.shape.sections import Sections
 from markerless_tracker.geometry import FloatArray
 
 ALONG = 9.0
-"""Number of pieces of outline with correlated residuals: sections are wrong along a whole limb."""
+"""Number of pieces of outline that count as one, since errors of sections extend along a limb."""
 AMONG = 3.0
 """Number of frames that count as one independent frame."""
 LIMB_OFFSET_SD_RATIO = 0.12
-"""Standard deviation of offsets of limbs among people, relative to the generic radius there, where
-poses are fitted, too. Wider, the flesh of thighs, calves and feet would lie beside the line of the
-joints, and bent knees be found too straight."""
+"""Standard deviation of limbs' offsets among people, relative to the generic radius, if poses are
+fitted, too. With a larger one the sections of thighs, calves and feet would be fitted beside the
+line of the joints, and bent knees would be too straight."""
 AGREEING_SD_M = 0.007
-"""Standard deviation of a view's residuals up to which all views count alike. Those of a camera
-that is calibrated worse, or whose silhouettes are, are larger: it counts less."""
+"""Standard deviation of a view's residuals up to which all views have the same weight. Views of a
+camera with a worse calibration or worse silhouettes have larger residuals and a smaller weight."""
 _STEP = 1e-4
 """Change of a log length in the finite differences."""
 _LONGEST_STEP = 0.1
@@ -57,16 +57,16 @@ class _Frame:
 
 
 class BodyFit:
-    """Fits one body to frames that are added as they come.
+    """Fits one body to frames that are added one by one.
 
     Args:
         sizes: makes the body of other lengths.
         body: the initial body; the prior of the sections is the generic one of its lengths.
         belief: prior of the lengths.
         limits: (2, p) of the poses.
-        varied: whether the frames show many poses of the person: limbs' flesh then keeps nearer to
-            the line of their joints (`LIMB_OFFSET_SD_RATIO`), and cameras whose outlines disagree
-            with the body count less (`AGREEING_SD_M`).
+        varied: whether the frames show many poses. The offsets of limbs then have a narrower prior
+            (`LIMB_OFFSET_SD_RATIO`), and cameras whose outlines disagree with the body have less
+            weight (`AGREEING_SD_M`).
         floor_precision: of each part below z = 0 (`contour.floor`), 1 / m²; 0 for no floor.
     """
 
@@ -94,12 +94,12 @@ class BodyFit:
 
     @property
     def body(self) -> BodyModel:
-        """The body as fitted so far."""
+        """The present body."""
         return self._made(self._lengths)
 
     @property
     def poses(self) -> FloatArray:
-        """(n, p) the poses of the frames as fitted so far."""
+        """(n, p) the present poses of the frames."""
         return np.array([frame.pose for frame in self._frames])
 
     def add(self, contours: ContourFrame, pose: FloatArray) -> None:
@@ -112,10 +112,10 @@ class BodyFit:
             pass
 
     def pieces(self, truncation_m: float) -> Iterator[None]:
-        """`iterate` in pieces: one frame's equations each, and the solution in the last.
+        """`iterate` in pieces: each makes one frame's equations; the last also solves them.
 
-        The poses are eliminated first (Schur complement), as they are coupled through the body
-        alone (docs/normal-equations.md). Equations that cannot be solved change nothing.
+        The poses are eliminated first (Schur complement), since only the body couples them
+        (docs/normal-equations.md). Equations that cannot be solved change nothing.
 
         Args:
             truncation_m: residuals beyond this distance are outliers.
@@ -193,8 +193,8 @@ class BodyFit:
     ) -> FloatArray:
         """Factor (n,) of each residual's weight: at most 1, less in views that disagree.
 
-        A view's deviation is that of all frames in the last step, in the first step that of the
-        frame; from the median, which few outliers do not change.
+        A view's standard deviation is that of all frames in the last step; in the first step, that
+        of the frame. It is computed from the median, which few outliers do not change.
         """
         if not self._varied:
             return np.ones(len(rows.view))

@@ -1,4 +1,4 @@
-"""Fits that are computed in pieces, so that a tracker can spread them over its frames."""
+"""Runs fits that are computed in pieces, which a tracker spreads over its frames."""
 
 from collections.abc import Generator
 
@@ -6,7 +6,7 @@ from markerless_tracker.body import BodyModel
 
 
 def at_once(fitting: Generator[None, None, BodyModel]) -> BodyModel:
-    """The body that a fit in pieces returns, all its pieces computed now."""
+    """The body returned by a fit in pieces, after computing all its pieces."""
     while True:
         try:
             next(fitting)

@@ -72,11 +72,11 @@ def shape_fitting(
     prior = Prior(sections.generic, tightness / sections.prior_sd**2)
     scale = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * sum(weight for _, _, weight in frames))
     shape = sections.of(start)
-    for reach_m in truncations(*truncation_m, iterations):
+    for bound_m in truncations(*truncation_m, iterations):
         shaped = sections.put(body, shape)
         hessian, slope = np.zeros((sections.size, sections.size)), np.zeros(sections.size)
         for frame, pose, weight in frames:
-            frame.collect(pose, float(reach_m), shaped)
+            frame.collect(pose, float(bound_m), shaped)
             rows = outline_rows(frame)
             slopes = sections.slopes(shaped, pose, rows)
             one = normal_equations(slopes, rows.weight, rows.value)
@@ -85,11 +85,11 @@ def shape_fitting(
             yield
         shape = refine(
             _sums(hessian, slope), shape, priors=(prior,), bounds=sections.bounds, iterations=1,
-            truncation=(float(reach_m), float(reach_m)),
+            truncation=(float(bound_m), float(bound_m)),
         )  # fmt: skip
     return sections.put(body, shape)
 
 
 def _sums(hessian: FloatArray, slope: FloatArray) -> Equations:
-    """Equations that are known at the one point where they are asked for."""
+    """Constant equations, for a refinement of one iteration."""
     return lambda _, __: (hessian, slope)

@@ -1,8 +1,8 @@
-"""Free numbers of a body's sections: radii and offsets, equal on the left and on the right.
+"""Free parameters of a body's sections: radii and offsets, equal on the left and on the right.
 
-A hand whose wrist is bent lies beside the line of its forearm, each hand in its own direction. That
-is posture, so the offsets of hands without a joint of their own are not equal. Otherwise the
-forearm would follow the hand, and the elbow be bent wrongly.
+A bent wrist puts the hand beside the line of the forearm, in a different direction on each side.
+This is posture, so the offsets of hands without a joint of their own are independent. Otherwise the
+forearm would follow the hand, and the elbow would be bent wrongly.
 """
 
 from dataclasses import replace
@@ -26,16 +26,16 @@ OFFSET_RANGE_M = 0.06
 
 
 class Sections:
-    """The k free numbers of a body's sections.
+    """The k free parameters of a body's sections.
 
-    Limbs of both sides share theirs, offsets to the side mirrored, but for the offsets of hands
-    without a joint of their own; trunk and head are symmetric.
+    Limbs of both sides share their parameters, with lateral offsets mirrored, except the offsets of
+    hands without a joint of their own. Trunk and head are symmetric.
 
     Args:
         generic: the body with the sections of the prior.
         limb_offset_sd_ratio: standard deviation of the limbs' offsets among people, relative to the
-            generic radius there; None: `OFFSET_SD_M`, as it is for trunk, head, and hands without
-            a joint of their own.
+            generic radius; None: `OFFSET_SD_M`, as for trunk, head, and hands without a joint of
+            their own.
 
     Attributes:
         generic: (k,) prior mean.
@@ -65,21 +65,21 @@ class Sections:
         return self._size
 
     def of(self, body: BodyModel) -> FloatArray:
-        """The numbers (k,) of a body; entries that share a number are averaged."""
+        """The parameters (k,) of a body; entries that share a parameter are averaged."""
         used = self._index >= 0
         index = self._index[used]
         total = np.bincount(index, (self._sign * body.cone_shape)[used], self._size)
         return np.asarray(total / np.bincount(index, minlength=self._size))
 
     def put(self, body: BodyModel, numbers: FloatArray) -> BodyModel:
-        """The body with sections of these numbers (k,)."""
+        """The body with sections of these parameters (k,)."""
         shape = body.cone_shape.copy()
         used = self._index >= 0
         shape[used] = self._sign[used] * numbers[self._index[used]]
         return replace(body, cone_shape=shape)
 
     def slopes(self, body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
-        """Derivatives (n, k) of residuals by the numbers, of a body at a pose (p,)."""
+        """Derivatives (n, k) of residuals by the parameters, for a body at a pose (p,)."""
         out = np.zeros((len(rows.cone), self._size))
         _fill_slopes(
             cone_transforms(body, pose), rows.cone, rows.place, rows.gradient, self._index,
@@ -90,12 +90,12 @@ class Sections:
 
 @kernel
 def _fill_slopes(placed, cone, place, gradient, index, sign, out):  # type: ignore[no-untyped-def]
-    """Fill out (n, k), zeros, with the derivatives of n residuals by k numbers.
+    """Fill out (n, k), zeros, with the derivatives of n residuals by k parameters.
 
     Args:
         placed: (c, 3, 4) the cones' transforms.
         cone, place, gradient: of `OutlineRows`.
-        index, sign: (c, 2, 4) number of each entry of the sections, or -1, and its sign.
+        index, sign: (c, 2, 4) parameter of each entry of the sections, or -1, and its sign.
     """
     for n in range(cone.size):
         c = cone[n]
@@ -126,7 +126,7 @@ def _limbs(body: BodyModel) -> list[int]:
 
 
 def _tie(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray, int]:
-    """Number of each entry (c, 2, 4) of `cone_shape` (-1: none), its sign, and k."""
+    """Parameter of each entry (c, 2, 4) of `cone_shape` (-1: none), its sign, and k."""
     index = np.full((len(body.cone_names), 2, 4), -1, dtype=np.int64)
     sign = np.ones(index.shape)
     known: dict[tuple[str, int, int], int] = {}
@@ -136,7 +136,7 @@ def _tie(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray, int]:
         for end in range(2):
             for entry in range(4):
                 if entry == 3:
-                    # Offsets to the side: none for trunk and head, mirrored for the limbs.
+                    # Lateral offsets: none for trunk and head, mirrored for the limbs.
                     if not paired:
                         continue
                     sign[c, end, entry] = 1.0 if name[0] == "l" else -1.0

@@ -1,6 +1,7 @@
-"""What a camera's images show without the person.
+"""The background: what a camera's images show without the person.
 
-Learned from empty frames or from recordings of the person, kept in files, adapted to slow changes.
+It is learned from empty frames or from recordings of the person, stored in files, and adapted to
+slow changes.
 """
 
 from markerless_tracker.imaging.background.live import MOVING_SHARE, LiveBackground

@@ -8,9 +8,9 @@ import numpy as np
 from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.masks import Mask, disc
 
-# After a longer gap, or a step back in time, nothing is learned from the first image.
+# Nothing is learned from the first image after a longer gap or a step back in time.
 GAP_NS = 1_000_000_000
-# Each frame adapts every STRIDE-th row, the next frame the next rows.
+# Each frame adapts every STRIDE-th row, and the next frame the rows after these.
 STRIDE = 4
 
 
@@ -45,7 +45,7 @@ class Adaptation:
 
     Args:
         time_constant_s: time after which the background has followed a change by 63 %.
-        margin_px: distance from the silhouette that does not adapt.
+        margin_px: distance from the silhouette within which nothing adapts.
     """
 
     def __init__(self, time_constant_s: float, margin_px: int) -> None:
@@ -62,7 +62,7 @@ class Adaptation:
     def pass_over(self, stamp_ns: int) -> None:
         """Note the stamp of an image from which nothing is learned.
 
-        One image may come twice: first a region of it, then the whole.
+        An image may come twice: first a region of it, then the whole image.
         """
         before, self._seen_ns = self._seen_ns, stamp_ns
         if before is None or not 0 <= stamp_ns - before <= GAP_NS:

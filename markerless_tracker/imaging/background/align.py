@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.imaging.images import FloatImage, Image, grey_of
 
-# Tiles along the longer side of the image, for each of which a shift is measured.
+# Number of tiles along the longer side of the image; the shift of each tile is measured.
 _TILES = 6
 # Phase correlations with a lower peak are not used.
 _LEAST_RESPONSE = 0.15
@@ -32,7 +32,7 @@ def align_geometry(image: Image, reference: Image) -> Image:
     here, there = _tile_shifts(grey_of(resized), grey_of(reference))
     if len(here) < 6:
         return resized
-    # Seeded inside OpenCV: the same images give the same map.
+    # OpenCV seeds RANSAC itself: the same images give the same map.
     affine, inliers = cv2.estimateAffine2D(
         there, here, method=cv2.RANSAC, ransacReprojThreshold=0.5
     )
@@ -51,7 +51,7 @@ def align_geometry(image: Image, reference: Image) -> Image:
 
 
 def _tile_shifts(image: Image, reference: Image) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Where tiles lie in the image, and their centres in the reference, (n, 2) px each."""
+    """Centres of tiles in the image and in the reference, (n, 2) px each."""
     height, width = reference.shape
     tile = max(32, 2 * max(height, width) // (_TILES + 1))
     first = cv2.Laplacian(image, cv2.CV_32F, ksize=3)
@@ -71,7 +71,7 @@ def _tile_shifts(image: Image, reference: Image) -> tuple[NDArray[np.float32], N
 
 
 def _starts(length: int, tile: int) -> list[int]:
-    """First pixels of tiles that cover a length and overlap by about half."""
+    """First pixel of each of the tiles that cover a length and overlap by about half."""
     if length <= tile:
         return [0]
     count = -(-2 * (length - tile) // tile) + 1
@@ -101,7 +101,7 @@ def align_exposure(image: FloatImage, reference: FloatImage) -> FloatImage:
 
 
 def _robust_line(x: FloatImage, y: FloatImage) -> tuple[float, float]:
-    """Gain and offset of y = gain x + offset, two images (h, w); the gain is 1 if none is found."""
+    """Gain and offset of y = gain x + offset, for two images (h, w); gain 1 if undetermined."""
     step = max(1, x.size // 40000)
     a, b = x.ravel()[::step].astype(np.float64), y.ravel()[::step].astype(np.float64)
     # Clipped pixels carry no information about the gain.

@@ -1,4 +1,4 @@
-"""Learning an empty scene from images as they come, as long as it is empty."""
+"""Learns an empty scene from images as they come, as long as it is empty."""
 
 import cv2
 import numpy as np
@@ -16,11 +16,11 @@ from markerless_tracker.imaging.masks import SOLID
 from markerless_tracker.imaging.settings import ImagingSettings
 
 MOVING_SHARE = 0.002
-"""Fraction of an image's pixels from which on something moves in it: 630 px of 644x488, where a
-person has some thousands. Leaves and screens may have more: an empty scene with them is refused."""
+"""Least fraction of changed pixels that counts as motion: 630 px of 644x488, where a person has
+thousands. Leaves and screens may have more: an empty scene with them is refused."""
 
 SAMPLES = 20
-"""Images that are kept for a mixture: 0.5 GB for four 1080p cameras."""
+"""Largest number of images kept for a mixture: 0.5 GB for four 1080p cameras."""
 
 # Window over which images are averaged before they are compared.
 _BLUR_PX = (5, 5)
@@ -30,10 +30,10 @@ _NOISE_FACTOR = 6.0
 
 
 class LiveBackground:
-    """Images of one camera that become its background; memory does not grow with their number.
+    """Learns the background of one camera; memory does not grow with the number of images.
 
-    For one Gaussian per pixel sums are kept, as `learn_background` makes them. For a mixture
-    images are kept, at most `SAMPLES`, evenly spaced.
+    For one Gaussian per pixel the sums of `learn_background` are kept. For a mixture at most
+    `SAMPLES` images are kept, evenly spaced.
 
     Args:
         camera: name for messages.
@@ -95,7 +95,7 @@ class LiveBackground:
         if self._settings.background.modes == 1:
             self._moments.add(image)
         elif self._count % self._every == 0:
-            # The memory of a message may be used again.
+            # The memory of a message may be reused.
             self._samples.append(image.copy())
             if len(self._samples) > SAMPLES:
                 self._samples, self._every = self._samples[::2], 2 * self._every

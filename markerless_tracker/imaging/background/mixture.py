@@ -11,11 +11,11 @@ from markerless_tracker.imaging.images import FloatImage, Image
 MEDIAN_TO_SD = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution."""
 
-# Values of one mode differ by at most so many standard deviations of the sensor's noise, or by
+# Values of one mode differ by at most this many standard deviations of the sensor's noise, or by
 # _LEAST_TOLERANCE grey levels if that is more.
 _TOLERANCE_SIGMAS = 4.0
 _LEAST_TOLERANCE = 12.0
-# A mode seen in fewer of the frames is dropped: a passing object.
+# A mode seen in a smaller fraction of the frames is dropped: it is a passing object.
 _LEAST_SHARE = 0.05
 _LEAST_FRAMES = 2
 
@@ -64,11 +64,11 @@ def add_frame(image, tolerance, count, mean, moment):  # type: ignore[no-untyped
 def learn_modes(
     frames: Iterable[Image], modes: int
 ) -> tuple[int, FloatImage, FloatImage, FloatImage]:
-    """Cluster each pixel's values over the frames, one pass, memory for ``modes`` models.
+    """Cluster each pixel's values over the frames, in one pass, with memory for ``modes`` models.
 
     Args:
         frames: (h, w, c) uint8, all of one shape, at least one.
-        modes: most modes per pixel.
+        modes: largest number of modes per pixel.
 
     Returns:
         Number of frames; counts (k, h, w), means (k, h, w, c) and summed squared deviations

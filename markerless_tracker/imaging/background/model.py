@@ -47,11 +47,11 @@ class BackgroundModel:
         mean: (h, w, c) float32, grey levels, c = 1 (grey) or 3 (BGR); read-only.
         variance: (h, w, c) float32, squared grey levels, above 0; read-only.
         note: how it was learned, and what that implies.
-        modes: further Gaussians of the mixture; `mean` and `variance` are the most frequent one,
-            which has the rest of the weight.
+        modes: further Gaussians of the mixture; `mean` and `variance` are the most frequent
+            Gaussian, which has the remaining weight.
 
     Raises:
-        ImageError: shapes that do not match, or values that are not finite or no variances.
+        ImageError: shapes do not match, values are not finite, or variances are not above 0.
     """
 
     mean: FloatImage
@@ -138,7 +138,7 @@ def learn_background(
 
 
 def _checked(frames: Iterable[Image], camera: str) -> Iterator[Image]:
-    """The frames as (h, w, c)."""
+    """The checked frames as (h, w, c)."""
     shape: tuple[int, ...] = ()
     index = -1
     for index, frame in enumerate(frames):
@@ -161,7 +161,7 @@ def _mixture(
     total, counts, means, moments = learn_modes(frames, settings.background.modes)
     if total == 1:
         return model_from_moments(means[0], moments[0], 1, settings, note=note)
-    # The variance of the most frequent modes is the sensor's noise, which holds for all modes.
+    # The variance of the most frequent modes is the sensor's noise, which all modes have.
     free = np.maximum(counts[0] - 1.0, 1.0)[..., None]
     typical = np.median(moments[0] / free, axis=(0, 1))
     least = settings.background.sigma_min**2

@@ -1,4 +1,4 @@
-"""A learned background as a file, to be kept beside the calibration."""
+"""Writes and reads a learned background as a file, stored beside the calibration."""
 
 import os
 import zipfile
@@ -16,7 +16,7 @@ _VERSION = 1
 def write_background_model(path: Path, model: BackgroundModel) -> None:
     """Write a model (NumPy's `.npz`, compressed; the same model gives the same bytes).
 
-    The file appears when it is complete; until then an earlier one stays.
+    The file is replaced when the new one is complete.
 
     Raises:
         ImageError: the file cannot be written.
@@ -37,7 +37,7 @@ def write_background_model(path: Path, model: BackgroundModel) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            # Through a file, or NumPy appends its own suffix to other names.
+            # An open file, since NumPy would append its own suffix to other names.
             with part.open("wb") as file:
                 np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
             os.replace(part, path)
@@ -49,7 +49,7 @@ def write_background_model(path: Path, model: BackgroundModel) -> None:
 
 
 def read_background_model(path: Path) -> BackgroundModel:
-    """Read what `write_background_model` wrote.
+    """Read a model written by `write_background_model`.
 
     Raises:
         ImageError: the file cannot be read or holds something else.

@@ -10,9 +10,9 @@ from markerless_tracker.imaging.images import FloatImage
 def scale_background_model(model: BackgroundModel, size_px: tuple[int, int]) -> BackgroundModel:
     """The model at ``size_px`` = (width, height); the same object if it already has that size.
 
-    Means and variances are averaged over areas, as `scale_image` averages images; those of modes
-    are weighted. The variance stays that of one pixel. That is an upper bound: a mean of pixels is
-    less noisy, by an unknown factor, since demosaicing and compression correlate neighbours.
+    Means and variances are averaged over areas, like images by `scale_image`; those of modes are
+    weighted. The variance remains that of one pixel, which is an upper bound: a mean of pixels is
+    less noisy, by a factor that is unknown since demosaicing and compression correlate neighbours.
     """
     if size_px == model.size_px:
         return model

@@ -6,7 +6,7 @@ from markerless_tracker.imaging.images import FloatImage, Image
 
 
 class Moments:
-    """Sums over images of one shape, after Welford (1962); memory for two images.
+    """Sums over images of one shape, after Welford (1962), with memory for two images.
 
     Attributes:
         count: number of images.

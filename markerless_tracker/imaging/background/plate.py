@@ -22,19 +22,20 @@ from markerless_tracker.records import locked
 
 BoolImage = NDArray[np.bool_]
 
-# Frames kept of all clips together: enough for a mode, within memory.
+# Number of frames kept of all clips together: enough for a mode, and within memory.
 _FRAMES = 36
 # Largest difference of pictures that show the same object, grey levels.
 _TOLERANCE = 14.0
-# Larger changes from frame to frame are a body's, smaller ones may be the light's; grey levels.
+# Larger changes from frame to frame are due to a body, smaller ones may be due to light; grey
+# levels.
 _ABRUPT = 28.0
-# Fraction of the time that a place is covered above which the steady image shows the person there.
+# A pixel that is covered for a larger fraction of the time shows the person in the steady image.
 _RESTLESS = 0.15
 # A frame is calm around a pixel if less than this fraction of the known pixels there differs.
 _CALM = 0.05
-# A value is scene if it appears in this fraction of the frames that are calm around the pixel.
+# A value belongs to the scene if it appears in this fraction of the frames calm around the pixel.
 _OFTEN = 0.35
-# Size of the neighbourhood that is assessed together, relative to the image's longer side.
+# Size of the neighbourhood of a pixel, relative to the image's longer side.
 _WINDOW = 0.03
 # Values seen in a smaller fraction of the frames are discarded.
 _SEEN_SHARE = 0.05
@@ -46,7 +47,7 @@ class Plate:
 
     Attributes:
         image: (h, w) or (h, w, 3) uint8, in the geometry and exposure of the first clip (or still).
-        unsure: (h, w) bool, pixels known from one source alone while others disagree.
+        unsure: (h, w) bool, pixels known from one source only, while others disagree.
         note: the sources, and what they imply.
     """
 
@@ -119,7 +120,7 @@ def background_plate(
 
 
 def _clip_frames(sequences: Sequence[Iterable[Image]], camera: str) -> list[list[Image]]:
-    """Some frames of each clip that has any, evenly spread; raises as `background_plate`."""
+    """A few evenly spread frames of each clip that has any; raises as `background_plate`."""
     frames: list[list[Image]] = []
     share = max(2, _FRAMES // max(1, len(sequences)))
     for number, sequence in enumerate(sequences):
@@ -159,10 +160,10 @@ def _stack(frames: list[list[Image]]) -> Image:
 def _covered(
     share: FloatImage, jump: FloatImage, steady: FloatImage, picture: FloatImage
 ) -> BoolImage:
-    """Where the clips show a person and the still does not: they differ, and the clips move.
+    """Pixels where the clips show a person and the still does not: they differ, and the clips move.
 
     Motion is averaged over the neighbourhood that differs: plain clothes show motion at their
-    outline only, and an arm that briefly passes over a person of the still has little weight.
+    outline only, and an arm that briefly passes over a person in the still has little weight.
     """
     apart = np.abs(picture - steady).max(axis=2)
     differ = (apart > _TOLERANCE).astype(np.uint8)
@@ -182,7 +183,7 @@ def _covered(
 def _fill(
     stack: Image, steady: FloatImage, pictures: list[FloatImage]
 ) -> tuple[FloatImage, BoolImage]:
-    """Replace moving people by the stills; returns the plate and where a still alone is known."""
+    """Replace moving people by the stills; returns the plate, and pixels known from stills only."""
     share, jump = motion(stack, steady, _TOLERANCE)
     least = max(2.0, _SEEN_SHARE * len(stack))
     filled = steady.copy()
@@ -212,17 +213,17 @@ def _fill(
 def _grow(
     stack: Image, filled: FloatImage, steady: FloatImage, covered: BoolImage, doubtful: BoolImage
 ) -> tuple[FloatImage, BoolImage]:
-    """Grow the known area inward, with the frames in which all known pixels around are scene.
+    """Grow the known area inward, using frames in which all known pixels around are scene.
 
-    Such frames confirm the still, or overrule it next to people of the still (``doubtful``): a
-    person of the still may stand behind the one in the clips.
+    Such frames confirm the still, or overrule it next to people in the still (``doubtful``), since
+    a person in the still may stand behind the person in the clips.
 
     Returns:
         The plate, and the pixels where the clips neither confirmed nor overruled the still.
     """
     longer = max(covered.shape)
     side = max(5, round(0.25 * _WINDOW * longer) | 1)
-    # Islands inside a covered area agree by chance.
+    # Islands inside a covered area agree by chance only.
     brush = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * side + 1, 2 * side + 1))
     closed = cv2.morphologyEx(covered.astype(np.uint8), cv2.MORPH_CLOSE, brush)
     v, u = np.nonzero(closed)
@@ -279,7 +280,7 @@ def _mean(values: FloatImage, chosen: BoolImage) -> FloatImage:
 
 
 def _from_stills(stills: Sequence[Image]) -> Plate:
-    """The median of the stills; of two the first, with their differences marked as unsure."""
+    """The median of the stills; the first of two, with their differences marked as unsure."""
     reference = stills[0]
     base = _float(reference)
     if len(stills) == 1:

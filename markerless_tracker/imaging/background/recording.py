@@ -1,4 +1,4 @@
-"""A background from the person's own recording."""
+"""Learns a background from the person's own recording."""
 
 from collections.abc import Iterable
 
@@ -10,7 +10,7 @@ from markerless_tracker.imaging.background.steady import ALONE_SHARE, steady_ima
 from markerless_tracker.imaging.images import Image, check_image
 from markerless_tracker.imaging.settings import ImagingSettings
 
-# Frames kept of the recording: a bound of memory and time.
+# Number of frames kept of the recording, which limits memory and time.
 _FRAMES = 48
 
 
@@ -22,12 +22,12 @@ def learn_from_recording(
 ) -> BackgroundModel:
     """Learn a background from frames with the person, spread over the whole recording.
 
-    The background is each pixel's steadiest value (see `steady.steady_image`). Where the person
-    covers a pixel for most of the time, or stands motionless, the person is learned and the
-    silhouette has a hole. A person that never moves away is hardly found.
+    The background is each pixel's steadiest value (see `steady.steady_image`). If the person covers
+    a pixel for most of the time, or stands motionless, the person is learned as background and the
+    silhouette has a hole. A person that never moves away is hardly segmented.
 
     Args:
-        frames: in temporal order, any number; read once, a few dozen are kept.
+        frames: any number, in temporal order; read once, a few dozen are kept.
         settings: `background.sigma_min` and, for a single frame, `background.sigma_still`.
         camera: name for error messages.
 

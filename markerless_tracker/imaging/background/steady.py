@@ -1,4 +1,4 @@
-"""Steadiest value of each pixel over time, and how often the pixel differs from it."""
+"""Steadiest value of each pixel over time, and the fraction of frames that differ from it."""
 
 from collections.abc import Iterable, Iterator
 
@@ -13,10 +13,10 @@ from markerless_tracker.imaging.images import Image
 def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-def]
     """Per pixel, the mean of the frames in the shortest brightness interval that holds ``share``.
 
-    Frames are chosen by brightness, not channel by channel, so that only colours occur that the
-    pixel had. Frames of the interval whose colour is far from its mean are left out. ``variance``
-    is, per channel, the mean square deviation from the result over all frames within three times
-    the interval (at least 6 grey levels).
+    Frames are chosen by brightness, not channel by channel, so that the result is a colour that the
+    pixel had. Frames of the interval with a colour far from its mean are left out. ``variance`` is,
+    per channel, the mean square deviation from the result over all frames within three times the
+    interval (at least 6 grey levels).
     """
     count, height, width, channels = stack.shape
     need = max(1, int(np.ceil(share * count)))
@@ -49,7 +49,7 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
                     total += int(stack[keys[i] & 4095, v, u, c])
                 rough[c] = np.float32(total) / np.float32(need)
                 sums[c] = 0
-            # The same brightness but another colour: a passing object.
+            # A passing object may have the same brightness but another colour.
             kept = 0
             for i in range(best, best + need):
                 t = keys[i] & 4095
@@ -76,8 +76,8 @@ def steady_kernel(stack, share, steady, variance):  # type: ignore[no-untyped-de
 ALONE_SHARE = 0.2
 """Fraction of the frames that must agree if there are only clips.
 
-Small enough to prefer a motionless floor that is seldom visible to a body that is often there, but
-never quite the same.
+It is small, so that a motionless floor that is seldom visible is preferred to a body that is often
+present but never quite the same.
 """
 
 
@@ -163,7 +163,7 @@ def motion(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """How often each pixel is covered, and how abruptly.
 
-    Light (reflections, soft shadows) changes gradually, a body arrives from one frame to the next.
+    Light (reflections, soft shadows) changes gradually; a body comes from one frame to the next.
 
     Args:
         stack: (n, h, w, c) uint8 frames in temporal order.

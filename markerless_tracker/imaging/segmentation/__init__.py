@@ -1,6 +1,6 @@
-"""From one image to the silhouette of the person.
+"""Segments one image: finds the silhouette of the person.
 
-Labels of pixels (background, shadow, foreground), then repair of patches, border and contour.
+Pixels are labelled (background, shadow, foreground); then patches, border and contour are repaired.
 """
 
 from markerless_tracker.imaging.segmentation.morphology import clean_mask

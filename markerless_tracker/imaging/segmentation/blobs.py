@@ -1,6 +1,6 @@
-"""Removal of small connected patches of a mask, also where patches continue outside of it.
+"""Removal of small connected patches of a mask, also of patches that may continue outside of it.
 
-Patches are built from the runs of each row, of which a silhouette has few.
+Patches are built from the runs of each row, since a silhouette has few runs.
 """
 
 import cv2
@@ -58,14 +58,14 @@ def _join_runs(mask, part, target, touch, begin, end, parent, first):  # type: i
 
     Args:
         mask, part, target: as for `flip_small`.
-        touch: 1 if runs of neighbouring rows touch at a corner too, else 0.
+        touch: 1 if runs of neighbouring rows also join at corners, else 0.
         begin, end: (n,) first column of each run, and the column after its last one; written.
         parent: (n,) union-find forest of the runs, one tree a patch; written.
         first: (rows + 1,) index of each row's first run; written.
     """
     rows, columns = part[3] - part[1], part[2] - part[0]
     n = 0
-    # Padded with the other value, so that every run ends before the padding.
+    # Padded with the other value, so that every run ends before or at the padding.
     values = np.full((columns + 7) // 8 * 8, 255 - target, dtype=np.uint8)
     words = values.view(np.uint64)
     for i in range(rows):
@@ -97,7 +97,7 @@ def _join_runs(mask, part, target, touch, begin, end, parent, first):  # type: i
 
 @compiled()
 def _measure_patches(part, need, begin, end, parent, first, area, sides, needed):  # type: ignore[no-untyped-def]
-    """Add up each patch at its root run.
+    """Sum area and sides of each patch at its root run.
 
     Args:
         part, need: as for `flip_small`.
@@ -136,14 +136,14 @@ def flip_small(mask, part, need, target, least, connectivity, spared, unknown): 
         part: (left, top, right, bottom) that is searched.
         need: (left, top, right, bottom) where the result is needed.
         target: 0 or 255.
-        least: least number of pixels of a patch that stays.
+        least: least number of pixels of a patch that is kept.
         connectivity: 4 or 8.
-        spared: sides of the part; patches that touch them stay.
+        spared: sides of the part; patches that touch them are kept.
         unknown: sides of the part beyond which patches may continue.
 
     Returns:
-        Whether the size of a patch in ``need`` is unknown, as it may continue outside the part;
-        such a patch stays.
+        Whether the size of a patch in ``need`` is unknown, since it may continue outside the part;
+        such a patch is kept.
     """
     count = _count_runs(mask, part, target)
     begin = np.empty(count, dtype=np.int32)
@@ -184,14 +184,14 @@ def clear_small(
 
     Args:
         mask: (h, w) uint8, 0 or 255, C-contiguous.
-        least_px: least size of a patch that stays.
+        least_px: least size of a patch that is kept.
         connectivity: 4 or 8.
-        zone: part of the mask that is searched; all of it if None.
-        need: where the result is needed; all of the zone if None.
+        zone: part of the mask that is searched; None = the whole mask.
+        need: where the result is needed; None = the whole zone.
         unknown: sides of the zone beyond which patches may continue.
 
     Returns:
-        Whether the size of a needed patch is unknown; such a patch stays.
+        Whether the size of a needed patch is unknown; such a patch is kept.
     """
     zone = zone or Region(0, 0, mask.shape[1], mask.shape[0])
     part = occupied(mask, zone)

@@ -1,8 +1,9 @@
 """Trimming of the silhouette's border: pixels that the body covers by less than half are cleared.
 
-The foreground test passes for any difference from the background, hence also for border pixels of
-which the body covers a small part, and the silhouette is half a pixel too wide. Such a pixel is a
-mixture, I = a F + (1 - a) B, of its background B and the body F beside it; a is the covered part.
+The foreground test passes for any difference from the background, hence also for border pixels that
+the body covers only partly, and the silhouette is half a pixel too wide. Such a pixel is a mixture,
+I = a F + (1 - a) B, of its background B and the colour F of the body beside it; a is the covered
+fraction.
 """
 
 import cv2
@@ -34,7 +35,7 @@ def _sum_near(image, source, top, bottom, left, right, sums):  # type: ignore[no
 
 
 @kernel
-def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, sums, gone):  # type: ignore[no-untyped-def]
+def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, sums, cleared):  # type: ignore[no-untyped-def]
     """Mark pixels of the mask's border that the body covers by less than half.
 
     Args:
@@ -44,9 +45,9 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, su
         left, top: the part's first column and row in the image.
         mask: (a, b) uint8, 0 or 255.
         inner, deep: (a, b) the mask without its border, and without two layers.
-        least: least squared difference of body and background; smaller ones are not decided.
+        least: least squared difference of body and background for which a pixel is decided.
         sums: (c,) int32, scratch.
-        gone: (a, b) uint8, 255 at pixels to clear; written.
+        cleared: (a, b) uint8, 255 at pixels to clear; written.
     """
     rows, columns = mask.shape
     channels = image.shape[2]
@@ -54,7 +55,7 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, su
     for i in range(rows):
         first, last = max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)
         for j in range(columns):
-            gone[i, j] = 0
+            cleared[i, j] = 0
             if mask[i, j] == 0 or inner[i, j] != 0:
                 continue
             begin, end = max(j - _NEAR_PX, 0), min(j + _NEAR_PX + 1, columns)
@@ -71,11 +72,11 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, su
                 along += (np.float32(image[i, j, c]) - base) * contrast
                 length += contrast * contrast
             if length >= least and along < np.float32(0.5) * length:
-                gone[i, j] = 255
+                cleared[i, j] = 255
 
 
 def border_radius_px(layers: int) -> int:
-    """Radius on which a pixel's result of `trim_border` depends, px."""
+    """Radius of the neighbourhood that a pixel's result of `trim_border` depends on, px."""
     return layers * (_NEAR_PX + 2)
 
 
@@ -98,9 +99,9 @@ def trim_border(
         mask: (a, b) uint8, 0 or 255, of the part.
         part: its place in the image.
         layers: largest number of border layers to clear, one after the other.
-        least: least difference of body and background, grey levels; smaller ones are not decided.
+        least: least difference of body and background for which a pixel is decided, grey levels.
     """
-    gone, sums = np.empty_like(mask), np.empty(image.shape[2], dtype=np.int32)
+    cleared, sums = np.empty_like(mask), np.empty(image.shape[2], dtype=np.int32)
     for _ in range(layers):
         inner = cv2.erode(mask, SOLID)
         deep = cv2.erode(inner, SOLID)
@@ -115,6 +116,6 @@ def trim_border(
             deep,
             np.float32(least**2),
             sums,
-            gone,
+            cleared,
         )
-        cv2.subtract(mask, gone, dst=mask)
+        cv2.subtract(mask, cleared, dst=mask)

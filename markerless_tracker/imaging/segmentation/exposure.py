@@ -1,8 +1,8 @@
 """Brightness of an image relative to its background, by channel.
 
-Exposure control, flicker and clouds multiply a whole image by a factor. It is the mode of the
-ratios of pixels to their background: a person or a shadow gives other ratios, but in fewer pixels.
-The factor of an image depends on this image alone.
+Exposure control, flicker and clouds multiply a whole image by a factor. The factor is estimated as
+the mode of the ratios of pixels to their background: a person or a shadow gives other ratios, but
+in fewer pixels. It depends on this image only.
 """
 
 import math
@@ -14,7 +14,7 @@ from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.observation import locked
 
-# Pixels of the sampling grid.
+# Number of pixels of the sampling grid.
 _SAMPLES = 6_000
 # Range of the histogram of log ratios: ratios from 1/4 to 4.
 _LOG_RANGE = math.log(4.0)
@@ -30,7 +30,7 @@ _LEAST_SAMPLES = 200
 
 @compiled()
 def _mode(counts, sums):  # type: ignore[no-untyped-def]
-    """Ratio at the fullest stretch of bins; 1 if too few are in it."""
+    """Ratio at the window of bins with the most samples; 1 if it has too few."""
     inside = 0
     for place in range(_WINDOW):
         inside += counts[place]
@@ -66,19 +66,19 @@ def _mode(counts, sums):  # type: ignore[no-untyped-def]
 def modal_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-untyped-def]
     """Fill gain (c,) from the pixels where (n, 2) = (v, u) of an image (h, w, c).
 
-    base_logs: (n, c) log of the background there; value_logs: (256,) log of each grey level; NaN
-    where not usable.
+    base_logs: (n, c) log of the background at these pixels; value_logs: (256,) log of each grey
+    level; NaN if not usable.
     """
     per_log = _BINS / (2.0 * _LOG_RANGE)
     channels = gain.size
     counts = np.zeros((channels, _BINS), dtype=np.int64)
     sums = np.zeros((channels, _BINS), dtype=np.float64)
-    # The channels of a pixel lie side by side in memory.
+    # The channels of a pixel are adjacent in memory.
     for i in range(where.shape[0]):
         pixel = image[where[i, 0], where[i, 1]]
         for c in range(channels):
             ratio = value_logs[pixel[c]] - base_logs[i, c]
-            if abs(ratio) < _LOG_RANGE:  # not for NaN either
+            if abs(ratio) < _LOG_RANGE:  # False for NaN.
                 place = min(int((ratio + _LOG_RANGE) * per_log), _BINS - 1)
                 counts[c, place] += 1
                 sums[c, place] += ratio

@@ -1,4 +1,4 @@
-"""The background as the foreground test reads it: Gaussians of every pixel, by channel."""
+"""The background in the layout of the foreground test: Gaussians of every pixel, by channel."""
 
 import cv2
 import numpy as np
@@ -16,16 +16,16 @@ from markerless_tracker.observation import locked
 # Largest difference between the channels of a grey camera's background, grey levels.
 _GREY_TOLERANCE = 0.5
 _LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
-# Window of the Gaussian blur that noisy images get.
+# Window of the Gaussian blur of noisy images.
 _SMOOTH_PX = (5, 5)
-# Mean of a mode that a pixel lacks: no value is near it or in its shadow.
+# Mean of a mode that a pixel lacks, so that no value is near it or in its shadow.
 _NOWHERE = np.float32(-1e6)
 
 
 class BackgroundGaussians:
-    """One camera's background in the form in which images are compared with it.
+    """One camera's background, prepared for comparison with images.
 
-    Grey cameras are compared in one channel, noisy ones after a blur.
+    Images of grey cameras are compared in one channel, noisy images after a blur.
 
     Args:
         camera: the camera's name.
@@ -33,7 +33,7 @@ class BackgroundGaussians:
         settings: those of the foreground test.
 
     Attributes:
-        is_grey: whether one channel carries all information.
+        is_grey: whether one channel has all information.
         mean: (k, c, h, w) float32 grey levels, means of the k Gaussians of each pixel.
         scale: (k, c, h, w) float32, 1 / (sigma sqrt(limit)): the foreground test is |.|^2 > 1.
         grey_mean: (h, w) float32, the first Gaussian's mean as a grey image.
@@ -65,9 +65,9 @@ class BackgroundGaussians:
         self.mean[...] = self._learned()[0]
 
     def pixels(self, image: Image, region: Region) -> Image:
-        """(h, w, c) of a region as it is compared: smoothed if too noisy, one channel if grey.
+        """Pixels (h, w, c) of a region for comparison: smoothed if noisy, one channel if grey.
 
-        Contiguous, and not to be written.
+        The array is contiguous and must not be written.
         """
         wide = region.grown(_SMOOTH_PX[0] // 2 if self._smooth else 0, self.size_px)
         part = image[wide.slices]
@@ -76,11 +76,11 @@ class BackgroundGaussians:
             part = part[region.relative_to(wide).slices]
         if self.is_grey:
             part = grey_of(part)
-        # Kernels are compiled once for all images, also for those that may not be written.
+        # All images are read-only, so that kernels are compiled once.
         return locked(part.reshape(region.height, region.width, -1), np.uint8)
 
     def _smoothed(self, mean: FloatImage, variance: FloatImage) -> tuple[FloatImage, FloatImage]:
-        """Mean and variance (h, w, c) of images as they are compared: smoothed if too noisy."""
+        """Mean and variance (h, w, c) for comparison: smoothed if too noisy."""
         if not self._smooth:
             return mean, variance
         smooth = np.asarray(cv2.GaussianBlur(mean, _SMOOTH_PX, 0.0), dtype=np.float32)

@@ -23,9 +23,9 @@ def coarse(
 ) -> tuple[NDArray[np.uint16], np.float32]:
     """Means and scales (c, h, w) as integers (2, c, h, w), and the number of steps of scale 1.
 
-    Integers of 16 bits halve the memory traffic, which limits the pass over an image. The error of
-    means is at most 1/512 grey level, that of scales below a thousandth if none is 60 times
-    another.
+    Integers of 16 bits halve the memory traffic, which limits the speed of the pass over an image.
+    The error of means is at most 1/512 grey level; that of scales is below a thousandth if no scale
+    is 60 times another.
     """
     unit = np.float32(65535.0 / max(float(scale.max()), 1e-9))
     steps = np.stack([np.clip(mean, 0.0, 255.0) * np.float32(LEVELS), scale * unit])
@@ -36,7 +36,7 @@ def coarse(
 def hue_deg(blue, green, red, value, chroma):  # type: ignore[no-untyped-def]
     """Hue in degrees, [0, 360), as OpenCV defines it; ``chroma`` = max - min > 0.
 
-    Choices between two values in place of branches: loops with it can be vectorised.
+    It selects values instead of branching, so that loops with it can be vectorised.
     """
     blue_red, red_green, green_blue = blue - red, red - green, green - blue
     along = blue_red if value == green else red_green
@@ -62,7 +62,7 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
     mean_saturation = mean_chroma / mean_value if mean_value > np.float32(0.0) else np.float32(0.0)
     if saturation - mean_saturation > rule[2]:
         return False
-    # Hue of dark pixels is noise: it is compared where the shadowed background would have colour.
+    # The hue of dark pixels is noise: it is compared only if the shadowed background has colour.
     if mean_chroma * value < rule[4] * mean_value:
         return True
     if chroma <= np.float32(0.0) or mean_chroma <= np.float32(0.0):
@@ -91,19 +91,18 @@ def _beyond(distance, limit, row, marks):  # type: ignore[no-untyped-def]
         row[j] = marks[j]
 
 
-# `is_shadow` of many pixels, with choices between two values in place of branches: the compiler
-# makes vector instructions of that. Where half of the pixels are marked they take a quarter of the
-# time of branches.
+# `is_shadow` of many pixels, with selections of values instead of branches, which the compiler
+# vectorises. If half of the pixels are marked, this takes a quarter of the time of branches.
 @compiled(error_model="numpy")
 def _split_marked(blue, green, red, first_b, first_g, first_r, gain, rule, marks, row):  # type: ignore[no-untyped-def]
-    """Fill a stretch of a row: shadow or foreground where it is marked, else 0.
+    """Fill a part of a row: shadow or foreground at marked pixels, else 0.
 
     Args:
         blue, green, red: (n,) uint8.
         first_b, first_g, first_r: (n,) means of the first Gaussians, of `coarse`.
         gain: 3 float32, brightness relative to the background's in those steps.
-        rule: as of `is_shadow`.
-        marks: (n,) uint8, not 0 where a pixel is not background.
+        rule: as for `is_shadow`.
+        marks: (n,) uint8, not 0 if a pixel is not background.
         row: (n,) uint8, written.
     """
     zero, one, white = np.float32(0.0), np.float32(1.0), np.float32(255.0)
@@ -128,7 +127,7 @@ def _split_marked(blue, green, red, first_b, first_g, first_r, gain, rule, marks
         mean_least = mean_b if mean_b < mean_g else mean_g
         mean_least = mean_least if mean_least < mean_r else mean_r
         chroma, mean_chroma = value - least, mean_value - mean_least
-        # Where a divisor is 0 the result does not count.
+        # The result is not used if a divisor is 0.
         by_value = value if value > zero else one
         by_mean_value = mean_value if mean_value > zero else one
         by_chroma = chroma if chroma > zero else one
@@ -155,8 +154,8 @@ def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels
     """Label a part of a colour image: 0 background, 127 shadow, 255 foreground.
 
     Args:
-        planes: (3, a, b) uint8, blue, green and red: the part alone.
-        first, unit: the first Gaussians, of `coarse`; most pixels are decided by them.
+        planes: (3, a, b) uint8, blue, green and red of the part.
+        first, unit: the first Gaussians, of `coarse`, which decide most pixels.
         mean: (k, 3, h, w) float32, grey levels, of the k Gaussians of each pixel.
         scale: (k, 3, h, w) float32, 1 / (sigma * sqrt(limit)): the foreground test is |.|^2 > 1.
         gain: (3,) float32, brightness of the image relative to the background's.
@@ -175,7 +174,7 @@ def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels
     words = marks.view(np.uint64)
     for i in range(rows):
         v = top + i
-        # First whole rows without branches: most pixels are background of the first Gaussian.
+        # Whole rows first, without branches: most pixels are background of the first Gaussian.
         distance[:] = 0.0
         for c in range(3):
             base = first[0, c, v, left : left + columns]
@@ -193,7 +192,7 @@ def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels
                 word += 1
             end = min(8 * word, columns)
             begin_u, end_u = left + begin, left + end
-            # Slices of one dimension: the compiler knows that their elements lie side by side.
+            # One-dimensional slices, whose elements the compiler knows to be adjacent.
             _split_marked(
                 planes[0, i, begin:end], planes[1, i, begin:end], planes[2, i, begin:end],
                 first[0, 0, v, begin_u:end_u], first[0, 1, v, begin_u:end_u],
@@ -227,7 +226,7 @@ def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels
 def label_grey(image, first, unit, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
     """As `label_colour` with one channel: image (a, b), mean and scale (k, 1, h, w), gain (1,).
 
-    The ratio of brightness alone decides on shadow.
+    Only the ratio of brightness decides on shadow.
     """
     one = np.float32(1.0)
     level = np.float32(1.0 / LEVELS)

@@ -36,12 +36,12 @@ from markerless_tracker.observation import locked
 WEAK_RADIUS_PX = 3
 """Radius of the patches whose mean is compared with the background."""
 _LEAST_SHARE = 0.5
-LOOK_PX = 3
-"""Radius within which the choice of pixels whose texture is examined depends on their labels."""
+EXAMINED_RADIUS_PX = 3
+"""Radius of the labels that decide whether a pixel's texture is examined."""
 
 
 def patch_radius_px(settings: ImagingSettings) -> int:
-    """Radius within which a label depends on other labels through the means of patches, px."""
+    """Radius of the labels that a label depends on through the means of patches, px."""
     compares = settings.shadow.undecided and settings.shadow.weak_sigmas > 0.0
     return WEAK_RADIUS_PX if compares else 0
 
@@ -57,7 +57,7 @@ class PixelLabeller:
         settings: of the foreground, shadow and texture tests.
 
     Attributes:
-        background: the Gaussians. `background.follow_s` says whether `mean` follows slow changes.
+        background: the Gaussians; with `background.follow_s`, `mean` follows slow changes.
         gain: (c,) float32, brightness of the last image relative to the background's.
     """
 
@@ -66,7 +66,7 @@ class PixelLabeller:
         self._settings = settings
         gaussians = self.background
         self._first = kernels.coarse(gaussians.mean[0], gaussians.scale[0])
-        # The same memory.
+        # A view of the same memory.
         self._means_channels_last = gaussians.mean.transpose(0, 2, 3, 1)
         self._scales_channels_last = gaussians.scale.transpose(0, 2, 3, 1)
         self.gain: NDArray[np.float32] = np.ones(gaussians.mean.shape[1], dtype=np.float32)
@@ -78,12 +78,12 @@ class PixelLabeller:
         )
         self._rule = shadow_rule(settings, grey=gaussians.is_grey)
         self._patches = self._patches_of_background()
-        # A pixel that alternates between several appearances has no one pattern.
+        # A pixel that alternates between several appearances has no single pattern.
         self._uses_texture = (
             settings.texture.radius_px > 0 and settings.shadow.removal and not background.modes
         )
-        # A single still does not tell its noise, and holds errors that patches do not average out.
-        # A slow change of light, which the background follows, looks like a faint patch.
+        # A single still does not show its noise, and has errors that patches do not average out.
+        # A slow change of light, which the background follows, would look like a faint patch.
         self._uses_patches = (
             patch_radius_px(settings) > 0
             and background.variance.min() < background.variance.max()
@@ -91,16 +91,16 @@ class PixelLabeller:
             and not background.modes
         )
         width, height = gaussians.size_px
-        # Smaller images show limbs smaller: patches must not be wider than those.
+        # Limbs are smaller in smaller images; patches must not be wider than limbs.
         scale = min(1.0, math.sqrt(width * height / FULL_FRAME_PX))
         self._patch_radius_px = max(1, round(WEAK_RADIUS_PX * scale))
         self._memory = np.empty(height * width, dtype=np.uint8)
         self._planes = np.empty(0 if gaussians.is_grey else 3 * height * width, dtype=np.uint8)
 
     def _patches_of_background(self) -> FloatImage | None:
-        """What `even_patches` knows about the background, if the colours of patches are compared.
+        """The background for `even_patches`; None if the colours of patches are not compared.
 
-        A pixel that alternates between several appearances has no one colour.
+        A pixel that alternates between several appearances has no single colour.
         """
         means = self.background.mean
         if len(means) > 1 or not compares_patches(self._settings, grey=self.background.is_grey):
@@ -123,7 +123,7 @@ class PixelLabeller:
         self.gain[:] = 1.0
 
     def measure_exposure(self, image: Image) -> None:
-        """Set `gain` from a whole image (h, w) or (h, w, 3), if the settings ask for it."""
+        """Set `gain` from a whole image (h, w) or (h, w, 3), if the settings require it."""
         if self._settings.background.exposure_compensation:
             self.gain[:] = self._meter.gain(image.reshape(image.shape[0], image.shape[1], -1))
 
@@ -133,7 +133,7 @@ class PixelLabeller:
         Args:
             image: the whole image.
             window: the labelled region.
-            corrected: inside the window; texture corrects labels here alone.
+            corrected: the part of the window in which texture corrects labels.
         """
         part = self.background.pixels(image, window)
         count = window.width * window.height
@@ -166,13 +166,13 @@ class PixelLabeller:
             part: (h, w, 3) the image in the window.
             planes: (3, h, w) its channels.
             labels: (h, w).
-            window: where it lies in the image.
+            window: its place in the image.
         """
         size_px = (window.width, window.height)
         box = occupied(labels, Region.whole(size_px))
         if self._patches is None or box.width <= 0:
             return
-        # The patches of the box's pixels lie inside.
+        # The box includes the patches of its pixels.
         rows, columns = box.grown(PATCH_RADIUS_PX, size_px).slices
         corner = (window.left + columns.start, window.top + rows.start)
         means = patch_means(planes[:, rows, columns])
@@ -191,7 +191,7 @@ class PixelLabeller:
         """Label background as weak where a patch differs from it, though no single pixel does."""
         options = self._settings.shadow
         limit = max(options.weak_least, options.weak_sigmas * self.background.sigma)
-        # Pixels that differ by themselves would smear over those beside them.
+        # Pixels that differ by themselves would affect the patches beside them.
         mark_weak(
             planes, self._first[0][0], self.gain, labels, (window.left, window.top),
             radius=self._patch_radius_px, limit=limit, least_share=_LEAST_SHARE,
@@ -202,13 +202,13 @@ class PixelLabeller:
     ) -> None:
         """Correct the labels (h, w) of a window inside `corrected`, in place."""
         options, is_grey = self._settings, self.background.is_grey
-        part, looked_at = window, labels
+        part, examined = window, labels
         if not is_grey:
-            # Specks are removed later: their texture is not tested.
+            # Specks are removed later, so their texture is not tested.
             solid = cv2.threshold(labels, kernels.SHADOW, 255, cv2.THRESH_BINARY)[1]
             cv2.morphologyEx(solid, cv2.MORPH_OPEN, SOLID, dst=solid)
-            looked_at = np.asarray(cv2.dilate(solid, SOLID), dtype=np.uint8)
-            part = occupied(looked_at, corrected.relative_to(window)).moved(window.left, window.top)
+            examined = np.asarray(cv2.dilate(solid, SOLID), dtype=np.uint8)
+            part = occupied(examined, corrected.relative_to(window)).moved(window.left, window.top)
         if part.width <= 0:
             return
         seen = part.grown(correction_radius_px(options.texture.radius_px), self.background.size_px)
@@ -221,7 +221,7 @@ class PixelLabeller:
             window,
             part,
             seen,
-            looked_at=looked_at,
+            examined=examined,
             radius=options.texture.radius_px,
             light=(options.texture.light_min, options.shadow.value_max + 0.03),
             protect=is_grey,
@@ -229,11 +229,12 @@ class PixelLabeller:
         )
 
     def follow(self, image: Image, mask: Mask | None, stamp_ns: int) -> None:
-        """Let the background follow an image, if the settings ask for it.
+        """Let the background follow an image, if the settings require it.
 
         Args:
             image: the whole image.
-            mask: (h, w) its silhouette; None if only a part was segmented: nothing is learned.
+            mask: (h, w) its silhouette; None if only a part was segmented, from which nothing is
+                learned.
             stamp_ns: capture time.
         """
         if self._adaptation is None:

@@ -1,4 +1,4 @@
-"""Localised active contour: the silhouette's contour moves to the local change of colour."""
+"""Localised active contour: moves the silhouette's contour to the local change of colour."""
 
 import cv2
 import numpy as np
@@ -15,7 +15,7 @@ _LEAST_FORCE = np.float32(0.2)
 
 @kernel
 def move_contour(image, total, inside, size, count, smooth, mask, band, least, out):  # type: ignore[no-untyped-def]
-    """One step of the contour: pixels beside it that fit the other side better change sides.
+    """One step of the contour: pixels beside it that fit the other side better are moved to it.
 
     Args:
         image: (a, b, c) uint8.
@@ -25,7 +25,7 @@ def move_contour(image, total, inside, size, count, smooth, mask, band, least, o
         smooth: (a, b) int32, pixels in the mask of a small window.
         mask: (a, b) uint8, 0 or 1.
         band: (a, b) uint8, 0 where no pixel may change.
-        least: least squared difference of both sides' means; below it the contour stays.
+        least: least squared difference of both sides' means for which the contour moves.
         out: (a, b) uint8, the new mask; written.
     """
     rows, columns = mask.shape
@@ -63,7 +63,7 @@ def move_contour(image, total, inside, size, count, smooth, mask, band, least, o
 
 
 def refinement_radius_px(iterations: int, radius_px: int) -> int:
-    """Radius on which a pixel's result of `refine_contour` depends, px."""
+    """Radius of the neighbourhood that a pixel's result of `refine_contour` depends on, px."""
     return iterations * (radius_px + 1)
 
 
@@ -77,19 +77,19 @@ def refine_contour(
     the local image has the means u inside and v outside. The point moves to the side whose mean is
     nearer to its colour; a second force keeps the contour smooth. Differences from the paper:
 
-    - the contour runs between pixels in steps of a pixel: the level set function is its sign alone,
-      without gradient and reinitialisation;
+    - the contour runs between pixels in steps of a pixel: only the sign of the level set function
+      is kept, without gradient and reinitialisation;
     - the force is (u - v)(2 I - u - v) of the point's own colour I, over all channels, relative to
       the contrast (u - v)^2; the paper sums it along the contour in the ball;
-    - smoothness is the part of a 5x5 window that the mask fills, not the curvature;
+    - smoothness is the fraction of a 5x5 window that the mask fills, not the curvature;
     - the ball is a square, since sums over squares cost the same for every radius;
-    - the contour stays where the contrast is below `least`, and moves by at most one pixel per
-      iteration from its origin: the foreground test has more information than local colours.
+    - the contour does not move where the contrast is below `least`, and moves by at most one pixel
+      per iteration from its origin: the foreground test has more information than local colours.
 
     Args:
         image: (h, w, c) uint8.
         mask: (h, w) uint8, 0 or 255.
-        iterations: steps of a pixel.
+        iterations: number of steps, of one pixel each.
         radius_px: half the side of the square.
         least: least difference of both sides' means, grey levels.
     """

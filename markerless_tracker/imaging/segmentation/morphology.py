@@ -15,7 +15,7 @@ FULL_FRAME_PX = 640 * 480
 
 
 def opening_radius_px(settings: ImagingSettings, *, grey: bool) -> int:
-    """Radius on which `shadow_patches` depends, px, apart from the size of patches."""
+    """Radius of the labels that `shadow_patches` depends on, px, besides the size of patches."""
     return 2 if grey or settings.shadow.undecided else 0
 
 
@@ -34,10 +34,10 @@ def shadow_patches(
     Args:
         labels: (h, w) uint8, as of `labels.PixelLabeller`.
         shadow: (h, w) uint8, written: 0 or 255.
-        least_px: smaller patches (4-connected) are cleared; none are if it is 1 or less.
-        opened: whether to open the patches first, by 3 px: pixels that the person covers in part
-            are darker than a bright background as well.
-        zone, need, unknown: as `blobs.clear_small` takes them.
+        least_px: smaller patches (4-connected) are cleared; none if it is 1 or less.
+        opened: whether to open the patches first, by 3 px, since pixels that the person covers
+            partly are darker than a bright background, too.
+        zone, need, unknown: as for `blobs.clear_small`.
 
     Returns:
         Whether the size of a needed patch is unknown.
@@ -51,7 +51,7 @@ def shadow_patches(
 
 
 SPLIT_RADIUS_PX = 3
-"""How far from a pixel `split_undecided` looks."""
+"""Radius of the neighbourhood that a pixel's result of `split_undecided` depends on."""
 
 
 def split_undecided(mask: Mask, shadow: Mask) -> None:
@@ -59,7 +59,7 @@ def split_undecided(mask: Mask, shadow: Mask) -> None:
 
     Args:
         mask: (h, w) all that is not background; becomes the person.
-        shadow: (h, w) pixels that may be shadow; becomes the undecided ones: those, and specks
+        shadow: (h, w) pixels that may be shadow; becomes the undecided pixels, which include specks
             and threads of the person among them.
     """
     cv2.bitwise_and(shadow, mask, dst=shadow)
@@ -73,18 +73,18 @@ def split_undecided(mask: Mask, shadow: Mask) -> None:
 
 
 def closing_px(settings: ImagingSettings, frame_px: int) -> int:
-    """Side of the closing in a frame of that many pixels, odd; `mask.close_px` says how."""
+    """Side of the closing in a frame of `frame_px` pixels, odd; see `mask.close_px`."""
     side = settings.mask.close_px * min(1.0, math.sqrt(frame_px / FULL_FRAME_PX))
     return 2 * round((side - 1.0) / 2.0) + 1 if side > 1.0 else 1
 
 
 def repair_radius_px(settings: ImagingSettings, frame_px: int) -> int:
-    """Radius on which a pixel depends through opening and closing, px."""
+    """Radius of the neighbourhood that a pixel depends on through opening and closing, px."""
     return 2 * (settings.mask.open_px // 2) + 2 * (closing_px(settings, frame_px) // 2)
 
 
 def open_and_close(mask: Mask, settings: ImagingSettings, frame_px: int) -> None:
-    """Remove specks and close cracks of a mask (h, w) of a frame of that many pixels, in place."""
+    """Remove specks and close cracks of a mask (h, w) of a frame of `frame_px` pixels, in place."""
     if settings.mask.open_px > 1:
         cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc(settings.mask.open_px), dst=mask)
     side = closing_px(settings, frame_px)

@@ -1,7 +1,7 @@
-"""Means of patches: they differ from the background where no single pixel does.
+"""Means of patches, which may differ from the background where no single pixel does.
 
-The mean of a patch has less noise than a pixel: it finds clothes
-nearly of the background's colour, and faint shadows.
+The mean of a patch has less noise than a pixel. So it shows clothes with nearly the background's
+colour, and faint shadows.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.imaging.segmentation.kernels import LEVELS, WEAK
 
 STEPS = 16
-"""Differences are compared in this part of a grey level."""
+"""Number of steps per grey level in which differences are compared."""
 
 
 @inlined
@@ -25,10 +25,10 @@ def _mirrored(v, count):  # type: ignore[no-untyped-def]
 
 
 # Loops over one row of integers each, which the compiler vectorises. Sums of integers are exact in
-# any order, so that a patch has the same mean whatever rows were summed before.
+# any order, so that the mean of a patch does not depend on the rows summed before.
 @kernel
 def _take_plain(label, plain, old, total):  # type: ignore[no-untyped-def]
-    """Row of background pixels, 1 or 0; the column sums ``total`` lose the row ``old`` for it."""
+    """Fill ``plain``, 1 at background pixels; it replaces ``old`` in the column sums ``total``."""
     for j in range(label.size):
         # Weak pixels were background before.
         one = np.int32((label[j] == 0) | (label[j] == WEAK))
@@ -39,7 +39,7 @@ def _take_plain(label, plain, old, total):  # type: ignore[no-untyped-def]
 
 @kernel
 def _take_differences(value, mean, gain, plain, old, total):  # type: ignore[no-untyped-def]
-    """As `_take_plain`, of a row's differences from the background, in steps of 1 / `STEPS`."""
+    """As `_take_plain`, for a row's differences from the background, in steps of 1 / `STEPS`."""
     white = np.float32(255.0 * STEPS)
     for j in range(plain.size):
         base = np.int32(min(gain * np.float32(mean[j]), white) + np.float32(0.5))
@@ -138,7 +138,7 @@ def mark_weak(
         corner: the part's first column and row in the image.
         radius: of the patches, px.
         limit: least difference of a mean, grey levels.
-        least_share: share of a patch as which a smaller share of background pixels counts.
+        least_share: lower bound of the fraction of background pixels, by which sums are divided.
     """
     channels, _, columns = planes.shape
     side = 2 * radius + 1

@@ -1,4 +1,4 @@
-"""From labels to a silhouette: shadow patches, cracks, blobs, holes, border and contour."""
+"""Makes a silhouette from labels: shadow patches, cracks, blobs, holes, border and contour."""
 
 import cv2
 import numpy as np
@@ -15,7 +15,7 @@ from markerless_tracker.imaging.segmentation.morphology import open_and_close, s
 from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
 
-# Difference of body and background, in deviations of the noise, below which a border stays.
+# Least difference of body and background, in standard deviations of the noise, to move a border.
 _LEAST_CONTRAST = 5.0
 
 
@@ -34,10 +34,10 @@ def repair_mask(
     With three classes the mask holds shadows, too.
 
     Args:
-        labels: (h, w) uint8 of `zones.window`, as of `labels.PixelLabeller`.
-        mask: (h, w) uint8, written: 0 or 255; correct within `zones.zone` alone.
+        labels: (h, w) uint8 of `zones.window`, from `labels.PixelLabeller`.
+        mask: (h, w) uint8, written: 0 or 255; correct only within `zones.zone`.
         shadow: (h, w) uint8, written: 0 or 255, patches of shadow.
-        zones: where the labels lie in the image, and where the mask is needed.
+        zones: the place of the labels in the image, and where the mask is needed.
         settings: the group `mask`.
         grey: whether the camera is a grey one.
         least_shadow_px: smaller patches of shadow become foreground.
@@ -53,13 +53,14 @@ def repair_mask(
         need=zones.patches_before_repair.relative_to(window), unknown=zones.open_sides,
     ):  # fmt: skip
         return False
-    # Weak pixels count in large patches only: small ones are noise.
+    # Weak pixels count in large patches only, since small ones are noise.
     cv2.threshold(labels, WEAK, 255, cv2.THRESH_BINARY, dst=mask)
     if settings.shadow.undecided:
         cv2.bitwise_or(mask, shadow, dst=mask)
     else:
         cv2.subtract(mask, shadow, dst=mask)
-    # Outside of `zone_before_repair` the mask is wrong; opening and closing do not depend on that.
+    # The mask is wrong outside of `zone_before_repair`, where opening and closing do not depend on
+    # it.
     open_and_close(mask, settings, frame_px)
     zone, need = zones.zone.relative_to(window), zones.patches.relative_to(window)
     unknown = zones.open_sides
@@ -72,13 +73,13 @@ def repair_mask(
 def fit_border(
     image: Image, mask: Mask, zones: Zones, labeller: PixelLabeller, settings: ImagingSettings
 ) -> None:
-    """Move a mask's border to where the body ends, in place.
+    """Move a mask's border to the body's border, in place.
 
     Args:
         image: the whole image.
         mask: (h, w) uint8 of `zones.window`, 0 or 255; correct within `zones.zone`.
         zones: as in `repair_mask`.
-        labeller: what labelled this image.
+        labeller: the labeller of this image.
         settings: `mask.trim_px` and the group `level_set`.
     """
     zone = zones.zone.relative_to(zones.window)
@@ -93,7 +94,7 @@ def _trim(
     body = occupied(mask, zone)
     if layers == 0 or body.width <= 0:
         return
-    # One pixel more, so that the body ends inside the box, except at the image's border.
+    # Grown by a pixel, so that the body ends inside the box, except at the image's border.
     box = body.grown(1, (mask.shape[1], mask.shape[0]))
     part = np.ascontiguousarray(mask[box.slices])
     place = box.moved(window.left, window.top)
@@ -113,7 +114,7 @@ def _refine(
     labeller: PixelLabeller,
     settings: ImagingSettings,
 ) -> None:
-    """Move the mask's contour to the local contrast, in place; outside the zone it stays."""
+    """Move the mask's contour inside the zone to the local contrast, in place."""
     if settings.level_set.iterations == 0:
         return
     body = occupied(mask, zone)

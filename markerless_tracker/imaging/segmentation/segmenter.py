@@ -1,4 +1,4 @@
-"""One camera's image to evidence: silhouette and edge map."""
+"""Makes evidence of one camera's images: silhouette and edge map."""
 
 import threading
 
@@ -17,26 +17,25 @@ from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.records import Observation
 
-# Margin that is labelled at first beyond the needed region, for patches that continue there.
+# Initial margin beyond the needed region that is labelled, for patches that continue there.
 _SLACK_PX = 8
 
 
 class Segmenter:
     """Finds the person in one camera's images.
 
-    Its scratch images are reused, so `observe` and `labels` of one segmenter wait for each other;
-    the segmenters of different cameras may run side by side (the compiled passes and OpenCV release
-    the interpreter's lock).
+    Its scratch images are reused, so `observe` and `labels` of one segmenter wait for each other.
+    The segmenters of different cameras may run in parallel, since the kernels and OpenCV release
+    the interpreter's lock.
 
     Args:
         camera: the camera's name.
         background: its empty scene.
         settings: defaults if None.
-        edges: whether edge maps are read; if not, those of observations are 0.
+        edges: whether edge maps are used; if not, those of observations are 0.
 
     Attributes:
-        lock: held while an image is segmented; `gain` belongs to the image of the call before it
-            under the same lock.
+        lock: held while an image is segmented; hold it to read the `gain` of that image.
 
     Raises:
         ImageError: no background for this camera.
@@ -72,7 +71,7 @@ class Segmenter:
         return tuple(float(value) for value in self._labeller.gain)
 
     def warm_up(self) -> None:
-        """Compile what segments an image; then `reset`."""
+        """Compile the segmentation; then `reset`."""
         width, height = self._size_px
         channels = self.background.channels
         shape = (height, width) if channels == 1 else (height, width, channels)
@@ -94,7 +93,7 @@ class Segmenter:
         return self.classes(image, region)[0]
 
     def classes(self, image: Image, region: Region | None = None) -> tuple[Mask, Mask | None]:
-        """As `mask`, and the undecided pixels likewise; None with two classes.
+        """As `mask`, and a mask of the undecided pixels; None with two classes.
 
         Raises:
             ImageError: as `mask`.
@@ -121,15 +120,15 @@ class Segmenter:
     def observe(self, image: Image, stamp_ns: int, region: Region | None = None) -> Observation:
         """Silhouette and edge map of a region, or of the whole frame.
 
-        They depend on this image alone, unless `background.follow_s` lets the background follow
-        slow changes: then on the images before as well, in the order of the calls. Inside a region
-        they are what they would be in the whole frame.
+        They depend on this image only, unless `background.follow_s` lets the background follow slow
+        changes; then they depend on earlier images, too, in the order of the calls. Inside a region
+        they equal those of the whole frame.
 
         Args:
             image: (h, w, 3) BGR or (h, w) grey, uint8, of the background's size and channels.
             stamp_ns: capture time, goes into the observation.
-            region: the part of the image to segment; all of it if None. The background follows only
-                images that are segmented whole.
+            region: the part of the image to segment; None = the whole image. The background follows
+                only images that are segmented whole.
 
         Raises:
             ImageError: another size or other channels, or a region outside; names the camera.
@@ -165,10 +164,10 @@ class Segmenter:
         )
 
     def check(self, image: Image) -> None:
-        """Make sure that an image is of the background's size and channels.
+        """Check that an image has the background's size and channels.
 
         Raises:
-            ImageError: it is not; names the camera.
+            ImageError: it has not; names the camera.
         """
         check_image(image, self.camera, size_px=self._size_px)
         channels = 1 if image.ndim == 2 else 3
@@ -184,8 +183,8 @@ class Segmenter:
     ) -> tuple[Mask, Mask | None, Region]:
         """Person and undecided of a zone that contains the region and `radius_px` px around it.
 
-        Decisions by the size of a patch need the whole patch: the margin grows until no needed
-        patch of unknown size continues outside.
+        Decisions by the size of a patch need the whole patch, so the margin is increased until the
+        sizes of all needed patches are known.
         """
         self._labeller.measure_exposure(image)
         need = region.grown(radius_px, self._size_px)

@@ -1,17 +1,17 @@
-"""The shadow test: which pixels are background in a shadow (H-MCPSO Eq 12).
+"""The shadow test: finds pixels that are background in a shadow (H-MCPSO Eq 12).
 
 A shadow darkens a surface and keeps its colour: with image I and background B in HSV, a pixel is
 shadow where w <= I_V / B_V <= e, I_S - B_S <= tau_S and |I_H - B_H| <= tau_H. Hue is an angle: the
-difference is taken around the circle, and hue is compared only where the darkened background would
-have colour. On grey cameras the ratio of brightness decides alone, in a narrower range. The paper
-prints no values: the defaults are measured. A shadow is also a patch of some size, unlike a few
+difference is taken around the circle, and hue is compared only if the darkened background would
+have colour. For grey cameras only the ratio of brightness decides, in a narrower range. The paper
+prints no values; the defaults were measured. A shadow is also a patch of some size, unlike a few
 pixels of clothes that pass the test (`morphology.shadow_patches`; not in the paper).
 
-Where shadows are undecided, the colours of patches decide besides (not in the paper). A shadow
-takes the same part of the light from every channel, so the ratios of image to background are alike
-in all of them. In a single dark pixel noise hides that: the saturation of a pixel of 80 grey levels
+If shadows are undecided, the colours of patches decide, too (not in the paper). A shadow removes
+the same fraction of the light from every channel, so the ratios of image to background are equal in
+all of them. In a single dark pixel noise hides this: the saturation of a pixel of 80 grey levels
 with a noise of 4 varies by 0.07, more than a shadow may differ. The mean of a patch has a fraction
-of that noise. It recognises shadows, and clothes that are nearly grey.
+of that noise, so it recognises shadows, and clothes that are nearly grey.
 """
 
 from typing import TypeVar, cast
@@ -31,7 +31,7 @@ PATCH_RADIUS_PX = 2
 """Radius of the patches whose colours are compared."""
 SIDE_PX = 2 * PATCH_RADIUS_PX + 1
 NOISE = 3.0
-"""Standard deviations of a patch's mean grey level by which its ratios may differ besides."""
+"""Additional tolerance of a patch's ratios, in standard deviations of its mean grey level."""
 
 
 def shadow_rule(settings: ImagingSettings, *, grey: bool = False) -> tuple[np.float32, ...]:
@@ -55,12 +55,12 @@ def shadow_rule(settings: ImagingSettings, *, grey: bool = False) -> tuple[np.fl
 
 
 def compares_patches(settings: ImagingSettings, *, grey: bool) -> bool:
-    """Whether the colours of patches decide besides those of pixels."""
+    """Whether the colours of patches decide in addition to those of pixels."""
     return settings.shadow.removal and settings.shadow.undecided and not grey
 
 
 def patches_radius_px(settings: ImagingSettings, *, grey: bool) -> int:
-    """Radius within which a label depends on the colours of patches, px."""
+    """Radius of the colours that a label depends on through patches, px."""
     return 2 * PATCH_RADIUS_PX if compares_patches(settings, grey=grey) else 0
 
 
@@ -84,7 +84,7 @@ def inverse_means(means: FloatImage) -> FloatImage:
 # One loop over one row, which the compiler vectorises.
 @kernel
 def _even_row(blue, green, red, bright_b, bright_g, bright_r, by, spread, noise, label, even):  # type: ignore[no-untyped-def]
-    # No mean is above white.
+    # No mean exceeds white.
     least = np.float32(1.0) / np.float32(255.0)
     for j in range(even.size):
         b = np.float32(blue[j]) * max(by[0] * bright_b[j], least)
@@ -98,14 +98,14 @@ def _even_row(blue, green, red, bright_b, bright_g, bright_r, by, spread, noise,
 
 @kernel
 def even_patches(patch, inverse, gain, spread, noise, left, top, labels, even):  # type: ignore[no-untyped-def]
-    """Find the pixels that differ from the background and whose patch is as dark in all channels.
+    """Find pixels that differ from the background and whose patch is equally dark in all channels.
 
     Args:
         patch: (3, a, b) uint8, means of the patches of a part of an image.
         inverse: (3, h, w) float32, of `inverse_means`.
         gain: (3,) float32, brightness of the image relative to the background's.
         spread: largest difference of ratios between channels, relative to the largest ratio.
-        noise: as much more is allowed, in grey levels of the brightest channel.
+        noise: additional tolerance, in grey levels of the brightest channel.
         left, top: the part's first column and row in the image.
         labels: (a, b) uint8, as of `labels.PixelLabeller`.
         even: (a, b) uint8, written: 255 or 0.
@@ -115,7 +115,7 @@ def even_patches(patch, inverse, gain, spread, noise, left, top, labels, even): 
     columns = labels.shape[1]
     for i in range(labels.shape[0]):
         v, label = top + i, labels[i]
-        # What no label needs is not fetched from memory.
+        # Columns without such pixels are not read from memory.
         begin, end = 0, columns
         while begin < end and label[begin] < SHADOW:
             begin += 1
@@ -133,15 +133,16 @@ def even_patches(patch, inverse, gain, spread, noise, left, top, labels, even): 
 
 @compiled()
 def label_by_patch(image, first, gain, rule, near, even, left, top, labels):  # type: ignore[no-untyped-def]
-    """Label as shadow or as foreground what differs from the background, by its patch.
+    """Label pixels that differ from the background as shadow or foreground, by their patches.
 
-    A pixel as dark as a shadow is one if its patch is even. At the border of something else its
-    patch is not; there it is one by its own colours if an even patch is near.
+    A pixel as dark as a shadow is shadow if its patch is even (equally dark in all channels). At
+    the border of another surface its patch is not even; there it is shadow if its own colour passes
+    the test and an even patch is near.
 
     Args:
         image: (a, b, 3) uint8, BGR: a part of an image.
         first: the background, of `kernels.coarse`.
-        gain, left, top: as of `even_patches`.
+        gain, left, top: as for `even_patches`.
         rule: of `shadow.shadow_rule`.
         near, even: (a, b) uint8, whether a patch nearby is even, and whether the pixel's own is.
         labels: (a, b) uint8, changed.
@@ -168,6 +169,6 @@ def label_by_patch(image, first, gain, rule, near, even, left, top, labels):  # 
 
 
 def near_even(even: Mask) -> Mask:
-    """Where (h, w) uint8, 0 or 255, an even patch has its centre within `PATCH_RADIUS_PX`."""
+    """Mask (h, w) of the pixels within `PATCH_RADIUS_PX` of the centre of an even patch."""
     square = np.ones((SIDE_PX, SIDE_PX), dtype=np.uint8)
     return cast(Mask, cv2.dilate(even, square))

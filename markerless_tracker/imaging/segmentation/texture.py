@@ -1,10 +1,10 @@
 """Texture test: a shadow keeps the background's pattern, a body hides it.
 
-Brightness alone does not separate a hard shadow from dark trousers, nor grey clothes from a grey
-wall of the same brightness. In a small window, image I and background B are compared by
-e^2 = var(I - p B) with the light p = mean(I) / mean(B). Where the window shows the background in
-any light, e^2 is the variance of the sensor's noise; where something covers the background it is
-larger by p^2 var(B), the pattern. A window is decided only if its pattern exceeds the noise.
+Brightness does not separate a hard shadow from dark trousers, nor grey clothes from a grey wall of
+the same brightness. In a small window, image I and background B are compared by
+e^2 = var(I - p B) with the light p = mean(I) / mean(B). If the window shows the background in any
+light, e^2 is the variance of the sensor's noise. If something covers the background, e^2 is larger
+by p^2 var(B), the pattern. A window is decided only if its pattern exceeds the noise.
 """
 
 import cv2
@@ -17,7 +17,7 @@ from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.kernels import FOREGROUND, SHADOW
 
 SHOWN_LEAST, HIDDEN_LEAST = 6.0, 6.0
-"""Least variance of the pattern, relative to the noise's, to decide that it is shown, or hidden."""
+"""Least ratio of the pattern's variance to the noise's to decide that it is shown, or hidden."""
 SAME, OTHER = 0.15, 0.85
 """e^2 minus noise variance, relative to the pattern: below SAME shown, above OTHER hidden."""
 UNKNOWN = 100.0
@@ -25,7 +25,7 @@ UNKNOWN = 100.0
 STEP = 0.006
 """Largest change of light between neighbouring pixels of one shadow."""
 SPREAD_PX = 24
-"""Distance over which windows without a pattern take over light, along rows, then along columns."""
+"""Distance over which light spreads to windows without a pattern: along rows, then columns."""
 MOST_RADIUS = 6
 """Largest radius of a window, px."""
 # Standard deviations of the noise within which a pixel agrees with a window's light.
@@ -42,7 +42,7 @@ def _slide(total, came, gone):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _slide_product(total, came_x, came_y, gone_x, gone_y):  # type: ignore[no-untyped-def]
-    """As `_slide`, of products of two images."""
+    """As `_slide`, for products of two images."""
     for j in range(came_x.size):
         total[j] += came_x[j] * came_y[j] - gone_x[j] * gone_y[j]
 
@@ -65,7 +65,7 @@ def _sum_across(part, side, total):  # type: ignore[no-untyped-def]
             total[j] += one[j] + other[j]
 
 
-# NumPy's error model: a test for division by zero would be a branch in the loop.
+# With NumPy's error model the loop has no branch to test for division by zero.
 @compiled(error_model="numpy")
 def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[no-untyped-def]
     """Fill out (w,) with the light of a row of windows, as `window_light` describes it.
@@ -78,7 +78,7 @@ def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[
     """
     for j in range(out.size):
         # n times a sum of squares fits into 31 bits up to a radius of `MOST_RADIUS`. Without the
-        # casts the products have 64 bits, for which processors have few vector instructions.
+        # casts the products would have 64 bits, for which there are few vector instructions.
         n = np.int32(down * across[j])
         share = np.float32(1.0) / np.float32(n)
         square_a, square_b = np.int32(a[j] * a[j]), np.int32(b[j] * b[j])
@@ -115,14 +115,13 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
     Windows end at the part's border.
 
     Args:
-        image: (a, b) uint8, the part alone.
+        image: (a, b) uint8, the part.
         mean: (h, w) float32, the background; the part begins at (left, top) of it.
         gain, noise: brightness relative to the background's, and variance of the noise.
         radius: of the windows, px.
         left, top: the part's first column and row in the image.
         light: (a, b) float32, written: p > 0 where the window shows the background in the light p;
-            -1 where something covers the background; UNKNOWN + p where there is no pattern; 0 if
-            undecided.
+            -1 where something covers the background; UNKNOWN + p without a pattern; 0 if undecided.
     """
     rows, columns = light.shape
     side = 2 * radius + 1
@@ -164,16 +163,16 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
 
 @compiled()
 def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
-    """Windows of a row without a pattern take over light from the row before, if it is similar.
+    """Spread light from the row before to windows of a row without a pattern, if it is similar.
 
     Args:
         row: (n,) light of the row.
         near: (n,) light that the row before passes on, 0 = none; becomes that of this row.
-        steps: (n,) how many rows have passed it on; likewise.
-        out: (n,) written where light is taken over.
+        steps: (n,) number of rows that have passed it on; updated, too.
+        out: (n,) written where light is spread to.
     """
     zero, one = np.float32(0.0), np.float32(1.0)
-    # Choices between two values at a time, which the compiler vectorises.
+    # Selections of values instead of branches, which the compiler vectorises.
     for j in range(row.size):
         p, before, passed, kept = row[j], near[j], steps[j], out[j]
         own = p - np.float32(UNKNOWN)
@@ -192,7 +191,7 @@ def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _spread_down_and_up(light, spread):  # type: ignore[no-untyped-def]
-    """Windows without a pattern take over light along columns; see `spread_light`."""
+    """Spread light along columns; see `spread_light`."""
     rows, columns = light.shape
     near = np.zeros(columns, dtype=np.float32)
     steps = np.zeros(columns, dtype=np.float32)
@@ -205,15 +204,15 @@ def _spread_down_and_up(light, spread):  # type: ignore[no-untyped-def]
 
 
 def spread_light(light: NDArray[np.float32], spread: NDArray[np.float32]) -> None:
-    """Windows without a pattern take over the light of windows next to them if theirs is similar.
+    """Spread light to neighbouring windows without a pattern, if their own light is similar.
 
-    First along rows, then along columns, `SPREAD_PX` each, so that a result depends on a bounded
-    neighbourhood. light (a, b) is changed; spread (a, b) is written.
+    It spreads along rows, then along columns, over at most `SPREAD_PX` each, so that a result
+    depends on a bounded neighbourhood. light (a, b) is changed; spread (a, b) is written.
     """
-    # Along rows each step needs the one before; along columns many are made at once.
-    turned = np.asarray(cv2.transpose(light), dtype=np.float32)
-    found = turned.copy()
-    _spread_down_and_up(turned, found)
+    # Along rows each step needs the one before; along columns many steps are made at once.
+    transposed = np.asarray(cv2.transpose(light), dtype=np.float32)
+    found = transposed.copy()
+    _spread_down_and_up(transposed, found)
     light[...] = cv2.transpose(found)
     spread[...] = light
     _spread_down_and_up(light, spread)
@@ -235,13 +234,13 @@ def lit(light, least, most, valid):  # type: ignore[no-untyped-def]
 @compiled()
 def apply_light(  # type: ignore[no-untyped-def]
     image, mean, gain, agree, radius, protect, reveal, left, top, light, near_valid, part, corner,
-    looked_at, labels,
+    examined, labels,
 ):  # fmt: skip
     """Correct labels by the light of the windows around each pixel, in place.
 
     A pixel that agrees with the light of any valid window around it is background, or shadow if its
     label was not background. Otherwise, if its own window is covered, shadow becomes foreground
-    with ``protect``, and background becomes foreground with ``reveal`` as well.
+    with ``protect``, and background becomes foreground with ``reveal``.
 
     Args:
         image, mean, gain, left, top, light: as in `window_light`; light is 0 where not valid,
@@ -249,10 +248,10 @@ def apply_light(  # type: ignore[no-untyped-def]
         agree: largest difference with which a pixel agrees, grey levels.
         radius: of the windows, px.
         protect, reveal: as for `correct_labels`.
-        near_valid: (a, b), not 0 where a window within the radius is valid.
+        near_valid: (a, b), not 0 if a window within the radius is valid.
         part: (left, top, right, bottom) of the light's array to correct.
         corner: column and row of the labels' array where that array begins.
-        looked_at: (c, d) shadow and foreground are corrected only where this is not 0.
+        examined: (c, d) shadow and foreground are corrected only where this is not 0.
         labels: (c, d).
     """
     rows, columns = light.shape
@@ -264,7 +263,7 @@ def apply_light(  # type: ignore[no-untyped-def]
             if label == 0:
                 if not reveal or light[i, j] >= 0.0:
                     continue
-            elif looked_at[y, x] == 0 or (label == SHADOW and not protect):
+            elif examined[y, x] == 0 or (label == SHADOW and not protect):
                 continue
             explained = False
             if near_valid[i, j] != 0:
@@ -286,7 +285,7 @@ def apply_light(  # type: ignore[no-untyped-def]
 
 
 def correction_radius_px(radius: int) -> int:
-    """Radius on which the correction of a pixel depends, px."""
+    """Radius of the neighbourhood that the correction of a pixel depends on, px."""
     return SPREAD_PX + 2 * radius
 
 
@@ -300,7 +299,7 @@ def correct_labels(
     part: Region,
     seen: Region,
     *,
-    looked_at: NDArray[np.uint8],
+    examined: NDArray[np.uint8],
     radius: int,
     light: tuple[float, float],
     protect: bool,
@@ -309,7 +308,7 @@ def correct_labels(
     """Correct labels by texture, in place.
 
     Args:
-        grey: (c, d) uint8, the seen part of the image.
+        grey: (c, d) uint8, the part `seen` of the image.
         mean: (h, w) grey background of the whole image.
         gain: brightness of the image relative to the background's.
         sigma: standard deviation of the sensor's noise, grey levels.
@@ -318,7 +317,7 @@ def correct_labels(
         part: the corrected region, inside the window.
         seen: place of ``grey``: the part and `correction_radius_px` around it, cut at the image's
             border.
-        looked_at: (a, b), 0 where shadow and foreground stay.
+        examined: (a, b), 0 where shadow and foreground are not corrected.
         radius: of the windows, px.
         light: least and largest light of a shadow.
         protect: whether shadow may become foreground.
@@ -336,5 +335,5 @@ def correct_labels(
     corner = (seen.left - window.left, seen.top - window.top)
     apply_light(
         grey, mean, one, np.float32(_AGREE * sigma), radius, protect, reveal, seen.left, seen.top,
-        found[1], near_valid, part.relative_to(seen), corner, looked_at, labels,
+        found[1], near_valid, part.relative_to(seen), corner, examined, labels,
     )  # fmt: skip

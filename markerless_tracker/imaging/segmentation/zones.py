@@ -1,11 +1,11 @@
-"""Regions of an image that a silhouette of a smaller region depends on."""
+"""Regions of an image that the silhouette in a smaller region depends on."""
 
 from dataclasses import dataclass
 
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.blobs import BOTTOM, LEFT, RIGHT, TOP
 from markerless_tracker.imaging.segmentation.border import border_radius_px
-from markerless_tracker.imaging.segmentation.labels import LOOK_PX, patch_radius_px
+from markerless_tracker.imaging.segmentation.labels import EXAMINED_RADIUS_PX, patch_radius_px
 from markerless_tracker.imaging.segmentation.level_set import refinement_radius_px
 from markerless_tracker.imaging.segmentation.morphology import (
     SPLIT_RADIUS_PX,
@@ -18,18 +18,18 @@ from markerless_tracker.imaging.settings import ImagingSettings
 
 @dataclass(frozen=True)
 class Zones:
-    """Nested regions, from the innermost to the outermost, each as large as the next one needs.
+    """Nested regions, from the innermost to the outermost; each includes what the one before needs.
 
     Attributes:
         patches: where patches must have the right size, before border and contour are moved.
-        zone: `patches` and some slack, in which patches are measured.
+        zone: `patches` and a margin, in which patches are measured.
         patches_before_repair, zone_before_repair: the same before opening and closing.
-        corrected: where texture corrects labels: `zone_before_repair`, and as far from it as the
-            opening of shadows and the means of patches depend on labels.
-        window: the labelled region: `corrected`, and as far from it as those labels depend on
-            colours.
+        corrected: where texture corrects labels: `zone_before_repair`, and the radius of labels
+            that the opening of shadows and the means of patches depend on.
+        window: the labelled region: `corrected`, and the radius of colours that these labels depend
+            on.
         open_sides: sides of `zone` beyond which the image continues.
-        frame_px: pixels of the whole image.
+        frame_px: number of pixels of the whole image.
     """
 
     patches: Region
@@ -51,7 +51,7 @@ class Zones:
         *,
         grey: bool,
     ) -> "Zones":
-        """The zones from which the silhouette in `need` follows, with slack for its patches."""
+        """The zones that the silhouette in `need` depends on, with a margin for its patches."""
         if settings.level_set.iterations:
             radius_px = refinement_radius_px(
                 settings.level_set.iterations, settings.level_set.radius_px
@@ -72,7 +72,9 @@ class Zones:
             patches_before_repair=patches.grown(repair, size_px),
             zone_before_repair=before,
             corrected=corrected,
-            window=corrected.grown(LOOK_PX + patches_radius_px(settings, grey=grey), size_px),
+            window=corrected.grown(
+                EXAMINED_RADIUS_PX + patches_radius_px(settings, grey=grey), size_px
+            ),
             open_sides=_open_sides(zone, size_px),
             frame_px=frame_px,
         )

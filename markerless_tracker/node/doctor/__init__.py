@@ -1,4 +1,4 @@
-"""Listening to cameras for the verb `doctor`.
+"""Reception of cameras' images for the verb `doctor`.
 
-`listen` receives their images for some seconds; `checks.stream` judges them.
+`listen` receives them for some seconds; `checks.stream` evaluates them.
 """

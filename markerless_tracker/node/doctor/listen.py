@@ -12,7 +12,7 @@ from markerless_tracker.node.ros.process import StopSignals, require_ros, runnin
 from markerless_tracker.node.ros.profile import apply_profile
 
 KEPT = 9
-"""Images of each camera that are decoded, evenly in time."""
+"""Number of images of each camera that are decoded, evenly spaced in time."""
 PATIENCE_S = 10.0
 """Longest wait for the first image, or the first topic: discovery takes a few seconds."""
 _TICK_S = 0.25
@@ -21,15 +21,15 @@ _LOOK_S = 1.0
 
 
 class Received(NamedTuple):
-    """What was received of one camera.
+    """The received images of one camera.
 
     Attributes:
         topic: of its images.
         stamps_ns, arrivals_s, ages_s: of each image: stamp, arrival by a monotonic clock, time
             from the stamp to the arrival by this machine's clock.
-        images: some of them, decoded.
+        images: some of the images, decoded.
         refused: number of unusable images.
-        trouble: why the last one could not be used; empty if all could.
+        trouble: why the last unusable image could not be used; empty if all could.
     """
 
     topic: str
@@ -42,7 +42,7 @@ class Received(NamedTuple):
 
 
 class _Sink:
-    """Takes one camera's images and troubles as `CameraInput` finds them."""
+    """Takes one camera's images and errors from a `CameraInput`."""
 
     def __init__(self, seconds: float) -> None:
         self._every_s = seconds / KEPT
@@ -54,7 +54,7 @@ class _Sink:
         self.count, self.trouble = 0, ""
 
     def add(self, camera: str, stamp_ns: int, view: Any, *, now_s: float) -> bool:
-        """Note an image; keep some."""
+        """Note an image; keep some of them."""
         self.stamps_ns.append(stamp_ns)
         self.arrivals_s.append(now_s)
         self.ages_s.append((time.time_ns() - stamp_ns) / 1e9)
@@ -68,10 +68,10 @@ class _Sink:
         self.count += 1
 
     def lost(self, camera: str, images: int) -> None:
-        """Lost images show in the rate."""
+        """Ignore lost images, which show in the rate."""
 
     def failed(self, message: str) -> None:
-        """Note what was wrong."""
+        """Note an error."""
         self.trouble = message
 
 
@@ -107,10 +107,10 @@ def listen(
 
     Args:
         cameras: their names.
-        seconds: how long, from the first image on; without any `PATIENCE_S` at least.
-        image_topic: topic, NAME stands for the camera.
-        stop: ends it earlier.
-        progress: called with the seconds that have passed.
+        seconds: duration from the first image on; without images at least `PATIENCE_S`.
+        image_topic: topic; NAME stands for the camera.
+        stop: ends the reception earlier.
+        progress: called with the number of seconds so far.
 
     Raises:
         RosMissingError: ROS is not installed.
@@ -129,7 +129,7 @@ def listen(
         ]  # fmt: skip
         topics = CameraTopics(node, inputs, transport="auto", clock=time.monotonic)
         begun_s = ticked_s = time.monotonic()
-        while not stop.asked:
+        while not stop.received:
             executor.spin_once(timeout_sec=_SPIN_S)
             now_s = time.monotonic()
             first = [sink.arrivals_s[0] for sink in sinks.values() if sink.arrivals_s]

@@ -1,4 +1,4 @@
-"""The node `player`: the images of a bag as topics.
+"""The node `player`: publishes the images of a bag as topics.
 
-Reads prefetch and keeps the pace of the recording.
+It prefetches the images and keeps the pace of the recording.
 """

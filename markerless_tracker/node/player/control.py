@@ -6,8 +6,8 @@ from typing import Any
 
 from std_srvs.srv import Trigger
 
-_LOOK_S = 0.05
-"""Time between two looks whether a paused player may go on."""
+_CHECK_S = 0.05
+"""Time between two checks whether a paused player may continue."""
 
 
 class Control:
@@ -29,19 +29,19 @@ class Control:
             node.create_service(Trigger, f"~/{name}", callback)
 
     def hold(self, spin: Callable[[float], bool]) -> float | None:
-        """Wait while the player is paused and no step is asked for.
+        """Wait while the player is paused and no step is requested.
 
         Args:
-            spin: lets callbacks run for that many seconds; returns False when it is time to end.
+            spin: lets callbacks run for a number of seconds; returns False when it is time to end.
 
         Returns:
-            How long it waited in s, None when it is time to end.
+            Duration of the wait in s; None when it is time to end.
         """
         if not self._paused:
             return 0.0
         began_s = time.monotonic()
         while self._paused and not self._steps:
-            if not spin(_LOOK_S):
+            if not spin(_CHECK_S):
                 return None
         self._steps -= self._paused
         return time.monotonic() - began_s

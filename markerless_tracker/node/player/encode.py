@@ -1,4 +1,4 @@
-"""Sets of a bag as serialised messages: as they are stored where that can be published."""
+"""Sets of a bag as serialised messages, unchanged if the stored ones can be published."""
 
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -22,7 +22,7 @@ class PlayedSet:
     Attributes:
         stamp_ns: time of the images.
         messages: camera -> serialised sensor_msgs/CameraInfo and sensor_msgs/Image.
-        others: messages of other topics since the last set, as they are stored.
+        others: stored messages of other topics since the last set.
     """
 
     stamp_ns: int
@@ -41,11 +41,11 @@ def played_sets(
     Args:
         recording: the bag.
         start: number of the first set.
-        cameras: those whose images are wanted.
+        cameras: names of the cameras whose images are played.
         others: gives the messages of other topics up to a time in ns.
 
-    An image message is taken as it is stored if it is a raw image in its camera's frame; others are
-    decoded and written anew.
+    A stored image message is used unchanged if it is a raw image in its camera's frame; others are
+    decoded and encoded again.
 
     Raises:
         DatasetError, ImageError: the bag ends before, or cannot be read.
@@ -78,14 +78,14 @@ def played_sets(
 
 
 def _as_stored(recording: BagRecording, name: str, raw: RawMessage) -> bytes | None:
-    """The stored bytes of an image message; None if they must be written anew."""
+    """The stored bytes of an image message; None if it must be encoded again."""
     if raw.type != RAW_TYPE:
         return None
     try:
         image = read_image(raw.data, raw.topic)
         check_layout(image, raw.topic)
     except ImageError:
-        # Decoding states what is wrong with it.
+        # Decoding reports the error.
         return None
     size_px = (image.width, image.height)
     if image.frame_id != optical_frame(name) or size_px != recording.rig[name].size_px:

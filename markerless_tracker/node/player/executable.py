@@ -37,15 +37,15 @@ def _run(argv: list[str], stop: StopSignals) -> int:
 
         def spin(seconds: float) -> bool:
             until_s = time.monotonic() + seconds
-            while not stop.asked:
+            while not stop.received:
                 left_s = until_s - time.monotonic()
                 executor.spin_once(timeout_sec=min(max(0.0, left_s), NOTICE_S))
                 if left_s <= 0.0:
                     break
-            return not stop.asked
+            return not stop.received
 
         node.play(spin)
-        if not stop.asked:
+        if not stop.received:
             node.finish(spin)
         node.get_logger().info(_summary(node.sets_played, node.playing_s, node.cpu_s))
     return 0

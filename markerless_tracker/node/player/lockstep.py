@@ -1,4 +1,4 @@
-"""Lockstep: the next set is sent when the trackers have dealt with the last."""
+"""Lockstep: the next set is sent when all trackers have processed the last set."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,15 +7,15 @@ from dataclasses import dataclass
 @dataclass
 class _Tracker:
     dealt_ns: int
-    heard_s: float
+    last_state_s: float
     waited_for: bool = True
 
 
 class Lockstep:
-    """Which trackers have not dealt with the set that was sent.
+    """Keeps which trackers have not yet processed the set that was sent.
 
-    A tracker counts once its `state` says ready. One that lets a set time out is not waited for
-    again until it has dealt with another set; one whose `state` is not heard for the timeout is
+    A tracker counts as soon as its `state` says ready. After a timeout, a tracker is not waited for
+    until it has processed another set. A tracker whose `state` is not received for the timeout is
     forgotten.
 
     Args:
@@ -34,27 +34,29 @@ class Lockstep:
         """Whether there is no tracker to wait for."""
         return not any(tracker.waited_for for tracker in self._trackers.values())
 
-    def hear(self, name: str, values: Mapping[str, str]) -> None:
-        """Take the values of a tracker's `state`."""
+    def update(self, name: str, values: Mapping[str, str]) -> None:
+        """Take the values of the `state` of a tracker."""
         if values.get("ready") != "true" or "dealt_with_ns" not in values:
             self._trackers.pop(name, None)
             return
         dealt_ns = int(values["dealt_with_ns"] or -1)
         known = self._trackers.setdefault(name, _Tracker(dealt_ns, self._clock()))
-        known.heard_s = self._clock()
+        known.last_state_s = self._clock()
         if dealt_ns != known.dealt_ns:
             known.dealt_ns, known.waited_for = dealt_ns, True
 
     def sent(self, stamp_ns: int) -> None:
-        """Begin to wait for the set of that stamp."""
+        """Begin to wait until the set of a stamp is processed."""
         self._sent = (stamp_ns, self._clock())
 
     def waiting_for(self) -> list[str]:
-        """Names of the trackers that have not dealt with the set; empty when the next is due."""
+        """Names of the trackers that have not processed the set; empty when the next is due."""
         if self._sent is None:
             return []
         now_s = self._clock()
-        for name in [n for n, t in self._trackers.items() if now_s - t.heard_s > self._timeout_s]:
+        for name in [
+            n for n, t in self._trackers.items() if now_s - t.last_state_s > self._timeout_s
+        ]:
             del self._trackers[name]
         return [
             name
@@ -63,7 +65,7 @@ class Lockstep:
         ]
 
     def overdue(self) -> list[str]:
-        """Names of the trackers that let the set time out, once; they are not waited for now."""
+        """Names of the trackers that have just timed out; they are no longer waited for."""
         if self._sent is None or self._clock() - self._sent[1] < self._timeout_s:
             return []
         late = self.waiting_for()

@@ -31,12 +31,12 @@ _PREFETCH_SETS = 8
 _REMIND_S = 10.0
 _DISCOVERY_S = 1.0
 _SERVE_S = 0.1
-"""Time between two looks at callbacks that are due, such as requests for parameters."""
+"""Interval at which due callbacks run, such as requests for parameters."""
 _PATIENCE_S = 5.0
 """Time for the discovery of a tracker in lockstep."""
 _ACKNOWLEDGE_S = 3.0
 _LATE_S = 0.05
-"""Delay of the last set that is reported."""
+"""Least delay of the last set that is reported."""
 # An acknowledged image may not have reached the subscriber's callback yet.
 _LINGER_S = 0.5
 
@@ -44,8 +44,8 @@ _LINGER_S = 0.5
 class PlayerNode(GivenNode):
     """Publishes ``NAME/image_raw`` and ``NAME/camera_info`` of every camera of a bag.
 
-    On request only some topics, also others that the bag has, and `/clock`. Its services are those
-    of `Control`.
+    By its parameters it publishes a selection of topics, other topics of the bag, and `/clock`. Its
+    services are those of `Control`.
 
     Args:
         node_arguments: passed on to ``rclpy.node.Node`` (context, parameter_overrides, ...).
@@ -77,7 +77,7 @@ class PlayerNode(GivenNode):
         self.playing_s = self.cpu_s = 0.0
 
     def waiting_for(self) -> list[str]:
-        """What `wait_for_subscribers` waits for, in words; empty when nothing is missing."""
+        """Descriptions of what `wait_for_subscribers` waits for; empty when nothing is missing."""
         missing = [
             f"a subscriber of {name}/image_raw"
             for name, publisher in self._images.items()
@@ -91,7 +91,7 @@ class PlayerNode(GivenNode):
         """Play the bag once, or repeatedly if it loops.
 
         Args:
-            spin: lets the node's callbacks run for about that many seconds (0: only those due);
+            spin: lets the node's callbacks run for about a number of seconds (0: only those due);
                 returns False when it is time to end.
 
         Raises:
@@ -101,7 +101,7 @@ class PlayerNode(GivenNode):
         if not going:
             return
         if not self.settings.lockstep:
-            # Every result comes with a state, and each would be decoded.
+            # Every result comes with a state, whose decoding would take time.
             self.destroy_subscription(self._states)
         count = self._recording.frame_count
         pace = f"at {self.settings.rate:g} x {self._recording.fps:g} fps"
@@ -131,7 +131,7 @@ class PlayerNode(GivenNode):
         return self.settings.lockstep and not self._lockstep.alone
 
     def _discover(self, spin: Callable[[float], bool]) -> bool:
-        """Wait a while for subscribers, in lockstep for a tracker: earlier images are lost."""
+        """Wait for subscribers, or in lockstep for a tracker, since earlier images are lost."""
         lockstep = self.settings.lockstep
         until_s = time.monotonic() + (_PATIENCE_S if lockstep else _DISCOVERY_S)
         while time.monotonic() < until_s:
@@ -154,12 +154,12 @@ class PlayerNode(GivenNode):
         return True
 
     def _pass(self, spin: Callable[[float], bool]) -> bool:
-        """Play once; returns whether to go on."""
+        """Play once; returns whether to continue."""
         pace = Pace(self.settings.rate, clock=time.monotonic)
         try:
             return self._send_all(pace, spin)
         finally:
-            # Also of a pass that is ended on the way.
+            # Also if the pass ended early.
             if (lost_s := pace.shifted_s + pace.late_s) > _LATE_S:
                 self.get_logger().warning(
                     f"could not keep pace: the last set was sent {lost_s:.2f} s late at rate "
@@ -167,7 +167,7 @@ class PlayerNode(GivenNode):
                 )
 
     def _send_all(self, pace: Pace, spin: Callable[[float], bool]) -> bool:
-        """Send the sets at their times; returns whether to go on."""
+        """Send the sets at their times; returns whether to continue."""
         with prefetch(self._sets, _PREFETCH_SETS) as sets:
             for played in sets:
                 wait_s = 0.0 if self._in_step else pace.wait_s(played.stamp_ns)
@@ -196,7 +196,7 @@ class PlayerNode(GivenNode):
         self.sets_played += 1
 
     def _until_dealt_with(self, stamp_ns: int, spin: Callable[[float], bool]) -> bool:
-        """In lockstep, wait until the trackers have dealt with a set; returns whether to go on."""
+        """In lockstep, wait until trackers have processed a set; returns whether to continue."""
         if not self._in_step:
             return True
         self._lockstep.sent(stamp_ns)
@@ -212,7 +212,7 @@ class PlayerNode(GivenNode):
         return True
 
     def _sleep(self, seconds: float, next_ns: int, spin: Callable[[float], bool]) -> bool:
-        """Sleep exactly until a set, serving callbacks now and then; False when it is time to end.
+        """Sleep until a set is due, serving callbacks at intervals; False when it is time to end.
 
         Args:
             seconds: until the set.
@@ -234,7 +234,7 @@ class PlayerNode(GivenNode):
     def _on_state(self, message: DiagnosticArray) -> None:
         for status in message.status:
             values = {pair.key: pair.value for pair in status.values}
-            self._lockstep.hear(status.name, values)
+            self._lockstep.update(status.name, values)
             if "ready" in values:
                 self._ready = values["ready"] == "true"
 
@@ -242,7 +242,7 @@ class PlayerNode(GivenNode):
 def _choice(
     recording: BagRecording, topics: Sequence[str] | None
 ) -> tuple[list[str], list[str], list[str]]:
-    """Cameras whose images, cameras whose infos are played, and names of other topics."""
+    """Cameras whose images are played, cameras whose infos are played, names of other topics."""
     names = recording.rig.names
     if topics is None:
         return list(names), list(names), []

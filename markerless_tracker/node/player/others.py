@@ -1,4 +1,4 @@
-"""Topics of a bag beside the images and camera infos: played as they are stored."""
+"""Topics of a bag other than images and camera infos; stored messages are played unchanged."""
 
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
@@ -10,11 +10,11 @@ from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.node.ros.qos import latched_qos, output_qos
 
 LATCHED = ("tf_static", "robot_description")
-"""Last parts of the topics whose last message late subscribers receive."""
+"""Last parts of the names of latched topics, whose last message late subscribers receive."""
 
 
 class OtherTopics:
-    """Publishes some topics of a bag, with the sets among which they were recorded.
+    """Publishes topics of a bag, in the recorded order among the sets of images.
 
     Args:
         node: creates the publishers.
@@ -61,7 +61,7 @@ class OtherTopics:
         return take
 
     def publish(self, messages: Sequence[RawMessage]) -> None:
-        """Publish messages as they are stored."""
+        """Publish stored messages unchanged."""
         for message in messages:
             self._publishers[message.topic].publish(bytes(message.data))
 

@@ -6,14 +6,14 @@ from collections.abc import Callable
 class Pace:
     """Publication times from the stamps of a recording and a rate.
 
-    The times are those of the first set and of the stamps, so that delays do not add up. After a
-    delay the sets that are overdue follow at most twice as fast as recorded, so that no burst of
-    images comes. A delay above `slack_s` shifts all later times; such delays add up in `shifted_s`.
+    The times are relative to the first set, so that delays do not add up. After a delay, overdue
+    sets follow at most twice as fast as recorded, so that there is no burst of images. A delay
+    above `slack_s` shifts all later times; `shifted_s` is the sum of such delays.
 
     Args:
         rate: 2 plays twice as fast as recorded.
         clock: monotonic time in s.
-        slack_s: delay that is caught up with.
+        slack_s: largest delay that later sets make up for.
     """
 
     def __init__(self, rate: float, *, clock: Callable[[], float], slack_s: float = 1.0) -> None:
@@ -26,9 +26,9 @@ class Pace:
         self.late_s = 0.0
 
     def wait_s(self, stamp_ns: int) -> float:
-        """Seconds until the set of that stamp is to be sent, 0 if it is due now or overdue.
+        """Seconds until the set of a stamp is to be sent; 0 if it is due now or overdue.
 
-        `late_s` is then how much later than its time it is sent.
+        `late_s` is then its delay.
         """
         now_s = self._clock()
         if self._origin is None:
@@ -47,7 +47,7 @@ class Pace:
         return at_s - now_s
 
     def held(self, seconds: float) -> None:
-        """Shift all later times by a pause, which is no delay."""
+        """Shift all later times by a pause, which does not count as a delay."""
         if self._origin is not None:
             self._origin = (self._origin[0] + seconds, self._origin[1])
         if self._last is not None:

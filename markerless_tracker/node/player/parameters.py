@@ -77,10 +77,10 @@ def player_values(settings: PlayerSettings) -> dict[str, Any]:
 
 
 def default_values() -> dict[str, Any]:
-    """Value of every parameter unless it is given; `bag` has none."""
+    """Default of every parameter; `bag` has none."""
     return {entry.name: entry.default for entry in fields(PlayerSettings) if entry.name != "bag"}
 
 
 def descriptions() -> dict[str, str]:
-    """One line about every parameter."""
+    """A one-line description of every parameter."""
     return declared.attribute_lines(PlayerSettings)

@@ -1,4 +1,4 @@
-"""Prefetching in a thread, so that decoding and publishing overlap."""
+"""Prefetches items in a thread, so that decoding and publishing overlap."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

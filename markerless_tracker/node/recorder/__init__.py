@@ -1,4 +1,4 @@
-"""The recorder: topics of a running graph, as they are, into an MCAP bag.
+"""The recorder: writes topics of a running graph, unchanged, to an MCAP bag.
 
-Which topics, subscriptions to them, and the process.
+`node` subscribes to the topics; `process` runs the node.
 """

@@ -1,4 +1,4 @@
-"""The node `recorder`: writes the messages of topics, as serialised, to a bag."""
+"""The node `recorder`: writes the serialised messages of topics to a bag."""
 
 import time
 from collections.abc import Sequence
@@ -9,16 +9,16 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from markerless_tracker.node.ros.declared import GivenNode
 
-_LOOK_S = 0.5
-"""Time between two looks for new topics."""
+_SEARCH_S = 0.5
+"""Interval of the search for new topics."""
 _FLUSH_S = 1.0
-"""Largest time of which a kill loses the messages."""
+"""Interval of flushes: a kill loses at most the messages of this time."""
 _DEPTH = 50
 _OF_ROS = ("/rosout", "/parameter_events")
 
 
 class Bag(Protocol):
-    """What the recorder asks of the writer of a bag (`bags.mcap_bag.BagWriter`)."""
+    """The part of a bag's writer (`bags.mcap_bag.BagWriter`) that the recorder uses."""
 
     def topic(self, name: str, kind: str, *, latched: bool = False) -> Any:
         """Declare a topic."""
@@ -27,7 +27,7 @@ class Bag(Protocol):
         """Write a message of a topic."""
 
     def flush(self) -> None:
-        """Write what waits to the disk."""
+        """Write buffered messages to the disk."""
 
     @property
     def messages(self) -> int:
@@ -35,13 +35,13 @@ class Bag(Protocol):
 
 
 class RecorderNode(GivenNode):
-    """Subscribes to topics as soon as somebody publishes them, and writes what arrives.
+    """Subscribes to topics as soon as they have a publisher, and writes their messages.
 
-    The time of a message in the bag is that of its arrival.
+    The time of a message in the bag is its time of arrival.
 
     Args:
         writer: of the bag.
-        topics: names of the topics; None takes all but those of ROS itself.
+        topics: names of the topics; None = all except those of ROS itself.
         node_arguments: passed on to ``rclpy.node.Node`` (context, ...).
     """
 
@@ -52,11 +52,11 @@ class RecorderNode(GivenNode):
         self._seen: set[str] = set()
         self._flushed_s = time.monotonic()
         self.counts: dict[str, int] = {}
-        self.create_timer(_LOOK_S, self._look)
-        self._look()
+        self.create_timer(_SEARCH_S, self._search)
+        self._search()
 
-    def _look(self) -> None:
-        """Subscribe to topics that are new; write what waits, now and then."""
+    def _search(self) -> None:
+        """Subscribe to new topics; flush the bag at intervals."""
         if time.monotonic() - self._flushed_s > _FLUSH_S:
             self._writer.flush()
             self._flushed_s = time.monotonic()

@@ -1,4 +1,4 @@
-"""A recorder in this process, until a signal or for some time."""
+"""Runs a recorder in this process, until a signal or for a given time."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -24,9 +24,9 @@ def record(
 
     Args:
         writer: of the bag.
-        stop: ends it.
-        topics: names; None takes all but those of ROS itself.
-        seconds: ends after that time, too; None records until a signal.
+        stop: ends the recording.
+        topics: names; None = all except those of ROS itself.
+        seconds: duration; None = until a signal.
         progress: called with the number of messages.
 
     Returns:
@@ -40,7 +40,7 @@ def record(
 
     with running(partial(RecorderNode, writer, topics)) as (node, executor):
         until_s = None if seconds is None else time.monotonic() + seconds
-        while not stop.asked and (until_s is None or time.monotonic() < until_s):
+        while not stop.received and (until_s is None or time.monotonic() < until_s):
             executor.spin_once(timeout_sec=NOTICE_S)
             if progress is not None:
                 progress(writer.messages)
@@ -51,7 +51,7 @@ def prepare() -> None:
     """Choose the profile of the middleware and make sure that ROS is installed.
 
     Raises:
-        RosMissingError: it is not.
+        RosMissingError: ROS is not installed.
     """
     apply_profile()
     require_ros()

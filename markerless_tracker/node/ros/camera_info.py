@@ -1,4 +1,4 @@
-"""sensor_msgs/CameraInfo and `CameraModel`."""
+"""Conversion between sensor_msgs/CameraInfo and `CameraModel`."""
 
 import numpy as np
 from sensor_msgs.msg import CameraInfo
@@ -21,17 +21,17 @@ def info_of(camera: CameraModel, stamp_ns: int) -> CameraInfo:
 
 
 FIRST_INFO = "the first camera info"
-"""Name of the reference where the rig comes from camera infos."""
+"""Name of the reference calibration if the rig comes from camera infos."""
 
 
 def camera_of(name: str, info: CameraInfo, T_cam_world: FloatArray, topic: str) -> CameraModel:
     """The camera that a CameraInfo describes.
 
     Args:
-        name: the camera's.
+        name: of the camera.
         info: the message.
         T_cam_world: (4, 4), takes world points to the camera.
-        topic: the message's, for messages.
+        topic: of the message, for error messages.
 
     Raises:
         CalibrationError: uncalibrated, cropped, or a lens model other than plumb_bob; names the
@@ -52,21 +52,20 @@ def check_info(
 ) -> str:
     """Compare a CameraInfo with the calibration in use.
 
-    A size of 0 and a K of zeros (uncalibrated) say nothing.
+    A size of 0 and a K of zeros (uncalibrated) are not compared.
 
     Args:
         info: the message.
         camera: the calibration in use.
-        topic: the message's, for messages.
-        reference: where the calibration in use is from, in words.
+        topic: of the message, for error messages.
+        reference: source of the calibration in use, in words.
 
     Returns:
-        How its K and D differ from those in use by more than `TOLERANCE`, in one line; empty if
-        they do not.
+        The differences of K and D of more than `TOLERANCE`, in one line; empty if there are none.
 
     Raises:
-        CalibrationError: the images cannot be those that the calibration describes: another size,
-            another lens model, binning or a region of interest, or K or D is not finite.
+        CalibrationError: the calibration cannot be that of the images: another size, another lens
+            model, binning or a region of interest, or K or D is not finite.
     """
     ignored = f"; {camera.name} is left out until it is right"
     width, height = camera.size_px

@@ -32,7 +32,7 @@ class ImageMessage:
         height, width: px.
         encoding: its name.
         step: bytes per row.
-        data: (n,) uint8, the message's own memory; to be read only.
+        data: (n,) uint8, the message's own memory; must not be changed.
     """
 
     stamp_ns: int
@@ -52,8 +52,8 @@ class CompressedMessage:
         stamp_ns: time of the header, ns.
         frame_id: frame of the header.
         format: its name.
-        data: (n,) uint8, the message's own memory; to be read only.
-        width, height: of the image, px, from its own header.
+        data: (n,) uint8, the message's own memory; must not be changed.
+        width, height: of the image, px, from the header of the JPEG or PNG.
         channels: of the decoded image: 1 (grey) or 3 (BGR).
     """
 
@@ -203,7 +203,7 @@ def with_stamp(message: bytes, stamp_ns: int) -> bytes:
 
 
 def without_stamp(message: bytes) -> bytes:
-    """A serialised message that begins with a std_msgs/Header, without its stamp, to compare."""
+    """A serialised message that begins with a std_msgs/Header, without its stamp."""
     return message[:_START] + message[_START + 8 :]
 
 
@@ -218,7 +218,7 @@ def _pad(head: bytearray) -> None:
 
 
 class _Borrowed:
-    """An array's memory, declared writable."""
+    """The memory of an array, declared as writable."""
 
     def __init__(self, array: NDArray[np.uint8]) -> None:
         self._array = array
@@ -227,5 +227,5 @@ class _Borrowed:
 
 
 def _writable(array: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The same array, not marked as read-only: numba would compile all kernels again for that."""
+    """The same array, not marked as read-only, for which numba would compile all kernels again."""
     return np.asarray(_Borrowed(array))

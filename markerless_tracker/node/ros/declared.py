@@ -18,10 +18,11 @@ ROS_OWN = ("use_sim_time", "start_type_description_service")
 
 
 class GivenNode(Node):
-    """A node that declares all parameters that are given, and does not wait for QoS events.
+    """A node that declares all given parameters, and has no QoS events.
 
-    All that an executor waits for costs time at every message, and each publisher and subscription
-    would add two events that only report other QoS. The node at the other end reports that as well.
+    Every entity that an executor waits for costs time at every message. Each publisher and each
+    subscription would add two events, which only report incompatible QoS. The node at the other end
+    reports that, too.
 
     Args:
         name: the node's name.
@@ -47,18 +48,18 @@ class GivenNode(Node):
             ) from error
 
     def create_publisher(self, *arguments: Any, **named: Any) -> Any:
-        """As `rclpy.node.Node.create_publisher`, without events unless they are asked for."""
+        """As `rclpy.node.Node.create_publisher`, without events unless they are requested."""
         named.setdefault("event_callbacks", PublisherEventCallbacks(use_default_callbacks=False))
         return super().create_publisher(*arguments, **named)
 
     def create_subscription(self, *arguments: Any, **named: Any) -> Any:
-        """As `rclpy.node.Node.create_subscription`, without events unless they are asked for."""
+        """As `rclpy.node.Node.create_subscription`, without events unless they are requested."""
         named.setdefault("event_callbacks", SubscriptionEventCallbacks(use_default_callbacks=False))
         return super().create_subscription(*arguments, **named)
 
 
 def given_parameters(node: Node) -> dict[str, Any]:
-    """The given parameters of a node that declares them from overrides, by name."""
+    """The parameters given to a node that declares them from overrides, by name."""
     return {
         name: parameter.value
         for name, parameter in node.get_parameters_by_prefix("").items()
@@ -75,15 +76,15 @@ def declare_effective(
     live: Collection[str] = (),
     fixed: str = "",
 ) -> None:
-    """Declare the parameters in effect, described, in place of the given ones.
+    """Declare the parameters in effect with descriptors, instead of the given ones.
 
     Args:
         node: the node.
-        values: every parameter's value; None where there is none.
-        lines: a line about each.
-        settings: whose ranges and choices the descriptors have.
-        live: those that may be set; the others are read-only.
-        fixed: why they are, for their descriptors.
+        values: value of every parameter; None = no value.
+        lines: a one-line description of each.
+        settings: the settings with ranges and choices, for the descriptors.
+        live: names of parameters that may be set; the others are read-only.
+        fixed: why the others are read-only, for their descriptors.
     """
     held = {setting.name: setting for setting in settings}
     for name in given_parameters(node):
@@ -101,7 +102,7 @@ def declare_effective(
 
 
 def check_names(given: Iterable[str], known: Sequence[str], node: str) -> None:
-    """Check that all given names are parameters: rclpy itself ignores others.
+    """Check that all given names are parameters, since rclpy ignores unknown ones.
 
     Args:
         given: the names.
@@ -109,7 +110,7 @@ def check_names(given: Iterable[str], known: Sequence[str], node: str) -> None:
         node: the executable, whose `--help` lists them.
 
     Raises:
-        ConfigError: one is not; names the most similar parameters.
+        ConfigError: a name is unknown; names the most similar parameters.
     """
     for name in given:
         if name not in known:
@@ -125,7 +126,7 @@ def present(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def attribute_lines(owner: type) -> dict[str, str]:
-    """Descriptions of attributes from a class' docstring, by name (``name: text``, indented on)."""
+    """Descriptions of attributes by name, from a class' docstring (``name: text``, indented)."""
     attributes = cleandoc(owner.__doc__ or "").partition("Attributes:\n")[2]
     found: dict[str, str] = {}
     for line in dedent(attributes).splitlines():

@@ -19,7 +19,7 @@ class TransformTree:
         """Take geometry_msgs/TransformStamped messages.
 
         Raises:
-            CalibrationError: one of them is no transform (an all-zero quaternion, NaN); those
+            CalibrationError: a message is no transform (an all-zero quaternion, NaN); the messages
                 before it are taken.
         """
         for stamped in transforms:

@@ -1,4 +1,4 @@
-"""Image messages and numpy arrays, without cv_bridge and with as few copies as possible."""
+"""Conversion between image messages and numpy arrays, without cv_bridge, with few copies."""
 
 import array
 from typing import Any, Protocol
@@ -18,12 +18,12 @@ from markerless_tracker.node.ros.cdr import CompressedMessage, ImageMessage
 
 Array = NDArray[np.uint8]
 
-# Characters of a received text that error messages show.
+# Largest number of characters of a received text in an error message.
 _SHOWN = 80
 
 
 class ImageLike(Protocol):
-    """The fields of sensor_msgs/Image that are read here; also of `cdr.ImageMessage`."""
+    """The fields of sensor_msgs/Image that are read here; `cdr.ImageMessage` has them, too."""
 
     @property
     def height(self) -> int:
@@ -78,10 +78,10 @@ def received_channels(message: ImageMessage | CompressedMessage) -> int:
 
 
 def decode_received(message: ImageMessage | CompressedMessage, topic: str) -> Array:
-    """The image of a received message: as `decode_image`, or of a JPEG or PNG.
+    """The image of a received message: as `decode_image`, or decoded from JPEG or PNG.
 
     Raises:
-        ImageError: it cannot be decoded, or is not as its header says.
+        ImageError: it cannot be decoded, or disagrees with its header.
     """
     if not isinstance(message, CompressedMessage):
         return decode_image(message, topic)
@@ -100,7 +100,7 @@ def decode_image(message: ImageLike, topic: str) -> Array:
     """The image of a sensor_msgs/Image as C-contiguous uint8, BGR (h, w, 3) or grey (h, w).
 
     Shares the message's memory for mono8 and bgr8 without padding; padded rows and other encodings
-    cost one copy; alpha channels are dropped. ``is_bigendian`` says nothing about 8-bit channels.
+    cost one copy; alpha channels are dropped. ``is_bigendian`` does not matter for 8-bit channels.
 
     Raises:
         ImageError: as `check_layout`.

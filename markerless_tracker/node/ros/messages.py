@@ -1,4 +1,4 @@
-"""Results as ROS messages. Fields hold plain Python numbers."""
+"""Conversion of results to ROS messages. Fields hold plain Python numbers."""
 
 from collections.abc import Mapping
 
@@ -43,14 +43,14 @@ def header(stamp_ns: int, frame: str = WORLD_FRAME) -> Header:
 
 
 def joint_state(angles: Angles, stamp_ns: int) -> JointState:
-    """All joint angles but the pelvis', named as in the body's URDF; rad."""
+    """All joint angles except the pelvis', named as in the body's URDF; rad."""
     return _joints(angles.names, angles.values_rad, stamp_ns)
 
 
 def root_pose(
     body: BodyModel, pose: FloatArray, stamp_ns: int, confidence: Confidence | None = None
 ) -> PoseWithCovarianceStamped:
-    """Pose of the body's root frame in the world; the covariance is zero if it is unknown."""
+    """Pose of the body's root frame in the world; the covariance is zero if unknown."""
     message = PoseWithCovarianceStamped(header=header(stamp_ns))
     message.pose.pose = _pose(root_transform(body, pose))
     if confidence is not None:
@@ -97,7 +97,7 @@ def body_markers(
 
 
 def no_markers(stamp_ns: int) -> MarkerArray:
-    """Deletes the body from viewers."""
+    """A message that deletes the body from viewers."""
     return MarkerArray(markers=[Marker(header=header(stamp_ns), action=Marker.DELETEALL)])
 
 
@@ -108,7 +108,7 @@ def state_message(
 
     Args:
         name: the node's name with its namespace.
-        values: what `TrackerStatus.values` gives.
+        values: of `TrackerStatus.values`.
         health: level and message.
         stamp_ns: time of the images of the last result, 0 before the first.
     """
@@ -123,7 +123,7 @@ def state_message(
 
 
 def _joints(names: tuple[str, ...], values: FloatArray, stamp_ns: int) -> JointState:
-    """A message with those of the root left out."""
+    """A message of all joints except those of the root."""
     kept = [k for k, name in enumerate(names) if name not in ROOT_ANGLES]
     return JointState(
         header=header(stamp_ns, ""),

@@ -1,4 +1,4 @@
-"""Log lines with bounded frequency: repetitions are counted."""
+"""Log lines with limited frequency: repetitions are counted."""
 
 import re
 from collections.abc import Callable
@@ -31,7 +31,7 @@ class Notices:
     Safe to use from several threads.
 
     Args:
-        log: gets the lines.
+        log: called with the lines.
         clock: monotonic time in s.
     """
 
@@ -45,7 +45,7 @@ class Notices:
         """Log a line, unless one of its kind was logged less than `HOLD_S` ago.
 
         Returns:
-            Whether it was logged now; else `flush` logs how many there were.
+            Whether it was logged now; else `flush` logs the number of repetitions.
         """
         text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
         key = kind_of(text)
@@ -63,7 +63,7 @@ class Notices:
         return True
 
     def flush(self) -> None:
-        """Log the repetitions held for `HOLD_S`; to be called periodically."""
+        """Log repetitions counted for `HOLD_S`; to be called periodically."""
         lines = []
         with self._lock:
             now_s = self._clock()

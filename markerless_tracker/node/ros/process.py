@@ -1,4 +1,4 @@
-"""Starting and stopping an executable of this package in a ROS graph."""
+"""Starts and stops an executable of this package in a ROS graph."""
 
 import os
 import shutil
@@ -22,7 +22,7 @@ NOT_INSTALLED = (
 NOTICE_S = 0.1
 """Longest time until a signal is noticed."""
 _NAME_WIDTH = 24
-"""Columns of the parameters' names in `--help`."""
+"""Width of the column of parameter names in `--help`, in characters."""
 _NEEDED = (
     "rclpy",
     "diagnostic_msgs.msg",
@@ -41,7 +41,7 @@ def require_ros() -> None:
     """Make sure that rclpy and the message packages can be imported.
 
     Raises:
-        RosMissingError: they cannot; says how to install them.
+        RosMissingError: they cannot be imported; the message says how to install them.
     """
     try:
         for module in _NEEDED:
@@ -54,15 +54,15 @@ def require_ros() -> None:
 class StopSignals:
     """Records SIGINT and SIGTERM instead of interrupting running code; a context manager.
 
-    An exception during the writing of a result would cut it; one during an import can make Python
-    exit with an error although it was caught.
+    An exception while a result is written would truncate it. An exception during an import can make
+    Python exit with an error although it was caught.
 
     Attributes:
-        asked: whether a signal was received.
+        received: whether a signal was received.
     """
 
     def __init__(self) -> None:
-        self.asked = False
+        self.received = False
 
     def __enter__(self) -> "StopSignals":
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -75,7 +75,7 @@ class StopSignals:
             signal.signal(number, signal.SIG_IGN)
 
     def _note(self, number: int, frame: object) -> None:
-        self.asked = True
+        self.received = True
 
 
 def run_executable(
@@ -84,10 +84,10 @@ def run_executable(
     """Run an executable: one line on standard error and 1 for an error.
 
     Args:
-        name: the executable's, for its messages.
-        body: called with the arguments and the stop signals once ROS is known to be installed;
-            returns the exit code.
-        argv: arguments without the program's name; those of this process if None.
+        name: of the executable, for its messages.
+        body: called with the arguments and the stop signals if ROS is installed; returns the exit
+            code.
+        argv: arguments without the program's name; None = those of this process.
     """
     single_threaded()
     with StopSignals() as stop:
@@ -106,11 +106,11 @@ def print_help(
     """Print a summary of an executable, an example, and each parameter with its default.
 
     Args:
-        name: the executable's.
+        name: of the executable.
         summary: one sentence.
         example: a command line.
-        lines: a line about each parameter.
-        defaults: their values unless given; None, an empty text or nothing at all: no default.
+        lines: a one-line description of each parameter.
+        defaults: default values; no default if the value is None, an empty text or missing.
     """
     listed = "".join(_entry(key, line, defaults.get(key)) for key, line in lines.items())
     print(
@@ -121,7 +121,7 @@ def print_help(
 
 
 def _entry(name: str, line: str, default: Any) -> str:
-    """A parameter as `argparse` lists options, as wide as the terminal."""
+    """A parameter in the layout of `argparse`'s options, wrapped at the terminal's width."""
     plain = str(default).lower() if isinstance(default, bool) else default
     text = line if default is None or default == "" else f"{line} [{plain}]"
     width = max(_NAME_WIDTH + 20, shutil.get_terminal_size().columns - 2)
@@ -141,13 +141,13 @@ def init_context(arguments: Sequence[str], domain_id: int | None = None) -> Any:
 
     Args:
         arguments: e.g. ``["--ros-args", "-p", "seed:=1"]``.
-        domain_id: the ROS domain, 0..101; that of the environment if None.
+        domain_id: the ROS domain, 0..101; None = that of the environment.
 
     Returns:
-        The ``rclpy.Context``; signals are left to the caller.
+        The ``rclpy.Context``, which handles no signals.
 
     Raises:
-        ConfigError: an argument that ROS does not understand, or one outside ``--ros-args``.
+        ConfigError: an argument that ROS does not know, or an argument outside of ``--ros-args``.
     """
     import rclpy
     from rclpy.signals import SignalHandlerOptions
@@ -178,11 +178,11 @@ def init_context(arguments: Sequence[str], domain_id: int | None = None) -> Any:
 def running(
     kind: Callable[..., Any], arguments: Sequence[str] = (), domain_id: int | None = None
 ) -> Iterator[tuple[Any, Any]]:
-    """A node and the executor that spins it, in a context of their own, until the block ends.
+    """A node and its executor in a context of their own, which end with the block.
 
     Args:
         kind: makes the node; called with a `context`.
-        arguments, domain_id: as of `init_context`.
+        arguments, domain_id: as for `init_context`.
 
     Raises:
         ConfigError: ROS arguments or parameters that cannot be used.
@@ -201,7 +201,7 @@ def running(
         try:
             yield node, executor
         finally:
-            # Destroying the node removes the shared memory of the middleware.
+            # Destruction of the node removes the middleware's shared memory.
             executor.shutdown(timeout_sec=0)
             node.destroy_node()
     finally:
@@ -209,11 +209,11 @@ def running(
 
 
 class Listener(ABC):
-    """A node of a class's own while its context lasts, without parameters; see `running`.
+    """Base of classes that have a node without parameters inside a `with` block; see `running`.
 
     Args:
-        name: the node's, before the number of the process.
-        domain_id: as of `init_context`.
+        name: of the node; the number of the process is added.
+        domain_id: as for `init_context`.
     """
 
     def __init__(self, name: str, domain_id: int | None = None) -> None:
@@ -236,4 +236,4 @@ class Listener(ABC):
 
     @abstractmethod
     def _subscribe_all(self) -> None:
-        """Subscribe `self._node` to what is listened to."""
+        """Create the subscriptions of `self._node`."""

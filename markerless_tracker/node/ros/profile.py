@@ -25,10 +25,10 @@ def apply_profile(environment: MutableMapping[str, str] | None = None) -> bool:
     (``DEFAULT_FASTRTPS_PROFILES.xml``) counts as a choice.
 
     Args:
-        environment: environment to change; this process's own if None.
+        environment: environment to change; None = that of this process.
 
     Returns:
-        Whether the shipped profile is the one in use.
+        Whether the shipped profile is in use.
     """
     env = os.environ if environment is None else environment
     chosen = any(env.get(name) for name in USERS_OWN)

@@ -11,9 +11,9 @@ IMAGE_DEPTH = 5
 
 
 TRANSPORTS = ("auto", "raw", "compressed")
-"""Which images are received: what is offered, sensor_msgs/Image, sensor_msgs/CompressedImage."""
+"""Images to receive: whichever are offered, sensor_msgs/Image, or sensor_msgs/CompressedImage."""
 EVIDENCE = "evidence"
-"""The tracker's transport besides: evidence of segmenters in place of images."""
+"""A further transport of the tracker: evidence of segmenters instead of images."""
 
 
 def image_qos(
@@ -21,7 +21,8 @@ def image_qos(
 ) -> QoSProfile:
     """For images and camera infos.
 
-    A reliable subscription does not match best-effort publishers, a latched one only latched ones.
+    A reliable subscription does not match best-effort publishers; a latched subscription matches
+    latched publishers only.
     """
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
@@ -51,8 +52,8 @@ def output_qos() -> QoSProfile:
 class FollowingSubscription:
     """A subscription with the quality of service that its publishers offer.
 
-    Best effort if one of them is: a reliable subscription does not match it. Latched if all are:
-    it then receives what they sent before.
+    It is best effort if any publisher is, which a reliable subscription would not match. It is
+    latched if all publishers are, and then receives their earlier messages.
 
     Args:
         node: creates the subscription.
@@ -61,8 +62,7 @@ class FollowingSubscription:
         callback: as for ``rclpy.node.Node.create_subscription``.
         depth: messages the middleware keeps.
         raw: whether the callback gets the serialised bytes.
-        polled: whether messages are taken by `poll` alone; the executor then spends no time on
-            them.
+        polled: whether only `poll` takes messages, so that the executor spends no time on them.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class FollowingSubscription:
         self._node.destroy_subscription(self._subscription)
 
     def poll(self) -> None:
-        """Call back with the newest message that waits, if any; from the executor's thread."""
+        """Call back with the newest queued message, if any; from the executor's thread."""
         newest = None
         handle = self._subscription.handle
         with handle:
@@ -116,10 +116,7 @@ class FollowingSubscription:
             self._callback(newest[0])
 
     def take_waiting(self) -> None:
-        """Call back with the messages that wait, each with its info; from the executor's thread.
-
-        At most as many as the middleware keeps.
-        """
+        """Call back with all queued messages, each with its info; from the executor's thread."""
         handle = self._subscription.handle
         for _ in range(self._depth):
             with handle:
@@ -142,7 +139,7 @@ class FollowingSubscription:
 
 
 class _NotExecuted(CallbackGroup):
-    """Its subscriptions are left out when an executor waits."""
+    """A callback group that executors ignore."""
 
     def can_execute(self, entity: Any) -> bool:
         return False

@@ -1,9 +1,9 @@
-"""A body as REP-155 (ROS4HRI) describes people: joints, their values, links.
+"""Conversion of a body to REP-155 (ROS4HRI): joints, their values, links.
 
-Names, axes and order of the joints are those of the package human_description. It has one joint in
-the waist, so bending and twist of the trunk are lost; arms keep their directions in the world, the
-positions of the shoulders do not follow. y and r of a hanging arm rotate about one axis: only their
-sum is determined.
+Names, axes and order of the joints are those of the package human_description. That has a single
+joint in the waist, so bending and twist of the trunk are lost; arms keep their directions in the
+world, but the shoulders' positions do not follow. y and r of a hanging arm rotate about the same
+axis, so that only their sum is determined.
 """
 
 import re
@@ -36,19 +36,19 @@ _LINK_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _SIDES = {"l": 1.0, "r": -1.0}
 _WHOLE_TURN = 2.0 * np.pi
 _LOCKED = 1e-9
-"""Sine of the angle between two z axes below which both are one."""
+"""Sine of the angle between two z axes below which they count as equal (gimbal lock)."""
 _RADIUS_M, _HEAD_RADIUS_M = 0.04, 0.1
 
 
 def check_id(name: str, value: str) -> str:
-    """The id of a person, checked to be one of REP-155; empty for none.
+    """The id of a person, checked to be valid by REP-155; may be empty.
 
     Args:
         name: the parameter.
         value: its value.
 
     Raises:
-        ConfigError: it is not; names the parameter.
+        ConfigError: it is not valid; names the parameter.
     """
     if value and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", value):
         raise ConfigError(
@@ -126,7 +126,7 @@ class Human:
         return robot.text()
 
     def _nearest(self, limb: str, first: FloatArray, second: FloatArray) -> FloatArray:
-        """Of the two triples of angles that give a rotation the one nearest to the last."""
+        """The triple of angles nearest to the last frame's, of the two that give a rotation."""
         last = self._last.get(limb, np.zeros(3))
         found = [last + _folded(angles - last) for angles in (first, second)]
         self._last[limb] = min(found, key=lambda angles: float(np.abs(angles - last).sum()))
@@ -134,20 +134,20 @@ class Human:
 
 
 def _xzy(R: FloatArray) -> FloatArray:
-    """Angles (3,) of a rotation about x, then the moved z, then the moved y."""
+    """Angles (3,) of a rotation about x, then the rotated z, then the rotated y."""
     z = np.arcsin(np.clip(-R[0, 1], -1.0, 1.0))
     return np.array([np.arctan2(R[2, 1], R[1, 1]), z, np.arctan2(R[0, 2], R[0, 0])])
 
 
 def _zxy(R: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Both triples of angles (3,) of a rotation about z, the moved x and the moved y."""
+    """Both triples of angles (3,) of a rotation about z, the rotated x and the rotated y."""
     x = np.arcsin(np.clip(R[2, 1], -1.0, 1.0))
     first = np.array([np.arctan2(-R[0, 1], R[1, 1]), x, np.arctan2(-R[2, 0], R[2, 2])])
     return first, np.array([first[0] + np.pi, np.pi - x, first[2] + np.pi])
 
 
 def _zxz(R: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Both triples of angles (3,) of a rotation about z, the moved x and the moved z."""
+    """Both triples of angles (3,) of a rotation about z, the rotated x and the rotated z."""
     x = np.arctan2(np.hypot(R[0, 2], R[1, 2]), R[2, 2])
     first = np.array([np.arctan2(R[0, 2], -R[1, 2]), x, np.arctan2(R[2, 0], R[2, 1])])
     if np.sin(x) < _LOCKED:

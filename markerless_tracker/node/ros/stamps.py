@@ -1,4 +1,4 @@
-"""Integer nanoseconds and builtin_interfaces/Time."""
+"""Conversion between integer nanoseconds and builtin_interfaces/Time."""
 
 from typing import Any
 

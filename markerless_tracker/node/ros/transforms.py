@@ -1,4 +1,4 @@
-"""tf2_msgs/TFMessage as serialised bytes (CDR): frames are written once, numbers per message.
+"""tf2_msgs/TFMessage as serialised bytes (CDR): names are written once, numbers per message.
 
 tf2_msgs may be missing (`installed`): pip has no wheel of it.
 """
@@ -12,7 +12,7 @@ import numpy as np
 from markerless_tracker.geometry import FloatArray
 
 TF_CHOICES = ("links", "root", "none")
-"""What a tracker publishes of a body: all links, the root link, nothing."""
+"""Transforms of a body that a tracker publishes: of all links, of the root link, none."""
 _START = 4
 """Bytes of the encapsulation."""
 _SECOND_NS = 1_000_000_000

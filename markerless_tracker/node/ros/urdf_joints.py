@@ -11,17 +11,17 @@ from markerless_tracker.geometry import FloatArray, quaternion_from_rotation, ro
 
 @dataclass(frozen=True, eq=False)
 class UrdfJoints:
-    """At least one joint: those of a URDF that move, or those that are fixed.
+    """The moving or the fixed joints of a URDF, at least one.
 
     Attributes:
         links: (parent, child) of each of n joints.
-        names: of the joint whose value each has: its own, or that of the joint it mimics.
+        names: by joint, the name of the joint whose value it has: its own, or the one it mimics.
         multipliers: (n,) of those values.
         origins_m: (n, 3) of the joints in their parents.
-        slides_m: (n, 3) how a joint that translates moves per metre, in its parent; 0 of others.
-        turns: (n,) 0.5 of a joint that rotates, 0 of others.
-        still, turned: (n, 4) quaternions (w, x, y, z) from the children's axes to the parents': at
-            value 0, and rotated by half a turn.
+        slides_m: (n, 3) unit axes of prismatic joints in their parents; 0 for others.
+        halves: (n,) 0.5 for joints that rotate, 0 for others.
+        at_zero, at_pi: (n, 4) quaternions (w, x, y, z) from the children's axes to the parents' at
+            the values 0 and pi.
     """
 
     links: tuple[tuple[str, str], ...]
@@ -29,19 +29,19 @@ class UrdfJoints:
     multipliers: FloatArray
     origins_m: FloatArray
     slides_m: FloatArray
-    turns: FloatArray
-    still: FloatArray
-    turned: FloatArray
+    halves: FloatArray
+    at_zero: FloatArray
+    at_pi: FloatArray
 
     def transforms(self, values: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
         """Translations (n, 3) and quaternions (n, 4) (w, x, y, z) of the children in their parents.
 
         Args:
-            values: of the joints by name, rad or m; a joint without a value is at 0.
+            values: of the joints by name, rad or m; 0 for a joint without a value.
         """
         at = self.multipliers * np.array([values.get(name, 0.0) for name in self.names])
-        half = self.turns * at
-        quaternions = np.cos(half)[:, None] * self.still + np.sin(half)[:, None] * self.turned
+        half = self.halves * at
+        quaternions = np.cos(half)[:, None] * self.at_zero + np.sin(half)[:, None] * self.at_pi
         return self.origins_m + at[:, None] * self.slides_m, quaternions
 
 
@@ -54,21 +54,21 @@ def read_joints(urdf: str) -> tuple[UrdfJoints, UrdfJoints]:
 
 
 def _arrays(joints: list[ElementTree.Element]) -> UrdfJoints:
-    turns = _triples(joints, "origin", "rpy", "0 0 0")
-    rotations = np.array([rotation_from_euler("zyx", rpy[::-1]) for rpy in turns]).reshape(-1, 3, 3)
+    angles_rad = _triples(joints, "origin", "rpy", "0 0 0")
+    rotations = np.array([rotation_from_euler("zyx", rpy[::-1]) for rpy in angles_rad])
     axes = _triples(joints, "axis", "xyz", "1 0 0")
     slides = np.array([joint.get("type") == "prismatic" for joint in joints])
-    still = np.array([quaternion_from_rotation(rotation) for rotation in rotations]).reshape(-1, 4)
-    turned = np.column_stack([np.zeros(len(axes)), axes])
+    at_zero = np.array([quaternion_from_rotation(rotation) for rotation in rotations])
+    half_turn = np.column_stack([np.zeros(len(axes)), axes])
     return UrdfJoints(
         links=tuple((_text(j, "parent", "link"), _text(j, "child", "link")) for j in joints),
         names=tuple(_text(j, "mimic", "joint") or str(j.get("name")) for j in joints),
         multipliers=np.array([float(_text(j, "mimic", "multiplier") or 1.0) for j in joints]),
         origins_m=_triples(joints, "origin", "xyz", "0 0 0"),
         slides_m=slides[:, None] * np.einsum("nij,nj->ni", rotations, axes),
-        turns=np.where(slides, 0.0, 0.5),
-        still=still,
-        turned=_product(still, turned),
+        halves=np.where(slides, 0.0, 0.5),
+        at_zero=at_zero,
+        at_pi=_product(at_zero, half_turn),
     )
 
 

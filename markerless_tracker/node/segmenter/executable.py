@@ -39,12 +39,12 @@ def _run(argv: list[str], stop: StopSignals) -> int:
     from markerless_tracker.libraries import collect_for_good
     from markerless_tracker.node.segmenter.node import SegmenterNode
 
-    if stop.asked:
+    if stop.received:
         return 0
     with running(SegmenterNode, argv) as (node, executor):
         node.begin()
         collect_for_good()
-        while not stop.asked:
+        while not stop.received:
             executor.spin_once(timeout_sec=NOTICE_S)
         node.close()
     return 0

@@ -52,13 +52,13 @@ from markerless_tracker.observation import Observation
 
 STATE_PERIOD_S = 0.5
 EVIDENCE_DEPTH = 10
-"""Messages of evidence that are kept for a subscriber that did not confirm them."""
+"""Number of messages of evidence that are kept for a subscriber that has not acknowledged them."""
 
 
 class SegmenterNode(GivenNode):
     """Receives one camera's images, and publishes the evidence that its worker thread makes.
 
-    It subscribes when it is compiled: a player that waits for subscribers waits for it. Call
+    It subscribes after compilation, so that a player that waits for subscribers waits for it. Call
     `close` before `destroy_node`.
 
     Args:
@@ -111,7 +111,7 @@ class SegmenterNode(GivenNode):
         self._subscription = ImageSubscription(
             self, self._input, self._settings.image_transport, lambda: None
         )
-        # A steady clock: without /clock simulated time stops.
+        # A steady clock, since simulated time stops without /clock.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(STATE_PERIOD_S, self._tick, clock=steady)
         self.get_logger().info(
@@ -143,7 +143,7 @@ class SegmenterNode(GivenNode):
             parts.append(edges_data(observation, self._digest))
         if self.context.ok():
             for publisher, part in zip(self._publishers_of_evidence, parts, strict=True):
-                # rclpy checks other types byte by byte.
+                # rclpy would check other types byte by byte.
                 data = array.array("B", part)
                 publisher.publish(CompressedImage(header=head, format=FORMAT, data=data))
         return sum(map(len, parts))
@@ -152,8 +152,8 @@ class SegmenterNode(GivenNode):
         assert self._subscription is not None
         self._subscription.follow()
         self._notices.flush()
-        heard_s = self._images.heard_s
-        silent = heard_s is None or time.monotonic() - heard_s > QUIET_S
+        last_arrival_s = self._images.last_arrival_s
+        silent = last_arrival_s is None or time.monotonic() - last_arrival_s > QUIET_S
         level, text = DiagnosticStatus.OK, "segmenting"
         if self._input.refusal:
             level, text = DiagnosticStatus.WARN, self._input.refusal
@@ -193,10 +193,10 @@ class SegmenterNode(GivenNode):
 
 
 def _background(settings: SegmenterSettings) -> tuple[tuple[int, int], BackgroundModel]:
-    """Size (width, height) of the images as they come, and the background as they are segmented.
+    """Size (width, height) of the received images, and the background scaled for segmentation.
 
     Raises:
-        ConfigError: there is none, or it cannot be used; names the parameter.
+        ConfigError: there is no usable background; names the parameter.
     """
     folder, name = settings.background_dir, settings.camera
     try:

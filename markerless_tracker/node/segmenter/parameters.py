@@ -34,19 +34,19 @@ class SegmenterSettings:
     config: TrackerConfig
 
     def scaled_size(self, size_px: tuple[int, int]) -> tuple[int, int]:
-        """(width, height) of images of a size as they are segmented."""
+        """Size (width, height) at which images of a size are segmented."""
         return size_px if self.scale == 1.0 else scaled_size(size_px, self.scale)
 
 
 _OWN = tuple(entry.name for entry in fields(SegmenterSettings) if entry.name != "config")
 _DECIDING = ("preset", "optimizer", "edge_weight")
-"""Settings of the search that decide on the imaging: a preset sets its values."""
+"""Settings of the search that affect the imaging, for example the preset."""
 
 
 def known_parameters() -> tuple[str, ...]:
     """Every parameter that may be given.
 
-    All settings of the tracker are among them: one file of parameters serves both nodes.
+    It includes all settings of the tracker, so that both nodes can use one file of parameters.
     """
     return (*_OWN, *(setting.name for setting in TrackerConfig.settings()))
 
@@ -93,7 +93,7 @@ def segmenter_values(settings: SegmenterSettings) -> dict[str, Any]:
 
 
 def segmenter_defaults() -> dict[str, Any]:
-    """Value of every parameter unless it is given; `camera` and `background_dir` have none."""
+    """Default of every parameter; `camera` and `background_dir` have none."""
     given = SegmenterSettings(
         camera="", background_dir=Path(), config=TrackerConfig.from_mapping({})
     )
@@ -102,7 +102,7 @@ def segmenter_defaults() -> dict[str, Any]:
 
 
 def segmenter_descriptions() -> dict[str, str]:
-    """One line about every parameter."""
+    """A one-line description of every parameter."""
     lines = declared.attribute_lines(SegmenterSettings)
     found = {name: lines[name] for name in _OWN}
     found["image_transport"] += f" ({', '.join(TRANSPORTS)})"

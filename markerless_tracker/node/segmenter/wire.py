@@ -38,12 +38,12 @@ _HEAD = struct.Struct("<4scB8s6I")
 _SIDE_MAX = 32768
 _CHANNELS_MAX = 4
 _LEVEL = 1
-"""Masks are mostly runs: higher levels of zlib save a twentieth and take as long again."""
+"""Masks are mostly runs: higher levels of zlib save a twentieth and take twice the time."""
 
 
 @dataclass(frozen=True, eq=False)
 class EvidenceMessage:
-    """One message of evidence, not unpacked.
+    """One message of evidence, still compressed.
 
     Attributes:
         stamp_ns: time of the image, ns.
@@ -52,9 +52,9 @@ class EvidenceMessage:
         width, height: of the full frame, px.
         box: left, top, width and height of the region, px.
         exposure: see `Observation`.
-        digest: of the settings that it was made with.
+        digest: of the imaging settings that it was made with.
         data: compressed words or edge map.
-        topic: where it came, for error messages.
+        topic: of the message, for error messages.
     """
 
     stamp_ns: int
@@ -82,7 +82,7 @@ class Evidence(NamedTuple):
 
 
 def settings_digest(settings: ImagingSettings) -> bytes:
-    """Eight bytes that differ where evidence would be made with other settings."""
+    """Digest (8 bytes) of all settings that change the evidence."""
     names = {setting.name for setting in ImagingSettings.settings()}
     chosen = {name: value for name, value in settings.by_name().items() if name in names}
     return hashlib.sha256(repr(sorted(chosen.items())).encode()).digest()[:8]
@@ -104,10 +104,10 @@ def edges_data(observation: Observation, digest: bytes) -> bytes:
 
 
 def read_evidence(serialised: bytes, topic: str) -> EvidenceMessage:
-    """A serialised message of evidence, its content checked but for the compressed part.
+    """The evidence of a serialised message, checked except for its compressed part.
 
     Raises:
-        ImageError: it is none, or contradicts itself; names the topic.
+        ImageError: the message is no evidence, or inconsistent; names the topic.
     """
     stamp_ns, frame_id, kind, data = compressed_fields(serialised, topic)
     raw = data.tobytes()
@@ -141,10 +141,10 @@ def read_evidence(serialised: bytes, topic: str) -> EvidenceMessage:
 
 
 def unpack(camera: str, evidence: Evidence) -> Observation:
-    """The observation that evidence was made of, to the byte; its edge map is 0 if left out.
+    """The observation of evidence, equal to the original byte by byte; without edges the map is 0.
 
     Raises:
-        ImageError: not as long as the region says, or cut; names the topic.
+        ImageError: the data are truncated or do not fit the region; names the topic.
     """
     seen, edges = evidence
     left, top, width, height = seen.box
@@ -178,7 +178,7 @@ def _data(kind: bytes, observation: Observation, digest: bytes, plain: bytes) ->
 
 
 def _plain(message: EvidenceMessage, size: int) -> bytes:
-    """The decompressed part, which must be of a size; more is never decompressed."""
+    """The decompressed part, which must have a given size; more is never decompressed."""
     unpacker = zlib.decompressobj()
     try:
         plain = unpacker.decompress(message.data, size + 1)

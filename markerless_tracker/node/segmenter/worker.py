@@ -12,10 +12,10 @@ from markerless_tracker.node.tracker.worker import one_line
 from markerless_tracker.observation import Observation
 
 QUEUE = 8
-"""Images that may wait."""
+"""Largest number of images that wait."""
 SHARE_MAX = 64
 CALM = 60
-"""Images in a row that did not wait for one another, after which more are kept again."""
+"""Number of consecutive images that did not wait, after which more images are kept again."""
 _MIXER = 0x9E3779B97F4A7C15
 WINDOW = 300
 """Images over which latency is computed."""
@@ -30,15 +30,15 @@ class Waiting(NamedTuple):
 
 
 class ImageQueue:
-    """Images in the order of their arrival, thinned out where they come too fast.
+    """A queue of images in the order of their arrival, thinned out if they come too fast.
 
-    Of images that cannot all be segmented, one of 2, 4, 8... is kept. Which ones follows from their
-    stamps alone, so that the segmenters of other cameras keep the same sets.
+    If not all images can be segmented, every 2nd, 4th, 8th... image is kept. The choice depends on
+    the stamps only, so that the segmenters of other cameras keep the same sets.
 
     Attributes:
         received, dropped: counts of images.
-        share: one of so many images is kept.
-        heard_s: time of the last arrival, s; None before the first.
+        share: one image of this many is kept.
+        last_arrival_s: time of the last arrival, s; None before the first.
     """
 
     def __init__(self) -> None:
@@ -47,13 +47,13 @@ class ImageQueue:
         self._calm = 0
         self.received = self.dropped = 0
         self.share = 1
-        self.heard_s: float | None = None
+        self.last_arrival_s: float | None = None
 
     def add(self, camera: str, stamp_ns: int, view: Any, *, now_s: float) -> bool:
         """Store an image; as `Synchronizer.add`. Returns whether it is kept."""
         with self._changed:
             self.received += 1
-            self.heard_s = now_s
+            self.last_arrival_s = now_s
             if not self._kept(stamp_ns):
                 self.dropped += 1
                 return False
@@ -64,7 +64,7 @@ class ImageQueue:
         return True
 
     def take(self, timeout_s: float) -> Waiting | None:
-        """The oldest image; None if none came in time."""
+        """The oldest image; None if no image came in time."""
         with self._changed:
             if not self._images:
                 self._changed.wait(timeout_s)
@@ -81,7 +81,7 @@ class ImageQueue:
         return (stamp_ns * _MIXER >> 40) % self.share == 0
 
     def _thin_out(self) -> None:
-        """Keep half as many images from now on, of those that wait, too; at least one leaves."""
+        """Keep half as many images from now on, also of the waiting ones; drop at least one."""
         self.share, self._calm = min(2 * self.share, SHARE_MAX), 0
         kept = deque(image for image in self._images if self._kept(image.stamp_ns))
         if len(kept) >= QUEUE:
@@ -125,8 +125,8 @@ class SegmenterStatus:
     def values(self) -> dict[str, str]:
         """Everything as text, by key.
 
-        `bytes_in`: of the images' pixels as they came; `bytes_out`: of the evidence; `latency`:
-        from an image's arrival to the publication of its evidence.
+        `bytes_in`: bytes of the received images' pixels; `bytes_out`: bytes of the evidence;
+        `latency`: from an image's arrival to the publication of its evidence.
         """
         with self._lock:
             times = np.array(self._latencies_s) * 1e3
@@ -144,8 +144,8 @@ class SegmentWorker:
     An error in one image is reported and costs that image.
 
     Args:
-        images: where they come from.
-        status: gets counts, times and errors.
+        images: source of the images.
+        status: receives counts, times and errors.
         observe: makes the evidence of an image message.
         publish: sends evidence; returns its bytes.
         report: called with each error, one line.
@@ -173,7 +173,7 @@ class SegmentWorker:
         self._thread.start()
 
     def stop(self, timeout_s: float = 3.0) -> bool:
-        """Finish the image at hand and end; returns whether the thread ended in time."""
+        """Finish the present image and end; returns whether the thread ended in time."""
         self._stop.set()
         if self._thread.ident is not None:
             self._thread.join(timeout_s)

@@ -1,4 +1,4 @@
 """The node `tracker`: image topics in, the pose of one person out.
 
-Receives and matches images, tracks in one worker thread, publishes results.
+It receives and matches images, tracks in a worker thread, and publishes results.
 """

@@ -1,4 +1,4 @@
-"""Log lines of a running tracker: one per event, in the words of `state` and the diagnostics."""
+"""Log lines of a running tracker: one per event, with the words of `state` and the diagnostics."""
 
 import sys
 import time
@@ -10,15 +10,15 @@ from markerless_tracker.node.ros.notices import Notices, kind_of
 from markerless_tracker.records import TrackResult, TrackState
 
 LONG_S = 5.0
-"""Time after which the log says that a first start may take long."""
+"""Time after which the log reports that a first start may take long."""
 PROGRESS_S = 20.0
 """Time between two lines of progress while kernels are compiled, in a terminal."""
 
 
 class CompilingLines:
-    """Log lines while kernels are compiled: one at the beginning, one when it takes long.
+    """Log lines while kernels are compiled: one at the beginning, one after `LONG_S`.
 
-    In a terminal progress follows every `PROGRESS_S`. Elsewhere `state` alone shows it.
+    In a terminal the progress is logged every `PROGRESS_S`; otherwise only `state` shows it.
 
     Args:
         inform: logs a line.
@@ -41,7 +41,7 @@ class CompilingLines:
         inform("compiling what is not stored from an earlier start")
 
     def progress(self, activity: str) -> None:
-        """Log the activity if its time has come."""
+        """Log the activity if a line is due."""
         now_s = self._clock()
         if now_s < self._next_s:
             return
@@ -57,9 +57,9 @@ class CompilingLines:
 
 
 class Announcer:
-    """Logs changes: the person found, lost and found again, cameras gone and back, warnings.
+    """Logs changes: the person found, lost and found again, cameras lost and recovered, warnings.
 
-    A line about the person begins as the message of `state` does. Repetitions are counted.
+    A line about the person begins like the message of `state`. Repetitions are counted.
 
     Args:
         news: logs lines as information.
@@ -86,7 +86,7 @@ class Announcer:
             self._notices.say(f"stamp {result.stamp_ns}: {warning}")
 
     def health(self, health: Health) -> None:
-        """Log cameras that are gone or back, the reason for missing results, and its end."""
+        """Log lost and recovered cameras, the reason for missing results, and its end."""
         if kind_of(health.without) != kind_of(self._without):
             if health.without:
                 self._notices.say(f"{self._state.value}: {health.without}")
@@ -101,10 +101,10 @@ class Announcer:
             self._trouble = health.trouble
 
     def time_offsets(self, found: Mapping[str, TimeOffset], given_s: Mapping[str, float]) -> None:
-        """Log each camera once whose images are late for sure, with the parameter that corrects it.
+        """Log each camera whose images are surely late, once, with the parameter that corrects it.
 
         Args:
-            found: the cameras' offsets that are left, by name.
+            found: the remaining offsets of the cameras, by name.
             given_s: the offsets in effect, of all cameras in their order.
         """
         late = {n: one for n, one in found.items() if one.certain and n not in self._late}
@@ -127,11 +127,11 @@ class Announcer:
 
 
 def ready_line(activity: str, kernels: int, seconds: float) -> str:
-    """The line for the log when the tracker is ready.
+    """The log line when the tracker is ready.
 
     Args:
-        activity: what it does from now on.
-        kernels: how many were compiled; the others were stored by an earlier start.
-        seconds: how long that took, loading included.
+        activity: its activity from now on.
+        kernels: number of kernels that were compiled; the others were stored by an earlier start.
+        seconds: duration, including that of loading.
     """
     return f"ready, {activity}; {kernels} kernels compiled, {seconds:.1f} s"

@@ -1,4 +1,4 @@
-"""Settings that are changed while the tracker runs: checked when set, used from the next set on."""
+"""Changes of settings while the tracker runs: checked when set, used from the next set on."""
 
 from collections.abc import Callable, Mapping
 from threading import Lock
@@ -19,15 +19,16 @@ from markerless_tracker.tracking.stages.frame import frame_stages
 LIVE = live_settings()
 """Parameters that may be set while the tracker runs."""
 FIXED = "fixed while the tracker runs"
-"""Constraint of the others, as their descriptors say it."""
+"""Constraint of all other parameters, in their descriptors."""
 
 
 class SettableTracker:
     """A tracker whose settings other threads may change between two steps.
 
     Args:
-        tracker: steps on the images.
-        changed: called in the thread of the steps with the stamp from which on settings hold.
+        tracker: the tracker.
+        changed: called in the thread of the steps with new settings and the stamp of their first
+            set.
     """
 
     def __init__(
@@ -46,7 +47,7 @@ class SettableTracker:
         return self._tracker.body
 
     def check(self, config: TrackerConfig) -> None:
-        """Make sure that settings can be used.
+        """Check that settings can be used.
 
         Raises:
             ConfigError: their budget cannot be spent.
@@ -55,7 +56,7 @@ class SettableTracker:
         frame_stages(body, config, body.neutral, body.sigma)
 
     def configure(self, config: TrackerConfig) -> None:
-        """Use settings that were checked from the next step on."""
+        """Use checked settings from the next step on."""
         with self._lock:
             self._next = config
 
@@ -68,7 +69,7 @@ class SettableTracker:
         return self._tracker.prepare(views, stamp_ns)
 
     def step(self, views: Any, stamp_ns: int, effort: float = 1.0) -> TrackResult:
-        """As `Tracker.step`, with the settings given last."""
+        """As `Tracker.step`, with the latest settings."""
         with self._lock:
             config, self._next = self._next, None
         if config is not None:
@@ -88,8 +89,8 @@ class SettableTracker:
 class LiveSettings:
     """The parameters of a node that change its tracker's settings.
 
-    A setting that follows from another one unless it was given, as `evaluations` from `optimizer`,
-    follows it here, too.
+    A setting whose default depends on another setting, such as `evaluations` on `optimizer`,
+    changes with it unless it was given.
 
     Args:
         node: its parameters are declared already.
@@ -98,7 +99,7 @@ class LiveSettings:
         inform: called with a line about a change.
 
     Attributes:
-        record: what was changed, in order: stamp from which on it holds, ns, and values by name.
+        record: the changes, in order: stamp of the first set, ns, and values by name.
     """
 
     def __init__(
@@ -118,17 +119,17 @@ class LiveSettings:
         node.add_post_set_parameters_callback(self._apply)
 
     def settable(self, tracker: Tracker | FittingProcess) -> SettableTracker:
-        """The tracker that the parameters change from now on."""
+        """A tracker whose settings the parameters change from now on."""
         self._tracker = SettableTracker(tracker, self._changed)
         return self._tracker
 
     def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Add what follows from the values that are set."""
+        """Add the settings that depend on the given ones."""
         self._asked = {p.name: p.value for p in parameters if p.name in LIVE}
         try:
             config = self._asked_config()
         except ConfigError:
-            return parameters  # refused by `_check`
+            return parameters  # `_check` refuses them.
         follows = set(_differences(self._config, config)) & LIVE - {p.name for p in parameters}
         values = config.by_name()
         return parameters + [Parameter(name, value=values[name]) for name in sorted(follows)]
@@ -175,6 +176,6 @@ class LiveSettings:
 
 
 def _differences(before: TrackerConfig, after: TrackerConfig) -> dict[str, Any]:
-    """Settings that differ, with their values after."""
+    """Settings that differ, with their new values."""
     old = before.by_name()
     return {name: value for name, value in after.by_name().items() if value != old[name]}

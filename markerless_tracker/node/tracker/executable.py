@@ -20,7 +20,7 @@ _EXAMPLE = (
 )
 _CLOSE_S = 3.0
 _SWITCH_S = 0.001
-"""Time after which a thread that runs Python gives way to another one."""
+"""Python's thread switch interval."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -38,14 +38,14 @@ def _run(argv: list[str], stop: StopSignals) -> int:
 
         print_help("tracker", _SUMMARY, _EXAMPLE, descriptions(), default_values())
         return 0
-    # The compiled passes give the interpreter up, and would wait for it up to 5 ms each.
+    # Compiled kernels release the interpreter's lock, and would wait up to 5 ms to get it back.
     sys.setswitchinterval(_SWITCH_S)
     from markerless_tracker.node.tracker.node import TrackerNode
 
-    if stop.asked:
+    if stop.received:
         return 0
     with running(TrackerNode, argv) as (node, executor):
-        while node.fatal is None and not stop.asked:
+        while node.fatal is None and not stop.received:
             executor.spin_once(timeout_sec=NOTICE_S)
         trouble, ended = node.fatal, False
         try:
@@ -55,7 +55,7 @@ def _run(argv: list[str], stop: StopSignals) -> int:
         if trouble is not None:
             print(f"tracker: {trouble}", file=sys.stderr, flush=True)
     if not ended:
-        # The compiler cannot be interrupted, and Python would wait for it.
+        # A compilation cannot be interrupted, and Python would wait for its end.
         sys.stdout.flush()
         os._exit(0 if trouble is None else 1)
     return 0 if trouble is None else 1

@@ -1,4 +1,4 @@
-"""Topics of one camera: messages are checked and stored, pixels are not touched."""
+"""Inputs of one camera: messages are checked and stored, pixels are not read."""
 
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -20,10 +20,10 @@ from markerless_tracker.node.ros.cdr import (
 from markerless_tracker.node.ros.images import check_layout, received_channels
 
 COMPRESSED_SUFFIX = "/compressed"
-"""Follows the topic of raw images in that of compressed ones."""
+"""Suffix of the topic of compressed images after that of raw images."""
 _GAP_MAX = 1000
 _SHOWN = 80
-"""Characters of a received text that messages show."""
+"""Largest number of characters of a received text in a message."""
 _KINDS = {1: "grey", 3: "colour"}
 
 
@@ -56,16 +56,16 @@ class CameraInput:
     Args:
         name: the camera's name.
         camera: its calibration for full-size images, None while unknown.
-        sets: gets the images (as `ImageMessage`) that can be used.
-        status: gets the counts and errors.
+        sets: receives the usable images (as `ImageMessage`).
+        status: receives the counts and errors.
         report: called with one line when a problem begins and when it ends.
         clock: monotonic time in s.
-        channels: number of channels of the camera's background, None if there is none to match.
-        image_topic, info_topic: names with the camera's in place of ``NAME``.
-        offset_ns: by which its stamps are late.
+        channels: number of channels of the camera's background; None if there is none to match.
+        image_topic, info_topic: topics; ``NAME`` stands for the camera.
+        offset_ns: time by which its stamps are late.
 
     Attributes:
-        image_topic, info_topic: the camera's.
+        image_topic, info_topic: of the camera.
     """
 
     _what = "an image"
@@ -107,7 +107,7 @@ class CameraInput:
 
     @property
     def refusal(self) -> str:
-        """Reason why the last image could not be used; empty if it could, or if it is old."""
+        """Reason why the last image could not be used; empty if it was usable or is old."""
         return self._refusal if self._clock() - self._refused_s < QUIET_S else ""
 
     def on_image(self, serialised: bytes, sequence: int | None = None) -> None:
@@ -115,12 +115,12 @@ class CameraInput:
 
         Args:
             serialised: the message's bytes; the stored image shares them.
-            sequence: its sequence number at the publisher; gaps are images lost by the middleware.
+            sequence: its number at the publisher; gaps are images lost by the middleware.
         """
         self._take(serialised, sequence, read_image, self.image_topic)
 
     def on_compressed(self, serialised: bytes, sequence: int | None = None) -> None:
-        """As `on_image`, of a sensor_msgs/CompressedImage."""
+        """As `on_image`, for a sensor_msgs/CompressedImage."""
         topic = f"{self.image_topic}{COMPRESSED_SUFFIX}"
         self._take(serialised, sequence, read_compressed, topic)
 
@@ -156,7 +156,7 @@ class CameraInput:
         self._sets.add(self.name, message.stamp_ns - self._offset_ns, message, now_s=now_s)
 
     def on_info_bytes(self, serialised: bytes) -> None:
-        """Take a serialised sensor_msgs/CameraInfo, if it differs from the last in its content."""
+        """Take a serialised sensor_msgs/CameraInfo, if its content differs from the last one."""
         content = without_stamp(serialised)
         if content == self._info_bytes:
             return
@@ -194,7 +194,7 @@ class CameraInput:
         Args:
             silent: whether no usable image was received for `QUIET_S`.
             left_out: whether sets are complete without this camera.
-            others_send: whether other cameras' images are received.
+            others_send: whether images of other cameras are received.
             now_s: the time.
         """
         topics = []
@@ -245,7 +245,7 @@ class CameraInput:
         before, self._sequence = self._sequence, sequence
         if sequence is not None and before is not None:
             gap = sequence - before - 1
-            # A restarted publisher begins another count.
+            # A restarted publisher counts from the beginning.
             if 0 < gap < _GAP_MAX:
                 self._status.lost(self.name, gap)
 

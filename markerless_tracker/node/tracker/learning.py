@@ -1,4 +1,4 @@
-"""A request to learn the backgrounds, from its first set of images to its answer."""
+"""A request to learn the backgrounds: collects sets of images, learns and answers."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -26,22 +26,21 @@ class TakesBackgrounds(Protocol):
 
 
 class Learning:
-    """Collects sets of images of the empty scene, and refuses if it is not empty.
+    """Collects sets of images of the empty scene; refuses if the scene is not empty.
 
     The scene is not empty if a person is tracked in the first or the last set, or if something
-    moves between the sets. A motionless person that the tracker does not find goes undetected.
-
-    One thread collects; any thread may wait for the answer.
+    moves between the sets. A motionless person that the tracker does not find goes undetected. One
+    thread collects; any thread may wait for the answer.
 
     Args:
         cameras: names of all cameras.
-        sets: how many sets to collect.
+        sets: number of sets to collect.
         settings: as in `learn_background`.
-        folder: where `NAME.npz` are written; None writes none.
+        folder: folder to write `NAME.npz` to; None = write no files.
         clock: monotonic time in s.
 
     Attributes:
-        success, message: the answer, once `answered`.
+        success, message: the answer, valid if `answered`.
     """
 
     def __init__(
@@ -57,7 +56,7 @@ class Learning:
         self._sets, self._taken = sets, 0
         self._folder = folder
         self._clock = clock
-        self._heard_s = clock()
+        self._last_set_s = clock()
         self._answered = Event()
         self.success, self.message = False, ""
 
@@ -67,13 +66,13 @@ class Learning:
         return self._answered.is_set()
 
     @property
-    def looks(self) -> bool:
+    def searches_person(self) -> bool:
         """Whether the tracker must search the last set for a person."""
         return self._taken in (1, self._sets)
 
     def take(self, images: Mapping[str, NDArray[np.uint8] | Observation]) -> None:
-        """Add a set of images, by camera; refuses if something moved since the first."""
-        self._heard_s = self._clock()
+        """Add a set of images, by camera; refuses if something has moved since the first set."""
+        self._last_set_s = self._clock()
         self._taken += 1
         for name, image in images.items():
             if isinstance(image, Observation):
@@ -86,12 +85,15 @@ class Learning:
                 return
 
     def saw(self, state: TrackState) -> None:
-        """Take the tracker's state for the last set; refuses if a person is tracked."""
+        """Take the tracker's state after the last set; refuses if a person is tracked."""
         if state is TrackState.TRACKING:
             self.refuse("a person is tracked; the scene must be empty")
 
     def finish_if_complete(self, tracker: TakesBackgrounds) -> bool:
-        """After the last set: learn, use, write and answer; returns whether they are used.
+        """After the last set: learn the backgrounds, use and write them, and answer.
+
+        Returns:
+            Whether they are used.
 
         Raises:
             Exception: from the tracker; the request is then not answered.
@@ -119,7 +121,7 @@ class Learning:
         return True
 
     def refuse(self, why: str) -> None:
-        """Answer that nothing is learned, with the reason in one line; the first reason counts."""
+        """Answer that nothing is learned, with a reason in one line; later reasons are ignored."""
         if not self.answered:
             self.message = f"nothing learned: {why}"
             self._answered.set()
@@ -128,9 +130,9 @@ class Learning:
         """Refuse if no set was received for `PATIENCE_S`.
 
         Args:
-            activity: what the tracker is doing, for the message.
+            activity: of the tracker, for the message.
         """
-        if self._clock() - self._heard_s > PATIENCE_S:
+        if self._clock() - self._last_set_s > PATIENCE_S:
             self.refuse(
                 f"{self._taken} of {self._sets} sets of images were received, then none for "
                 f"{PATIENCE_S:g} s ({activity})"
@@ -143,7 +145,7 @@ class Learning:
 
 
 class OpenRequest:
-    """The request that is being answered, one at a time. Safe to use from several threads."""
+    """Holds the open request, at most one. Safe to use from several threads."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -151,14 +153,14 @@ class OpenRequest:
 
     @property
     def current(self) -> Learning | None:
-        """The request, None without one or once it is answered."""
+        """The open request; None if there is none or it has been answered."""
         with self._lock:
             if self._learning is not None and self._learning.answered:
                 self._learning = None
             return self._learning
 
     def open(self, learning: Learning) -> None:
-        """Take a request; refuses it while there is another."""
+        """Take a request; refuses it while another is open."""
         with self._lock:
             if self._learning is not None and not self._learning.answered:
                 learning.refuse("the backgrounds are being learned already")

@@ -45,8 +45,8 @@ STATE_PERIOD_S = 0.5
 class TrackerNode(GivenNode):
     """Receives images, and publishes the results of its worker thread.
 
-    Callbacks only store; `TrackWorker` does the work, the reading of files included: what is wrong
-    with them is in `fatal`. Call `close` before `destroy_node`.
+    Callbacks only store data; `TrackWorker` does the work and reads the files. `fatal` reports
+    errors in the files. Call `close` before `destroy_node`.
 
     Args:
         node_arguments: passed on to ``rclpy.node.Node`` (context, parameter_overrides, ...).
@@ -179,11 +179,11 @@ class TrackerNode(GivenNode):
             clock=self._seconds,
             inform=self._inform,
         )
-        # A steady clock: without /clock simulated time stops, and the state must be published.
+        # A steady clock: the state must be published while simulated time stops without /clock.
         self.create_timer(STATE_PERIOD_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _background_channels(self, camera: str) -> int | None:
-        """Channels of a camera's background; None without one, or while one is learned."""
+        """Channels of a camera's background; None if there is none or it is being learned."""
         if self._tracker is None or self._worker.learning:
             return None
         segmenter = self._tracker.segmenter(camera)
@@ -234,7 +234,7 @@ class TrackerNode(GivenNode):
         )
 
     def _warm_up(self, body: BodyModel) -> None:
-        """Compile what runs beside the tracker."""
+        """Compile what the node uses besides the tracker."""
         if self._time_offsets is not None:
             self._time_offsets.warm_up(body)
         self._report.warm_up(body)
@@ -255,7 +255,7 @@ class TrackerNode(GivenNode):
         self._announcer.time_offsets(self._time_offsets.by_camera, self._source.offsets_s)
 
     def _dealt(self, arrived_s: float) -> None:
-        """Publish that a set was dealt with; of sets that newer ones follow not each."""
+        """Publish the state after a set was processed; not after each while newer sets wait."""
         if not self.context.ok():
             return
         if self._state_pace.due(self._seconds(), arrived_s, self._sets.complete_s):

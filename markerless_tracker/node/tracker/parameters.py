@@ -72,7 +72,7 @@ class NodeSettings:
     config: TrackerConfig
 
     def takes_evidence(self, camera: str) -> bool:
-        """Whether a camera's evidence is received in place of its images."""
+        """Whether a camera's evidence is received instead of its images."""
         return self.image_transport == EVIDENCE or camera in self.evidence_cameras
 
 
@@ -107,7 +107,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
     "tf": TF_CHOICES,
     "image_transport": (*TRANSPORTS, EVIDENCE),
 }
-"""Values of the node's own parameters that are one of a few."""
+"""Choices of the node's own parameters."""
 
 
 def parameter_names() -> tuple[str, ...]:
@@ -116,7 +116,7 @@ def parameter_names() -> tuple[str, ...]:
 
 
 def held_settings() -> tuple[Setting, ...]:
-    """The parameters that have a range or choices."""
+    """All parameters with a range or choices."""
     lines = declared.attribute_lines(NodeSettings)
     own = (
         Setting(name, type(least), least, lines[name], None, least, most)
@@ -186,12 +186,12 @@ def effective_values(settings: NodeSettings) -> dict[str, Any]:
 
 
 def default_values() -> dict[str, Any]:
-    """Value of every parameter unless it is given; None where there is none."""
+    """Default of every parameter; None = no default."""
     return effective_values(read_settings({}))
 
 
 def descriptions() -> dict[str, str]:
-    """One line about every parameter: the most used first, then the node's, then the tracker's."""
+    """A line about every parameter: the most used ones, then the node's, then the tracker's."""
     own = declared.attribute_lines(NodeSettings)
     lines = {name: own[name] for name in dict.fromkeys((*_FIRST, *_OWN))}
     lines |= {name: f"{lines[name]} ({', '.join(values)})" for name, values in CHOICES.items()}

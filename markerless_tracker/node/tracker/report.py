@@ -1,4 +1,4 @@
-"""The verdict of a live run: what its frames add up to."""
+"""The verdict of a live run."""
 
 from collections.abc import Mapping
 from threading import Lock
@@ -19,13 +19,13 @@ _LEFT_OUT = {
     "dropped_while_learning": "while learning",
     "dropped_on_error": "with an error",
 }
-"""Count of `state` -> words, for sets of images that were not tracked beside those skipped."""
+"""Count of `state` -> words, for sets that were not tracked, except skipped ones."""
 
 _PICTURES = "while it runs the topics debug/NAME/evidence show silhouettes and body"
 
 
 def sets_line(counts: Mapping[str, str]) -> str:
-    """How many sets of images were not tracked, and why, in a line.
+    """A line with the number of sets that were not tracked, and the reasons.
 
     Args:
         counts: the values of `state`.
@@ -50,7 +50,7 @@ class RunReport:
         self._doubts: tuple[str, ...] = ()
 
     def begin(self, tracker: Tracker, rig: CameraRig) -> tuple[str, ...]:
-        """Set the tracker; returns what is doubtful about the cameras, one line each."""
+        """Set the tracker; returns doubts about the cameras, one line each."""
         with self._lock:
             self._tracker, self._record = tracker, RunRecord(tracker.rig)
             self._doubts = calibration_doubts(rig)
@@ -62,7 +62,7 @@ class RunReport:
             self._record.static.warm_up(body)
 
     def add(self, result: TrackResult, body: BodyModel) -> None:
-        """Take a result, and the body as it is now."""
+        """Take a result and the present body."""
         with self._lock:
             if self._record is not None:
                 self._record.add(result, body)
@@ -72,7 +72,7 @@ class RunReport:
         with self._lock:
             if self._record is None or self._tracker is None or not self._record.frames:
                 return None
-            # No search for exchanged cameras: a node that is told to end must end soon.
+            # Without the search for exchanged cameras, since a node must end soon after a signal.
             return verdict_of(
                 self._record,
                 load_description(self._tracker.config.body),

@@ -27,13 +27,13 @@ class Services:
 
     Args:
         node: offers the services.
-        worker: does what takes images.
-        settings: the node's.
-        cameras: those whose backgrounds are learned.
+        worker: answers the requests that need images.
+        settings: of the node.
+        cameras: the cameras whose backgrounds are learned.
         rig: the cameras of full-size images; None while they are not known.
         person: the tracked body; None before a person was tracked.
         clock: monotonic time in s.
-        inform: called with a line about what was done.
+        inform: called with a line about each answered request.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Services:
         self._cameras, self._rig, self._person = cameras, rig, person
         self._clock, self._inform = clock, inform
         node.create_service(Trigger, "~/reset", self._on_reset)
-        # Images must be received while the request is answered.
+        # In its own callback group: images must be received while the request is answered.
         node.create_service(
             Trigger,
             "~/learn_background",
@@ -69,7 +69,7 @@ class Services:
         )
 
     def save_subject(self) -> str:
-        """Write the tracked person's sizes to `SUBJECT_FILE`; returns what was written, in words.
+        """Write the tracked person's sizes to `SUBJECT_FILE`; returns a description of them.
 
         Raises:
             ConfigError: nobody was tracked, or the file exists or cannot be written.
@@ -87,7 +87,7 @@ class Services:
         return f"{path}: sizes of the tracked person written (subject_file)"
 
     def save_calibration(self) -> str:
-        """Write the cameras in use to `CALIBRATION_FILE`; returns what was written, in words.
+        """Write the cameras in use to `CALIBRATION_FILE`; returns a description of them.
 
         Raises:
             TrackerError: the cameras are not known, or the file exists or cannot be written.

@@ -1,4 +1,4 @@
-"""Construction of the rig and the tracker from the node's settings."""
+"""Builds the rig and the tracker from the node's settings."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -21,11 +21,11 @@ class RigSource:
 
     Attributes:
         names: the cameras.
-        rig: the rig of full-size images, None while it is not known.
+        rig: the rig of full-size images; None while it is not known.
 
     Raises:
-        ConfigError: the calibration file cannot be used or lacks a camera, there is neither one nor
-            TF, or the offsets are not one for each camera; names the parameter.
+        ConfigError: the calibration file cannot be used or lacks a camera; there is neither a file
+            nor TF; or the number of offsets is not that of the cameras; names the parameter.
     """
 
     def __init__(self, settings: NodeSettings) -> None:
@@ -75,11 +75,11 @@ class RigSource:
 
     @property
     def offsets_s(self) -> dict[str, float]:
-        """The same of all cameras, s, in their order."""
+        """Times by which the stamps of all cameras are late, s, in their order."""
         return {name: 1e-9 * self.offset_ns(name) for name in self.names}
 
     def listen(self, node: Any, report: Callable[[str], None]) -> None:
-        """Subscribe to TF if that is needed.
+        """Subscribe to TF if it is needed.
 
         Args:
             node: creates the subscriptions.
@@ -103,10 +103,10 @@ class RigSource:
         node.create_subscription(TFMessage, "/tf", take, image_qos(depth=100))
 
     def try_rig(self, infos: Mapping[str, Any]) -> CameraRig | None:
-        """The rig, None while a message for it is missing.
+        """The rig; None while a message for it is missing.
 
         Args:
-            infos: sensor_msgs/CameraInfo of each camera, None for those that sent none.
+            infos: sensor_msgs/CameraInfo of each camera; None if it has sent none.
 
         Raises:
             CalibrationError: a camera info cannot be used.
@@ -126,7 +126,7 @@ class RigSource:
         return self.rig
 
     def missing(self) -> list[str]:
-        """Transforms that are missing."""
+        """Descriptions of the missing transforms."""
         if self._tree is None or self.rig is not None:
             return []
         from markerless_tracker.node.ros.messages import WORLD_FRAME, optical_frame
@@ -142,9 +142,9 @@ def build(settings: NodeSettings, rig: CameraRig, scaled: CameraRig) -> TrackerS
     """The tracker that the settings describe.
 
     Args:
-        settings: the node's.
-        rig: cameras of the images as they come.
-        scaled: cameras of the images as the tracker gets them.
+        settings: of the node.
+        rig: cameras of the full-size images.
+        scaled: cameras of the scaled images, which the tracker uses.
 
     Raises:
         TrackerError: a file cannot be read, or does not fit the rig; names the parameter.
@@ -163,10 +163,10 @@ def build(settings: NodeSettings, rig: CameraRig, scaled: CameraRig) -> TrackerS
 
 
 def _check_person(settings: NodeSettings) -> None:
-    """Make sure that the files of the start and the person can be used.
+    """Check that the files of the start and the person can be used.
 
     Raises:
-        ConfigError: they cannot; names the parameter.
+        ConfigError: a file cannot be used; names the parameter.
     """
     if settings.subject_file is not None:
         with _named("subject_file"):
@@ -189,7 +189,7 @@ def _check_person(settings: NodeSettings) -> None:
 
 @contextmanager
 def _named(what: str) -> Iterator[None]:
-    """Prefix errors with the parameter."""
+    """Prefix errors with the name of the parameter."""
     try:
         yield
     except TrackerError as error:
@@ -217,7 +217,7 @@ def _backgrounds(
     frames = read_background(folder, scaled, stored_sizes_px=sizes_px, ignore_others=True)
     missing = [name for name in rig.names if name not in models and name not in frames]
     if missing and settings.wait_for_background:
-        # Learning replaces all backgrounds, those that are there included.
+        # Learning replaces all backgrounds, including those in the folder.
         return {}
     if missing:
         raise ConfigError(

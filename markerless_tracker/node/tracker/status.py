@@ -34,7 +34,7 @@ NOTED = (
     "first_pose_s",
     "cpu_s",
 )
-"""Values that a result file keeps."""
+"""Keys of the values that a result file records."""
 
 
 class TrackerStatus:
@@ -62,13 +62,13 @@ class TrackerStatus:
 
     @property
     def ready(self) -> bool:
-        """Whether the kernels are compiled and images are tracked as they come."""
+        """Whether the kernels are compiled and images are tracked on arrival."""
         with self._lock:
             return self._ready
 
     @property
     def stamp_ns(self) -> int:
-        """Stamp of the last result, 0 before the first."""
+        """Stamp of the last result; 0 before the first."""
         with self._lock:
             return 0 if self._result is None else self._result.stamp_ns
 
@@ -80,7 +80,7 @@ class TrackerStatus:
 
     @property
     def activity(self) -> str:
-        """What the tracker is doing, in a few words."""
+        """Present activity of the tracker, in a few words."""
         with self._lock:
             return self._activity
 
@@ -90,18 +90,18 @@ class TrackerStatus:
             self._activity = activity
 
     def add_cpu_of(self, helper_cpu_s: Callable[[], float]) -> None:
-        """Count the CPU time of another process, which works for this one, as well."""
+        """Include the CPU time of a helper process."""
         with self._lock:
             self._helper_cpu_s = helper_cpu_s
 
     def became_ready(self, activity: str, *, now_s: float) -> None:
-        """Images are tracked as they arrive from now on."""
+        """Note that images are tracked on arrival from now on."""
         with self._lock:
             self._activity, self._ready, self._ready_s = activity, True, now_s
             self._ready_cpu_s = self._cpu_s()
 
     def tracked(self, result: TrackResult, *, arrived_s: float, finished_s: float) -> None:
-        """Record a result and its times of one monotonic clock."""
+        """Record a result and its times, of one monotonic clock."""
         with self._lock:
             self._tracked += 1
             self._result = result
@@ -145,7 +145,7 @@ class TrackerStatus:
             self._last_error = self._set_error = message
 
     def set_error(self) -> str:
-        """Reason why the last set could not be tracked; empty if it could."""
+        """Reason why the last set could not be tracked; empty if it was tracked."""
         with self._lock:
             return self._set_error
 
@@ -160,7 +160,7 @@ class TrackerStatus:
             return self._ready_s
 
     def restarted(self) -> None:
-        """Forget the last result; the counts stay."""
+        """Forget the last result; the counts are kept."""
         with self._lock:
             self._result = None
 
@@ -186,7 +186,7 @@ class TrackerStatus:
             missing: topics or transforms that are missing.
             now_s: the time, for `fps` over the last `RATE_S`; None = over the last `WINDOW` frames.
             views: counts of the cameras' views; other cameras have no entries.
-            time_offsets: of the cameras by the motion, by name, as far as they are known.
+            time_offsets: of the cameras, estimated from the motion, by name, as far as known.
         """
         with self._lock:
             result = self._result
@@ -256,7 +256,8 @@ class TrackerStatus:
         times = [t for t in self._finished_s if now_s is None or now_s - t <= RATE_S]
         if not times:
             return 0.0
-        # Of a running stream the time since the last frame counts: the rate falls without frames.
+        # In a running stream the time since the last frame counts, so the rate falls without
+        # frames.
         span = (times[-1] if now_s is None else now_s) - times[0]
         return (len(times) - 1) / span if span > 0.0 else None
 

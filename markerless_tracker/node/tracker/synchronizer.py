@@ -1,4 +1,4 @@
-"""Matching the cameras' images by their stamps; the newest complete set is handed out."""
+"""Matches the cameras' images by their stamps, and returns the newest complete set."""
 
 from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,15 +17,16 @@ from markerless_tracker.node.tracker.pace.waiting import MatchedSet, WaitingSets
 View = TypeVar("View")
 
 STOPPED_VIEWS = 12
-"""Views that another camera sends before a silent one is left out."""
+"""A silent camera is left out after another camera has sent this many views."""
 STOPPED_S = 0.5
-"""Least silence of a camera that was heard before it is left out."""
+"""Least silence after which a camera that has sent views is left out."""
 ABSENT_S = 5.0
-"""Time after the first view of all before a camera that was never heard is left out: discovery of
-a publisher may take 3 s."""
+"""Time after the very first view after which a camera that has sent none is left out: the discovery
+of a publisher may take 3 s."""
 LEAST_CAMERAS = 2
 RESTART_SETS = 3
-"""Consecutive sets, in order, that lie before the newest one: time was set back. Fewer are late."""
+"""Number of consecutive sets, in order, older than the newest set, after which time is taken to
+have been set back. Fewer such sets are late."""
 
 
 class _Entry(NamedTuple, Generic[View]):
@@ -34,20 +35,21 @@ class _Entry(NamedTuple, Generic[View]):
 
 
 class Synchronizer(Generic[View]):
-    """Collects views as they arrive and hands out the newest complete set.
+    """Collects views as they arrive and returns the newest complete set.
 
-    Each camera's views are kept in the order they arrived. The middleware keeps each camera's
-    order, so once a set is complete, whatever arrived before its members can never be completed
-    and is dropped. Views are matched by equal stamps, not by their age: one stamp far in the future
-    cannot block the next sets. At most one complete set waits (some more while they are kept, see
-    `keep`), and at most `depth` views per camera, however slow the consumer is.
+    Each camera's views are kept in the order of arrival. The middleware preserves each camera's
+    order, so when a set is complete, earlier views can never be completed and are dropped. Views
+    are matched by equal stamps, not by their age, so a stamp far in the future cannot block the
+    next sets. At most one complete set waits (more while sets are kept, see `keep`), and at most
+    `depth` views per camera, however slow the consumer is.
 
-    A set that is not newer than the last one is late and dropped. After `RESTART_SETS` of them in a
-    row, in order, time was set back, and sets are handed out from there on.
+    A set that is not newer than the last one is late and is dropped. After `RESTART_SETS` such sets
+    in a row, in order, time is taken to have been set back, and sets are returned from there on.
 
-    A camera that stops sending is not waited for once another has sent `STOPPED_VIEWS` views since,
-    over `STOPPED_S` at least; one that never sent, after `ABSENT_S`. Sets are then complete without
-    it, as long as `LEAST_CAMERAS` are left. Its next view takes it back.
+    A camera that stops sending is left out when another camera has sent `STOPPED_VIEWS` views
+    since, over at least `STOPPED_S`. A camera that has never sent is left out after `ABSENT_S`.
+    Sets are then complete without it, as long as `LEAST_CAMERAS` remain. Its next view includes it
+    again.
 
     Safe to use from several threads; no callback is ever called.
 
@@ -74,7 +76,7 @@ class Synchronizer(Generic[View]):
         self._depth = depth
         self._pending: dict[str, deque[_Entry[View]]] = {name: deque() for name in cameras}
         self._last_stamps: dict[str, int] = {}
-        self._heard_s: dict[str, float] = {}
+        self._last_view_s: dict[str, float] = {}
         self._first_s: float | None = None
         self._since: dict[str, Counter[str]] = {name: Counter() for name in cameras}
         self._waiting: WaitingSets[View] = WaitingSets()
@@ -94,19 +96,19 @@ class Synchronizer(Generic[View]):
 
     @property
     def camera_counts(self) -> dict[str, CameraCounts]:
-        """Counts of each camera's views, likewise."""
+        """Counts of each camera's views since the start, or since `start_counting`."""
         with self._changed:
             return self._counter.counts()
 
     @property
     def held(self) -> int:
-        """Views kept at this moment."""
+        """Number of views kept now."""
         with self._changed:
             return self._waiting.views + sum(map(len, self._pending.values()))
 
     @property
     def late_ns(self) -> int | None:
-        """Stamp of the last set that was dropped because it was late; None so far."""
+        """Stamp of the last set that was dropped because it was late; None if there was none."""
         with self._changed:
             return self._last_late_ns
 
@@ -117,12 +119,12 @@ class Synchronizer(Generic[View]):
             return self._complete_s
 
     def add(self, camera: str, stamp_ns: int, view: View, *, now_s: float) -> bool:
-        """Store one view; never blocks and does no work on it.
+        """Store one view; never blocks and does not process it.
 
         Args:
             camera: its name, one of `cameras`.
             stamp_ns: its time of capture.
-            view: the object to hand out.
+            view: the object to return in a set.
             now_s: time of its arrival in s, of a monotonic clock.
 
         Returns:
@@ -137,7 +139,7 @@ class Synchronizer(Generic[View]):
                 self._counter.note("dropped", camera)
                 return False
             self._last_stamps[camera] = stamp_ns
-            self._heard_s[camera] = now_s
+            self._last_view_s[camera] = now_s
             self._since[camera].clear()
             for name in self.cameras:
                 if name != camera:
@@ -153,9 +155,9 @@ class Synchronizer(Generic[View]):
             return True
 
     def take(self, timeout_s: float = 0.0) -> MatchedSet[View] | None:
-        """The newest complete set, or the earliest that was kept, once.
+        """Remove and return the newest complete set, or the earliest kept set.
 
-        Waits up to `timeout_s` for one; None if none came.
+        Waits up to `timeout_s` for a set; None if none came.
         """
         with self._changed:
             if not self._waiting and timeout_s > 0.0:
@@ -163,12 +165,12 @@ class Synchronizer(Generic[View]):
             return self._waiting.take()
 
     def keep(self, at_most: int) -> None:
-        """Keep so many complete sets from now on, or 0: no more; see `WaitingSets`."""
+        """Keep at most `at_most` complete sets from now on; see `WaitingSets`."""
         with self._changed:
             self._waiting.keep(at_most)
 
     def drop_older(self) -> None:
-        """Drop the complete sets that wait but for the newest."""
+        """Drop all waiting complete sets but the newest."""
         with self._changed:
             self._counts["skipped"] += self._waiting.drop_older()
 
@@ -178,25 +180,25 @@ class Synchronizer(Generic[View]):
             self._changed.notify_all()
 
     def silent(self, now_s: float, after_s: float = 1.0) -> tuple[str, ...]:
-        """Cameras of which no new view came for that long, or ever, in the order of the cameras."""
+        """Cameras without a new view for `after_s`, or without any, in the order of the cameras."""
         with self._changed:
             return tuple(
                 name
                 for name in self.cameras
-                if name not in self._heard_s or now_s - self._heard_s[name] > after_s
+                if name not in self._last_view_s or now_s - self._last_view_s[name] > after_s
             )
 
     def left_out(self, now_s: float) -> tuple[str, ...]:
-        """Cameras without which sets are complete now, in the order of the cameras."""
+        """Cameras that are left out of the sets now, in the order of the cameras."""
         with self._changed:
             left_out = self._left_out(now_s)
             return tuple(name for name in self.cameras if name in left_out)
 
     def offsets_ns(self) -> dict[str, int]:
-        """Offset of each camera's stamps from the nearest ones of the other cameras.
+        """Offset of each camera's stamps from the nearest stamps of the other cameras.
 
-        The median over the views that wait for their set, relative to the camera in best agreement
-        with the others; cameras without such views are absent.
+        It is the median over the views that wait for their set, relative to the camera that agrees
+        best with the others; cameras without such views are absent.
         """
         with self._changed:
             stamps = {name: [e.stamp_ns for e in queue] for name, queue in self._pending.items()}
@@ -228,13 +230,13 @@ class Synchronizer(Generic[View]):
         return left_out if len(self.cameras) - len(left_out) >= LEAST_CAMERAS else frozenset()
 
     def _gone(self, camera: str, now_s: float) -> bool:
-        heard_s = self._heard_s.get(camera)
-        if heard_s is not None:
-            return now_s - heard_s >= STOPPED_S
+        last_view_s = self._last_view_s.get(camera)
+        if last_view_s is not None:
+            return now_s - last_view_s >= STOPPED_S
         return self._first_s is not None and now_s - self._first_s >= ABSENT_S
 
     def _match(self, camera: str, stamp_ns: int, left_out: frozenset[str]) -> dict[str, int] | None:
-        """Positions of a set's members in the cameras' queues, if that view completes one."""
+        """Positions of a set's views in the cameras' queues, if the given view completes a set."""
         positions: dict[str, int] = {}
         for name, queue in self._pending.items():
             if name in left_out:
@@ -277,7 +279,7 @@ class Synchronizer(Generic[View]):
         self._counts["skipped"] += self._waiting.put(matched)
 
     def _accepts(self, stamp_ns: int) -> bool:
-        """Whether a set is the next in time, by itself or after time was set back."""
+        """Whether a set is newer than the last one, or time was set back."""
         if self._newest_ns is None or stamp_ns > self._newest_ns:
             self._late_ns.clear()
             return True
@@ -299,7 +301,7 @@ class Synchronizer(Generic[View]):
 
 
 def _nearest(queue: Iterable[_Entry[View]], stamp_ns: int, tolerance_ns: int) -> int | None:
-    """Position of the view nearest in stamp, the last of equals; None if none is near enough."""
+    """Position of the view with the nearest stamp, the last of equals; None if none is near."""
     best: int | None = None
     best_gap = tolerance_ns
     for position, entry in enumerate(queue):

@@ -11,15 +11,15 @@ from markerless_tracker.node.tracker.cameras.evidence_input import EvidenceInput
 from markerless_tracker.node.tracker.inputs import COMPRESSED_SUFFIX, CameraInput
 
 POLL_INFOS_S = 0.1
-"""Time between two looks at the camera infos: they come with every image and rarely change."""
+"""Interval at which camera infos are taken: they come with every image and rarely change."""
 
 
 class CameraTopics:
-    """Hands the messages of the cameras' topics to their inputs.
+    """Passes the messages of the cameras' topics to their inputs.
 
     Args:
         node: creates the subscriptions.
-        inputs: the cameras'.
+        inputs: of the cameras.
         transport: one of `qos.TRANSPORTS`.
         clock: monotonic time in s.
     """
@@ -58,14 +58,14 @@ class CameraTopics:
         self._poll_infos()
 
     def _before_image(self) -> None:
-        """Take the camera infos now and then before an image."""
+        """Take the camera infos before an image, at most every `POLL_INFOS_S`."""
         if self._clock() - self._polled_s > POLL_INFOS_S:
             self._poll_infos()
 
     def _after_image(self) -> None:
         """Take the images of the other cameras that have come meanwhile.
 
-        The executor takes one message, and then looks at all that it waits for once more.
+        The executor would take one message only, and then wait on all its entities again.
         """
         if self._taking:
             return
@@ -83,11 +83,11 @@ class CameraTopics:
 
 
 class _EvidenceSubscription:
-    """Receives one camera's silhouettes and, where they are used, its edge maps.
+    """Receives one camera's silhouettes and, if they are used, its edge maps.
 
     Args:
         node: creates the subscriptions.
-        source: gets the messages.
+        source: receives the messages.
         before: called before each silhouette.
     """
 
@@ -110,7 +110,7 @@ class _EvidenceSubscription:
             part.follow()
 
     def take_waiting(self) -> None:
-        """Nothing: evidence is small, and its two topics come to the executor."""
+        """Do nothing: evidence is small, and the executor takes both topics."""
 
 
 class ImageSubscription:
@@ -118,8 +118,8 @@ class ImageSubscription:
 
     Args:
         node: creates the subscription.
-        source: gets the messages.
-        transport: "auto": raw images, compressed ones while only those are offered.
+        source: receives the messages.
+        transport: "auto": raw images, or compressed ones while only those are offered.
         before, after: called before and after each message.
     """
 
@@ -134,7 +134,7 @@ class ImageSubscription:
         self._node, self._source, self._before, self._after = node, source, before, after
         self._auto = transport == "auto"
         self._compressed = transport == "compressed"
-        # A remapped topic's compressed images have the name it is mapped to.
+        # Compressed images have the resolved name of the topic, after remapping.
         self._topic = node.resolve_topic_name(source.image_topic)
         self._subscription = self._subscribe()
 
@@ -153,7 +153,7 @@ class ImageSubscription:
         self._subscription.follow()
 
     def take_waiting(self) -> None:
-        """Take the images that have come."""
+        """Take the queued images."""
         self._subscription.take_waiting()
 
     def _subscribe(self) -> FollowingSubscription:

@@ -1,4 +1,4 @@
-"""The tracking thread: takes the newest complete set, tracks it, publishes the result."""
+"""The tracking thread: takes the newest complete set, tracks it, passes on the result."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -46,7 +46,7 @@ class Stepper(Protocol):
         """Make the evidence of the next set while one is tracked."""
 
     def step(self, views: Any, stamp_ns: int, effort: float = 1.0) -> TrackResult:
-        """Track one set of images, or what was prepared of it."""
+        """Track one set of images, or a prepared set."""
 
     def reset(self) -> None:
         """Forget the person."""
@@ -57,10 +57,10 @@ class Stepper(Protocol):
 
 @dataclass(frozen=True)
 class TrackedSet:
-    """A result, and the images or evidence it came from (scaled, as the tracker saw them).
+    """A result, and the scaled images or evidence that it was made from.
 
     Attributes:
-        body: the tracked body, as it was fitted to the person by then.
+        body: the estimate of the body at that time.
     """
 
     result: TrackResult
@@ -70,16 +70,16 @@ class TrackedSet:
 
 @dataclass(frozen=True)
 class TrackerHandle:
-    """Tracker and inputs of the worker.
+    """The worker's tracker, and how to use it.
 
     Attributes:
-        tracker: steps on the images.
+        tracker: the tracker.
         start_ns: see `StartTimeGate`.
         decode: makes the tracker's image or observation of a camera's view.
         waits: whether the tracker has no backgrounds; sets are dropped until they are learned.
-        warm_up: compiles what runs beside the tracker.
-        kept: sets that are kept while a person is searched for.
-        searches: whether the tracker begins with that, and not from a start pose.
+        warm_up: compiles what the node uses besides the tracker.
+        kept: number of sets that are kept during the search for a person.
+        searches: whether the tracker begins with a search, without a start pose.
     """
 
     tracker: Stepper
@@ -92,22 +92,23 @@ class TrackerHandle:
 
 
 class TrackWorker:
-    """A thread that compiles, then tracks the newest set, again and again; another publishes.
+    """A thread that compiles the kernels, then tracks set after set; another thread publishes.
 
-    No exception leaves the thread: an error in one set is reported and costs that set; an error
+    No exception leaves the thread: an error in a set is reported and the set is lost; an error
     before the first set ends the worker and is kept in `fatal`.
 
     Args:
         sets: source of the complete sets.
         status: receives counts, times and errors.
-        prepare: makes the `TrackerHandle`; None while an input is missing, then called again.
-        publish: called with each result, in a thread of its own and in order; the next set is
-            tracked meanwhile.
+        prepare: makes the `TrackerHandle`; called again while it returns None (an input is
+            missing).
+        publish: called with each result, in order, in its own thread, while the next set is
+            tracked.
         report: called with each error, one line.
         inform: called with a line for the log when a phase begins.
-        dealt: called after each set, tracked or dropped, with the time at which it was complete;
-            in the thread of `publish`.
-        clock: monotonic time in s, the clock of the sets' arrival.
+        dealt: called after each set, tracked or dropped, with the time at which it was complete; in
+            the thread of `publish`.
+        clock: monotonic time in s; the clock of the sets' arrival times.
     """
 
     def __init__(
@@ -136,12 +137,12 @@ class TrackWorker:
         self._waits = False
         self._effort = EffortRule()
         self.fatal: str | None = None
-        # Compilation cannot be interrupted and must not keep the process alive.
+        # A daemon: compilation cannot be interrupted and must not keep the process alive.
         self._thread = Thread(target=self._run, name="fit", daemon=True)
 
     @property
     def learning(self) -> bool:
-        """Whether the backgrounds are being learned, or must be."""
+        """Whether the backgrounds are being learned or must be learned."""
         return self._waits or self._request.current is not None
 
     def start(self) -> None:
@@ -149,13 +150,13 @@ class TrackWorker:
         self._thread.start()
 
     def reset(self) -> None:
-        """Forget the person before the next set, and begin from the start pose if there is one."""
+        """Forget the person before the next set; restart from the start pose if there is one."""
         self._reset.set()
 
     def learn(self, learning: Learning) -> None:
         """Learn the backgrounds from the next sets of images.
 
-        The request is refused before the worker is ready and while there is another.
+        The request is refused before the worker is ready, and while another is open.
         """
         if not self._status.ready:
             learning.refuse("the tracker is not ready yet")
@@ -163,7 +164,7 @@ class TrackWorker:
             self._request.open(learning)
 
     def stop(self, timeout_s: float) -> bool:
-        """End after the set at hand, or at once while compiling; returns whether it ended."""
+        """End after the present set, or at once while compiling; returns whether it has ended."""
         self._stop.set()
         self._sets.wake()
         if self._thread.ident is not None:
@@ -185,7 +186,7 @@ class TrackWorker:
             self.fatal = one_line(error)
             self._status.failed(self.fatal)
             return
-        # Sets received during compilation are old by now.
+        # Sets received during compilation are outdated.
         self._status.dropped("before_ready", self._sets.start_counting().complete)
         self._waits = handle.waits
         activity = "waiting for learn_background" if handle.waits else "waiting for images"
@@ -231,7 +232,7 @@ class TrackWorker:
         return None
 
     def _evidence(self, handle: TrackerHandle, matched: MatchedSet[Any]) -> tuple[Images, Any]:
-        """The set's images, and what the tracker takes of them."""
+        """The set's images, and the argument of the tracker's step."""
         images = self._decoded(handle, matched)
         if self.learning:
             return images, images
@@ -267,7 +268,7 @@ class TrackWorker:
             if learning is not None:
                 self._status.doing("learning the background")
                 learning.take(images)
-                if self._waits or not (learning.looks or learning.answered):
+                if self._waits or not (learning.searches_person or learning.answered):
                     self._status.dropped("while_learning")
                     self._learn(handle, learning, matched.stamp_ns)
                     return None
@@ -278,7 +279,7 @@ class TrackWorker:
             result = handle.tracker.step(views, matched.stamp_ns, self._effort.take(lateness))
             finished_s = self._clock()
         except Exception as error:
-            # The next set may be fine.
+            # The next set may be usable.
             if learning is not None:
                 learning.refuse(one_line(error))
             self._status.set_failed(one_line(error))
@@ -293,14 +294,14 @@ class TrackWorker:
         return tracked
 
     def _keep_for(self, result: TrackResult, kept: int) -> None:
-        """Keep the sets that come while a person is searched for; without a person, the newest."""
+        """Keep the sets that come during the search for a person; without a person, the newest."""
         searching = result.state is TrackState.SEARCHING
         self._sets.keep(kept if searching or result.settling else 0)
         if searching:
             self._sets.drop_older()
 
     def _give(self, matched: MatchedSet[Any], tracked: TrackedSet | None) -> None:
-        """Publish a set's result and that the set was dealt with."""
+        """Publish a set's result, and note that the set was processed."""
         try:
             if tracked is not None:
                 self._publish(tracked)
@@ -313,7 +314,7 @@ class TrackWorker:
             self._trouble(matched.stamp_ns, error)
 
     def _decoded(self, handle: TrackerHandle, matched: MatchedSet[Any]) -> Images:
-        """The set's images; one that cannot be decoded is left out, unless it is the last."""
+        """The set's images without those that cannot be decoded; an error if none remains."""
         images: dict[str, NDArray[np.uint8] | Observation] = {}
         failed: ImageError | None = None
         for name, view in matched.views.items():
@@ -344,6 +345,6 @@ class TrackWorker:
 
 
 def one_line(error: BaseException) -> str:
-    """An error in one line; the type is named unless it is a `TrackerError`."""
+    """An error in one line, with its type unless it is a `TrackerError`."""
     text = " ".join(str(error).split())
     return text if isinstance(error, TrackerError) else f"{type(error).__name__}: {text}"

@@ -1,4 +1,4 @@
-"""Alignment of two worlds and two clocks: one rigid transform and one time offset per recording."""
+"""Alignment of two worlds and two clocks: a rigid transform and a time offset per recording."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -23,12 +23,12 @@ _LEAST_SPEED_SD = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Where a result's world lies in that of a reference, and its clock.
+    """Transform from a result's world to that of a reference, and the offset of the clocks.
 
     Attributes:
         rotation: (3, 3) takes directions of the result's world to the reference's.
         translation_m: (3,) position of the result's origin in the reference's world, m.
-        offset_s: what the reference's clock shows when the result's shows 0, s.
+        offset_s: time of the reference's clock when that of the result is 0, s.
         rms_mm: root mean square distance of the markers after the alignment.
     """
 
@@ -72,8 +72,9 @@ class Alignment:
 def align(result: MarkerTrack, reference: MarkerTrack) -> Alignment:
     """Find the rigid transform between the worlds' axes and the offset between the clocks.
 
-    The offset that makes the markers' speeds, which depend on no frame of reference, agree best is
-    refined by the residual of the rigid alignment (least squares over all common markers and rows).
+    First the offset is found at which the markers' speeds, which do not depend on the frame of
+    reference, agree best. It is refined by the residual of the rigid alignment (least squares over
+    all common markers and rows).
 
     Args:
         result: the track whose world is to be moved.

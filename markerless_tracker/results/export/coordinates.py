@@ -1,11 +1,11 @@
 """The coordinates of a result as OpenSim names and measures them: degrees, metres, Y up.
 
-Those of a joint with reported angles (docs/joint-angles.md) are these angles, between the segments'
-anatomical axes, as the pose alone has them: they turn the model to it. The translations of the
-pelvis follow the axes of the marker file. What has no reported angles has the body's own
-parameters. An arm's angles are relative to the thorax, but it hangs on a clavicle: an extra segment
-at the shoulder, which undoes the clavicle's rotation, carries it. Its coordinates `NAME_back` are
-the clavicle's with the sign reversed.
+The coordinates of a joint with reported angles (docs/joint-angles.md) are these angles, between the
+segments' anatomical axes, as determined by the pose; they move the model to the pose. The
+translations of the pelvis are along the axes of the marker file. Joints without reported angles
+have the body's own parameters. An arm's angles are relative to the thorax, but the arm is attached
+to a clavicle: an extra segment at the shoulder reverses the clavicle's rotation. Its coordinates
+`NAME_back` are those of the clavicle with the sign reversed.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from markerless_tracker.results.pose_angles import PoseAngles
 from markerless_tracker.results.stored_result import StoredResult
 
 BACK = "_back"
-"""Ending of a coordinate that undoes another one."""
+"""Suffix of a coordinate that reverses another one."""
 _AXES = "XYZ"
 _CONSTANT_RAD = 1e-9
 _GROUND_M = 100.0
@@ -102,7 +102,7 @@ class Coordinates:
         Args:
             parameters: the poses.
             names: of reported angles.
-            near_rad: (n, len(names)) reported angles: of both solutions and full turns the nearest.
+            near_rad: (n, len(names)) reported angles; the nearest of both solutions is returned.
         """
         found = np.full((len(parameters), len(self.names)), np.nan)
         columns = [names.index(name) if name in names else -1 for name in self._reader.names]

@@ -12,9 +12,9 @@ from markerless_tracker.results.stored_result import stored_body
 def write_mot(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
     """Write the coordinates of the `.osim`: joint angles of the poses, the place of the pelvis.
 
-    They move the model to the markers. Where the result's angles share a rotation otherwise, near
-    90 degrees of abduction, these may jump from frame to frame. Frames without a pose are rows of
-    NaN, which OpenSim reads.
+    They move the model to the markers. Near 90 degrees of abduction (gimbal lock) they may jump
+    from frame to frame, unlike the result's angles. Frames without a pose are rows of NaN, which
+    OpenSim reads.
 
     Args:
         path: the file.

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and the numbers in them."""
+"""Atomic writing of files, and the format of the numbers in them."""
 
 import os
 from collections.abc import Iterator
@@ -30,5 +30,5 @@ def new_file(path: Path, *, binary: bool = False) -> Iterator[IO[Any]]:
 
 
 def number(value: float, digits: int) -> str:
-    """A number with that many decimals, without a negative zero; empty for NaN."""
+    """A number with a given number of decimals, without a negative zero; empty for NaN."""
     return f"{round(float(value), digits) + 0.0:.{digits}f}" if value == value else ""

@@ -35,8 +35,8 @@ _ARRAYS: dict[str, Callable[[StoredResult], NDArray[Any]]] = {
 def write_npz(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
     """Write the arrays of `StoredResult`, positions Y up, and `marker_names`, `axes`, `fps`.
 
-    `numpy.load(path)` reads them. Each array grows in a file of its own, beside `path`, until the
-    archive is put together: memory stays flat.
+    `numpy.load(path)` reads them. Each array is first written to its own file beside `path`, so
+    that memory does not grow with the frames.
 
     Args:
         path: the file.

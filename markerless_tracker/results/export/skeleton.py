@@ -1,4 +1,4 @@
-"""A body as segments that turn about one point each, for files of skeletons."""
+"""A body as rigid segments, each rotating about one point, for files of skeletons."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,9 @@ from markerless_tracker.geometry import FloatArray
 
 MOST_ROTATIONS = 3
 FIRST_COUPLED = 6
-"""Kinds of nodes from here on rotate together with their neighbours, about no axis of their own."""
+"""Nodes of this kind or a higher one rotate together with a neighbour, without an axis of their
+own.
+"""
 ANATOMICAL: FloatArray = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """(3, 3) OpenSim's axes of a segment, x forward, y up, z right, in the world, body neutral."""
 BALL_AXES = (2, 0, 1)
@@ -45,7 +47,7 @@ class Segment:
         T_parent_joint: (3, 4) pose of the joint at zero in the parent segment.
         moves: translations, then at most three rotations, each about an axis that the earlier ones
             have rotated.
-        node: the body's node whose position is that of the joint and which the segment turns with.
+        node: the body's node at the joint, with which the segment rotates.
         R_segment_node: (3, 3) rotation from that node's axes to the segment's.
         ball: whether the joint's rotations are those of `BALL_AXES` between the anatomical axes of
             parent and segment, since no axes belong to the body's parameters.
@@ -79,7 +81,7 @@ class Skeleton:
 
 
 class _Open:
-    """A segment while its joint grows."""
+    """A segment under construction."""
 
     def __init__(self, parent: int, place: FloatArray) -> None:
         self.parent, self.place = parent, place

@@ -90,13 +90,13 @@ class Surface:
         left = np.cross(axes, ahead)
         angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
         x, y = (np.sign(f) * np.abs(f) ** (2.0 / exponent) for f in (np.cos(angle), np.sin(angle)))
-        reach_x = np.where(x > 0.0, radii[:, :1], radii[:, 1:2])
-        reach_y = np.where(y > 0.0, radii[:, 2:3], radii[:, 3:])
+        radius_x = np.where(x > 0.0, radii[:, :1], radii[:, 1:2])
+        radius_y = np.where(y > 0.0, radii[:, 2:3], radii[:, 3:])
         stretch = 1.0 + _folds(len(centres), ripple_m, ease, radii.mean(axis=1), rng)
         points = (
             centres[:, None]
-            + (stretch * reach_x * x)[..., None] * ahead[:, None]
-            + (stretch * reach_y * y)[..., None] * left[:, None]
+            + (stretch * radius_x * x)[..., None] * ahead[:, None]
+            + (stretch * radius_y * y)[..., None] * left[:, None]
         )
         rings = len(points)
         flat = np.concatenate([points.reshape(-1, 3), centres[[0, -1]]])

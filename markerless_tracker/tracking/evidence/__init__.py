@@ -1,4 +1,4 @@
 """From views to the evidence of the tracked person.
 
-Segmentation around the prediction, choice of components, views that cannot be right.
+Segments images around the predicted body, selects components, leaves out unusable views.
 """

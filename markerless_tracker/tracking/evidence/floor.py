@@ -1,8 +1,8 @@
-"""The floor test: an undecided pixel whose floor point other cameras see lit is no shadow.
+"""The floor test: an undecided pixel is no shadow if other cameras see its floor point lit.
 
-A shadow lies on the floor, the plane z = 0 of the calibrated world: the floor point behind such a
-pixel is darkened alike in every camera that sees it. The floor point behind a pixel of the person
-is another one for each camera, and mostly lit.
+A shadow lies on the floor, the plane z = 0 of the calibrated world. The floor point behind a shadow
+pixel is darkened in every camera that sees it. The floor point behind a pixel of the person is seen
+elsewhere in the other images, and is mostly lit there.
 """
 
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import MaskWords
 
 PENUMBRA_PX = 2
-"""Background so near to what is not background may be half in shadow, and is not called lit."""
+"""Background this near to person or undecided pixels may be half in shadow, so it is not lit."""
 
 
 class FloorView(NamedTuple):
@@ -29,9 +29,9 @@ class FloorView(NamedTuple):
         camera: its model.
         offset_px: (u, v) of the window's top left pixel.
         width: of the window, px.
-        person: (h, ceil(w / 64)) silhouette, packed as `pack_mask` does.
-        undecided: pixels that look like a shadow, packed likewise.
-        hidden: pixels of the predicted body, packed likewise: they show no floor.
+        person: (h, ceil(w / 64)) silhouette, packed as by `pack_mask`.
+        undecided: pixels that may be shadow, packed likewise.
+        hidden: pixels of the predicted body, packed likewise; they show no floor.
     """
 
     camera: CameraModel
@@ -50,9 +50,10 @@ def floor_points(pixels: FloatArray, camera: CameraModel) -> FloatArray:
 
 
 def lit_elsewhere(points: FloatArray, others: Iterable[FloorView]) -> NDArray[np.bool_]:
-    """Which floor points (n, 3) m some camera sees lit and none darkened; never those with NaN.
+    """Which floor points (n, 3) m some camera sees lit and no camera sees darkened; False for NaN.
 
-    Lit are pixels that are neither person nor undecided, nor within `PENUMBRA_PX` of such.
+    A pixel is lit if neither it nor any pixel within `PENUMBRA_PX` is person or undecided. It is
+    darkened if it is undecided.
     """
     lit, dark = np.zeros((2, len(points)), dtype=np.bool_)
     for view in others:
@@ -66,13 +67,13 @@ def lit_elsewhere(points: FloatArray, others: Iterable[FloorView]) -> NDArray[np
 
 @kernel
 def _meet_floor(pixels, matrix, distortion, placed, points):  # type: ignore[no-untyped-def]
-    """Fill points (n, 3) with those of `floor_points`; placed (4, 4): camera to world."""
+    """Fill points (n, 3) as `floor_points`; placed (4, 4): camera to world."""
     for i in range(pixels.shape[0]):
         b = (pixels[i, 1] - matrix[1, 2]) / matrix[1, 1]
         a = (pixels[i, 0] - matrix[0, 2] - matrix[0, 1] * b) / matrix[0, 0]
         a, b = without_lens(a, b, distortion)
         down = placed[2, 0] * a + placed[2, 1] * b + placed[2, 2]
-        # Rays that lead away from the floor do not meet it.
+        # A ray that points away from the floor does not meet it.
         along = -placed[2, 3] / down if down * placed[2, 3] < 0.0 else np.nan
         for k in range(3):
             ray = placed[k, 0] * a + placed[k, 1] * b + placed[k, 2]
@@ -83,7 +84,7 @@ def _meet_floor(pixels, matrix, distortion, placed, points):  # type: ignore[no-
 def _look(  # type: ignore[no-untyped-def]
     points, to_camera, matrix, distortion, offset, width, person, undecided, hidden, lit, dark
 ):
-    """Mark the points (n, 3) that a view shows lit, and those that it shows darkened."""
+    """Mark the points (n, 3) that a view shows lit (in `lit`) or darkened (in `dark`)."""
     height = person.shape[0]
     for i in range(points.shape[0]):
         u, v = pixel(points[i, 0], points[i, 1], points[i, 2], to_camera, matrix, distortion)

@@ -1,4 +1,4 @@
-"""The views of one time to the evidence of the tracked body, cameras side by side."""
+"""Makes the evidence of the tracked body from the views of one time, cameras in parallel."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
@@ -26,19 +26,19 @@ from markerless_tracker.tracking.processes.child import SharedMemory
 from markerless_tracker.tracking.processes.segmenting import SegmentingProcess
 
 WIDE_MARGIN_M = 0.5
-"""Margin around the predicted body that is segmented where the first region cuts the person off."""
-_TOLD_PX = 16
-"""Smaller silhouettes that are left out are specks of noise: nothing is said about them."""
+"""Margin around the predicted body of the second region, used if the first cuts the person off."""
+_REPORTED_PX = 16
+"""Fewer pixels that are left out are specks of noise and give no warning."""
 
 
 class EvidenceMaker:
-    """Makes observations of views, and keeps of their silhouettes what the prediction explains.
+    """Makes observations of views, and keeps the parts of silhouettes that the prediction explains.
 
     Args:
         rig: the cameras.
         config: settings of the imaging and the selection.
         backgrounds: the empty scene per camera; cameras without one take observations only.
-        mapper: `map`, or a thread pool's: for the cameras.
+        mapper: `map`, or that of a thread pool; applied to the cameras.
 
     Raises:
         ImageError: a background does not fit its camera.
@@ -67,7 +67,7 @@ class EvidenceMaker:
         """Use other backgrounds from now on.
 
         Raises:
-            ImageError: a background does not fit its camera; all stays as it was.
+            ImageError: a background does not fit its camera; nothing has changed then.
         """
         segmenters: dict[str, Segmenter] = {}
         for camera in self._rig:
@@ -96,14 +96,15 @@ class EvidenceMaker:
     ) -> dict[str, SeenView]:
         """The views segmented in the regions that follow from an outlook.
 
-        A ready-made observation of a whole frame is treated as the image that it was made of: its
-        components are chosen in the same regions. One of a part of the frame is taken as it is.
+        A ready-made observation of a whole frame is treated like its image: its components are
+        selected in the same regions. An observation of a part of the frame is used as it is.
 
         Args:
             views: camera name to image or observation.
             stamp_ns: their time.
             outlook: of the set before the last one.
-            ahead: one camera after the other in this thread, which leaves the others to a step.
+            ahead: whether this runs beside a step: in this thread or the segmenting process, one
+                camera after the other.
 
         Raises:
             ImageError, CalibrationError: no view, an unknown camera, an image without a background
@@ -136,7 +137,7 @@ class EvidenceMaker:
         stamp_ns: int,
         regions: Mapping[str, Region | None],
     ) -> dict[str, SeenView]:
-        """Images segmented in given regions, None = all, one after the other.
+        """Images segmented in given regions (None = whole image), one after the other.
 
         Raises:
             ImageError: an image without a background or one that does not fit; names the camera.
@@ -144,13 +145,13 @@ class EvidenceMaker:
         return {n: self._segmented(n, v, stamp_ns, regions[n], 0) for n, v in images.items()}
 
     def start_process(self, shared: SharedMemory | None = None) -> None:
-        """Let a process of its own segment what is made ahead; `warm_up` hands it its backgrounds.
+        """Start a process that segments sets ahead of their step; `warm_up` gives it backgrounds.
 
-        Without effect with one thread, and if the backgrounds follow the images: the steps decide
-        on the order then.
+        Without effect with one thread, or if the backgrounds follow the images, which must then be
+        segmented in the order of the steps.
 
         Args:
-            shared: memory that the images lie in; None for memory of its own.
+            shared: memory that holds the images; None for memory of its own.
         """
         several = (self._config.threads or usable_cores()) > 1
         if several and self.segmenters and not self._follows and self._process is None:
@@ -158,24 +159,24 @@ class EvidenceMaker:
 
     @property
     def process_cpu_s(self) -> float:
-        """CPU time of that process, 0 without one."""
+        """CPU time of the segmenting process; 0 without one."""
         return 0.0 if self._process is None else self._process.cpu_s
 
     def wait(self) -> None:
-        """Compile the imaging, or wait until that process has done it and is ready."""
+        """Compile the imaging, and wait until the segmenting process has done so, too."""
         if self._process is not None:
             self._process.wait()
         for segmenter in self.segmenters.values():
             segmenter.warm_up()
 
     def close(self) -> None:
-        """End the process, if there is one."""
+        """End the segmenting process, if there is one."""
         process, self._process = self._process, None
         if process is not None:
             process.close()
 
     def whole(self, seen: Mapping[str, SeenView], stamp_ns: int) -> dict[str, Observation]:
-        """Observations of the whole views, as they are."""
+        """Observations of the whole views, without selection of components."""
         found = self._mapper(lambda name: self._whole(name, seen[name], stamp_ns), seen)
         return dict(zip(seen, found, strict=True))
 
@@ -183,7 +184,7 @@ class EvidenceMaker:
         self, name: str, image: Image, stamp_ns: int, region: Region | None, number: int
     ) -> SeenView:
         segmenter = self._segmenter(name)
-        # A background that follows the images learns from whole ones.
+        # A background that follows the images learns from whole images.
         part = None if self._whole_frame_is_due(name, number) else region
         with segmenter.lock:
             observation = segmenter.observe(image, stamp_ns, part)
@@ -198,18 +199,18 @@ class EvidenceMaker:
             return segmenter.observe(seen.image, stamp_ns)
 
     def _whole_frame_is_due(self, name: str, number: int) -> bool:
-        """The cameras in rotation, so that no frame costs much more than others."""
+        """Whether a camera's whole image is due; in rotation, so that frames take equally long."""
         shift = self._rig.names.index(name) * self._every // len(self._rig)
         return self._follows and (number + shift) % self._every == 0
 
     def warm_up(self) -> dict[str, Observation]:
-        """Begin to compile the imaging (`wait` ends it); returns made-up observations.
+        """Start the compilation of the imaging (`wait` completes it); returns made-up observations.
 
-        All but the first are of regions, as when the body is tracked. The silhouette is a
-        rectangle, with undecided pixels around it and known ones above, and a pixel in the corner.
+        All but the first are of regions, as when the body is tracked. The silhouette is a rectangle
+        and a pixel in the corner. Pixels beside and below the rectangle are undecided.
         """
         if self._process is not None:
-            # It compiles while this process compiles what comes after the imaging.
+            # It compiles the imaging while this process compiles the other kernels.
             self._process.use(self._config, self._backgrounds)
         made_up: dict[str, Observation] = {}
         for camera in self._rig:
@@ -229,7 +230,7 @@ class EvidenceMaker:
     def select(
         self, observed: Mapping[str, Observation], body: BodyModel, predicted: FloatArray
     ) -> tuple[dict[str, Observation], tuple[str, ...]]:
-        """Keep the components that a predicted pose (p,) explains; say what was left out."""
+        """Keep the components that a predicted pose (p,) explains; return warnings, too."""
         cones = place_cones(body, predicted)
 
         def part(item: tuple[str, Observation]) -> tuple[Observation, int]:
@@ -245,13 +246,13 @@ class EvidenceMaker:
         body: BodyModel,
         predicted: FloatArray,
     ) -> tuple[dict[str, Observation], tuple[str, ...]]:
-        """As `whole` and then `select`, in less time while the body is tracked.
+        """The result of `whole` and `select`, in less time while the body is tracked.
 
-        Where a region cuts the person off, a wider one is segmented, and the whole frame where that
-        does, too.
+        If a region cuts the person off, a wider region is segmented. If that cuts the person off,
+        too, the whole frame is segmented.
 
         Args:
-            seen: of `segment`.
+            seen: returned by `segment`.
             stamp_ns: time of the views.
             body: the tracked body.
             predicted: (p,) pose expected at that time.
@@ -271,10 +272,10 @@ class EvidenceMaker:
     def _parts(
         self, name: str, view: SeenView, stamp_ns: int, lines: BodyLines
     ) -> Iterator[Observation]:
-        """The view in its region, then in a wider one, segmented when it is asked for.
+        """The view in its region, then in a wider one, which is segmented when it is requested.
 
-        Inside of a region an image's evidence is that of the whole image (`Segmenter.observe`):
-        parts of ready-made evidence are cut out of it.
+        Inside of a region the evidence is the same as that of the whole image
+        (`Segmenter.observe`), so ready-made evidence is cut to the region.
         """
         if view.region is None:
             return
@@ -290,7 +291,7 @@ class EvidenceMaker:
             yield segmenter.observe(view.image, stamp_ns, wide)
 
     def regions(self, outlook: Outlook, stamp_ns: int) -> dict[str, Region | None]:
-        """Region of each camera in the step after the next one: body and margin; None = all."""
+        """Region of each camera, None = whole frame; arguments as for `segment`."""
         predicted, margin_m = outlook.predicted(stamp_ns)
         if margin_m is None or self._every == 1:
             return dict.fromkeys(self._rig.names)
@@ -315,10 +316,10 @@ class EvidenceMaker:
 def _kept(
     parts: Mapping[str, tuple[Observation, int]],
 ) -> tuple[dict[str, Observation], tuple[str, ...]]:
-    """What is kept of each view, and a line for each of which more than specks were left out."""
+    """What is kept of each view, and a warning for each view that lost more than specks."""
     warnings = tuple(
         f"{name}: {left_out} px of silhouette away from the body left out"
         for name, (_, left_out) in parts.items()
-        if left_out >= _TOLD_PX
+        if left_out >= _REPORTED_PX
     )
     return {name: kept for name, (kept, _) in parts.items()}, warnings

@@ -1,8 +1,7 @@
-"""Evidence of a set made while the set before it is fitted, and from what its regions follow.
+"""Evidence of a set made while the set before it is fitted, and the source of its regions.
 
-A region cannot follow from the pose of the set just before: that pose is not known yet. It follows
-from the pose of the set before that one, with or without this pipeline, so that results are the
-same bytes.
+The regions of set n follow from the pose of set n - 2: that of set n - 1 is not known yet while
+evidence is made ahead. They do so without this pipeline, too, so that results are the same bytes.
 """
 
 import threading
@@ -19,14 +18,14 @@ from markerless_tracker.tracking.motion import MotionModel
 
 @dataclass(frozen=True, eq=False)
 class Outlook:
-    """What is known after a set, from which the regions of the set after the next one follow.
+    """State of the tracker after set n, from which the regions of set n + 2 follow.
 
     Attributes:
-        number: sets dealt with so far; -1 and 0 before the first.
+        number: number of sets processed so far; -1 and 0 for the two outlooks before the first set.
         body: the tracked body.
         motion: a copy, which does not change.
         limits: (2, p) joint limits.
-        searching: whether a person is looked for in the whole views.
+        searching: whether a person is searched in the whole views.
     """
 
     number: int
@@ -36,19 +35,19 @@ class Outlook:
     searching: bool
 
     def predicted(self, stamp_ns: int) -> tuple[FloatArray, float | None]:
-        """The pose (p,) expected at a time, and the margin around it, m; None for whole views."""
+        """The predicted pose (p,) at a time, and the margin around it, m; None for whole views."""
         margin_m = None if self.searching else self.motion.region_margin_m(stamp_ns)
         return self.motion.predict(stamp_ns, self.limits), margin_m
 
 
 class SeenView(NamedTuple):
-    """What one camera's segmentation gave.
+    """The segmented view of one camera.
 
     Attributes:
-        observation: of a region or the whole frame, before components are chosen.
-        image: what it was made of; None if it came ready-made.
-        region: where the components of the person are chosen; None = all of it.
-        exposure: brightness of the image relative to its background's, by channel.
+        observation: of a region or the whole frame, before components are selected.
+        image: the image that was segmented; None for a ready-made observation.
+        region: part of the frame in which the person's components are selected; None = whole frame.
+        exposure: brightness of the image relative to its background, by channel.
     """
 
     observation: Observation
@@ -62,10 +61,10 @@ class Prepared:
     """A set of views with evidence made ahead, for `Tracker.step`.
 
     Attributes:
-        views: as `Tracker.prepare` got them; the images must not change until the step is done.
+        views: as given to `Tracker.prepare`; the images must not change until the step has ended.
         stamp_ns: their time.
-        outlook: what the regions follow from; None if nothing was made ahead.
-        seen: by camera; empty if nothing was made ahead.
+        outlook: the outlook of the regions; None if no evidence was made ahead.
+        seen: by camera; empty if no evidence was made ahead.
     """
 
     views: Mapping[str, Image | Observation]
@@ -75,13 +74,13 @@ class Prepared:
 
 
 class Lookahead:
-    """Which outlook the regions of a set follow from, whenever its evidence is made.
+    """Assigns each set the outlook of its regions, whenever its evidence is made.
 
-    `prepare` of the next set may run at any time beside the step before it. One set is made ahead;
-    those further ahead are left to their step.
+    `prepare` of the next set may run at any time during the step before it. Evidence of one set is
+    made ahead; evidence of later sets is made in their step.
 
     Args:
-        first, second: what is known before the first set, numbers -1 and 0.
+        first, second: the outlooks before the first set, numbers -1 and 0.
     """
 
     def __init__(self, first: Outlook, second: Outlook) -> None:
@@ -89,7 +88,7 @@ class Lookahead:
         self.restart(first, second)
 
     def restart(self, first: Outlook, second: Outlook) -> None:
-        """Begin anew; what was made ahead is not used."""
+        """Restart; evidence made ahead is not used."""
         with self._lock:
             self._previous, self._latest = first, second
             self._running = False
@@ -101,23 +100,23 @@ class Lookahead:
         return self._previous
 
     def take(self) -> Outlook | None:
-        """The outlook of a set that is prepared now; None if that is not known yet."""
+        """The outlook of the set that is prepared now; None if it is not known yet."""
         with self._lock:
             place = self._ahead + self._running
             self._ahead += 1
             return (self._previous, self._latest, None)[min(place, 2)]
 
     def drop(self) -> None:
-        """A set whose outlook was taken will not come."""
+        """Note that a set whose outlook was taken will not be tracked."""
         with self._lock:
             self._ahead = max(0, self._ahead - 1)
 
     def begin(self, prepared: Prepared | None) -> Outlook:
-        """A step begins; returns its outlook."""
+        """Begin a step; returns its outlook."""
         with self._lock:
             self._running = True
             missed = prepared is None or prepared.outlook not in (None, self._previous)
-            # A set that was prepared and then left out would count forever.
+            # A set that was prepared and then skipped would be counted forever.
             self._ahead = 0 if missed else max(0, self._ahead - 1)
             return self._previous
 
@@ -125,7 +124,7 @@ class Lookahead:
     def made(
         views: Mapping[str, Image | Observation] | Prepared, stamp_ns: int, outlook: Outlook
     ) -> tuple[Mapping[str, Image | Observation], Mapping[str, SeenView] | None]:
-        """The views of a step, and their evidence if what was made ahead holds for it; else None.
+        """The views of a step, and the evidence made ahead if it is valid for the step; else None.
 
         Args:
             views: the step's.
@@ -138,7 +137,7 @@ class Lookahead:
         return views.views, views.seen if holds else None
 
     def end(self, latest: Outlook | None) -> None:
-        """A step ends; None if it failed."""
+        """End a step with its outlook; None if it failed."""
         with self._lock:
             self._running = False
             if latest is not None:

@@ -1,4 +1,4 @@
-"""The evidence of one frame, as it is searched."""
+"""The evidence of one frame, as the searches use it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,12 +12,11 @@ class Seen:
 
     Attributes:
         stamp_ns: its time.
-        observed: what each camera saw.
-        used: the observations that are used; near the predicted body undecided pixels are
-            decided.
-        imaged: the same, with the undecided pixels that imaging alone left.
+        observed: the observations of all cameras.
+        used: those of the usable cameras; undecided pixels near the predicted body are decided.
+        imaged: those of the usable cameras, with the undecided pixels that imaging left.
         notes: a line for each camera that is left out from now on, or used again.
-        left_out: a line for each camera of whose silhouette parts are left out.
+        left_out: a line for each camera with silhouette parts that are left out.
     """
 
     stamp_ns: int

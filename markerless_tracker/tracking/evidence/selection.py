@@ -1,4 +1,4 @@
-"""Which parts of a silhouette are the tracked body's: the components that the prediction meets."""
+"""Selects the components of a silhouette that belong to the tracked body: those near it."""
 
 from typing import NamedTuple
 
@@ -15,9 +15,9 @@ from markerless_tracker.records import Observation
 
 _POINTS_PER_CONE = 6
 _FAR_PX = 1e4
-"""A line with a point farther off is not drawn."""
+"""A line with a point farther than this from the region's corner is not drawn."""
 HAND_M = 0.07
-"""Side of a square: a smaller patch of person pixels is no limb that continues elsewhere."""
+"""Side of a square. A patch of person pixels with a smaller area is no limb cut off by a region."""
 
 
 class PlacedCones(NamedTuple):
@@ -75,13 +75,13 @@ def body_lines(camera: CameraModel, cones: PlacedCones) -> BodyLines:
 def explained_part(
     observation: Observation, lines: BodyLines, margin_px: int
 ) -> tuple[Observation, int]:
-    """Keep the silhouette's components that come near to the predicted body.
+    """Keep the silhouette's components near the predicted body.
 
-    A component stays if any of its pixels is nearer than `margin_px` to the body at the predicted
-    pose, drawn as `lines`. If none is (the prediction is elsewhere), all stay.
+    A component is kept if any of its pixels is nearer than `margin_px` to the body at the predicted
+    pose, drawn as `lines`. If none is near (the prediction is wrong), all are kept.
 
     Returns:
-        The observation, the very same if nothing was left out, and the number of pixels left out.
+        The observation, the same object if nothing was left out, and the number of pixels left out.
     """
     count, labels = _components(observation)
     if count <= 2:
@@ -101,8 +101,8 @@ def explained_in_region(
     if a component near the body has person pixels within `clear_px` of a side of the region that is
     no side of the frame: the person may continue beyond it. Undecided pixels at a side do not
     count, since shadows and faint patches continue across the floor; nor do specks of person pixels
-    that are smaller than a hand. Components are those of the region: one that is connected to the
-    body's through undecided pixels outside of the region only is left out.
+    that are smaller than a hand. Components are those of the region: a component that is connected
+    to the body's only through undecided pixels outside of the region is left out.
     """
     count, labels = _components(observation)
     kept = _near(labels, count, observation, lines, margin_px)
@@ -127,7 +127,7 @@ def _leaves_region(mask: NDArray[np.uint8], observation: Observation, clear_px: 
     box = Region(left, top, left + width, top + height).moved(*observation.offset_px)
     u, v = observation.offset_px
     region = Region(u, v, u + observation.width, v + observation.height)
-    # Grown by that much it must stay inside, but for what the frame itself cuts off.
+    # Grown by `clear_px`, and clipped to the frame, the box must lie inside the region.
     wide = box.grown(clear_px, observation.size_px)
     return (
         wide.left < region.left
@@ -138,7 +138,7 @@ def _leaves_region(mask: NDArray[np.uint8], observation: Observation, clear_px: 
 
 
 def _larger(mask: NDArray[np.uint8], least: float) -> NDArray[np.uint8]:
-    """The components of a mask (h, w) with that many pixels or more, 0 or 1."""
+    """The components of a mask (h, w) with at least `least` pixels, 0 or 1."""
     _, labels, table, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
     large = table[:, cv2.CC_STAT_AREA] >= least
     large[0] = False
@@ -171,7 +171,7 @@ def body_region(lines: BodyLines, margin_m: float, least_px: int) -> Region | No
 
 
 def _components(observation: Observation) -> tuple[int, NDArray[np.int32]]:
-    """Components of what is person or undecided: count, and label of each pixel (h, w)."""
+    """Components of person and undecided pixels: their count, and labels (h, w) of the pixels."""
     mask = observation.not_background.view(np.uint8)
     count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
     return count, np.asarray(labels)
@@ -184,9 +184,9 @@ def _near(
     lines: BodyLines,
     margin_px: int,
 ) -> NDArray[np.bool_]:
-    """(count,) which components come near to the body; the first is the background's."""
+    """(count,) which components are near the body; the first is the background, always False."""
     kept = np.zeros(count, dtype=np.bool_)
-    # Mostly the points of the lines themselves meet all components, and nothing need be drawn.
+    # Mostly the lines' points lie in all components, and nothing needs to be drawn.
     _meet(lines.pixels, observation.offset_px, labels, kept)
     if not kept[1:].all():
         kept[np.unique(labels[_thick_body(observation, lines, margin_px)])] = True
@@ -196,10 +196,10 @@ def _near(
 
 @kernel
 def _meet(pixels, offset, labels, kept):  # type: ignore[no-untyped-def]
-    """Mark the components (count,) that points (c, n, 2) lie in, px of the frame.
+    """Mark the components (count,) that the points (c, n, 2) of lines lie in, px of the frame.
 
-    labels (h, w) are those of a region at `offset`; lines with a point that is far off, or not
-    finite, are left out.
+    labels (h, w) are those of a region at `offset`. Lines with a point that is farther than
+    `_FAR_PX`, or not finite, are left out.
     """
     height, width = labels.shape
     for c in range(pixels.shape[0]):
@@ -224,7 +224,7 @@ def _only(
         return observation, 0
     selected = kept[labels]
     mask = observation.mask
-    # A shadow away from the body remains one: it is no lit floor.
+    # A shadow away from the body remains undecided: it is no lit floor.
     part = observation.with_masks(mask & selected, observation.undecided)
     return part, int((mask & ~selected).sum())
 

@@ -1,9 +1,9 @@
 """Undecided pixels that the predicted body explains become person; the others stay undecided.
 
 Three rules; the nearer to the body, the less evidence they require:
-1. What the body covers is person, and so is the next pixel.
+1. Pixels that the body covers, and their neighbours, are person.
 2. Beside the body, a pixel that cannot be a shadow on the floor is person (`evidence.floor`).
-3. Beside the body, so is a patch that ends there: shadows continue.
+3. Beside the body, a patch that ends there is person: a shadow would continue.
 """
 
 from collections.abc import Mapping
@@ -30,9 +30,9 @@ from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, 
 from markerless_tracker.tracking.search import pixels_per_m, root_m
 
 BESIDE_M = 0.06
-"""Undecided pixels so near to the body belong to the person unless they may be a shadow's."""
+"""Width of the band beside the body whose undecided pixels are person unless they may be shadow."""
 FLOOR_M = 3.0
-"""Distance from the body of floor points that are tested: farther ones may lie behind a wall."""
+"""Floor points farther than this from the body are not tested: they may lie behind a wall."""
 
 
 def decide(
@@ -41,7 +41,7 @@ def decide(
     body: BodyModel,
     pose: FloatArray,
 ) -> dict[str, Observation]:
-    """Observations whose undecided pixels that a body at a pose (p,) explains are person.
+    """Observations in which the undecided pixels that a body at a pose (p,) explains are person.
 
     The pose is a prior of the segmentation, after PoseCut (Bray, Kohli and Torr 2006).
     """
@@ -76,9 +76,9 @@ def _explained(view: FloorView, others: list[FloorView], where_m: FloatArray) ->
     """The undecided pixels that are person, packed.
 
     Args:
-        view: the view, `hidden` being what the body covers, and the next pixel.
+        view: the view; `hidden` are the pixels that the body covers, and their neighbours.
         others: the other views.
-        where_m: (3,) where the body is, world frame.
+        where_m: (3,) the body's root, world frame.
     """
     person = view.undecided & view.hidden
     radius = max(1, round(BESIDE_M * pixels_per_m(view.camera, where_m)))
@@ -87,7 +87,7 @@ def _explained(view: FloorView, others: list[FloorView], where_m: FloatArray) ->
     if not _beside(view.undecided, view.hidden, radius, view.width, beside, tested):
         return person
     if _going_on(view.undecided, beside, tested, away, rows, going_on):
-        # Patches that end there are person whatever the floor test says.
+        # Only patches that continue need the floor test.
         height, width = len(tested), view.width
         pixels = np.empty(((height // 2 + 1) * (width // 2 + 1), 2))
         count = _floor_pixels(view.hidden, tested, going_on, radius, width, pixels)
@@ -102,13 +102,13 @@ def _explained(view: FloorView, others: list[FloorView], where_m: FloatArray) ->
 
 @kernel
 def _near(covered, left, top, width, window, near):  # type: ignore[no-untyped-def]
-    """Fill `near` (h, k) with a window of what the body covers, and the next pixel.
+    """Fill `near` (h, k) with the pixels of a window that the body covers, and their neighbours.
 
     Args:
-        covered: words of the frame.
+        covered: body in the frame, packed.
         left, top: of the window in the frame.
         width: of the window, px.
-        window: (h, k), changed.
+        window: (h, k), overwritten.
     """
     cut_words(covered, left, top, width, window)
     for v in range(near.shape[0]):
@@ -119,7 +119,10 @@ def _near(covered, left, top, width, window, near):  # type: ignore[no-untyped-d
 
 @kernel
 def _beside(undecided, near, radius, width, beside, tested):  # type: ignore[no-untyped-def]
-    """Fill what lies beside the body, with the body, and which of it is undecided; if any is."""
+    """Fill `beside` with the body and the band beside it, `tested` with the undecided of the band.
+
+    Returns whether any pixel is tested.
+    """
     for v in range(near.shape[0]):
         for w in range(near.shape[1]):
             beside[v, w] = near[v, w]
@@ -134,8 +137,8 @@ def _beside(undecided, near, radius, width, beside, tested):  # type: ignore[no-
 
 @kernel
 def _going_on(undecided, beside, tested, away, open_rows, out):  # type: ignore[no-untyped-def]
-    """Fill `out` with the tested pixels of patches that go on beyond `beside`; if there are any."""
-    # Neighbours across the boundary begin; the flood stays within what is tested.
+    """Fill `out` with tested pixels of patches that continue beyond `beside`; return if any do."""
+    # Seeds are neighbours of undecided pixels beyond; the flood fills tested pixels only.
     height, count = tested.shape
     for v in range(height):
         for w in range(count):
@@ -153,10 +156,11 @@ def _going_on(undecided, beside, tested, away, open_rows, out):  # type: ignore[
 
 @kernel
 def _floor_pixels(near, tested, going_on, radius, width, pixels):  # type: ignore[no-untyped-def]
-    """Fill the pixels (n, 2) to which the floor test is applied; returns their number.
+    """Fill the pixels (n, 2) to which the floor test is applied; return their number.
 
-    One pixel of four stands for the others: the first of a block of two by two, from the corner of
-    what lies beside the body on, if any pixel of the block is of a patch that continues beyond it.
+    The test is applied to the first pixel of a block of two by two, if that is a tested pixel and
+    any pixel of the block belongs to a patch that continues. Blocks begin at the top left corner of
+    the band beside the body.
     """
     height, count = tested.shape
     left, top = width, height
@@ -187,7 +191,7 @@ def _floor_pixels(near, tested, going_on, radius, width, pixels):  # type: ignor
 
 @kernel
 def _any_tested(tested, v):  # type: ignore[no-untyped-def]
-    """Whether a row holds a bit."""
+    """Whether row v has a tested pixel."""
     for w in range(tested.shape[1]):
         if tested[v, w] != np.uint64(0):
             return True
@@ -196,7 +200,7 @@ def _any_tested(tested, v):  # type: ignore[no-untyped-def]
 
 @kernel
 def _take(found, tested, person, width):  # type: ignore[no-untyped-def]
-    """Take the tested pixels of the blocks that begin at pixels (n, 2): they are person."""
+    """Make the tested pixels of the blocks that begin at pixels (n, 2) person."""
     for i in range(found.shape[0]):
         u, v = found[i, 0], found[i, 1]
         for row in range(v, min(v + 2, tested.shape[0])):

@@ -1,4 +1,4 @@
-"""Which views are usable: a blinded camera shows silhouette everywhere, or none at all."""
+"""Decides which views are usable: a blinded camera shows silhouette everywhere, or none at all."""
 
 from collections.abc import Mapping
 
@@ -10,14 +10,14 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 
 MOST_COVER = 0.6
-"""A silhouette that covers a larger fraction of the frame is no person's: the light or the camera
+"""A silhouette that covers a larger fraction of the frame is no person: the light or the camera has
 changed."""
 IN_FRAME = 0.7
-"""Fraction of the markers that must be in the frame for a view without silhouette to be wrong."""
+"""A view without silhouette is wrong if at least this fraction of the markers is in its frame."""
 
 
 class ViewWatch:
-    """Leaves out views that cannot be right, and reports when a camera is left out or used again.
+    """Leaves out unusable views, and reports when a camera is left out or used again.
 
     Args:
         rig: the cameras.
@@ -40,7 +40,7 @@ class ViewWatch:
         """The usable views, and a line for each camera that is left out from now on or used again.
 
         Args:
-            observed: what the cameras saw.
+            observed: the observations of all cameras.
             body: the tracked body.
             expected: (p,) predicted pose, None if unknown.
         """
@@ -56,7 +56,7 @@ class ViewWatch:
                 reasons[camera.name] = f"silhouette over {cover:.0%} of the frame"
         used = {name: seen for name, seen in observed.items() if name not in reasons}
         empty = [name for name, seen in used.items() if not seen.mask_words.any()]
-        # No silhouette in any view: the person left, no camera is wrong.
+        # Without silhouette in any view the person has left, and no camera is wrong.
         if expected is not None and len(empty) < len(used):
             points = markers(body, expected)
             for name in empty:

@@ -1,4 +1,4 @@
-"""State of each limb, and the search for a limb that was lost.
+"""State of each limb, and the searches for limbs and headings that were lost.
 
-The rest of the body stays.
+A search for a limb begins with the rest of the body held at the estimate.
 """

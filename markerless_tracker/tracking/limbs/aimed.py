@@ -1,4 +1,4 @@
-"""Draws of a limb that put it into unexplained regions of silhouette."""
+"""Selects draws of a limb that lie in unexplained regions of silhouette."""
 
 from collections.abc import Mapping
 
@@ -14,7 +14,7 @@ from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
 
 ALONG = np.array([0.3, 0.6, 0.9])
-"""Points that count along each cone of the limb, as fractions of its length."""
+"""Points along each cone of the limb that are tested, as fractions of its length."""
 
 
 def most_aimed(
@@ -26,12 +26,12 @@ def most_aimed(
     regions: Mapping[str, NDArray[np.bool_]],
     rig: CameraRig,
 ) -> FloatArray:
-    """Those `count` of the poses (n, p) whose limb lies most in unexplained regions; best first.
+    """The `count` poses of (n, p) whose limb lies most in unexplained regions; best first.
 
     Args:
         body: the body.
-        poses: differ in the limb alone.
-        count: how many are kept; fewer if fewer lie in a region in any view.
+        poses: the draws, which differ in the limb only.
+        count: number of poses to return; fewer if fewer have a point in a region of any view.
         limb: the limb's parameters.
         regions: by camera, the unexplained pixels (h, w) of its frame.
         rig: the cameras.
@@ -55,7 +55,7 @@ def most_aimed(
 
 @kernel
 def _count_hits(points, to_camera, matrix, distortion, region, hits):  # type: ignore[no-untyped-def]
-    """Add, for each of n poses, how many of its points (n, k, 3) a view has in a region (h, w)."""
+    """Add to hits (n,) how many of each pose's points (n, k, 3) a view has in a region (h, w)."""
     height, width = region.shape
     for i in range(points.shape[0]):
         for j in range(points.shape[1]):
@@ -71,7 +71,7 @@ def _limb_points(  # type: ignore[no-untyped-def]
     poses, parent, fixed, kind, sign, parameter, moving, cone_node, cone_fixed, length, along,
     nodes, points,
 ):  # fmt: skip
-    """Fill points (n, c * k, 3) at k places along the axes of c cones, of each of n poses.
+    """Fill points (n, c * k, 3): k places along the axes of c cones, at each of n poses.
 
     Only the `moving` nodes (m,) differ between the poses.
     """

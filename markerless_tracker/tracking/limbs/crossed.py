@@ -1,8 +1,8 @@
-"""Crossed legs or arms, and where each goes if the two take each other's place.
+"""Detects crossed legs or arms, and makes a pose with the two in each other's place.
 
-A leg on the other leg's side, with the other one on its side, leaves the silhouette that an
-uncrossed pair leaves, but for the thighs. People seldom stand so. Exchanging the joints' angles, as
-in a mirror, does not help: what is crossed stays crossed.
+Crossed legs give nearly the silhouette of uncrossed legs; only the thighs differ. People seldom
+cross their legs. Exchanging the joint angles of left and right, as in a mirror, does not uncross
+them.
 """
 
 from markerless_tracker.body import BodyModel, markers
@@ -14,7 +14,7 @@ from markerless_tracker.tracking.confidence import slopes
 _JOINTS = {"legs": ("Hip", "Knee", "Ankle"), "arms": ("Shoulder", "Elbow", "Wrist")}
 _STEPS = 8
 _PLACE_M = 0.02
-"""Standard deviation of a joint from the other one's place: the rest is the angles' own prior."""
+"""Standard deviation of a joint's distance from its goal; the angles have their own prior."""
 
 
 def is_crossed(body: BodyModel, pose: FloatArray, pair: str) -> bool:
@@ -34,15 +34,15 @@ def is_crossed(body: BodyModel, pose: FloatArray, pair: str) -> bool:
 def in_each_others_place(
     body: BodyModel, pose: FloatArray, pair: str, begin: FloatArray, limits: FloatArray
 ) -> FloatArray:
-    """A pose (p,) whose left limb lies where the right one was, and the other way round.
+    """A pose (p,) with its left limb where the right one was, and its right where the left one was.
 
-    By damped least squares over the pair's parameters, as far as limits (2, p) allow.
+    By damped least squares over the pair's parameters, as far as the limits allow.
 
     Args:
         body: the body.
-        pose: (p,) as it is.
+        pose: (p,) the present pose.
         pair: "legs" or "arms".
-        begin: (p,) a pose with the pair where the squares' descent begins.
+        begin: (p,) initial pose of the least squares.
         limits: (2, p).
     """
     _, *joints = _JOINTS[pair]

@@ -1,7 +1,8 @@
-"""Both legs or both arms exchanged: in a walk they pass each other, within one silhouette there.
+"""Exchange of both legs or both arms, which may be confused when they pass each other in a walk.
 
-Legs or arms that were tracked into each other's place explain the silhouettes nearly as well, for
-as long as the step goes on. No search of one limb alone finds both again.
+While they pass, one silhouette covers both. Legs or arms that are tracked into each other's place
+explain the silhouettes nearly as well until the step ends. A search of a single limb cannot correct
+both.
 """
 
 from typing import NamedTuple
@@ -15,13 +16,14 @@ from markerless_tracker.tracking.start.mirror import mirror_of
 
 PAIRS = ("legs", "arms")
 EVERY_NS = 50_000_000
-"""The pairs are exchanged in turn, one so often: each some times within half of a step."""
+"""Interval at which an exchange is tried, of the two pairs in rotation. Each is tried several times
+within half a step."""
 LEAST_M = 0.1
-"""Limbs nearer to each other's place, at every marker, need not be exchanged."""
+"""An exchange that moves no marker farther than this is not tried."""
 LEAST_GAIN = 0.004
-"""Least rise of f_s. Where the legs pass each other both ways fit alike."""
+"""Least rise of f_s for an exchange. While the legs pass each other, both poses fit alike."""
 CLOSE = 0.018
-"""As of `LimbSearch.compared`: limbs in their place cost more when they are exchanged."""
+"""Argument of `LimbSearch.compared`. Exchanging limbs that are right costs more than this."""
 
 
 class Exchange(NamedTuple):
@@ -30,8 +32,7 @@ class Exchange(NamedTuple):
     Attributes:
         name: of the pair.
         pose: (p,) with the pair exchanged.
-        least_gain: rise of f_s from which on it is taken: a pair that is crossed no more need not
-            be any better.
+        least_gain: least rise of f_s for which it is taken; 0 if it uncrosses the pair.
     """
 
     name: str
@@ -40,13 +41,13 @@ class Exchange(NamedTuple):
 
 
 class PairExchange:
-    """Tries the exchange of the legs and that of the arms at intervals."""
+    """Proposes the exchange of the legs or of the arms at intervals."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Forget when they were tried."""
+        """Forget when an exchange was tried last."""
         self._tried_ns: int | None = None
         self._next = 0
 
@@ -56,8 +57,8 @@ class PairExchange:
         """The exchange of a pair in a pose (p,), within limits (2, p), if one is due."""
         if self._tried_ns is not None and 0 <= stamp_ns - self._tried_ns < EVERY_NS:
             return None
-        for turn in range(len(PAIRS)):
-            name = PAIRS[(self._next + turn) % len(PAIRS)]
+        for offset in range(len(PAIRS)):
+            name = PAIRS[(self._next + offset) % len(PAIRS)]
             other = _exchanged(name, body, pose, limits)
             if other is not None:
                 self._tried_ns = stamp_ns

@@ -1,8 +1,8 @@
-"""Whether the person faces another way: compared while the person is tracked.
+"""Checks the heading of the tracked person against other headings.
 
-A person facing the opposite way gives nearly the same silhouettes, and in loose clothes one facing
-sideways does, too, so that a start may be wrong and a turn may be missed. One frame does not tell;
-the mean of many does.
+The opposite heading gives nearly the same silhouettes; in loose clothes a heading sideways does,
+too. So a start may be wrong, and a rotation of the person may be missed. One frame does not decide;
+the mean over many does.
 """
 
 from collections.abc import Callable
@@ -12,43 +12,44 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.limbs.search import LimbSearch
-from markerless_tracker.tracking.start.mirror import turned_by, turned_round
+from markerless_tracker.tracking.start.mirror import opposite_heading, rotated_by
 
 EVERY_NS, FIRST_EVERY_NS, DOUBTED_EVERY_NS = 600_000_000, 250_000_000, 80_000_000
-"""Time between two comparisons; in the first `FIRST_NS`, since a start may be wrong; and while one
-spoke for another way."""
+"""Time between two comparisons: usually; in the first `FIRST_NS`, since a start may be wrong; and
+while some sum of gains is positive."""
 FIRST_NS = 2_000_000_000
 LEAST_GAIN = 0.02
-"""Sum of the rises of f_s, over comparisons, from which on the person is turned."""
+"""Least sum of the rises of f_s, over comparisons, for which another heading is taken."""
 LEAST_COMPARISONS = 3
+"""Least number of comparisons in this sum."""
 CLOSE = 0.03
-"""As of `LimbSearch.compared`."""
+"""Argument of `LimbSearch.compared`."""
 _FORGET = 0.9
 """Factor of the earlier sum in each comparison."""
 
 
-def _around(body: BodyModel, pose: FloatArray) -> FloatArray:
-    return turned_round(body).of(pose)
+def _reversed(body: BodyModel, pose: FloatArray) -> FloatArray:
+    return opposite_heading(body).of(pose)
 
 
 def _to_the_left(body: BodyModel, pose: FloatArray) -> FloatArray:
-    return turned_by(body, pose, 0.5 * np.pi, about=pose)
+    return rotated_by(body, pose, 0.5 * np.pi, about=pose)
 
 
 def _to_the_right(body: BodyModel, pose: FloatArray) -> FloatArray:
-    return turned_by(body, pose, -0.5 * np.pi, about=pose)
+    return rotated_by(body, pose, -0.5 * np.pi, about=pose)
 
 
-_TURNS: tuple[Callable[[BodyModel, FloatArray], FloatArray], ...] = (
-    _around, _to_the_left, _to_the_right,
+_ROTATIONS: tuple[Callable[[BodyModel, FloatArray], FloatArray], ...] = (
+    _reversed, _to_the_left, _to_the_right,
 )  # fmt: skip
 
 
 class FacingWatch:
-    """Sums up how much better the person turned explains the views, for each of three turns.
+    """Sums the gains of f_s of three other headings: the opposite one, and a quarter to each side.
 
-    A turn that fits worse counts fully against it, so that a few frames decide nothing. They are
-    compared one after the other, so that the best one is taken.
+    A comparison in which a heading fits worse lowers its sum, so that a few frames do not decide.
+    Each comparison tests one heading, in rotation; the heading with the best mean is taken.
     """
 
     def __init__(self) -> None:
@@ -62,11 +63,11 @@ class FacingWatch:
     def _begin(self) -> None:
         self._compared_ns: int | None = None
         self._next = 0
-        self._gains = [0.0] * len(_TURNS)
-        self._counts = [0] * len(_TURNS)
+        self._gains = [0.0] * len(_ROTATIONS)
+        self._counts = [0] * len(_ROTATIONS)
 
     def due(self, stamp_ns: int) -> bool:
-        """Whether to compare at this time; if so, it is noted."""
+        """Whether to compare at this time; if so, the time is noted as that of a comparison."""
         if self._began_ns is None:
             self._began_ns = stamp_ns
         since = self._compared_ns
@@ -79,21 +80,21 @@ class FacingWatch:
         return due
 
     def compare(self, search: LimbSearch, body: BodyModel, limits: FloatArray) -> FloatArray | None:
-        """The pose (p,) turned, once that turn has been better for long enough; else None.
+        """Compare one heading; the pose (p,) with it, if it has been better for long enough.
 
         Args:
             search: of the frame, with the estimate.
             body: the body.
             limits: (2, p).
         """
-        turn, self._next = self._next, (self._next + 1) % len(_TURNS)
-        other, gain = search.compared(np.clip(_TURNS[turn](body, search.pose), *limits), CLOSE)
-        total = max(0.0, _FORGET * self._gains[turn] + gain)
-        self._gains[turn] = total
-        self._counts[turn] = self._counts[turn] + 1 if total > 0.0 else 0
+        index, self._next = self._next, (self._next + 1) % len(_ROTATIONS)
+        other, gain = search.compared(np.clip(_ROTATIONS[index](body, search.pose), *limits), CLOSE)
+        total = max(0.0, _FORGET * self._gains[index] + gain)
+        self._gains[index] = total
+        self._counts[index] = self._counts[index] + 1 if total > 0.0 else 0
         means = [g / max(1, count) for g, count in zip(self._gains, self._counts, strict=True)]
-        sure = total >= LEAST_GAIN and self._counts[turn] >= LEAST_COMPARISONS
-        if not sure or gain <= 0.0 or means[turn] < max(means):
+        sure = total >= LEAST_GAIN and self._counts[index] >= LEAST_COMPARISONS
+        if not sure or gain <= 0.0 or means[index] < max(means):
             return None
         self._begin()
         return other

@@ -1,4 +1,4 @@
-"""Search of limbs over their whole range, while the rest of the body stays."""
+"""Search of a limb over its whole range, and comparison of whole poses with the estimate."""
 
 from collections.abc import Callable
 
@@ -15,25 +15,25 @@ from markerless_tracker.tracking.start.recombination import Recombiner
 DRAWS = 120
 """First draws of a limb: half from the pose prior, half uniform."""
 AIMED, AIMED_OF = 60, 1000
-"""Where silhouette is unexplained: further draws of a limb that lies there, the best of so many."""
+"""If silhouette is unexplained: further draws of the limb in its regions, the best of how many."""
 LAYERS = (0.4, 0.2)
-"""Then the best are varied in layers, by these fractions of the prior's standard deviations."""
+"""The best draws are varied in layers, by these fractions of the prior's standard deviations."""
 HOPELESS = 0.03
 """A limb whose cost exceeds the largest useful cost by more than this is not refined."""
 NEAR_M = 0.10
-"""A limb that is drawn nearer than that to its place, at every marker, would return there when
-refined."""
+"""A drawn limb with every marker nearer than this to its place would return there when refined."""
 LEAST_GAIN = 0.003
-"""Least rise of f_s between poses in evidence of their own, which differs a little by chance."""
+"""Least rise of f_s between two poses in their own evidence, which differs a little by chance."""
 LEAST_M = 0.05
-"""Limbs nearer to where they were, at every marker, are not elsewhere."""
+"""A limb with every marker nearer than this to its place was not found elsewhere."""
 CLOSE = 0.01
-"""What costs so much more in undecided evidence may be better in its own."""
+"""A pose that costs at most this much more in undecided evidence may be better in its own."""
 _PARENTS, _CHILDREN = 6, 10
+"""Draws that are varied in each layer, and variations of each."""
 _REFINE = (3, (LIMB_M, 0.035))
-"""Iterations of the refinement of the best, and truncation (m) of the first and the last."""
+"""Iterations of the refinement of the best draw; truncation (m) in the first and the last one."""
 _REFINE_FAR = (8, (0.15, 0.035))
-"""The same of a pose that nothing was drawn for."""
+"""The same for a given pose, which may be far from the optimum."""
 
 Aim = Callable[[FloatArray, int], FloatArray]
 
@@ -41,16 +41,16 @@ Aim = Callable[[FloatArray, int], FloatArray]
 class LimbSearch:
     """The searches of one frame for limbs that are elsewhere.
 
-    Another pose is refined, all of the body. A limb is taken if that explains the frame better than
-    the estimate does, and than the estimate refined as much does: what the rest of the body gains
-    is no merit of the limb's.
+    After a search of a limb the whole body is refined. The result is taken if it explains the frame
+    better than the estimate, and better than the estimate after the same refinement: a gain of the
+    rest of the body is not due to the limb.
 
     Args:
         recombiner: draws limbs of the body.
         frame: the evidence, decided near the predicted body.
-        own: the same for poses that decide it themselves.
+        own: the evidence for poses that decide it themselves.
         pose: (p,) the estimate.
-        least_gain: rise of f_s from which on another pose is taken.
+        least_gain: least rise of f_s for which another pose is taken.
 
     Attributes:
         pose: (p,) the estimate so far.
@@ -71,7 +71,7 @@ class LimbSearch:
         self._take(pose, None)
 
     def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
-        """Search a limb's parameters; whether it was found elsewhere. Arguments as `other_limb`."""
+        """Search a limb; return whether it was found elsewhere. Arguments as for `other_limb`."""
         frame = self._own.undecided
         cost = float(frame.costs(self.pose[None])[0])
         other, other_cost = other_limb(frame, self._recombiner, self.pose, limb, rng, aim, cost)
@@ -80,7 +80,7 @@ class LimbSearch:
             refined = frame.refined(self.pose[None], *_REFINE)
             better = other_cost < float(frame.costs(refined)[0]) - self._least_gain
         if self._own.differs:
-            if other_cost > cost + CLOSE or _apart_m(self._own.body, other, self.pose) < LEAST_M:
+            if other_cost > cost + CLOSE or _distance_m(self._own.body, other, self.pose) < LEAST_M:
                 return False
             other, other_cost = self._own.refined(other, *_REFINE)
             least_gain = 0.0 if better else LEAST_GAIN
@@ -91,7 +91,10 @@ class LimbSearch:
         return better
 
     def takes(self, other: FloatArray, least_gain: float, close: float) -> bool:
-        """Take another pose (p,) if f_s rises by `least_gain`; other arguments as `compared`."""
+        """Take another pose (p,) if f_s rises by `least_gain`; return whether it was taken.
+
+        Other arguments as for `compared`.
+        """
         found, gain = self.compared(other, close)
         if gain < least_gain:
             return False
@@ -99,12 +102,12 @@ class LimbSearch:
         return True
 
     def compared(self, other: FloatArray, close: float) -> tuple[FloatArray, float]:
-        """Another pose (p,), refined, and by how much its f_s exceeds that of the estimate.
+        """Another pose (p,), refined, and its f_s less that of the estimate.
 
         Args:
             other: the pose, which may be far from the estimate.
-            close: it is compared in evidence of its own if it costs at most so much more than the
-                estimate in the evidence that was decided for that.
+            close: each pose is compared in its own evidence if the other costs at most this much
+                more in the evidence decided with the predicted pose.
         """
         refined = self._frame.refined(other[None], *_REFINE_FAR)
         costs = self._frame.costs(np.concatenate([self.pose[None], refined]))
@@ -134,20 +137,20 @@ def other_limb(
     aim: Aim | None = None,
     most_cost: float = np.inf,
 ) -> tuple[FloatArray, float]:
-    """The best pose (p,) that is found with a limb elsewhere, and its cost 1 - f_s.
+    """The best pose (p,) with a limb elsewhere, and its cost 1 - f_s.
 
-    Draws are sparse for a limb of six joints, so the best are varied twice, as in an annealed
-    filter. One contour refinement, of the whole body, then refines the best of all. If that is
-    where the limb was, the pose itself is returned, with a cost that is not below `most_cost`.
+    The draws are sparse for a limb of six joints, so the best ones are varied twice, as in an
+    annealed particle filter. A contour refinement of the whole body then refines the best pose. If
+    its limb is near its former place, the given pose is returned with `most_cost`.
 
     Args:
         frame: the evidence.
         recombiner: draws limbs of the body.
-        pose: (p,) where the rest of the body is.
+        pose: (p,) the estimate.
         limb: the limb's parameters.
         rng: draws.
-        aim: of many poses (n, p) keeps at most so many, those whose limb lies where silhouette is
-            unexplained; None: no such draws.
+        aim: selects, from poses (n, p), at most a given number whose limb lies in unexplained
+            silhouette; None for no such draws.
         most_cost: largest useful cost; the result matters only below it.
     """
     half = DRAWS // 2
@@ -170,7 +173,7 @@ def other_limb(
         near = recombiner.with_limb_near(
             np.repeat(poses[best], _CHILDREN, axis=0), limb, fraction, rng
         )
-        # Of the last layer only the best counts, of the others the parents.
+        # Only the best of the last layer is used, and only the parents of the others.
         cutoff = costs[best[0 if layer == len(LAYERS) else -1]]
         poses = np.concatenate([poses[best], near])
         more = costs_of(near[:, limb], np.full(len(near), cutoff))
@@ -178,12 +181,12 @@ def other_limb(
     if costs.min() > most_cost + HOPELESS:
         return pose, float(costs.min())
     best_pose = poses[int(costs.argmin())]
-    if _apart_m(recombiner.body, best_pose, pose) < NEAR_M:
+    if _distance_m(recombiner.body, best_pose, pose) < NEAR_M:
         return pose, most_cost
     refined = frame.refined(best_pose[None], *_REFINE)
     return refined[0], float(frame.costs(refined)[0])
 
 
-def _apart_m(body: BodyModel, one: FloatArray, other: FloatArray) -> float:
+def _distance_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:
     """Largest distance of a marker between two poses (p,)."""
-    return float(np.linalg.norm(markers(body, one) - markers(body, other), axis=1).max())
+    return float(np.linalg.norm(markers(body, pose) - markers(body, other), axis=1).max())

@@ -21,9 +21,9 @@ from markerless_tracker.records import MaskWords, Observation, unpack_mask
 from markerless_tracker.tracking.search import pixels_per_m
 
 MARGIN_M = 0.03
-"""Silhouette so near to the body is explained: sections and clothes are never exact."""
+"""Silhouette within this distance of the body is explained: sections and clothes are not exact."""
 LEAST_M2 = 0.004
-"""Area of the smallest region that counts, at the body: half of a hand."""
+"""Area of the smallest region that counts, at the body's distance: half of a hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +31,9 @@ class Unexplained:
     """Silhouette that the body does not cover.
 
     Attributes:
-        areas_m2: of the regions that each limb may belong to, the likeliest limb first.
-        regions: by camera with such a region, the pixels (h, w) of its frame.
+        areas_m2: by limb, the weighted area of the regions that it may belong to, the likeliest
+            limb first.
+        regions: by camera with such regions, their pixels (h, w) in its frame.
     """
 
     areas_m2: Mapping[str, float]
@@ -40,20 +41,20 @@ class Unexplained:
 
     @property
     def limbs(self) -> tuple[str, ...]:
-        """The limbs that may belong there, the likeliest first."""
+        """The limbs that may belong to the regions, the likeliest first."""
         return tuple(self.areas_m2)
 
 
-def look_unexplained(
+def find_unexplained(
     body: BodyModel,
     pose: FloatArray,
     observations: Mapping[str, Observation],
     rig: CameraRig,
 ) -> Unexplained:
-    """Regions of silhouette that a body does not explain, and the limbs that may belong there.
+    """Finds regions of silhouette that a body does not explain, and limbs that may belong there.
 
-    A region counts by its area for the limb nearest to it, by half of it for the second, by a third
-    for the third of those that are long enough to lie there.
+    A region counts with its whole area for the nearest limb of those that are long enough to lie in
+    it, with half of the area for the second nearest, with a third for the third nearest.
 
     Args:
         body: the body.
@@ -64,7 +65,7 @@ def look_unexplained(
     if not body.limbs:
         return Unexplained({}, {})
     axes = _axes(body, pose)
-    reach = {name: _reach(points) for name, points in axes.items()}
+    lengths_m = {name: _length_m(points) for name, points in axes.items()}
     middle = np.concatenate(list(axes.values())).mean(axis=0)
     covered = body_words(body, pose, [rig[name] for name in observations])
     areas: dict[str, float] = {}
@@ -76,7 +77,7 @@ def look_unexplained(
         if rest is not None:
             regions[name] = observation.in_full_frame(rest)
         for area_px, centre in left_over:
-            for rank, limb in enumerate(_within_reach(axes, reach, camera, centre, scale)):
+            for rank, limb in enumerate(_long_enough(axes, lengths_m, camera, centre, scale)):
                 areas[limb] = areas.get(limb, 0.0) + area_px / scale**2 / (1 + rank)
     likeliest = sorted(areas, key=lambda limb: -areas[limb])
     return Unexplained({limb: areas[limb] for limb in likeliest}, regions)
@@ -85,21 +86,30 @@ def look_unexplained(
 def _left_over(
     observation: Observation, covered: MaskWords, scale: float
 ) -> tuple[NDArray[np.bool_] | None, list[tuple[float, FloatArray]]]:
-    """Pixels (h, w) farther than the margin from the body; their regions' areas and centres.
-
-    None and no region if there is none that counts.
+    """Silhouette farther than `MARGIN_M` from the body, and its regions.
 
     Args:
         observation: the view.
         covered: the body in its frame, packed.
         scale: size of a metre at the body, px.
+
+    Returns:
+        The pixels (h, w), and per region of at least `LEAST_M2` its area and centre in px; None and
+        an empty list without any such region.
     """
-    reach, least_px = max(1, round(MARGIN_M * scale)), LEAST_M2 * scale**2
+    margin_px, least_px = max(1, round(MARGIN_M * scale)), LEAST_M2 * scale**2
     seen = observation.mask_words
-    shape = seen.shape[0] + 2 * reach, (observation.width + 2 * reach + 63) // 64
+    shape = seen.shape[0] + 2 * margin_px, (observation.width + 2 * margin_px + 63) // 64
     rest, around, near = np.empty_like(seen), np.zeros(shape, np.uint64), np.zeros(shape, np.uint64)
     count = _beyond(
-        seen, covered, *observation.offset_px, observation.width, _disc(reach), around, near, rest
+        seen,
+        covered,
+        *observation.offset_px,
+        observation.width,
+        _disc(margin_px),
+        around,
+        near,
+        rest,
     )
     if count < least_px:
         return None, []
@@ -118,7 +128,7 @@ def _left_over(
 
 @cache
 def _disc(radius: int) -> NDArray[np.int64]:
-    """(2 r + 1,) half of the width of each row of a disc, px; read-only."""
+    """(2 r + 1,) half the width of each row of a disc, px; read-only."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
     return np.asarray(locked(disc.sum(axis=1, dtype=np.int64) // 2, np.int64))
 
@@ -127,16 +137,17 @@ def _disc(radius: int) -> NDArray[np.int64]:
 def _beyond(  # type: ignore[no-untyped-def]
     seen, covered, left, top, width, half_widths, around, near, rest
 ):
-    """Fill `rest` with the silhouette beyond a disc's radius r of the body; counts its pixels.
+    """Fill `rest` with the silhouette farther from the body than a disc's radius r; count its
+    pixels.
 
     Args:
-        seen: (h, k) silhouette of a window of the frame.
-        covered: words of the frame, of the body.
+        seen: (h, k) silhouette in a window of the frame.
+        covered: body in the frame, packed.
         left, top: of the window in the frame.
         width: of the window, px.
         half_widths: (2 r + 1,) of the disc.
-        around, near: (h + 2 r, m) empty, for the window and r pixels around it; changed.
-        rest: (h, k).
+        around, near: (h + 2 r, m) zeros, for the window and r pixels around it; overwritten.
+        rest: (h, k), output.
     """
     radius = half_widths.size // 2
     paste_words(covered, left - radius, top - radius, width + 2 * radius, around)
@@ -159,22 +170,22 @@ def _axes(body: BodyModel, pose: FloatArray) -> dict[str, FloatArray]:
     return axes
 
 
-def _reach(points: FloatArray) -> float:
-    """Length (m) of a limb along its cones, from points at both ends of each."""
+def _length_m(points: FloatArray) -> float:
+    """Length (m) of a limb along its cones, from the points of `_axes`."""
     starts, ends = points[: len(points) // 2], points[len(points) // 2 :]
     return float(np.linalg.norm(ends - starts, axis=1).sum())
 
 
-def _within_reach(
+def _long_enough(
     axes: Mapping[str, FloatArray],
-    reach: Mapping[str, float],
+    lengths_m: Mapping[str, float],
     camera: CameraModel,
     centre: FloatArray,
     scale: float,
 ) -> list[str]:
-    """Limbs that are long enough for a region (2,), the nearest first; all if none is.
+    """Limbs long enough to lie at a region's centre (2,), the nearest first; all if none is.
 
-    A limb at a wrong place may be far from its own region, and another limb nearer.
+    A limb at a wrong place may be farther from its own region than another limb.
     """
     gaps = {}
     for name, points in axes.items():
@@ -182,4 +193,4 @@ def _within_reach(
         if np.isfinite(off).any():
             gaps[name] = (float(np.nanmin(off)), float(off[0]))
     near = sorted(gaps, key=lambda name: gaps[name][0])
-    return [name for name in near if gaps[name][1] <= reach[name] * scale] or near
+    return [name for name in near if gaps[name][1] <= lengths_m[name] * scale] or near

@@ -1,8 +1,8 @@
-"""A person who walks faces the way that the trunk moves.
+"""Corrects the heading of a walking person, who faces the walking direction.
 
-Arms that hang and legs that pass each other look alike from many sides: a body whose limbs are in
-each other's place can turn away from a person who walks a curve, and explain the silhouettes nearly
-as well for a second or more.
+Hanging arms and passing legs look alike from many sides. With its limbs in each other's place, a
+body can rotate away from a person walking a curve, and explain the silhouettes nearly as well for a
+second or more.
 """
 
 from collections import deque
@@ -12,25 +12,25 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.start.mirror import TRUNK, mirror_of, turned_by
+from markerless_tracker.tracking.start.mirror import TRUNK, mirror_of, rotated_by
 
 EVERY_NS = 100_000_000
-"""Time between two comparisons, while the body faces elsewhere."""
+"""Time between two comparisons, while heading and walking direction differ."""
 WALKED_NS, LEAST_WALKED_NS = 500_000_000, 300_000_000
-"""Time over which the trunk's move is the way that the person walks, and the least such time."""
+"""Usual and least time over which the trunk's displacement gives the walking direction."""
 LEAST_SPEED_M_S = 0.3
-"""A slower trunk sways."""
+"""A trunk slower than this sways and does not walk."""
 LEAST_ANGLE_RAD = 0.7
-"""A body that faces the way of walking by less is left as it is: the way of a curve lags."""
+"""A heading nearer than this to the walking direction is kept, since that lags in a curve."""
 LEAST_GAIN = 0.004
-"""Least rise of f_s from which on the body is turned: people seldom walk backwards or sideways, so
-that a rise beyond chance is enough."""
+"""Least rise of f_s for which the body is rotated. People seldom walk backwards or sideways, so a
+rise beyond chance is enough."""
 CLOSE = 0.03
-"""As of `LimbSearch.compared`."""
+"""Argument of `LimbSearch.compared`."""
 
 
 class WalkingWatch:
-    """Proposes poses that face the way that the person walks."""
+    """Proposes poses whose heading is the walking direction."""
 
     def __init__(self) -> None:
         self.reset()
@@ -43,31 +43,31 @@ class WalkingWatch:
     def due(
         self, body: BodyModel, pose: FloatArray, limits: FloatArray, stamp_ns: int
     ) -> list[FloatArray]:
-        """Poses (p,) that face the way of walking, if the body does not and a comparison is due.
+        """Poses (p,) facing the walking direction, if the body does not and a comparison is due.
 
-        The joints keep their angles in one of them; in the other they are as in a mirror.
+        The joints keep their angles in one of them; in the other, left and right are exchanged.
 
         Args:
             body: the body.
             pose: (p,) the estimate.
-            limits: (2, p), kept.
+            limits: (2, p) of the poses.
             stamp_ns: its time.
         """
         points = markers(body, pose)
-        way_rad = self._way_rad(points[TRUNK].mean(axis=0), stamp_ns)
+        direction_rad = self._direction_rad(points[TRUNK].mean(axis=0), stamp_ns)
         faced_rad = heading(points)
-        if way_rad is None or heading_difference(way_rad, faced_rad) < LEAST_ANGLE_RAD:
+        if direction_rad is None or heading_difference(direction_rad, faced_rad) < LEAST_ANGLE_RAD:
             return []
         last_ns = self._compared_ns
         if last_ns is not None and 0 <= stamp_ns - last_ns < EVERY_NS:
             return []
         self._compared_ns = stamp_ns
         both = (pose, mirror_of(body).of(pose))
-        found = [turned_by(body, other, way_rad - faced_rad, about=pose) for other in both]
+        found = [rotated_by(body, other, direction_rad - faced_rad, about=pose) for other in both]
         return [np.clip(other, *limits) for other in found]
 
-    def _way_rad(self, trunk_m: FloatArray, stamp_ns: int) -> float | None:
-        """Direction of walking, about the vertical; None if the person stands or for too short."""
+    def _direction_rad(self, trunk_m: FloatArray, stamp_ns: int) -> float | None:
+        """Walking direction, about the vertical; None if the person stands, or began just now."""
         if self._trunks and stamp_ns <= self._trunks[-1][0]:
             self._trunks.clear()
         self._trunks.append((stamp_ns, trunk_m))

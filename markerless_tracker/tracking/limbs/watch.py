@@ -1,7 +1,7 @@
-"""Lost limbs: detecting them, and searching for them while the rest of the body stays.
+"""Detects lost limbs, and schedules the searches for limbs and headings.
 
 A limb outside the silhouettes is detected. A wrong limb inside the silhouettes goes undetected, so
-all limbs are searched elsewhere in rotation, and both legs or both arms are exchanged.
+all limbs are searched elsewhere in rotation, and exchanges of both legs or both arms are tried.
 """
 
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ from markerless_tracker.tracking.limbs.aimed import most_aimed
 from markerless_tracker.tracking.limbs.exchange import CLOSE, PairExchange
 from markerless_tracker.tracking.limbs.facing import FacingWatch
 from markerless_tracker.tracking.limbs.search import LimbSearch
-from markerless_tracker.tracking.limbs.unexplained import look_unexplained
+from markerless_tracker.tracking.limbs.unexplained import find_unexplained
 from markerless_tracker.tracking.limbs.walking import CLOSE as WALKING_CLOSE
 from markerless_tracker.tracking.limbs.walking import LEAST_GAIN as WALKING_GAIN
 from markerless_tracker.tracking.limbs.walking import WalkingWatch
@@ -39,71 +39,73 @@ from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.recombination import Recombiner
 
 ROTATION_NS = 100_000_000
-"""One limb that is not lost is searched elsewhere this often: every sixth frame at 60 frames/s."""
+"""Interval at which the next limb in rotation is searched: six frames at 60 frames/s."""
 WAIT_NS = 16_000_000
-"""Time before a limb near unexplained silhouette is searched again, after a search without gain."""
+"""Half the time before a limb near unexplained silhouette is searched again, after one search
+without gain."""
 RECOVERED_M = 0.10
-"""A limb that is found so far from its last place was wrong there."""
+"""A limb that is found farther than this from its last place was wrong there."""
 _DOUBLINGS = 4
-"""That time doubles with each search without gain, so often."""
+"""That time doubles with each further search without gain, at most this often."""
 _GROWN = 2.0
-"""An earlier search does not count where the unexplained area has grown by this factor."""
+"""Earlier searches do not count once the unexplained area has grown by this factor."""
 _NONE = locked(np.empty((0, 0), dtype=np.uint64), np.uint64)
 _ALONG = np.linspace(0.1, 0.9, 5)
+"""Points along each cone's axis that `inside_fractions` tests, as fractions of its length."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recovered:
-    """What was found elsewhere in a frame.
+    """Result of the searches of a frame.
 
     Attributes:
         pose: (p,) the estimate.
-        names: of the limbs that were taken from elsewhere; `legs` and `arms` are exchanged.
-        turned: whether the person faces another way; nothing of the body is where it was.
-        moved_m: how far the limbs' joints were from where they were found, at most.
+        names: of the limbs that were found elsewhere; `legs` or `arms` for an exchanged pair.
+        rotated: whether another heading was found; no parameter continues its last value then.
+        moved_m: largest distance by which the searches moved a marker.
     """
 
     pose: FloatArray
     names: tuple[str, ...] = ()
-    turned: bool = False
+    rotated: bool = False
     moved_m: float = 0.0
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know, one line each."""
-        if self.turned:
+        """Messages for the user, one line each."""
+        if self.rotated:
             return ("the person faces another way: turned round",)
         return tuple(f"{name}: found elsewhere" for name in self.names)
 
     def jumped(self, body: BodyModel) -> IntArray:
         """Indices of the parameters that do not continue those of the last frame."""
-        if self.turned:
+        if self.rotated:
             return np.arange(body.size)
         return np.array([i for name in self.names for i in body.subspaces[name]], dtype=np.int64)
 
     def placed(self, body: BodyModel, limits: FloatArray, corrected: FloatArray) -> FloatArray:
-        """The pose (p,): limbs that were wrong jump, the rest of the body does not.
+        """The pose (p,), within limits except for limbs that were wrong.
 
         Args:
             body: the body.
-            limits: (2, p) of what does not jump.
-            corrected: (2, p) the same of limbs that were nearly in their places (`RECOVERED_M`).
+            limits: (2, p) of the parameters that continue those of the last frame.
+            corrected: (2, p) of limbs that were found elsewhere, but nearer than `RECOVERED_M`.
         """
         pose, jumped = np.clip(self.pose, *limits), self.jumped(body)
         pose[jumped] = self.pose[jumped]
-        if not self.turned and self.moved_m <= RECOVERED_M:
+        if not self.rotated and self.moved_m <= RECOVERED_M:
             pose[jumped] = np.clip(pose, *corrected)[jumped]
         return np.asarray(pose)
 
 
 @dataclass(frozen=True)
 class _Wait:
-    """Searches of a limb that did not improve it.
+    """Searches of a limb without gain.
 
     Attributes:
         failures: number of such searches in a row.
         searched_ns: time of the last one.
-        area_m2: of the unexplained silhouette at that time.
+        area_m2: unexplained silhouette at that time.
     """
 
     failures: int
@@ -118,7 +120,7 @@ class _Wait:
 
 
 class LimbWatch:
-    """Detects lost limbs, and searches limbs alone: the lost ones, and all in rotation.
+    """Detects lost limbs, and searches for them; all other limbs are searched in rotation.
 
     Args:
         rig: the cameras.
@@ -132,7 +134,7 @@ class LimbWatch:
         """Forget the limbs so far."""
         self._tracks: dict[str, LimbTrack] = {}
         self._next = 0
-        self._turn = 0
+        self._calls = 0
         self._unexplained = 0
         self._rotated_ns: int | None = None
         self._waits: dict[str, _Wait] = {}
@@ -152,7 +154,7 @@ class LimbWatch:
         observations: Mapping[str, Observation],
         particle_sd_ratio: FloatArray,
     ) -> dict[str, LimbState]:
-        """By limb, its state at a pose (p,).
+        """The state of each limb at a pose (p,), by name.
 
         Args:
             body: the body.
@@ -181,49 +183,49 @@ class LimbWatch:
     ) -> Recovered:
         """Search the limbs that `assess` found lost, and the next one in rotation.
 
-        A limb is taken from elsewhere if f_s rises as clearly as a swarm's result must
-        (`min_improvement`), each pose in the evidence that it decides itself.
+        A limb is taken from elsewhere if f_s rises by at least `min_improvement`, like a swarm's
+        result. Each pose is compared in its own evidence.
 
         Args:
             searcher: of the frame.
             contours: the frame's contours.
             seen: the frame's evidence.
             pose: (p,) the estimate.
-            one: whether there is time for one thing alone: what compares the whole body's poses, or
-                one of the limbs, in turn.
+            one: whether there is time for a single search: a comparison of whole poses and a search
+                of one limb alternate then.
         """
         body, stamp_ns, observations = searcher.body, seen.stamp_ns, seen.used
         if not body.limbs:
             return Recovered(pose)
-        unexplained = look_unexplained(body, pose, observations, self._rig)
+        unexplained = find_unexplained(body, pose, observations, self._rig)
         if not unexplained.limbs:
             self._waits.clear()
         due = self._due(body, stamp_ns, unexplained.areas_m2)
         pair, facing, walking = None, False, []
-        self._turn += 1
-        if not one or self._turn % 2:
+        self._calls += 1
+        if not one or self._calls % 2:
             pair = self._exchange.due(body, pose, searcher.limits, stamp_ns)
             facing = self._facing.due(stamp_ns)
             walking = self._walking.due(body, pose, searcher.limits, stamp_ns)
         whole = facing or pair is not None or bool(walking)
         if one and due:
-            due = [] if whole else [due[self._turn // 2 % len(due)]]
+            due = [] if whole else [due[self._calls // 2 % len(due)]]
         if not due and not whole:
             return Recovered(pose)
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
-        reach_m = searcher.tracked_reach_m
-        own = OwnEvidence(searcher, seen.imaged, stamp_ns, frame, reach_m=reach_m)
+        radius_m = searcher.tracked_radius_m
+        own = OwnEvidence(searcher, seen.imaged, stamp_ns, frame, radius_m=radius_m)
         recombiner = Recombiner(body, searcher.limits)
         search = LimbSearch(recombiner, frame, own, pose, searcher.config.min_improvement)
         if facing:
-            turned = self._facing.compare(search, body, searcher.limits)
-            if turned is not None:
-                return Recovered(turned, turned=True)
+            rotated = self._facing.compare(search, body, searcher.limits)
+            if rotated is not None:
+                return Recovered(rotated, rotated=True)
         for other in walking:
             if search.takes(other, WALKING_GAIN, WALKING_CLOSE):
-                # Its sums belong to the heading so far.
+                # The sums were of comparisons with the former heading.
                 self._facing.reset()
-                return Recovered(search.pose, turned=True)
+                return Recovered(search.pose, rotated=True)
         found = []
         if pair is not None and search.takes(pair.pose, pair.least_gain, CLOSE):
             found.append(pair.name)
@@ -251,7 +253,7 @@ class LimbWatch:
         self._waits[name] = _Wait(failures, stamp_ns, area_m2)
 
     def _due(self, body: BodyModel, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
-        """Limbs to search: lost, near unexplained silhouette, and at times the next in rotation."""
+        """Limbs to search: the lost ones, those near unexplained silhouette, one in rotation."""
         lost = self.lost
         due = [*lost, *(n for n in self._suspects(stamp_ns, areas_m2) if n not in lost)]
         if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < ROTATION_NS:
@@ -262,9 +264,9 @@ class LimbWatch:
         return due if name in due else [*due, name]
 
     def _suspects(self, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
-        """The likeliest limb, and the others in rotation while silhouette stays unexplained.
+        """The limb likeliest to lie in unexplained silhouette, and one of the others in rotation.
 
-        Limbs whose search failed shortly before are left out.
+        Limbs whose last search failed a short time ago are left out.
         """
         if not areas_m2:
             self._unexplained = 0
@@ -282,15 +284,15 @@ def inside_fractions(
     observations: Mapping[str, Observation],
     rig: CameraRig,
 ) -> dict[str, float]:
-    """By limb, how much of its cones' axes lies inside the silhouettes, mean over the views.
+    """Fraction of each limb's cone axes inside the silhouettes, mean over the views.
 
-    Points outside a view's region count as outside; those outside its frame, and those on
-    undecided pixels, do not count.
+    Points outside of a view's region count as outside of its silhouette. Points outside of its
+    frame, or on undecided pixels, do not count.
     """
     placed = cone_transforms(body, pose)
     along = (body.cone_length[:, None] * _ALONG)[:, :, None]
     points = (placed[:, None, :, 3] + along * placed[:, None, :, 2]).reshape(-1, 3)
-    seen = [_look(points, observation, rig) for observation in observations.values()]
+    seen = [_located(points, observation, rig) for observation in observations.values()]
     fractions = {}
     for name in body.limbs:
         own = np.repeat(cones_of(body, name), _ALONG.size)
@@ -304,10 +306,10 @@ def inside_fractions(
     return fractions
 
 
-def _look(
+def _located(
     points: FloatArray, observation: Observation, rig: CameraRig
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which of the points (n, 3) a view has in its frame, and which in its silhouette."""
+    """Which of the points (n, 3) lie in a view's frame, and which in its silhouette."""
     camera = rig[observation.camera]
     undecided = observation.undecided_words
     framed, inside = np.zeros((2, len(points)), dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""The body of this person: sections and lengths found while tracking.
+"""The body of the tracked person: sections and lengths fitted while tracking.
 
-From the first frame, and from the first tracked frames together.
+They are fitted to the first frame, to the first tracked frames, and to later frames.
 """

@@ -12,11 +12,11 @@ from markerless_tracker.fitness.shape import BodyFit
 from markerless_tracker.geometry import FloatArray
 
 FRAMES = 10
-"""Frames that a body is fitted to; poses change over them."""
+"""Number of frames that a body is fitted to; the pose should change over them."""
 EVERY = 2
-"""One of so many tracked frames is taken."""
+"""Every second tracked frame is taken."""
 POLISH = 5
-"""Iterations after the last frame was taken; there is one with each frame before."""
+"""Iterations after the last frame was taken; before, there is one iteration per frame."""
 TRUNCATION_M = (0.10, 0.05)
 """Outline points farther than this from the contour are outliers: first and last iteration."""
 
@@ -27,7 +27,7 @@ class Fitted:
 
     Attributes:
         body: the body.
-        moved: (p,) how far poses lie from those that the former body was tracked in.
+        moved: (p,) difference of its last pose from that tracked with the former body.
     """
 
     body: BodyModel
@@ -36,11 +36,11 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class Unmeasured:
-    """A person of whom at most the stature is known.
+    """A person with unknown lengths, of known or unknown stature.
 
     Attributes:
         sizes: makes bodies of any size.
-        stature_m: None = unknown, too.
+        stature_m: None = unknown.
     """
 
     sizes: Sizes
@@ -48,17 +48,17 @@ class Unmeasured:
 
     @property
     def sized(self) -> Callable[[float], BodyModel] | None:
-        """Makes the body of a stature, m, where that is to be found, too."""
+        """Makes the body of a stature, m; None if the stature is known."""
         return self.sizes.of_stature if self.stature_m is None else None
 
 
 class BodyFitting:
-    """Fits the body while it is tracked, a little in every frame, so that no frame takes long.
+    """Fits the body while it is tracked, one iteration per frame, so that no frame takes long.
 
     Args:
-        person: what is known.
+        person: what is known of the person.
         limits: (2, p) of the poses.
-        floor_precision: as of `BodyFit`.
+        floor_precision: as in `BodyFit`.
     """
 
     def __init__(
@@ -72,12 +72,12 @@ class BodyFitting:
         self._last = np.zeros(limits.shape[1])
 
     def add(self, body: BodyModel, contours: ContourFrame, pose: FloatArray) -> Fitted | None:
-        """Take a tracked frame; the fitted body once it is done.
+        """Take a tracked frame; returns the fitted body when the fit is complete, else None.
 
         Args:
-            body: that was tracked; the fit begins with its lengths.
+            body: the tracked body; the fit begins with its lengths.
             contours: the frame's evidence.
-            pose: (p,) tracked.
+            pose: (p,) the tracked pose.
         """
         if self._fit is None:
             sizes = self._person.sizes
@@ -99,6 +99,6 @@ class BodyFitting:
         return Fitted(self._fit.body, self._fit.poses[-1] - self._last)
 
     def warm_up(self, body: BodyModel, contours: ContourFrame, pose: FloatArray) -> None:
-        """Compile what `add` needs; arguments as there. Forget this fit then."""
+        """Compile what `add` needs; same arguments. This object must not be used afterwards."""
         for _ in range(EVERY):
             self.add(body, contours, pose)

@@ -1,4 +1,4 @@
-"""The body of the tracked person: what is known of it, and what remains to be fitted."""
+"""The estimate of the tracked person's body, and the schedule of its fits."""
 
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import replace
@@ -24,26 +24,26 @@ from markerless_tracker.tracking.stages.frame import frame_stages
 START_FRAMES = 30
 """Frames that may disagree with a given start pose before tracking begins without a fit."""
 REVISION_STEPS = 4
-"""Gauss-Newton steps of a revision, which begins with the sections so far."""
+"""Gauss-Newton steps of a revision, which begins with the present sections."""
 PIECES = 2
 """Pieces of a revision that are computed in each tracked frame, so that no frame takes much longer
-than others. A piece is one step's sums over one of the frames that are fitted to."""
+than others. A piece is the sums of one step over one frame."""
 
 SearcherFor = Callable[[BodyModel], Searcher]
 RECOVERED_FRAMES = 30
-"""Frames after a fit of the lengths in which a limb that is found elsewhere makes it doubtful."""
+"""The lengths are fitted again if a limb is found elsewhere within this many frames after a fit."""
 MOST_RECOVERED = 6
-"""Fits of the lengths that begin anew for that reason."""
+"""Largest number of fits of the lengths that are restarted for that reason."""
 
 
 class BodyEstimate:
-    """A body that becomes the person's: first its sections, then its lengths are fitted.
+    """Estimate of the person's body: first its sections are fitted, then its lengths.
 
     Sections are fitted in one frame with the pose held, lengths over several tracked frames. With a
-    start given, sections are revised whenever a tracked pose shows something new; a body that was
-    not measured is fitted anew when poses have become more varied. Only frames whose silhouettes
-    agree with the body are used: f_s of at least `LEAST_FIT`. Lengths that were fitted to a limb in
-    a wrong place are wrong: they are fitted anew once the limb was found.
+    given start, sections are revised when a tracked pose differs from those fitted to. A body that
+    was not measured is fitted again when poses have become more varied. Only frames whose
+    silhouettes agree with the body are used (f_s of at least `LEAST_FIT`). If a limb was in a wrong
+    place during a fit of the lengths, they are fitted again after it has been found.
 
     Args:
         body: with generic sections, and lengths that were measured or follow from a stature.
@@ -54,7 +54,7 @@ class BodyEstimate:
 
     Attributes:
         generic: the body before any fit.
-        body: the body so far.
+        body: the present estimate.
         limits: (2, p) its joint limits.
         sections_fitted: whether the sections are the person's, or are not to be fitted.
         sized: makes the body of a stature, m, while the stature is to be found; else None.
@@ -78,11 +78,11 @@ class BodyEstimate:
         self.reset()
 
     def configure(self, config: TrackerConfig) -> None:
-        """Use other settings of the search in frames that the body is fitted to."""
+        """Use other settings from the next fit on."""
         self._config = config
 
     def reset(self) -> None:
-        """Back to the generic body."""
+        """Return to the generic body."""
         self.body = self.generic
         self.sections_fitted = not self._fits_sections
         self.sized = None if self._person is None else self._person.sized
@@ -110,7 +110,7 @@ class BodyEstimate:
     ) -> FloatArray | None:
         """Fit the sections to a frame, if its silhouettes agree with the body.
 
-        They must agree at the start pose, or where a search from there leads.
+        They must agree at the start pose, or at the pose found by a search from there.
 
         Args:
             searcher_for: makes a searcher of a body.
@@ -130,7 +130,7 @@ class BodyEstimate:
         return self._fit_sections(searcher_for, observations, stamp_ns, search.pose)
 
     def take_warnings(self) -> tuple[str, ...]:
-        """What the user should know and was not yet reported, one line each."""
+        """Warnings that were not yet reported, one line each."""
         warn = not self.sections_fitted and self._disagreeing == START_FRAMES
         if not warn or self._reported:
             return ()
@@ -141,34 +141,34 @@ class BodyEstimate:
         )
 
     def take_found(self, body: BodyModel, *, settled: bool) -> None:
-        """Take the body of an automatic start; once settled its sections are fitted."""
+        """Take the body of an automatic start; with `settled` its sections have been fitted."""
         self.body = body
         if settled:
             self.sections_fitted, self.sized = True, None
 
     def fit_tracked_frame(
-        self, search: FrameSearch, *, turned: bool = False, recovered: bool = False
+        self, search: FrameSearch, *, rotated: bool = False, recovered: bool = False
     ) -> FloatArray | None:
         """Use a tracked frame for what remains to be fitted, if it agrees with the body.
 
         Args:
-            search: the frame's.
-            turned: whether the body was turned round.
-            recovered: whether a limb was found elsewhere: it was in a wrong place before.
+            search: of the frame.
+            rotated: whether another heading was found.
+            recovered: whether a limb was found elsewhere, so that it was in a wrong place before.
 
         Returns:
-            If `body` has changed: how far (p,) its poses lie from those tracked so far.
+            If `body` has changed: the difference (p,) of its poses from those of the former body.
         """
-        if turned:
-            return self.turned()
+        if rotated:
+            return self.restart_lengths()
         self._since_fit += 1
         if recovered:
-            self._fit_lengths_anew()
+            self._refit_lengths()
         agrees = _agrees(search)
         if agrees and self._later is not None:
             self._later.keep(search)
         if self._revision is not None:
-            return self._go_on(self._revision)
+            return self._continue(self._revision)
         if not agrees:
             return None
         if self.sections_fitted and self._lengths is None:
@@ -186,8 +186,8 @@ class BodyEstimate:
         self.body = fitted.body
         return fitted.moved
 
-    def turned(self) -> FloatArray | None:
-        """Fit an unmeasured body anew: so far it was fitted to poses that face the wrong way.
+    def restart_lengths(self) -> FloatArray | None:
+        """Restart the fit of an unmeasured body, which was fitted to poses with a wrong heading.
 
         Returns:
             As `fit_tracked_frame`.
@@ -200,8 +200,8 @@ class BodyEstimate:
             self._begin_lengths(self._person)
         return np.zeros(self.body.size)
 
-    def _fit_lengths_anew(self) -> None:
-        """Drop the frames that lengths are being fitted to, or were shortly before."""
+    def _refit_lengths(self) -> None:
+        """Restart the fit of the lengths, if it is in progress or ended a short time ago."""
         if self._person is None or not (self._fits_sections and self._config.fit_lengths):
             return
         recent = self._lengths is not None or self._since_fit <= RECOVERED_FRAMES
@@ -216,7 +216,7 @@ class BodyEstimate:
         self._later, self._revision = LaterFits(person), None
 
     def _revise(self, search: FrameSearch) -> None:
-        """Begin to fit the body anew, if this frame's pose shows something new."""
+        """Start a revision of the body, if this frame's pose differs from those fitted to."""
         if self._later is not None and self._later.due():
             self._revision = self._later.fit(search)
             return
@@ -227,8 +227,8 @@ class BodyEstimate:
             iterations=REVISION_STEPS, truncation_m=(TRUNCATION_M[1], TRUNCATION_M[1]),
         )  # fmt: skip
 
-    def _go_on(self, revision: Generator[None, None, BodyModel]) -> FloatArray | None:
-        """Go on with a fit of the sections; returns as `fit_tracked_frame` once it is complete."""
+    def _continue(self, revision: Generator[None, None, BodyModel]) -> FloatArray | None:
+        """Continue a revision; when it is complete, return as `fit_tracked_frame`."""
         try:
             for _ in range(PIECES):
                 next(revision)
@@ -244,7 +244,7 @@ class BodyEstimate:
         observations: Mapping[str, Observation],
         pose: FloatArray,
     ) -> None:
-        """Compile what the fits need; then `reset`. Arguments as of `fit_first_frame`."""
+        """Compile what the fits need; call `reset` then. Arguments as of `fit_first_frame`."""
         if self._fits_sections:
             self._fit_sections(searcher_for, observations, 0, pose)
         if self._lengths is not None:
@@ -264,10 +264,10 @@ class BodyEstimate:
         self.body, pose = shape_of_first_frame(
             self.generic, pose, self._start_markers, contours, self._config, self.limits
         )
-        # Other lengths make another body, which knows nothing of this person's posture.
+        # A body of other lengths has a generic prior of poses, not that of this person.
         known = self.generic
         self.body = replace(self.body, prior_mean=known.prior_mean, prior_sd=known.prior_sd)
-        # The generic sections on the lengths that were settled with the first frame.
+        # The generic sections with the lengths from the first frame.
         prior = replace(self.body, cone_shape=self.generic.cone_shape)
         self.sections_fitted = True
         self._varied = VariedFrames(prior, contours(self.body, pose), pose)

@@ -1,9 +1,8 @@
-"""The first frame: the person's shape from the silhouettes, the start pose known or nearly so.
+"""Fits the person's sections to the silhouettes of the first frame, given the start pose.
 
-Fitting pose and shape together drifts while the fitness rises, so the pose is held while the shape
-is fitted. Noise of the start markers would enter the shape: pose and segment lengths
-are first moved to where a nearly generic body fits silhouettes and markers, each as far as it is
-trusted.
+Pose and shape fitted together drift while the fitness rises, so the pose is held while the sections
+are fitted. Noise of the start markers would enter the sections. So pose and segment lengths are
+first refined with a nearly generic body on silhouettes and markers, weighted by their precision.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,7 +20,7 @@ from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.refinement import data_precision
 
 TRUSTED_M = 0.003
-"""Start markers with at most this deviation are taken as they are."""
+"""Start markers with at most this standard deviation are used unchanged."""
 _TIGHT = 3.0
 _ITERATIONS = 8
 _STEP = 1e-6
@@ -38,7 +37,7 @@ class StartMarkers:
 
     Attributes:
         positions_m: (15, 3) world frame, in the order of `MARKER_NAMES`, NaN where missing.
-        noise_m: how far they may be off, per coordinate.
+        noise_m: their standard deviation per coordinate.
         sizes: makes the body of other lengths.
     """
 
@@ -50,8 +49,9 @@ class StartMarkers:
 def start_noise_m(lengths_m: Mapping[str, float]) -> float:
     """Standard deviation of a row's markers per coordinate, estimated from segment lengths, m.
 
-    Left and right segments of a person are alike, so their differences are noise: each holds four
-    markers' errors along the segment, hence twice the deviation of one coordinate. 0 without pairs.
+    Left and right segments of a person are equally long, so their differences are noise. Each
+    difference is the sum of four markers' errors along the segment, hence has twice the standard
+    deviation of one coordinate. 0 without pairs.
     """
     pairs = [
         (value, lengths_m["r_" + name[2:]])
@@ -71,12 +71,12 @@ def shape_of_first_frame(
     config: TrackerConfig,
     limits: FloatArray,
 ) -> tuple[BodyModel, FloatArray]:
-    """The body with the person's sections, and the start pose (p,) they were fitted at.
+    """The body with the person's sections, and the pose (p,) at which they were fitted.
 
     Args:
         body: the body with generic sections.
         pose: (p,) start pose.
-        start: the markers it was taken from, if any.
+        start: the markers that it was computed from, if any.
         contours: makes the frame's contour evidence.
         config: settings of the refinement.
         limits: (2, p) joint limits.
@@ -96,7 +96,7 @@ def _settled(
     config: TrackerConfig,
     limits: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Free lengths (k,) and pose (p,) that fit contours and markers."""
+    """Lengths (k,) and pose (p,) refined on contours and markers."""
     scale = data_precision(config)
     begin = start.sizes.of(body)
     seen = np.isfinite(start.positions_m).all(axis=1)

@@ -1,7 +1,7 @@
-"""Fits of an unmeasured body that follow the first one, while poses still teach something.
+"""Further fits of an unmeasured body, made as long as new postures appear.
 
-The first fit has seen a moment of the motion. A knee that was straight and an arm that hung show
-neither where the joint lies nor how long the limb is; later poses do.
+The first fit uses a short part of the motion. A straight knee and a hanging arm show neither where
+the joint lies nor how long the limb is; later poses do.
 """
 
 from collections.abc import Generator
@@ -16,14 +16,13 @@ from markerless_tracker.tracking.person.whole import WholeRecording
 from markerless_tracker.tracking.search import FrameSearch
 
 FIRST = 40
-"""Tracked frames before the first of these fits. Each later one waits for as many frames as there
-were until the one before it."""
+"""Tracked frames before the first of these fits. Their number doubles from each fit to the next."""
 STEPS = 5
-"""Gauss-Newton steps: a fit begins with the lengths of the one before it."""
+"""Gauss-Newton steps; few, since a fit begins with the lengths of the one before it."""
 VARIETY_RAD = 0.15
-"""Root mean square difference of the joints' angles from which on a pose teaches something."""
+"""Least root mean square difference of joint angles by which a posture is new."""
 MOST_KNOWN = 64
-"""Poses after which no other teaches anything."""
+"""Number of postures after which none counts as new."""
 
 
 class LaterFits:
@@ -54,11 +53,11 @@ class LaterFits:
             self._known.append(posture)
 
     def due(self) -> bool:
-        """Whether it is time for a fit, and a pose has come that the last one did not know."""
+        """Whether it is time for a fit, and a new posture has come since the last one."""
         return self._learns and self._count >= self._next
 
     def fit(self, search: FrameSearch) -> Generator[None, None, BodyModel]:
-        """A fit, in pieces (`WholeRecording.fitting`), with the body of a frame's search."""
+        """A fit in pieces (`WholeRecording.fitting`), begun with the body of a frame's search."""
         self._next = 2 * self._count
         self._learns = False
         return self._frames.fitting(search.searcher, self._person, STEPS)

@@ -1,10 +1,10 @@
 """The person's resting posture of trunk, shoulders and head, from a measured start pose.
 
-Where the shoulders, the neck and the top of the head lie relative to the trunk depends on the
-person and on the measuring system's definition of joint centres. At rest the angles of clavicles,
-thorax and head differ between people, and between systems, by more than they change in motion. A
-measured start pose shows them, but also the posture of that moment. Differences between left and
-right, and deviations larger than those among people, are taken for posture.
+The positions of shoulders, neck and top of the head relative to the trunk depend on the person and
+on the measuring system's definition of joint centres. At rest the angles of clavicles, thorax and
+head differ more between people, and between systems, than they change in motion. A measured start
+pose shows the resting posture and the posture of that moment together. Differences between left
+and right, and deviations larger than those among people, are attributed to the latter.
 """
 
 from dataclasses import replace
@@ -15,15 +15,14 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 
 MIDDLE = ("thorax_y", "head_y")
-"""Bending of trunk and head forward: alike on both sides."""
+"""Forward bending of trunk and head, which is symmetric."""
 PAIRED = {"clavicle_x": -1.0, "clavicle_y": 1.0}
-"""Parameters with a left and a right one, and the factor from one to the other in a body at rest
-that is alike on both sides."""
+"""Parameters of left and right, and the factor between them in a symmetric posture."""
 MOST_SD = 2.0
 """Largest shift of the resting posture, in standard deviations of the prior of poses."""
 NARROWER = 0.5
-"""Factor of the prior's standard deviations of trunk and shoulders, about the person's own posture:
-one person's motion is smaller than the differences among people and definitions."""
+"""Factor of the prior's standard deviations of trunk and shoulders about the person's own posture,
+since one person's motion is smaller than the differences among people and definitions."""
 _NARROWED = (
     "thorax_x", "thorax_y", "thorax_z",
     "l_clavicle_x", "l_clavicle_y", "r_clavicle_x", "r_clavicle_y",
@@ -31,10 +30,10 @@ _NARROWED = (
 
 
 def at_rest(body: BodyModel, start: FloatArray) -> BodyModel:
-    """The body whose prior of poses is centred at the person's own resting posture.
+    """The body with its prior of poses centred at the person's resting posture.
 
     Args:
-        body: with measured lengths.
+        body: the body, with measured lengths.
         start: (p,) measured pose.
     """
     index = {name: i for i, name in enumerate(body.parameter_names)}

@@ -1,4 +1,4 @@
-"""A few frames of a run of any length, evenly spread over it or as different as possible."""
+"""Selects a few frames of a run of any length: evenly spread over it, or with different poses."""
 
 from collections.abc import Callable
 from typing import Generic, TypeVar
@@ -13,18 +13,18 @@ Item = TypeVar("Item")
 
 
 def posture_angles(body: BodyModel) -> IntArray:
-    """Indices of the parameters that make a posture: where a person stands and faces is none."""
+    """Indices of the parameters that make a posture: all joints, without place and heading."""
     return np.setdiff1d(body.joints, body.root)
 
 
 class EvenlySpread(Generic[Item]):
-    """Keeps every k-th of the items it is offered; k doubles when there are too many.
+    """Keeps every k-th of the offered items; k doubles when there are too many.
 
     Args:
-        most: fewer than so many are kept.
+        most: fewer items than this are kept.
 
     Attributes:
-        items: what is kept, in the order in which it came.
+        items: the kept items, in the order in which they came.
     """
 
     def __init__(self, most: int) -> None:
@@ -34,7 +34,7 @@ class EvenlySpread(Generic[Item]):
         self._offered = 0
 
     def offer(self, make: Callable[[], Item]) -> None:
-        """Take the next item or pass it over; `make` is called if it is kept."""
+        """Keep the next item or skip it; `make` is called if it is kept."""
         self._offered += 1
         if (self._offered - 1) % self._every:
             return
@@ -44,14 +44,14 @@ class EvenlySpread(Generic[Item]):
 
 
 def most_different(count: int, most: int, distances: Callable[[int], FloatArray]) -> list[int]:
-    """At most `most` of `count` items, each as far as possible from those before it in the list.
+    """At most `most` of `count` items, each as far as possible from the items chosen before it.
 
-    The first is the one in the middle.
+    The first chosen item is the middle one.
 
     Args:
-        count: number of the items.
-        most: number of those that are chosen.
-        distances: of an item's index, its distances (count,) to all.
+        count: number of items.
+        most: number of items to choose.
+        distances: gives, for an item's index, its distances (count,) to all items.
     """
     if count == 0:
         return []

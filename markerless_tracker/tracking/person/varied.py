@@ -1,4 +1,4 @@
-"""Frames in which a person's poses differ, for fits of the sections."""
+"""Keeps frames with different poses, for fits of the sections."""
 
 import numpy as np
 
@@ -8,15 +8,15 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.person.spread import posture_angles
 
 MOST = 8
-"""Frames that are kept."""
+"""Number of frames that are kept."""
 VARIETY_RAD = 0.2
-"""Root mean square difference of the joints' angles from which on a pose is another one."""
+"""Least root mean square difference of joint angles by which a pose differs."""
 FIRST_WEIGHT = 5.0
 """Weight of the first frame, relative to each later one."""
 
 
 class VariedFrames:
-    """The first frame, whose pose is known best, and later ones in other poses.
+    """Keeps the first frame, whose pose is known best, and later frames with other poses.
 
     Args:
         prior: the body with generic sections.

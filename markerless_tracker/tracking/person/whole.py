@@ -1,7 +1,7 @@
-"""The body of a person from frames of a whole recording, in poses as different as possible.
+"""Fits the body to frames of a whole recording with poses as different as possible.
 
-Bent and straight limbs, raised and hanging arms show where joints are. A few similar postures do
-not: the outline stays the same when a joint is moved along its limb.
+Bent and straight limbs, raised and hanging arms together show where joints are. Similar postures do
+not: the outline does not change when a joint is moved along its limb.
 """
 
 from collections.abc import Generator, Mapping
@@ -27,10 +27,10 @@ from markerless_tracker.tracking.refinement import floor_precision
 from markerless_tracker.tracking.search import Searcher, make_searcher
 
 MOST = 10
-"""Frames that the body is fitted to. With more the outlines outweigh the priors, which hold what
-outlines do not show."""
+"""Number of frames that the body is fitted to. With more, the outlines outweigh the priors, which
+determine what outlines do not show."""
 MOST_KEPT = 8 * MOST
-"""Frames that are kept to choose from."""
+"""Number of frames that are kept to choose from."""
 STEPS = 10
 """Gauss-Newton steps."""
 
@@ -43,13 +43,13 @@ class _Kept:
 
 
 class WholeRecording:
-    """Keeps frames of a run of any length, evenly spread over it, and fits the body to some."""
+    """Keeps frames evenly spread over a run of any length, and fits the body to some of them."""
 
     def __init__(self) -> None:
         self._kept: EvenlySpread[_Kept] = EvenlySpread(MOST_KEPT)
 
     def add(self, result: TrackResult) -> None:
-        """Take a frame; those that are not tracked are passed over."""
+        """Take a frame; frames that are not tracked are skipped."""
         if result.state is TrackState.TRACKING and result.pose is not None:
             self.keep(result.stamp_ns, result.pose, result.observations)
 
@@ -60,9 +60,9 @@ class WholeRecording:
         self._kept.offer(lambda: _Kept(stamp_ns, pose, dict(observations)))
 
     def chosen(self, body: BodyModel) -> list[int]:
-        """At most `MOST` of the kept frames, ascending, each as far as possible from the others.
+        """Indices of at most `MOST` kept frames, ascending, with postures as different as possible.
 
-        By the joints' angles, without the root's; the one in the middle of the run is among them.
+        Postures are compared by `posture_angles`. The frame in the middle of the run is included.
         """
         angles = posture_angles(body)
         poses = np.array([frame.pose[angles] for frame in self._kept.items])
@@ -72,11 +72,11 @@ class WholeRecording:
     def fitted(
         self, rig: CameraRig, body: BodyModel, config: TrackerConfig, person: Unmeasured
     ) -> BodyModel:
-        """The body fitted to the chosen frames; as it was without any.
+        """The body fitted to the chosen frames; unchanged if there is no frame.
 
         Args:
             rig: the cameras.
-            body: that was tracked last.
+            body: the body that was tracked last.
             config: of the tracker.
             person: what is known of the person.
         """
@@ -88,7 +88,7 @@ class WholeRecording:
     def fitting(
         self, searcher: Searcher, person: Unmeasured, steps: int = STEPS
     ) -> Generator[None, None, BodyModel]:
-        """`fitted` in pieces: one frame's evidence, or one frame's equations in a step, each.
+        """`fitted` in pieces, each with the evidence of a frame, or its equations in a step.
 
         Args:
             searcher: with the body that was tracked last; not used while another frame is searched.
@@ -102,7 +102,7 @@ class WholeRecording:
         )  # fmt: skip
         for frame in [self._kept.items[i] for i in self.chosen(body)]:
             search = searcher.frame(
-                frame.observations, frame.stamp_ns, frame.pose, reach_m=searcher.tracked_reach_m
+                frame.observations, frame.stamp_ns, frame.pose, radius_m=searcher.tracked_radius_m
             )
             fit.add(search.contours, frame.pose)
             yield

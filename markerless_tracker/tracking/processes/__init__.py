@@ -1,4 +1,5 @@
-"""Segmentation and tracking in processes of their own: no part waits for another's interpreter.
+"""Segmentation and tracking in separate processes, so that neither waits for another's interpreter.
 
-`segmenting` and `fitting` start and ask the processes; `*_main` are their main programs.
+`segmenting` and `fitting` start the processes and send them requests; `*_main` are their main
+programs.
 """

@@ -1,4 +1,4 @@
-"""A process that works for this one, and the memory that both see."""
+"""A child process, and the memory that it shares with this one."""
 
 import mmap
 import os
@@ -13,15 +13,15 @@ from markerless_tracker.tracking.processes.wire import receive, send
 
 _PACKAGE = Path(__file__).resolve().parents[3]
 _PIPE_BYTES = 1 << 20
-"""Room for a result, so that its sender does not wait for the receiver; Linux only."""
+"""Size of a pipe: it holds a result, so that the sender need not wait; Linux only."""
 
 
 class SharedMemory(NamedTuple):
-    """Memory that several processes see.
+    """Memory shared by several processes.
 
     Attributes:
         fd: descriptor of its file.
-        memory: how this process sees it.
+        memory: its mapping in this process.
     """
 
     fd: int
@@ -29,12 +29,12 @@ class SharedMemory(NamedTuple):
 
 
 class Child:
-    """A running module of the package, and shared memory; ends with this process.
+    """A process that runs a module of the package, with shared memory; it ends with this process.
 
     Args:
         module: its main program. Its arguments are `arguments` and the memory's descriptor.
-        memory: bytes of shared memory to make, or memory that is shared already.
-        arguments: further words of its command line.
+        memory: size of the shared memory to make, in bytes, or memory that is shared already.
+        arguments: further arguments of its command line.
         pass_fds: further descriptors that it inherits.
 
     Attributes:
@@ -52,7 +52,7 @@ class Child:
         try:
             self.memory = memory.memory if isinstance(memory, SharedMemory) else mmap.mmap(fd, 0)
             paths = [str(_PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
-            # A session of its own: a terminal's Ctrl-C is for this process, which ends the other.
+            # In a session of its own it gets no Ctrl-C of the terminal: this process ends it.
             self._process = subprocess.Popen(
                 [sys.executable, "-m", module, *arguments, str(fd)],
                 stdin=subprocess.PIPE,
@@ -75,7 +75,7 @@ class Child:
         """Write an object to its input.
 
         Raises:
-            OSError, ValueError: it has ended, or is being ended.
+            OSError, ValueError: the process has ended, or is being ended.
         """
         send(cast(BinaryIO, self._process.stdin), message)
 
@@ -83,17 +83,17 @@ class Child:
         """Read an object that it wrote.
 
         Raises:
-            EOFError, OSError, ValueError: it has ended, or is being ended.
+            EOFError, OSError, ValueError: the process has ended, or is being ended.
         """
         return receive(cast(BinaryIO, self._process.stdout))
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """End it; it is killed if it does not end in that time."""
+        """End the process; kill it if it does not end within the timeout."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.close()
         except OSError:
-            pass  # It ended with something left to read.
+            pass  # It ended before it read everything.
         try:
             self._process.wait(timeout_s)
         except subprocess.TimeoutExpired:
@@ -102,7 +102,7 @@ class Child:
 
 
 def _memory_fd(size: int) -> int:
-    """A file without a name, so that nothing is left behind whatever happens."""
+    """A file without a name, so that none remains after a crash."""
     if hasattr(os, "memfd_create"):
         fd = os.memfd_create("markerless_tracker_images")
     else:
@@ -113,7 +113,7 @@ def _memory_fd(size: int) -> int:
 
 
 def take_output() -> BinaryIO:
-    """In the child: its output, for answers alone; what else is printed goes to standard error."""
+    """In the child: its output, used for answers only; other prints go to standard error."""
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     return answers

@@ -1,4 +1,4 @@
-"""The process of a tracker as its parent sees it."""
+"""The parent's side of a tracker's process."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -20,15 +20,15 @@ from markerless_tracker.tracking.setup import TrackerSetup
 
 _MAIN = "markerless_tracker.tracking.processes.fitting_main"
 _END_S = 1.0
-"""Time for the step in progress; a compilation takes longer, and is not waited for."""
+"""Time that the step in progress has to end; a compilation takes longer and is aborted."""
 _SETS = 3
-"""Sets of images in shared memory: one that is tracked, one prepared, and the next."""
+"""Sets of images in shared memory: the one that is tracked, the one prepared, and the next."""
 
 Views = Mapping[str, Image | Observation]
 
 
 class SetOfViews(NamedTuple):
-    """The views of one time, by camera: where an image lies, or an observation."""
+    """The views of one time, by camera: the place of an image, or an observation."""
 
     number: int
     stamp_ns: int
@@ -43,14 +43,14 @@ class Call(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A set to track, which was prepared or not."""
+    """A set to track, prepared or not."""
 
     views: SetOfViews
     effort: float
 
 
 class Compiled(NamedTuple):
-    """Progress of a compilation: the kernel, how many are done, how many there can be."""
+    """Progress of a compilation: the kernel, and how many are done of at most how many."""
 
     name: str
     done: int
@@ -58,7 +58,7 @@ class Compiled(NamedTuple):
 
 
 class Tracked(NamedTuple):
-    """A result; the body if it is another than before."""
+    """A result, and the body if it has changed."""
 
     result: TrackResult
     body: BodyModel | None
@@ -66,11 +66,11 @@ class Tracked(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Handed:
-    """A set whose images the process has.
+    """A set that was handed over to the process.
 
     Attributes:
         views: the images and observations.
-        sent: the same as the process was told.
+        sent: the message to the process.
     """
 
     views: Views
@@ -78,14 +78,15 @@ class Handed:
 
 
 class FittingProcess:
-    """A tracker in a process of its own: calls and bytes are those of `Tracker`.
+    """A tracker in a process of its own, with the calls and the results, byte by byte, of
+    `Tracker`.
 
-    The process ends with this one, or when it is closed. If it ends by itself, the tracker goes on
-    in this process, from its start. `prepare` may be called beside `step`; other calls must come
-    from one thread at a time.
+    The process ends with this one, or when it is closed. If it ends by itself, tracking restarts in
+    this process. `prepare` may be called during `step`; other calls must come from one thread at a
+    time.
 
     Args:
-        setup: the tracker to be. The one of this process takes no steps as long as the other lives.
+        setup: makes the tracker. Its own tracker takes no steps while the process lives.
         report: called with a line if the process has ended by itself.
 
     Attributes:
@@ -101,7 +102,7 @@ class FittingProcess:
         self._cpu_s = 0.0
         self._ended = self._closed = False
         self._lock = Lock()
-        # Sets are prepared beside the other calls, on a line of their own.
+        # Sets are prepared during other calls, so they have their own pair of pipes.
         sets_read, sets_write = os.pipe()
         made_read, made_write = os.pipe()
         try:
@@ -125,7 +126,7 @@ class FittingProcess:
 
     @property
     def cpu_s(self) -> float:
-        """CPU time that it, and what it started, had taken when it last answered, s."""
+        """CPU time of the process and its children at its last answer, s."""
         return self._cpu_s + self._local.evidence.process_cpu_s
 
     def segmenter(self, camera: str) -> Segmenter | None:
@@ -151,7 +152,7 @@ class FittingProcess:
         self._call("take_backgrounds", dict(backgrounds))
 
     def prepare(self, views: Views, stamp_ns: int) -> Any:
-        """As `Tracker.prepare`; what it returns is for `step`."""
+        """As `Tracker.prepare`; returns an argument for `step`."""
         if self._ended:
             return self._local.prepare(views, stamp_ns)
         handed = self._hand_over(views, stamp_ns)
@@ -159,7 +160,7 @@ class FittingProcess:
             send(self._sets, handed.sent)
             error = receive(self._made)
         except (EOFError, OSError, ValueError):
-            return handed  # `step` finds out, too.
+            return handed  # `step` will notice that the process has ended.
         if error is not None:
             raise error
         return handed
@@ -179,7 +180,7 @@ class FittingProcess:
         return result
 
     def close(self) -> None:
-        """End the process; calls that wait for it return."""
+        """End the process; calls that wait for it return then."""
         self._closed = True
         self._child.close(_END_S)
         for stream in (self._sets, self._made):
@@ -188,7 +189,7 @@ class FittingProcess:
         self._local.evidence.close()
 
     def _hand_over(self, views: Views, stamp_ns: int) -> Handed:
-        """Put a set where the process finds it."""
+        """Put a set's images into shared memory."""
         with self._lock:
             number = self._number
             self._number += 1
@@ -232,7 +233,7 @@ class FittingProcess:
         return answer
 
     def _end(self) -> None:
-        """Go on in this process, unless all is over."""
+        """Restart tracking in this process, unless the tracker was closed."""
         self._ended = True
         if self._closed:
             raise TrackerError("the tracker was closed")

@@ -1,9 +1,8 @@
 """Main program of a tracker's process: sets of images in, results out, until its input ends.
 
-Started as ``python -m markerless_tracker.tracking.processes.fitting_main SETS MADE FD``. SETS and
-MADE are descriptors: sets to prepare come from the first, what became of them goes to the second.
-FD is the shared memory. Its input is the parent's other requests; its output belongs to the answers
-alone.
+Started as ``python -m markerless_tracker.tracking.processes.fitting_main SETS MADE FD`` with three
+descriptors: SETS gives the sets to prepare, MADE takes the answers to these, FD is the shared
+memory. Standard input gives the parent's other requests; standard output takes only the answers.
 """
 
 import mmap
@@ -39,32 +38,32 @@ def main(sets_fd: int, made_fd: int, memory_fd: int) -> int:
 
 
 class Service:
-    """A tracker and what its parent asks of it.
+    """A tracker that answers its parent's requests.
 
     Args:
         shared: memory shared with the parent; holds the images.
     """
 
     def __init__(self, shared: "SharedMemory") -> None:
-        # Read while the parent prepares itself.
+        # Imported while the parent starts.
         import cv2
 
         import_module("markerless_tracker.tracking")
-        # Its threads wait for each other in a loop, and take the cores from the other processes.
+        # OpenCV's threads wait in busy loops, which would take cores from the other processes.
         cv2.setNumThreads(1)
         self._shared = shared
         self._tracker: Tracker | None = None
-        self._told: Any = None
+        self._reported: Any = None
         self._lock = Lock()
         self._prepared: dict[int, Any] = {}
 
     def close(self) -> None:
-        """End what the tracker started."""
+        """End the tracker's segmenting process."""
         if self._tracker is not None:
             self._tracker.evidence.close()
 
     def serve(self, requests: BinaryIO, answers: BinaryIO) -> None:
-        """Answer requests; each answer is what was found, or the exception, and the CPU time.
+        """Answer requests; each answer is the result or the exception, and the CPU time.
 
         The first request is a function that makes the tracker.
 
@@ -131,14 +130,14 @@ class Service:
         of = step.views
         with self._lock:
             prepared = self._prepared.pop(of.number, None)
-            # Sets that were prepared and then left out.
+            # Sets that were prepared and then skipped.
             for number in [n for n in self._prepared if n < of.number]:
                 del self._prepared[number]
         views = self._views(of) if prepared is None else prepared
         result = self.tracker.step(views, of.stamp_ns, step.effort)
         body = self.tracker.body
-        told, self._told = self._told, body
-        return Tracked(result, None if body is told else body)
+        reported, self._reported = self._reported, body
+        return Tracked(result, None if body is reported else body)
 
     def _views(self, of: "SetOfViews") -> "dict[str, Image | Observation]":
         from markerless_tracker.tracking.processes.images import Place, get
@@ -150,7 +149,7 @@ class Service:
 
 
 def _portable(error: Exception) -> Exception:
-    """The error, or one of its text if it cannot be handed to another process."""
+    """The error; a `RuntimeError` with its text if it cannot be pickled."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:

@@ -14,7 +14,7 @@ _CHANNELS = 3
 
 
 class Place(NamedTuple):
-    """Where an image lies in the shared memory.
+    """Place of an image in the shared memory.
 
     Attributes:
         offset: of its first byte.
@@ -26,7 +26,7 @@ class Place(NamedTuple):
 
 
 def set_bytes(rig: CameraRig) -> int:
-    """Bytes that the images of all cameras need."""
+    """Number of bytes that the images of all cameras need."""
     sizes = (camera.size_px for camera in rig)
     return sum(_aligned(_CHANNELS * width * height) for width, height in sizes)
 
@@ -36,7 +36,7 @@ def put(
 ) -> dict[str, Place] | None:
     """Copy images into a part of the memory; None if they do not fit into it.
 
-    Those that lie in the memory already stay where they are.
+    Images that lie in the memory already are not copied.
     """
     places = {}
     whole = np.frombuffer(memory, np.uint8)
@@ -56,7 +56,7 @@ def put(
 
 
 def get(memory: mmap.mmap, place: Place) -> Image:
-    """The image that lies there, without a copy."""
+    """The image at a place, without a copy."""
     size = int(np.prod(place.shape))
     return np.frombuffer(memory, np.uint8, size, place.offset).reshape(place.shape)
 

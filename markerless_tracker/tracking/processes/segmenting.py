@@ -1,4 +1,4 @@
-"""The segmenting process as its parent sees it."""
+"""The parent's side of the segmenting process."""
 
 from collections.abc import Mapping
 from threading import Lock, Thread
@@ -15,7 +15,7 @@ _MAIN = "markerless_tracker.tracking.processes.segmenting_main"
 
 
 class SegmentRequest(NamedTuple):
-    """Images of one time to segment, by camera: where they lie, and which part; None = all."""
+    """Images of one time to segment, by camera: their places and regions (None = whole image)."""
 
     stamp_ns: int
     images: dict[str, Place]
@@ -23,15 +23,14 @@ class SegmentRequest(NamedTuple):
 
 
 class SegmentingProcess:
-    """A process that segments images; ends with this one, or when it is closed.
+    """A process that segments images; it ends with this one, or when it is closed.
 
-    Images are copied into shared memory, unless that is given: then they must lie there. A process
-    that has ended is not started again: `segment` gives None from then on. Safe to use from several
-    threads.
+    Images are copied into shared memory. If shared memory is given, they must lie in it. A process
+    that has ended is not restarted; `segment` then returns None. Safe to use from several threads.
 
     Args:
-        rig: the cameras, whose sizes say how much memory is shared.
-        shared: memory that is shared already, and that the images lie in.
+        rig: the cameras, whose sizes determine the size of the shared memory.
+        shared: memory that is shared already and holds the images.
     """
 
     def __init__(self, rig: CameraRig, shared: SharedMemory | None = None) -> None:
@@ -49,18 +48,18 @@ class SegmentingProcess:
 
     @property
     def cpu_s(self) -> float:
-        """CPU time that it had taken when it last answered, s."""
+        """CPU time of the process at its last answer, s."""
         return self._cpu_s
 
     def use(self, config: TrackerConfig, backgrounds: Mapping[str, BackgroundModel]) -> None:
-        """Use these backgrounds from now on; returns before the process is ready for that."""
+        """Use these backgrounds from now on; returns before the process is ready."""
         message = self._rig, config, dict(backgrounds)
         self._lock.acquire()
-        # Released when the process is ready: until then everybody else waits.
+        # The thread releases the lock when the process is ready; other calls wait for it.
         Thread(target=self._begin, args=(message,), name="segmenting", daemon=True).start()
 
     def wait(self) -> None:
-        """Wait until it uses the backgrounds, or has ended."""
+        """Wait until the process uses the backgrounds, or has ended."""
         with self._lock:
             pass
 
@@ -72,10 +71,10 @@ class SegmentingProcess:
     ) -> dict[str, SeenView] | None:
         """As `EvidenceMaker.segment_regions`; None if the process cannot do it.
 
-        Waits for a process that is not ready yet.
+        Waits until the process is ready.
 
         Raises:
-            TrackerError: what the segmentation raised.
+            TrackerError: raised by the segmentation.
         """
         with self._lock:
             if not self._ready:

@@ -1,7 +1,7 @@
 """Main program of the segmenting process: images in, observations out, until its input ends.
 
 Started as ``python -m markerless_tracker.tracking.processes.segmenting_main FD``, where FD is the
-shared memory. Its input is the parent's requests; its output belongs to the answers alone.
+shared memory. Standard input gives the parent's requests; standard output takes only the answers.
 """
 
 import mmap
@@ -26,16 +26,16 @@ def main(memory_fd: int) -> int:
 
 
 def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
-    """Answer requests; a message that is none brings another rig, configuration and backgrounds.
+    """Answer messages: segmentation requests, or a new rig, configuration and backgrounds.
 
-    Each answer is what `EvidenceMaker.segment_regions` gave, by camera, without the images; an
-    exception if it raised one; True when other backgrounds are in use. The CPU time of this process
-    so far comes with it.
+    The answer to a request is the result of `EvidenceMaker.segment_regions` without the images, or
+    the exception it raised. The answer to new backgrounds is True. Each answer is sent with the CPU
+    time of this process.
 
     Raises:
         EOFError, BrokenPipeError: the parent has ended.
     """
-    # Read while the parent prepares itself.
+    # Imported while the parent starts.
     import cv2
 
     from markerless_tracker.tracking.evidence.gather import EvidenceMaker
@@ -43,7 +43,7 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
     from markerless_tracker.tracking.processes.segmenting import SegmentRequest
     from markerless_tracker.tracking.processes.wire import receive, send
 
-    # Its threads wait for each other in a loop, and take the cores from the other processes.
+    # OpenCV's threads wait in busy loops, which would take cores from the other processes.
     cv2.setNumThreads(1)
     maker: EvidenceMaker | None = None
     while True:

@@ -1,4 +1,4 @@
-"""What two processes send each other: pickled objects, each after its length."""
+"""Messages between two processes: pickled objects, each preceded by its length."""
 
 import pickle
 import struct

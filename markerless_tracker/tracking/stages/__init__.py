@@ -1,6 +1,6 @@
 """The stages of a frame: those of each optimiser, and the refinements around them.
 
-`frame` composes them; `budget` shares out the evaluations; `effort` decides what a frame needs.
+`frame` composes them; `budget` divides the evaluations; `effort` decides what a frame needs.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""How a budget of evaluations is spent: particles scale with it, iterations stay."""
+"""Divides a budget of evaluations: particles scale with it, iterations do not change."""
 
 import math
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.tracking.config import TrackerConfig
 
 SWARM_SHARE = Fraction(2, 10)
-"""Fraction of the budget that the swarm keeps beside contour refinement."""
+"""The swarm's fraction of the budget if there is contour refinement, too."""
 
 
 def scaled_particles(
@@ -18,7 +18,7 @@ def scaled_particles(
     *,
     share: Fraction = Fraction(1),
 ) -> tuple[int, ...]:
-    """Particles per stage for the swarm's fraction of a budget: they scale, the iterations stay.
+    """Particles per stage for a share of a budget; the iterations are the published ones.
 
     Raises:
         ConfigError: the budget cannot be met exactly; names the nearest that can.
@@ -38,9 +38,9 @@ def scaled_particles(
 def shared_out(
     published: Sequence[tuple[int, int]], config: TrackerConfig
 ) -> tuple[tuple[int, int], ...]:
-    """Particles and iterations per stage. Beside a refinement the iterations shrink.
+    """Particles and iterations per stage; with contour refinement fewer iterations.
 
-    Swarms of few particles need all of them, and near the answer few iterations do.
+    Swarms of few particles need all of them, and few iterations are enough near the optimum.
 
     Raises:
         ConfigError: the budget cannot be met exactly; names the nearest that can.

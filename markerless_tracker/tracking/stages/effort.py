@@ -1,4 +1,4 @@
-"""How much is searched in a frame beside the refinement."""
+"""Decides which searches a frame gets in addition to the contour refinement."""
 
 import numpy as np
 
@@ -14,22 +14,23 @@ from markerless_tracker.tracking.stages.frame import (
 )
 
 WORSE = 0.01
-"""A frame is explained badly whose f lies this far below the track's usual one."""
+"""A frame is explained badly if its f lies this far below the track's usual f."""
 NEAR = 0.1
 """A pose is refined once more if a parameter has moved by more than this, rad or m."""
 FAR_S = 0.045
 """Frames farther apart than this are all searched: a limb can be lost from each to the next."""
 _MEMORY = 0.05
+"""Weight of a frame in the running mean of the track's cost."""
 
 
 class Effort:
     """Decides which frames are searched by swarms, and which by the limbs' searches.
 
-    The refinement follows a body that moves as predicted. Swarms find what it has lost, so they
-    are needed where a frame is explained worse than this track's usual, or a limb is in doubt.
-    With an effort below 1 and no limb in doubt, a frame is searched by swarms or by the limbs'
-    searches, in turn, and frames count as far apart only beyond `FAR_S` / effort. A search takes
-    longer than `FAR_S`: who is late would search every frame and stay late.
+    The refinement follows a body that moves as predicted. Swarms find what it has lost, so they are
+    needed if a frame is explained worse than usual in this track, or if a limb is in doubt. With an
+    effort below 1 and no limb in doubt, swarms and the limbs' searches alternate, and frames count
+    as far apart only beyond `FAR_S` / effort: a search takes longer than `FAR_S`, so a tracker that
+    is late would search every frame and remain late.
 
     Args:
         needed_only: whether swarms search only the frames that need them; else all frames.
@@ -49,7 +50,7 @@ class Effort:
         self._credit = 0.0
         self._granted = True
         self._reduced = False
-        self._limbs_turn = False
+        self._limbs_frame = False
         self._swarms = False
         self._doubt = False
 
@@ -57,12 +58,12 @@ class Effort:
         """Begin a frame.
 
         Args:
-            effort: fraction of the frames that may be searched beside the refinement, 0 to 1.
+            effort: fraction of the frames that may be searched in addition, 0 to 1.
             doubt: whether a limb is in doubt.
             since_s: time since the last frame.
 
         Raises:
-            ConfigError: no such fraction.
+            ConfigError: the effort is not between 0 and 1.
         """
         if not 0.0 <= effort <= 1.0:
             raise ConfigError(f"effort is {effort}, expected 0 to 1")
@@ -72,23 +73,23 @@ class Effort:
         self._granted = self._credit > 1.0 - 1e-9 or (effort > 0.0 and since_s > far_s)
         if self._granted:
             self._credit = 0.0
-            self._limbs_turn = not self._limbs_turn
+            self._limbs_frame = not self._limbs_frame
         self._reduced, self._swarms = effort < 1.0 and not doubt, False
         self._doubt = doubt
 
     @property
     def granted(self) -> bool:
-        """Whether this frame may be searched beside the refinement."""
+        """Whether this frame may be searched in addition to the refinement."""
         return self._granted
 
     @property
     def reduced(self) -> bool:
-        """Whether a frame is searched for one thing alone."""
+        """Whether a frame gets a single search, by swarms or for limbs."""
         return self._reduced
 
     @property
     def for_limbs(self) -> bool:
-        """Whether this frame may be searched by the limbs' searches; to be asked after `search`."""
+        """Whether this frame may be searched by the limbs' searches; valid after `search`."""
         return self._granted and not (self._reduced and self._swarms)
 
     def search(
@@ -99,10 +100,10 @@ class Effort:
         centre: FloatArray,
         sigma: FloatArray,
     ) -> None:
-        """Search a frame with the stages of `frame_stages`, swarms where they are needed.
+        """Search a frame with the stages of `frame_stages`, with swarms only if they are needed.
 
         Args:
-            search: the frame's.
+            search: of the frame.
             body, config, centre, sigma: as for `frame_stages`.
         """
         if config.refinement == "none":
@@ -113,7 +114,7 @@ class Effort:
         swarms = self._swarms = self.wants_swarms(search.cost)
         if swarms:
             search.run(rescue_stages(body, config, centre, sigma))
-        # A refinement that begins near its end has arrived.
+        # A refinement that moved the pose by little has converged.
         if swarms or float(np.abs(search.pose - begin).max()) > NEAR:
             search.run((contour_stage("polish", body, config, centre, sigma),))
         self.end(search.cost)
@@ -124,13 +125,13 @@ class Effort:
         Args:
             cost: of the pose after the first refinement.
         """
-        if not self._granted or (self._reduced and self._limbs_turn):
+        if not self._granted or (self._reduced and self._limbs_frame):
             return False
         usual = self._usual_cost
         badly = usual is None or cost > usual + WORSE
         return badly or self._doubt or not self._needed_only
 
     def end(self, cost: float) -> None:
-        """Take the cost of the frame's result into the usual one."""
+        """End a frame: add the cost of its result to the running mean."""
         usual = self._usual_cost
         self._usual_cost = cost if usual is None else usual + _MEMORY * (cost - usual)

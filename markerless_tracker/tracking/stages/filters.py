@@ -1,7 +1,7 @@
 """Particle filters over the whole body: APF in layers, PF in one.
 
 APF: 600 particles x 6 layers, 3600 evaluations, in Saini et al. (2015); 200 x 5, 1000 evaluations,
-as HumanEva's baseline (Sigal, Balan and Black, 2010) and SPPSO's comparison have it [R].
+in HumanEva's baseline (Sigal, Balan and Black, 2010) and in SPPSO's comparison [R].
 """
 
 from fractions import Fraction
@@ -19,7 +19,7 @@ from markerless_tracker.tracking.stages.stage import swarm_stage
 def filter_stages(
     body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> tuple[Stage, ...]:
-    """One stage; beside a refinement with `SWARM_SHARE` of the particles.
+    """One stage; with contour refinement it has `SWARM_SHARE` of the particles.
 
     Raises:
         ConfigError: the budget is no multiple of the layers.
@@ -38,5 +38,5 @@ def filter_stages(
 
 
 def layers_for(config: TrackerConfig) -> int:
-    """Layers of APF: those asked for, else six where the budget is a multiple of six, else five."""
+    """Layers of APF: as configured, else six if the budget is a multiple of six, else five."""
     return config.apf.layers or (6 if config.evaluations % 6 == 0 else 5)

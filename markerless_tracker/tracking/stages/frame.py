@@ -1,4 +1,4 @@
-"""The searches of a frame: an optimiser's stages, and refinement around them."""
+"""The stages of a frame: those of an optimiser, and contour refinement before and after them."""
 
 import numpy as np
 
@@ -16,10 +16,10 @@ LIMB_SWARM = (6, 4)
 def frame_stages(
     body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> tuple[Stage, ...]:
-    """The stages of one frame, in order; each starts from the estimate so far.
+    """The stages of one frame, in order; each starts from the estimate of the one before it.
 
-    Beside a refinement, swarms must raise f clearly (`min_improvement`). A body part that is found
-    again does so. Without that threshold parts that no view shows would drift.
+    With contour refinement, swarms must raise f by at least `min_improvement`. Recovering a lost
+    body part does. Without that threshold, parts that no view shows would drift.
 
     Args:
         body: the body.
@@ -54,7 +54,7 @@ def rescue_stages(
 def limb_stages(
     body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> tuple[Stage, ...]:
-    """A small, wide swarm for each limb alone: finds one that the refinement has lost."""
+    """A small, wide swarm for each limb, which recovers a limb that the refinement has lost."""
     particles, iterations = LIMB_SWARM
     budget = (max(1, particles * config.evaluations // 1000), iterations)
     stages = (
@@ -74,11 +74,11 @@ def limb_stages(
 
 
 def swarm_sigma(body: BodyModel, config: TrackerConfig, sigma: FloatArray) -> FloatArray:
-    """Sigma (p,) of swarms: the body's, scaled; of an angle `sigma.angle` at least.
+    """Sigma (p,) of swarms: the body's sigma, scaled; of angles at least `sigma.angle`.
 
-    Saini et al. (2015) print one covariance of 0.01 for all joints and name no rate. Reading: its
-    root, 0.1 rad, is wider than what any joint moves between frames at 60 frames/s, so that it
-    stands at every rate, until a joint's own sigma, which grows with the time, exceeds it.
+    Saini et al. (2015) print one covariance of 0.01 for all joints and state no rate. Reading: its
+    root, 0.1 rad, exceeds the motion of any joint between frames at 60 frames/s, so it is used at
+    every rate, unless a joint's own sigma, which grows with the time, exceeds it.
     """
     scaled = config.sigma.scale * sigma
     angles = np.setdiff1d(np.arange(body.size), body.translations)

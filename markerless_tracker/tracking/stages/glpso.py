@@ -1,4 +1,4 @@
-"""GLPSO: the whole body, then legs and arms on their own with fewer particles.
+"""GLPSO: the whole body, then legs and arms separately with fewer particles.
 
 Krzeszowski, Kwolek and Wojciechowski: "GPU-accelerated tracking of the motion of 3D articulated
 figure", ICCVG 2010, as both papers cite it: global-local particle swarm optimisation. Ours: the
@@ -17,12 +17,13 @@ from markerless_tracker.tracking.stages.stage import swarm_stage
 
 BODY = (20, 120)
 LOCAL = (10, 60)
+"""Particles and iterations of the stage of the body, and of each local stage."""
 
 
 def glpso_stages(
     body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> tuple[Stage, ...]:
-    """The body, then each step of the body's hierarchy 'limbs'.
+    """A stage of the whole body, then one for each step of the body's hierarchy 'limbs'.
 
     Raises:
         ConfigError: the budget cannot be spent exactly.

@@ -1,4 +1,4 @@
-"""Searching a body step by step, as its description declares the steps."""
+"""Hierarchical search: one stage for each step of a hierarchy in the body's description."""
 
 import numpy as np
 
@@ -20,14 +20,14 @@ def hierarchical_stages(
     budget: tuple[int, int],
     soft: bool,
 ) -> tuple[Stage, ...]:
-    """A stage per step of the hierarchy that is named, all of one size.
+    """A stage per step of the hierarchy `hmcpso.hierarchy`, all with the same budget.
 
     Args:
         body, config, centre, sigma: as for `frame_stages`.
-        algorithm: what searches each step.
+        algorithm: the optimiser of each step.
         budget: published particles and iterations per step.
-        soft: whether the subspaces that a step names after its own join, with their sigmas divided
-            by `sigma.soft_factor`.
+        soft: whether the further subspaces of a step vary, too, with their sigmas divided by
+            `sigma.soft_factor`.
 
     Raises:
         ConfigError: the budget cannot be spent exactly.

@@ -26,7 +26,7 @@ STEP = (20, 30)
 def hmcpso_stages(
     body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> tuple[Stage, ...]:
-    """The steps, each with its sub-swarms; softly partitioned unless the setting says hard.
+    """A stage per step, each with its sub-swarms; softly partitioned if `partition` is soft.
 
     Raises:
         ConfigError: the budget cannot be spent exactly, or has too few particles.
@@ -40,7 +40,7 @@ def hmcpso_stages(
 
 
 def check_swarms(particles: int, config: TrackerConfig) -> None:
-    """Raise a ConfigError unless the particles do for the sub-swarms and the master."""
+    """Raise a ConfigError if the particles are too few for the sub-swarms and the master."""
     try:
         swarm_sizes(particles, config.hmcpso.sub_swarms)
     except SearchError as error:

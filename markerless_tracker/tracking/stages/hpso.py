@@ -19,7 +19,7 @@ STEP = (10, 60)
 def hpso_stages(
     body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> tuple[Stage, ...]:
-    """HPSO's hard partition: every step varies its own parameters alone.
+    """HPSO's hard partition: every step varies its own parameters only.
 
     Raises:
         ConfigError: the budget cannot be spent exactly.

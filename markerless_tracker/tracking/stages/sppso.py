@@ -1,10 +1,10 @@
-"""SPPSO: the root first, then everything with the root nearly fixed; and what it was compared with.
+"""SPPSO: the root first, then everything with the root nearly fixed; and the paper's comparisons.
 
 Fleischmann, Austvoll, Kwolek: "Particle Swarm Optimization with Soft Search Space Partitioning for
 Video-Based Markerless Pose Tracking", ACIVS 2012, section 3: 10 particles x 20 iterations, then 20
-x 40, 1000 evaluations. The paper compares this soft partition in two steps with one in three, with
-a global search and with a hard partition, whose budgets and steps it does not give: ours spend as
-many evaluations, and the step in between varies torso and head.
+x 40, 1000 evaluations. The paper compares this soft partition in two steps with a soft partition in
+three steps, a global search and a hard partition. It does not state their budgets and steps: ours
+spend as many evaluations, and the second of three steps varies torso and head.
 """
 
 from collections.abc import Mapping
@@ -32,7 +32,8 @@ RESCUE_STAGES: Mapping[str, tuple[tuple[int, int], ...]] = {
     "three": ((40, 5), (40, 5), (60, 10)),
     "global": ((100, 10),),
 }
-"""The same evaluations beside contour refinement, which converges: the swarm may be wide."""
+"""The same with contour refinement, which converges, so the swarm may be wide: more particles and
+fewer iterations."""
 
 
 def sppso_stages(
@@ -40,10 +41,11 @@ def sppso_stages(
 ) -> tuple[Stage, ...]:
     """SPPSO's soft partition (section 3): the root first, then everything, the root nearly fixed.
 
-    Stage 1 varies the root's six parameters and samples edges on the cones that are rigid with it;
-    the last stage varies all from stage 1's estimate, with the root's position sigma, and that of
-    a step in between, divided by `sigma.soft_factor`. In the hard partition every stage varies its
-    own parameters alone. Beside a refinement the swarm keeps `SWARM_SHARE` of the budget.
+    Stage 1 varies the root's six parameters and samples edges on the cones that are rigid with it.
+    The last stage varies all parameters from the estimate before it; sigma of the root's position,
+    and of a middle stage's parameters, is divided by `sigma.soft_factor`. In the hard partition
+    every stage varies its own parameters only. With contour refinement the swarm has `SWARM_SHARE`
+    of the budget.
 
     Raises:
         ConfigError: the budget cannot be spent exactly.
@@ -75,7 +77,7 @@ def sppso_stages(
 
 
 def _parts(body: BodyModel, stages: str) -> dict[str, IntArray]:
-    """Stages' names to the parameters that they add to those of the stages before."""
+    """By stage, the parameters that it adds to those of the stages before."""
     if stages == "global":
         return {"body": np.arange(body.size)}
     if stages == "two":

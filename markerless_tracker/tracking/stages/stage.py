@@ -1,4 +1,4 @@
-"""Stages of all swarms: they compare the whole body with the whole views."""
+"""The stage of a swarm: compares the whole body with the whole views."""
 
 from dataclasses import asdict, replace
 from typing import Any
@@ -25,7 +25,7 @@ def swarm_stage(
     *,
     edge_cones: NDArray[np.bool_] | None = None,
 ) -> Stage:
-    """A stage of a swarm that compares the whole body.
+    """The stage of a swarm.
 
     Args:
         body, config: as for `frame_stages`.
@@ -44,7 +44,7 @@ def swarm_stage(
 
 
 def options(algorithm: str, config: TrackerConfig) -> dict[str, Any]:
-    """The settings of an algorithm of `optim`, by its arguments' names."""
+    """The settings of an algorithm of `optim`, by the names of its arguments."""
     swarm = asdict(config.pso)
     cooperative = config.hmcpso
     return {

@@ -21,7 +21,7 @@ WHOLE = ((20, 180),)
 def whole_stages(
     body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> tuple[Stage, ...]:
-    """One stage of the optimiser that is named, over all parameters.
+    """One stage of the configured optimiser, over all parameters.
 
     Raises:
         ConfigError: the budget cannot be spent exactly, or has too few particles.

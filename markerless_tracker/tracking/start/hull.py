@@ -1,10 +1,10 @@
-"""Where a person is: a coarse visual hull of the silhouettes, and the trunk in it.
+"""Locates people: the visual hull of the silhouettes on a grid, and the trunk in it.
 
-The hull is what all silhouettes agree on: a point of the room belongs to it if no camera that looks
-there sees background (Laurentini 1994, on a grid of points). Undecided pixels never carve it, since
-legs may look like a shadow in some views. Shadows themselves lie on the floor: points near it count
-only where two cameras see a person. A person is where the hull has a connected component of a
-person's size that two cameras see.
+A point of the room belongs to the visual hull if no camera that has it in view sees background
+there (Laurentini 1994, on a grid of points). Undecided pixels never carve the hull, since legs may
+look like a shadow in some views. Shadows lie on the floor, so points near the floor count only
+where two cameras see a person. A connected component of the hull is a person if it has a person's
+size and two cameras see it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,29 +25,34 @@ COARSE_M = 0.20
 FINE_M = 0.03
 """Spacing of the grid around a person."""
 LEAST_VIEWS = 2
-"""Cameras that must look at a point for it to count."""
+"""Cameras that must have a point in view for it to count."""
 LEAST_HEIGHT_M = 0.45
 """A component with a smaller extent in every direction is no person."""
 LEAST_VOLUME_M3 = 0.015
 MOST_VOLUME_M3 = 1.5
-"""A person of two metres with the slack of two views; more is a room, not a person."""
+"""Limits of a person's volume. The upper one is that of a tall person seen by two cameras only,
+whose hull is too large."""
 MOST_COARSE_M3 = 6.0
+"""The same upper limit on the coarse grid."""
 FLOOR_M = 0.08
 """Below this height above the floor, z = 0, undecided pixels are taken for shadows."""
 LEAST_PERSON = 0.25
 """Fraction of a component's points that two cameras must see as person."""
 HIGH_M = 0.35
-"""Shadows on the floor hardly make hulls higher than this: the trunk is looked for above it."""
+"""Hulls of shadows on the floor are hardly higher than this. The trunk is searched above it."""
 FOOT_M, SHIN_M = 0.22, 0.16
 """Points lower than `SHIN_M` are feet only within `FOOT_M`, horizontally, of a leg above."""
-ASIDE_M = 0.45
+TRUNK_DISTANCE_M = 0.45
 """Horizontal distance from the trunk. Beyond it, points on the floor are shadows, and so are points
-lower than `HIGH_M` that no two cameras show as person. A component ends so far from all points that
-two cameras show as person: shadows on walls join it."""
+lower than `HIGH_M` that no two cameras see as person. A component has no points farther than this
+from those that two cameras see as person, since shadows on walls are connected to it."""
 _RADIUS_M = 5.0
 _UP_M = 2.5
+"""Half the width and half the height of the grid."""
 _FAR_M = 4.0
+"""Distance of the scene from the cameras, assumed where their optical axes are parallel."""
 _TRUNK_SHARE = 0.5
+"""Depth from which on a point belongs to the trunk, as a fraction of the largest depth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +61,9 @@ class Hull:
 
     Attributes:
         points_m: (n, 3) points of a grid with spacing `FINE_M` that lie in it, world frame.
-        depth_m: (n,) how deep each lies in the component.
-        views: how many cameras see it.
-        trunk_m: (m, 3) the thick part: points that lie at least half as deep as the deepest.
+        depth_m: (n,) distance of each point from the component's surface.
+        views: number of cameras that see it.
+        trunk_m: (m, 3) the thick part: points with at least half of the largest depth.
         sure_m: (k, 3) points that are no shadow: high enough, or person in two views and not at the
             floor.
     """
@@ -81,29 +86,29 @@ class Hull:
 
     @property
     def height_m(self) -> float:
-        """From its lowest to its highest point, without what the grid's spacing adds."""
+        """From its lowest to its highest point, less one spacing of the grid."""
         return self.high_m - self.low_m - FINE_M
 
     @classmethod
     def without_shadows(
         cls, points_m: FloatArray, depth_m: FloatArray, views: int, person: NDArray[np.bool_]
     ) -> "Hull":
-        """The component without what lies on the floor beside the person.
+        """The component without its points on the floor beside the person.
 
         Args:
             points_m: (n, 3) points of the component.
-            depth_m: (n,) how deep each lies in it.
-            views: how many cameras see it.
-            person: (n,) whether two cameras show a point as person.
+            depth_m: (n,) distance of each point from the component's surface.
+            views: number of cameras that see it.
+            person: (n,) whether two cameras see a point as person.
         """
         high = (points_m[:, 2] > HIGH_M) & person
         if FINE_M**3 * high.sum() < LEAST_VOLUME_M3:
             high = np.ones(len(points_m), dtype=np.bool_)
         thick = high & (depth_m >= _TRUNK_SHARE * depth_m[high].max())
         trunk = points_m[thick]
-        aside = np.linalg.norm((points_m - trunk.mean(axis=0))[:, :2], axis=1) > ASIDE_M
+        aside = np.linalg.norm((points_m - trunk.mean(axis=0))[:, :2], axis=1) > TRUNK_DISTANCE_M
         low = (points_m[:, 2] < FLOOR_M) | ((points_m[:, 2] < HIGH_M) & ~person)
-        kept = (~(aside & low) | thick) & ~_floor_alone(points_m, ~(aside & low))
+        kept = (~(aside & low) | thick) & ~_isolated_floor(points_m, ~(aside & low))
         sure = kept & (person | (points_m[:, 2] > HIGH_M)) & (points_m[:, 2] > SHIN_M)
         return cls(points_m[kept], depth_m[kept], views, trunk, points_m[sure])
 
@@ -117,7 +122,7 @@ def find_hulls(
         cameras: cameras by name.
         observations: silhouettes of some of them.
     """
-    # A view without any silhouette is left out: the camera may be broken.
+    # A view without any silhouette is left out, since its camera may be broken.
     seen = [
         (cameras[name], observation)
         for name, observation in observations.items()
@@ -129,9 +134,9 @@ def find_hulls(
     views = [_View.of(camera, observation, middle) for camera, observation in seen]
     low = middle - (_RADIUS_M, _RADIUS_M, _UP_M)
     size = np.ceil(2.0 * np.array([_RADIUS_M, _RADIUS_M, _UP_M]) / COARSE_M).astype(np.int64)
-    inside, looking, _ = _occupied(low, size, COARSE_M, views)
+    inside, view_count, _ = _occupied(low, size, COARSE_M, views)
     labels, count = ndimage.label(inside, structure=np.ones((3, 3, 3), dtype=np.bool_))
-    support = np.bincount(labels[inside], weights=looking[inside], minlength=count + 1)
+    support = np.bincount(labels[inside], weights=view_count[inside], minlength=count + 1)
     boxes = ndimage.find_objects(labels)
     for number in np.argsort(-support[1:], kind="stable") + 1:
         hull = _fine(labels, int(number), boxes[number - 1], low, views)
@@ -146,7 +151,7 @@ def _fine(
     low: FloatArray,
     views: "Sequence[_View]",
 ) -> Hull | None:
-    """A component of the coarse grid on the fine one; None if it is no person."""
+    """A component of the coarse grid, resampled on the fine grid; None if it is no person."""
     cells = int((labels[box] == number).sum())
     if cells < 2 or COARSE_M**3 * cells > MOST_COARSE_M3:
         return None
@@ -156,33 +161,33 @@ def _fine(
     near = ndimage.binary_dilation(
         np.pad(labels[box] == number, 1), structure=np.ones((3, 3, 3), dtype=np.bool_)
     )
-    inside, looking, person = _occupied(first, size, FINE_M, views, near)
-    inside &= _beside(np.asarray(person.any(axis=2)))[:, :, None]
+    inside, view_count, person = _occupied(first, size, FINE_M, views, near)
+    inside &= _dilated(np.asarray(person.any(axis=2)))[:, :, None]
     parts, count = ndimage.label(inside)
     if count == 0:
         return None
-    # A shadow beside the person, on the coarse grid one with it, may be the larger part.
+    # The coarse component may include a shadow beside the person, which may be the larger part.
     persons = np.bincount(parts.ravel(), weights=person.ravel())[1:]
     part = parts == 1 + int(persons.argmax())
     volume = FINE_M**3 * float(part.sum())
     if not LEAST_VOLUME_M3 <= volume <= MOST_VOLUME_M3:
         return None
-    lump = ndimage.find_objects(part.view(np.uint8))[0]
+    bounds = ndimage.find_objects(part.view(np.uint8))[0]
     depth = np.zeros(part.shape)
-    depth[lump] = ndimage.distance_transform_edt(np.pad(part[lump], 1))[1:-1, 1:-1, 1:-1]
+    depth[bounds] = ndimage.distance_transform_edt(np.pad(part[bounds], 1))[1:-1, 1:-1, 1:-1]
     points = first + FINE_M * (np.argwhere(part) + 0.5)
     if float(np.ptp(points, axis=0).max()) < LEAST_HEIGHT_M:
         return None
     if float(person[part].mean()) < LEAST_PERSON:
         return None
     return Hull.without_shadows(
-        points, FINE_M * depth[part], int(np.median(looking[part])), person[part]
+        points, FINE_M * depth[part], int(np.median(view_count[part])), person[part]
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """A camera and its silhouette, grown to bridge a grid's spacing.
+    """A camera and its silhouette, dilated to bridge a grid's spacing.
 
     Attributes:
         camera: the camera.
@@ -195,7 +200,7 @@ class _View:
 
     @classmethod
     def of(cls, camera: CameraModel, observation: Observation, middle: FloatArray) -> "_View":
-        """The view, its silhouette grown by half a grid spacing at the room's middle."""
+        """The view, its silhouette dilated by half a grid spacing at the scene's middle."""
         either = observation.not_background.view(np.uint8) + observation.mask.view(np.uint8)
         mask = observation.in_full_frame(either)
         depth = float(camera.T_cam_world[2, :3] @ middle + camera.T_cam_world[2, 3])
@@ -215,16 +220,18 @@ def _occupied(
     views: Sequence[_View],
     cells: NDArray[np.bool_] | None = None,
 ) -> tuple[NDArray[np.bool_], NDArray[np.int8], NDArray[np.bool_]]:
-    """Points of a grid that no view shows as background, and how many views look at each.
-
-    Also the points that at least two views show as person.
+    """Classifies the points of a grid.
 
     Args:
         low: (3,) corner of the grid, m.
-        size: (3,) its points.
+        size: (3,) its number of points along each axis.
         spacing: m.
         views: the silhouettes.
-        cells: cells of the coarse grid from the same corner on; points elsewhere are left out.
+        cells: cells of the coarse grid with the same corner; points outside of them are left out.
+
+    Returns:
+        Per point: whether it belongs to the hull, how many views have it in their frame, and
+        whether at least two views see it as person.
     """
     axes = [low[i] + spacing * (np.arange(size[i]) + 0.5) for i in range(3)]
     if cells is None:
@@ -234,11 +241,11 @@ def _occupied(
                   for a, b, n in zip(axes, low, cells.shape, strict=True)]  # fmt: skip
         index = np.flatnonzero(cells[np.ix_(*within)])
     at = np.unravel_index(index, tuple(size))
-    # Only those that are left are ever projected.
+    # Only the points that are left are projected.
     points = np.empty((int(size.prod()), 3))
     points[index] = np.column_stack([axis[i] for axis, i in zip(axes, at, strict=True)])
-    looking = np.zeros(len(points), dtype=np.int8)
-    seen = np.zeros(len(points), dtype=np.int8)
+    view_count = np.zeros(len(points), dtype=np.int8)
+    person_count = np.zeros(len(points), dtype=np.int8)
     for view in views:
         camera = view.camera
         pixels = project_camera(points[index], camera)
@@ -249,26 +256,26 @@ def _occupied(
         keep = ~framed
         shown = mask[v[framed].astype(np.int64), u[framed].astype(np.int64)]
         keep[framed] = shown > 0
-        looking[index] += framed
-        seen[index[framed]] += shown > 1
+        view_count[index] += framed
+        person_count[index[framed]] += shown > 1
         index = index[keep]
-    person = seen >= LEAST_VIEWS
+    person = person_count >= LEAST_VIEWS
     inside = np.zeros(len(points), dtype=np.bool_)
-    inside[index] = looking[index] >= LEAST_VIEWS
+    inside[index] = view_count[index] >= LEAST_VIEWS
     inside &= person | (points[:, 2] > FLOOR_M)
     shape = tuple(int(n) for n in size)
-    return inside.reshape(shape), looking.reshape(shape), person.reshape(shape)
+    return inside.reshape(shape), view_count.reshape(shape), person.reshape(shape)
 
 
-def _beside(footprint: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """A footprint (n, m) on the fine grid and what is beside it, within `ASIDE_M`."""
-    side = 2 * round(ASIDE_M / FINE_M) + 1
+def _dilated(footprint: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """A footprint (n, m) on the fine grid, dilated by `TRUNK_DISTANCE_M`."""
+    side = 2 * round(TRUNK_DISTANCE_M / FINE_M) + 1
     circle = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     return np.asarray(cv2.dilate(footprint.astype(np.uint8), circle), np.uint8).view(np.bool_)
 
 
-def _floor_alone(points_m: FloatArray, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which points (n, 3) lie at the floor, and near no kept point of what may be a leg above."""
+def _isolated_floor(points_m: FloatArray, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which points (n, 3) lie at the floor, with no kept point of a possible leg near above."""
     low = points_m[:, 2] < SHIN_M
     leg = kept & ~low & (points_m[:, 2] < HIGH_M)
     if not (low.any() and leg.any()):
@@ -284,9 +291,9 @@ def _floor_alone(points_m: FloatArray, kept: NDArray[np.bool_]) -> NDArray[np.bo
 
 
 def _middle(cameras: Sequence[CameraModel]) -> FloatArray:
-    """The point (3,) nearest to all optical axes, m: the middle of what is looked at.
+    """The point (3,) nearest to all optical axes, m: the middle of the scene.
 
-    A weak pull to a place some metres in front of the cameras decides where the axes are parallel.
+    A weak prior for a point `_FAR_M` in front of each camera makes it unique for parallel axes.
     """
     total, right = np.zeros((3, 3)), np.zeros(3)
     for camera in cameras:

@@ -22,5 +22,5 @@ def transforms_of_many(body: BodyModel, poses: FloatArray) -> FloatArray:
 def markers_of_many(body: BodyModel, poses: FloatArray) -> FloatArray:
     """The markers (n, 15, 3) in m, world frame, at poses (n, p)."""
     nodes = transforms_of_many(body, poses)[:, body.marker_node]
-    turned = np.matmul(nodes[..., :3], body.marker_offset[:, :, None])[..., 0]
-    return np.asarray(turned + nodes[..., 3])
+    rotated = np.matmul(nodes[..., :3], body.marker_offset[:, :, None])[..., 0]
+    return np.asarray(rotated + nodes[..., 3])

@@ -1,4 +1,4 @@
-"""A pose turned about the vertical, or with the limbs exchanged as in a mirror, or both."""
+"""A pose rotated about the vertical axis, with its left and right limbs exchanged, or both."""
 
 from functools import lru_cache
 
@@ -17,34 +17,34 @@ _BENT = {
 """A posture in which every joint moves a marker."""
 _CHANGE_RAD = 0.2
 _OTHER = {"L": "R", "R": "L"}
-_IN_A_MIRROR = np.array([1.0, -1.0, 1.0])
-_FACING_THE_OTHER_WAY = np.array([-1.0, -1.0, 1.0])
+_MIRRORED = np.array([1.0, -1.0, 1.0])
+_REVERSED = np.array([-1.0, -1.0, 1.0])
 TRUNK = [MARKER_NAMES.index(name) for name in ("Pelvis", "Neck")]
 """Rows of the pelvis and the neck among the markers."""
 
 
 class Mirror:
-    """Exchanges the limbs' parameters of a body, with the signs that its conventions need.
+    """Exchanges the parameters of the left and right limbs of a body, with the right signs.
 
-    The signs are those with which a change on one side moves the markers as the same change on the
-    other side, seen in a mirror.
+    The sign of a parameter is the one with which its change moves the markers of its side as the
+    mirror image of what the same change of the other side's parameter does.
 
     Args:
         body: the body; parameters `l_NAME` and `r_NAME` belong together.
     """
 
     def __init__(self, body: BodyModel) -> None:
-        self._exchange = _Exchange(body, posture(body, _BENT), _limb_pairs(body), _IN_A_MIRROR)
+        self._exchange = _Exchange(body, posture(body, _BENT), _limb_pairs(body), _MIRRORED)
 
     def of(self, pose: FloatArray) -> FloatArray:
         """A pose (p,) with the limbs exchanged; root, trunk and head stay."""
         return self._exchange.of(pose)
 
 
-class TurnedRound:
-    """Lets a person face the other way, with every joint near where it was.
+class OppositeHeading:
+    """Reverses a person's heading, with every joint near its position.
 
-    What was bent forwards is then bent backwards, as far as the joints allow. Both poses give
+    A trunk bent forwards becomes one bent backwards, as far as the joints allow. Both poses give
     nearly the same silhouettes.
 
     Args:
@@ -60,19 +60,19 @@ class TurnedRound:
             if not name.startswith(("l_", "r_")) and i not in root
         ]
         pairs = [*_limb_pairs(body), *alone]
-        self._exchange = _Exchange(body, body.neutral, pairs, _FACING_THE_OTHER_WAY)
+        self._exchange = _Exchange(body, body.neutral, pairs, _REVERSED)
 
     def of(self, pose: FloatArray) -> FloatArray:
-        """A pose (p,), turned about the middle of its trunk; limits may be broken."""
-        return turned_by(self._body, self._exchange.of(pose), np.pi, about=pose)
+        """A pose (p,) with its heading reversed about its trunk's middle; it may violate limits."""
+        return rotated_by(self._body, self._exchange.of(pose), np.pi, about=pose)
 
 
-def turned_by(
+def rotated_by(
     body: BodyModel, pose: FloatArray, angle_rad: float, *, about: FloatArray
 ) -> FloatArray:
-    """A pose (p,) turned about the vertical; limits may be broken.
+    """A pose (p,) rotated about the vertical axis; it may violate joint limits.
 
-    The middle of its trunk is where the pose `about` (p,) has it.
+    The middle of its trunk is moved to where the pose `about` (p,) has it.
     """
     out = pose.copy()
     out[body.index("pelvis_rz")] += angle_rad
@@ -82,17 +82,20 @@ def turned_by(
 
 
 class _Exchange:
-    """Exchanges paired parameters; a change moves the markers as their change did, seen otherwise.
+    """Exchanges paired parameters, with signs found from the movements of the markers.
+
+    A parameter's sign is the one with which its change moves the markers as its partner's change
+    does, with left and right markers exchanged and the movement multiplied by `factors`.
 
     Args:
         body: the body.
-        about: (p,) pose about which the changes are made.
-        pairs: indices of left and right parameters; of a parameter of the trunk twice the same.
-        seen: (3,) factors of a marker's movement forwards, to the left and upwards.
+        about: (p,) pose at which the parameters are changed.
+        pairs: indices of left and right parameters; for a parameter of the trunk, its index twice.
+        factors: (3,) of a marker's movement forwards, to the left and upwards.
     """
 
     def __init__(
-        self, body: BodyModel, about: FloatArray, pairs: list[tuple[int, int]], seen: FloatArray
+        self, body: BodyModel, about: FloatArray, pairs: list[tuple[int, int]], factors: FloatArray
     ) -> None:
         self._neutral = body.neutral
         both = [pair if pair[0] != pair[1] else pair[:1] for pair in pairs]
@@ -101,9 +104,9 @@ class _Exchange:
         rest = markers(body, about)
         signs: list[float] = []
         for pair in both:
-            wanted = _exchanged(_moved(body, about, pair[0], _CHANGE_RAD) - rest, seen)
+            expected = _exchanged(_moved(body, about, pair[0], _CHANGE_RAD) - rest, factors)
             gaps = [
-                np.abs(_moved(body, about, pair[-1], sign * _CHANGE_RAD) - rest - wanted).sum()
+                np.abs(_moved(body, about, pair[-1], sign * _CHANGE_RAD) - rest - expected).sum()
                 for sign in (1.0, -1.0)
             ]
             signs += [1.0 if gaps[0] <= gaps[1] else -1.0] * len(pair)
@@ -119,14 +122,14 @@ class _Exchange:
 
 @lru_cache(maxsize=4)
 def mirror_of(body: BodyModel) -> Mirror:
-    """The mirror of a body; bodies of other sizes have the same."""
+    """The mirror of a body; it is the same for all sizes of the body."""
     return Mirror(body)
 
 
 @lru_cache(maxsize=4)
-def turned_round(body: BodyModel) -> TurnedRound:
-    """What turns a body round."""
-    return TurnedRound(body)
+def opposite_heading(body: BodyModel) -> OppositeHeading:
+    """The reversal of a body's heading; it is the same for all sizes of the body."""
+    return OppositeHeading(body)
 
 
 def _limb_pairs(body: BodyModel) -> list[tuple[int, int]]:
@@ -144,8 +147,8 @@ def _moved(body: BodyModel, pose: FloatArray, index: int, change_rad: float) -> 
     return markers(body, moved)
 
 
-def _exchanged(change_m: FloatArray, seen: FloatArray) -> FloatArray:
-    """Changes (15, 3) of the markers, those of left and right exchanged, times factors (3,)."""
+def _exchanged(change_m: FloatArray, factors: FloatArray) -> FloatArray:
+    """Movements (15, 3) of the markers, left and right exchanged, times factors (3,)."""
     rows = [MARKER_NAMES.index(_OTHER.get(n[0], n[0]) + n[1:]) if n[1].isupper() else k
             for k, n in enumerate(MARKER_NAMES)]  # fmt: skip
-    return np.asarray(change_m[rows] * seen)
+    return np.asarray(change_m[rows] * factors)

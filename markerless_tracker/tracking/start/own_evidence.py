@@ -1,7 +1,7 @@
-"""Poses compared with each other, each in the evidence that its body decides.
+"""Compares poses, each in the evidence that it decides itself.
 
-Undecided pixels near a body become person. Evidence that was decided for one pose therefore speaks
-against every other one: a leg that was found wrong on a floor of its trousers' colour would stay.
+Undecided pixels near a body become person. Evidence that was decided with one pose is therefore
+biased against every other pose: a wrong leg over a floor of the trousers' colour would be kept.
 """
 
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from markerless_tracker.fitness.contour import REACH_M
+from markerless_tracker.fitness.contour import RADIUS_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.evidence.undecided import decide
@@ -24,12 +24,12 @@ class OwnEvidence:
         searcher: the body, the cameras and the settings.
         imaged: the evidence, with the undecided pixels that imaging left.
         stamp_ns: its time.
-        frame: the evidence as decided so far; it serves all poses where nothing was undecided.
-        reach_m: as of `FrameSearch`, for evidence made here.
+        frame: the evidence decided so far; used for all poses if imaging left nothing undecided.
+        radius_m: as in `FrameSearch`, for evidence made here.
 
     Attributes:
         body: the body.
-        differs: whether anything is undecided, so that poses differ in their evidence.
+        differs: whether imaging left undecided pixels, so that poses differ in their evidence.
     """
 
     def __init__(
@@ -39,20 +39,20 @@ class OwnEvidence:
         stamp_ns: int,
         frame: FramePopulation,
         *,
-        reach_m: float = REACH_M,
+        radius_m: float = RADIUS_M,
     ) -> None:
         self._searcher = searcher
         self._imaged = imaged
         self._stamp_ns = stamp_ns
         self._frame = frame
-        self._reach_m = reach_m
+        self._radius_m = radius_m
         self._last: tuple[FloatArray, FramePopulation] | None = None
         self.body = searcher.body
         self.differs = any(seen.undecided_words is not None for seen in imaged.values())
 
     @cached_property
     def undecided(self) -> FramePopulation:
-        """The evidence that no body decided: undecided pixels count for no pose."""
+        """The evidence before any body decides it: undecided pixels do not count."""
         if not self.differs:
             return self._frame
         return self._population(self._imaged, self._frame.near)
@@ -67,7 +67,7 @@ class OwnEvidence:
         """A pose (p,) refined in its own evidence, and its cost there.
 
         Args:
-            pose: where to begin.
+            pose: the initial pose.
             iterations: of the contour refinement.
             truncation_m: residuals beyond it are outliers, in the first and in the last iteration.
         """
@@ -75,7 +75,7 @@ class OwnEvidence:
         return found, self.cost(found)
 
     def _decided(self, pose: FloatArray) -> FramePopulation:
-        """The evidence that the body at a pose (p,) decides; that of the last pose is kept."""
+        """The evidence that the body at a pose (p,) decides; cached for the last pose."""
         if not self.differs:
             return self._frame
         if self._last is None or not np.array_equal(self._last[0], pose):
@@ -87,5 +87,5 @@ class OwnEvidence:
         self, observations: Mapping[str, Observation], near: FloatArray
     ) -> FramePopulation:
         return FramePopulation(
-            self._searcher, observations, self._stamp_ns, near, reach_m=self._reach_m
+            self._searcher, observations, self._stamp_ns, near, radius_m=self._radius_m
         )

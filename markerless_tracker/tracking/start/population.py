@@ -1,4 +1,4 @@
-"""Several poses that explain one frame, better and better: recombined, refined, selected."""
+"""A population of poses of one frame, improved by recombination, refinement and selection."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.fitness import Evaluator
-from markerless_tracker.fitness.contour import REACH_M, ContourFrame
+from markerless_tracker.fitness.contour import RADIUS_M, ContourFrame
 from markerless_tracker.fitness.threads import side_by_side, usable_threads
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
@@ -24,18 +24,22 @@ from markerless_tracker.tracking.start.recombination import Recombiner
 from markerless_tracker.tracking.start.standing import off_floor
 
 PER_QUARTER = 4
-"""Poses that are kept of each quarter of the headings, seen from the best."""
+"""Poses that are kept in each quarter of the headings, relative to the best pose's heading."""
 _INITIALISED_COUNT = 24
+"""First guesses that are refined."""
 _PER_HEADING = 2
+"""First guesses of each heading that are candidates for it."""
 _CHILDREN = 480
+"""Children of a generation."""
 _REFINED = 10
+"""Children of a generation that are refined."""
 _NOVEL = 0.6
-"""Fraction of the children refined that differ from the parents and from each other: the others are
-the best, and those are mostly parents with a small change."""
+"""Fraction of the refined children that must differ from the parents and from each other. The
+others are the best children, which are mostly parents with a small change."""
 _NOVEL_M = 0.20
-"""They differ if a marker lies this far from where it was."""
+"""Poses differ if some marker lies farther apart than this."""
 _ALIKE_M = 0.07
-"""Poses whose markers lie nearer to each other than this, on average, are the same."""
+"""Poses are the same if their markers lie nearer to each other than this, on average."""
 _PRIOR_WEIGHT = 4.0
 """Weight of the pose prior: a generic body's outline fits within some centimetres only."""
 _INITIALISE = (6, (0.25, 0.08))
@@ -60,7 +64,7 @@ class Population:
     headings: FloatArray
 
     def facing(self, heading_rad: float) -> "Population":
-        """Those that face within a right angle of a heading; may be empty."""
+        """The poses within a right angle of a heading; may be empty."""
         near = np.array(
             [heading_difference(h, heading_rad) < 0.5 * np.pi for h in self.headings], bool
         )
@@ -77,9 +81,9 @@ class FramePopulation:
         searcher: the body, the cameras and the settings.
         observations: the evidence.
         stamp_ns: keys the draws, together with the seed.
-        near: (p,) a pose whose root is near the body.
-        contours: the frame's contour evidence, if it was made already.
-        reach_m: as of `FrameSearch`, if it was not.
+        near: (p,) a pose whose root is near the person.
+        contours: the frame's contour evidence, if it exists already.
+        radius_m: as in `FrameSearch`, if it does not.
 
     Attributes:
         near: as given.
@@ -93,14 +97,14 @@ class FramePopulation:
         near: FloatArray,
         *,
         contours: ContourFrame | None = None,
-        reach_m: float = REACH_M,
+        radius_m: float = RADIUS_M,
     ) -> None:
         self._searcher = searcher
         self._stamp_ns = stamp_ns
         self.near = near
         frame: FrameSearch | ContourFrame | None = contours
         if frame is None:
-            frame = searcher.frame(observations, stamp_ns, near, reach_m=reach_m)
+            frame = searcher.frame(observations, stamp_ns, near, radius_m=radius_m)
         self._frame = frame
         self._costs = searcher.fitness.prepare(
             frame.views, Comparison.whole(near, len(searcher.body.cone_names))
@@ -108,12 +112,12 @@ class FramePopulation:
 
     @property
     def contours(self) -> ContourFrame:
-        """The frame's contour evidence, made when first asked for."""
+        """The frame's contour evidence, made on first use."""
         frame = self._frame
         return frame if isinstance(frame, ContourFrame) else frame.contours
 
     @cached_property
-    def _beside(self) -> list[ContourFrame]:
+    def _per_thread(self) -> list[ContourFrame]:
         return [self.contours]
 
     @cached_property
@@ -121,7 +125,7 @@ class FramePopulation:
         return Recombiner(self._searcher.body, self._searcher.limits)
 
     def initialised(self, hull: Hull, hints: FloatArray | None = None) -> Population:
-        """The best first guesses of every heading, and hints (n, p), refined."""
+        """The first population: the best first guesses, and hints (n, p), refined."""
         rng = keyed_generator(self._searcher.config.seed, self._stamp_ns, "sow")
         guesses = first_guesses(self._searcher.body, self._searcher.limits, hull, rng)
         costs = self.costs_on_floor(guesses.reshape(-1, guesses.shape[2]))
@@ -137,11 +141,11 @@ class FramePopulation:
     def recombined(
         self, population: Population, generation: int, *, fraction: float = 1.0
     ) -> Population:
-        """One more generation.
+        """The next generation.
 
         Args:
-            population: the parents; they stay if they are good enough.
-            generation: keys the draws.
+            population: the parents; the selection may keep them.
+            generation: its number; keys the draws.
             fraction: of the full number of children.
         """
         rng = keyed_generator(
@@ -152,13 +156,13 @@ class FramePopulation:
         return self.selected(np.concatenate([population.poses, self.refined(best, *_RECOMBINE)]))
 
     def _promising(self, children: FloatArray, parents: FloatArray, count: int) -> FloatArray:
-        """So many of the children (n, p): the best, and the best of those that are new."""
+        """`count` of the children (n, p): the best, and the best of those that are novel."""
         order = np.argsort(self.costs_on_floor(children), kind="stable")
         chosen = [int(i) for i in order[: count - round(_NOVEL * count)]]
         body = self._searcher.body
         points = markers_of_many(body, children)
         known = np.concatenate([markers_of_many(body, parents), points[chosen]])
-        # Squared distance to the nearest of those known so far, of each child.
+        # Per child: squared distance to the nearest pose known so far.
         gaps_m2 = np.full(len(children), np.inf)
         for other in known:
             np.minimum(gaps_m2, _farthest_m2(points, other), out=gaps_m2)
@@ -171,25 +175,26 @@ class FramePopulation:
         return np.asarray(children[chosen])
 
     def propagated(self, population: Population, *, far: bool = False) -> Population:
-        """The population of the frame before, which may be long ago, refined in this one."""
+        """The population of the frame before, refined in this one; `far`: after a gap in time."""
         return self.selected(self.refined(population.poses, *(_INITIALISE if far else _PROPAGATE)))
 
     def costs(self, poses: FloatArray) -> FloatArray:
-        """1 - f_s (n,) of poses (n, p); infinite where there is none."""
+        """1 - f_s (n,) of poses (n, p); infinite where it is undefined."""
         costs = self._costs(poses)
         return np.where(np.isfinite(costs), costs, np.inf)
 
     def costs_on_floor(self, poses: FloatArray) -> FloatArray:
-        """`costs`, and what feet off the floor cost besides, if there is a floor."""
+        """`costs` plus the cost of feet off the floor, if the settings have a floor."""
         costs = self.costs(poses)
         if self._searcher.config.refine.floor_sd_m > 0.0:
             costs += off_floor(self._searcher.body, poses)
         return costs
 
     def limb_costs(self, pose: FloatArray, limb: IntArray) -> Evaluator:
-        """Gives 1 - f_s (n,) of a limb's parameters (n, d) with the rest of a pose (p,).
+        """An evaluator of 1 - f_s (n,) for a limb's parameters (n, d), the rest held at a pose
+        (p,).
 
-        The rest of the body is drawn once.
+        The rest of the body is rasterised once.
         """
         whole = Comparison.whole(pose, len(self._searcher.body.cone_names))
         return self._searcher.fitness.prepare(self._frame.views, replace(whole, active=limb))
@@ -197,18 +202,18 @@ class FramePopulation:
     def refined(
         self, poses: FloatArray, iterations: int, truncation: tuple[float, float]
     ) -> FloatArray:
-        """Poses (n, p), each refined on the contours; side by side, each by one thread."""
+        """Poses (n, p), each refined on the contours by one thread; threads run in parallel."""
         searcher = self._searcher
         prior = pose_prior(searcher.body, _PRIOR_WEIGHT)
         threads = max(1, min(usable_threads(searcher.threads), len(poses)))
-        while len(self._beside) < threads:
-            self._beside.append(self.contours.with_body(searcher.body))
+        while len(self._per_thread) < threads:
+            self._per_thread.append(self.contours.with_body(searcher.body))
         out = np.array(poses)
 
         def work(thread: int) -> None:
             for i in range(thread, len(out), threads):
                 out[i] = refined_on_contours(
-                    self._beside[thread], out[i], searcher.config, priors=(prior,),
+                    self._per_thread[thread], out[i], searcher.config, priors=(prior,),
                     limits=searcher.limits, iterations=iterations, truncation_m=truncation,
                 )  # fmt: skip
 
@@ -216,7 +221,7 @@ class FramePopulation:
         return out
 
     def selected(self, poses: FloatArray) -> Population:
-        """The best of poses (n, p) that differ, among them some of each quarter of the headings."""
+        """The best poses of (n, p) that differ, at most `PER_QUARTER` per quarter of headings."""
         costs = self.costs_on_floor(poses)
         order = [int(i) for i in np.argsort(costs, kind="stable") if np.isfinite(costs[i])]
         points = markers_of_many(self._searcher.body, poses)
@@ -237,7 +242,7 @@ class FramePopulation:
 
 
 def scaled_to(body: BodyModel, other: BodyModel, poses: FloatArray) -> FloatArray:
-    """Poses (n, p) of one body for another of the same kind: markers' middles stay in place."""
+    """Poses (n, p) of one body for a body of another size; the markers' mean stays in place."""
     out = poses.copy()
     at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
     out[:, at] += (markers_of_many(body, poses) - markers_of_many(other, poses)).mean(axis=1)
@@ -245,6 +250,6 @@ def scaled_to(body: BodyModel, other: BodyModel, poses: FloatArray) -> FloatArra
 
 
 def _farthest_m2(points: FloatArray, other: FloatArray) -> FloatArray:
-    """Squared distance (n,) of the markers (n, 15, 3) that moved farthest from others (15, 3)."""
+    """Squared distance (n,) of the farthest marker between poses (n, 15, 3) and one (15, 3)."""
     apart = points - other
     return np.asarray(np.einsum("nij,nij->ni", apart, apart).max(axis=1))

@@ -1,4 +1,4 @@
-"""Generic postures to begin with, placed at a hull's trunk, in every heading."""
+"""First guesses of the pose: generic postures, placed at a hull's trunk, in every heading."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -18,10 +18,11 @@ VARIATIONS = 48
 ANKLE_M = 0.08
 """Height of the lower ankle of a person that stands, squats, bends or sits."""
 OFF_FLOOR_M = 0.15
-"""A hull that begins higher above the floor, z = 0, may lack the feet."""
+"""A hull whose lowest point is higher above the floor, z = 0, may lack the feet."""
 VARIATION_FRACTION = 0.6
-"""Their standard deviation, as a fraction of the prior's."""
+"""Standard deviation of the variations, as a fraction of the prior's."""
 _TILT_RAD = (0.35, 0.40)
+"""Standard deviations of the variations' pelvis_rx and pelvis_ry."""
 _ANKLES = [MARKER_NAMES.index("LAnkle"), MARKER_NAMES.index("RAnkle")]
 _LIKE_TRUNK = ("pelvis", "belly", "chest", "torso")
 
@@ -88,8 +89,8 @@ def first_guesses(
 
     Args:
         body: the body.
-        limits: (2, p), kept.
-        hull: its trunk is where the body's trunk is put.
+        limits: (2, p) of the poses.
+        hull: the body's trunk is placed at its trunk.
         rng: draws the variations.
     """
     known = postures(body)
@@ -110,7 +111,8 @@ def first_guesses(
     middles = _trunk_middles(body, flat).reshape(HEADINGS, -1, 3)
     ankles = markers_of_many(body, flat)[:, _ANKLES, 2].min(axis=1).reshape(HEADINGS, -1)
     out[..., at] += hull.trunk_m.mean(axis=0) - middles
-    # What the hull's trunk is differs with clothes and arms by 0.3 m in height; feet are sure.
+    # The height of the hull's trunk varies by 0.3 m with clothes and arms; that of the feet is
+    # sure.
     shift = hull.trunk_m[:, 2].mean() - middles[..., 2]
     place = np.concatenate(
         [np.repeat(np.arange(places), len(known)), np.arange(VARIATIONS) % places]
@@ -122,13 +124,13 @@ def first_guesses(
 
 
 def ankle_heights_m(hull: Hull) -> tuple[float, ...]:
-    """Heights of a person's lower ankle, m: above the hull's lowest point, or above the floor."""
+    """Possible heights of the lower ankle, m: from the hull's lowest point, and from the floor."""
     low = max(hull.low_m, 0.0)
     return (low + ANKLE_M,) if low <= OFF_FLOOR_M else (low + ANKLE_M, ANKLE_M)
 
 
 def put_at(body: BodyModel, hull: Hull, pose: FloatArray) -> FloatArray:
-    """A pose (p,) with its trunk moved to where the hull's is."""
+    """A pose (p,) with its trunk moved to the hull's trunk."""
     moved = pose.copy()
     at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
     moved[at] += hull.trunk_m.mean(axis=0) - _trunk_middles(body, pose[None])[0]

@@ -1,7 +1,7 @@
 """New poses from good ones: whole limbs exchanged, mirrored, taken from a posture, or drawn.
 
-A refinement converges to the nearest optimum, and a limb's optimum is far from where another limb
-explains the same silhouette: so limbs change as wholes, and the good ones are refined.
+A refinement converges to the nearest optimum. A limb's true place is far from a place where it
+explains another limb's silhouette, so limbs are changed as a whole and good poses refined.
 """
 
 from functools import cached_property
@@ -15,22 +15,25 @@ from markerless_tracker.tracking.start.mirror import Mirror, mirror_of
 from markerless_tracker.tracking.start.postures import joint_sd, postures
 
 _ONE_LIMB, _KNOWN = 0.35, 0.3
-"""Fractions of children with one limb drawn anew, and with one limb, or both arms or legs, of a
-known posture or mirrored; the others mix limbs."""
+"""Fractions of two kinds of children: one limb drawn at random; and one limb, or both arms or legs,
+taken from a known posture or mirrored. The others mix limbs."""
 _MIRRORED = 0.25
-"""Fraction of the latter that are mirrored."""
+"""Fraction of the second kind that are mirrored."""
 _NOISE = 0.3
-"""Their variation, as a fraction of the prior's deviations."""
+"""Variation of the second kind, as a fraction of the prior's standard deviations."""
 _MIXED = 0.35
 """Fraction of the limbs that a mixed child changes."""
-_TURNED = 0.4
+_ROTATED = 0.4
 """Fraction of the mixed children whose root is also rotated."""
 _YAW_RAD, _TILT_RAD = 0.5, 0.15
+"""Standard deviations of that rotation, about the vertical axis and about the others."""
 _FREE_RAD = 2.8
+"""Limbs are drawn at most this far from neutral."""
 _FEW = 0.3
-"""A smaller prior standard deviation (rad) marks a joint that hardly moves: clavicles, thorax."""
+"""A smaller prior standard deviation (rad) marks a joint that hardly moves (clavicles, thorax).
+Such joints are drawn at most this far from neutral."""
 _RANK = 0.15
-"""Parents are drawn by rank: from the best on, each is taken with this probability."""
+"""Probability of taking a parent, tried in order from the best (geometric distribution)."""
 
 
 class Recombiner:
@@ -38,7 +41,7 @@ class Recombiner:
 
     Args:
         body: the body.
-        limits: (2, p), kept.
+        limits: (2, p) of the children.
 
     Attributes:
         body: the body.
@@ -57,7 +60,7 @@ class Recombiner:
         self._yaw = body.index("pelvis_rz")
         self._tilt = [body.index("pelvis_rx"), body.index("pelvis_ry")]
 
-    # Draws of a limb need neither of these, and both take milliseconds.
+    # `with_limb` and the like need neither of these, and both take milliseconds.
     @cached_property
     def _known(self) -> FloatArray:
         return postures(self.body)
@@ -83,7 +86,7 @@ class Recombiner:
     def with_limb(
         self, pose: FloatArray, limb: IntArray, count: int, rng: np.random.Generator
     ) -> FloatArray:
-        """Poses (count, p): one with a limb's parameters drawn anew, uniformly."""
+        """Poses (count, p): a pose with a limb's parameters drawn uniformly."""
         low, high = self._low[limb], self._high[limb]
         out = np.tile(pose, (count, 1))
         out[:, limb] = low + (high - low) * rng.random((count, len(limb)))
@@ -92,7 +95,7 @@ class Recombiner:
     def with_prior_limb(
         self, pose: FloatArray, limb: IntArray, count: int, rng: np.random.Generator
     ) -> FloatArray:
-        """Poses (count, p): one with a limb drawn about its prior mean."""
+        """Poses (count, p): a pose with a limb drawn about its prior mean."""
         poses = np.tile(pose, (count, 1))
         poses[:, limb] = self.body.neutral[limb]
         return self.with_limb_near(poses, limb, 1.0, rng)
@@ -129,6 +132,6 @@ class Recombiner:
             else:
                 scale = (0.5, 1.0)[rng.integers(2)]
                 child[limb] += scale * self._sd[limb] * rng.standard_normal(len(limb))
-        if rng.random() < _TURNED:
+        if rng.random() < _ROTATED:
             child[self._yaw] += _YAW_RAD * rng.standard_normal()
             child[self._tilt] += _TILT_RAD * rng.standard_normal(2)

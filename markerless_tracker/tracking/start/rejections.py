@@ -1,7 +1,7 @@
-"""Hulls that were searched and are no person: they are searched again ever more rarely.
+"""Rejected hulls, whose search found no person: they are searched again at growing intervals.
 
-A search takes as long as many tracked frames. An object that entered the scene after its background
-was learned would cost one in every set.
+A search takes as long as many tracked frames. Without this, an object that entered the scene after
+its background was learned would cost a search in every set.
 """
 
 from dataclasses import dataclass, replace
@@ -14,13 +14,13 @@ from markerless_tracker.tracking.start.hull import FINE_M, Hull
 FIRST_WAIT = 2
 """Frames without a search after the first rejection; doubled by each further one."""
 LONGEST_WAIT_NS = 1_000_000_000
-"""After so long a hull is searched again, however often it was rejected."""
+"""After this time a hull is searched again, however often it was rejected."""
 MOVED_M = 0.30
-"""A hull whose middle or top moved farther than this is another one."""
+"""A hull whose middle or top moved farther than this counts as a new hull."""
 RESIZED = 0.30
-"""So is one whose volume changed by a larger fraction."""
+"""A hull whose volume changed by a larger fraction counts as a new hull, too."""
 FORGOTTEN_NS = 5_000_000_000
-"""A hull that was not seen for so long is forgotten."""
+"""A hull that was not seen for this time is forgotten."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +51,8 @@ class _Rejected:
 class Rejections:
     """Remembers rejected hulls, and when each may be searched again.
 
-    A hull is the same as an earlier one if place and size are about the same. Frames are counted by
-    `begin_frame`; stamps may be set back, which forgets all.
+    A hull is the same as an earlier one if place and size are about the same. `begin_frame` counts
+    the frames; if stamps run backwards, all hulls are forgotten.
     """
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class Rejections:
         self._stamp_ns = 0
 
     def begin_frame(self, stamp_ns: int) -> None:
-        """Count a frame of a time."""
+        """Begin a frame at a time."""
         if stamp_ns < self._stamp_ns:
             self._rejected = []
         self._frame += 1
@@ -81,7 +81,7 @@ class Rejections:
         )
 
     def note(self, hull: Hull) -> None:
-        """A search of a hull in this frame was rejected."""
+        """Note that a search of a hull in this frame found no person."""
         known = self._known(hull)
         wait = FIRST_WAIT
         if known is not None:

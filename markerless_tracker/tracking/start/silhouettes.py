@@ -1,8 +1,8 @@
-"""Silhouettes of a person that a hull has located: shadows and unsure pixels are decided by it.
+"""Silhouettes of a person located by a hull, which decides shadows and undecided pixels.
 
-Where no body is known yet, the views decide for each other. A pixel may be the person where the
-hull lies on its ray. A shadow lies on the floor: a pixel whose floor point another view sees lit is
-none (`evidence.floor`).
+As long as no body is known, the other views decide a view's pixels. A pixel may be the person if
+the hull lies on its ray. A shadow lies on the floor: a pixel whose floor point another view sees
+lit is no shadow (`evidence.floor`).
 """
 
 from collections.abc import Mapping
@@ -19,15 +19,15 @@ from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, 
 from markerless_tracker.tracking.start.hull import FINE_M, Hull
 
 FLOOR_RADIUS_M = 3.0
-"""Distance from the hull of floor points that are tested: farther ones may lie behind a wall."""
+"""Floor points farther than this from the hull are not tested: they may lie behind a wall."""
 _BLOCK_PX = 2
-"""One pixel of so many in a row and a column is tested on the floor."""
+"""The floor test is made once per block of this many rows and columns."""
 
 
 def hulls_silhouettes(
     observations: Mapping[str, Observation], cameras: Mapping[str, CameraModel], hull: Hull
 ) -> dict[str, Observation]:
-    """The silhouettes of the person that a hull holds, as `decided_by_hull` and `hulls_part` do.
+    """The silhouettes of the person in a hull: `decided_by_hull`, then `hulls_part` of each.
 
     Args:
         observations: the views.
@@ -39,7 +39,7 @@ def hulls_silhouettes(
 
 
 def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
-    """The silhouette's components that a hull's points fall on, the very same if that is all."""
+    """The silhouette's components that a hull's points fall on; the same object if that is all."""
     mask = observation.not_background.view(np.uint8)
     count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
     if count <= 2:
@@ -61,13 +61,12 @@ def decided_by_hull(
 ) -> dict[str, Observation]:
     """Observations with undecided pixels decided where the hull and the floor allow it.
 
-    Of the undecided pixels
-    - those beside the hull's image are background: other views show nobody on their rays;
-    - those in the image of its sure points are person if the floor there is lit in another view,
-      and darkened in none, or if they show no floor; the others stay undecided.
-
-    Person pixels beside the hull's image, whose floor is lit in no other view, become undecided:
-    they may be a dark shadow.
+    - Undecided pixels outside of the hull's image become background: other views show nobody on
+      their rays.
+    - Undecided pixels in the image of its sure points become person if they show no floor, or if
+      their floor point is lit in another view and darkened in none. Others stay undecided.
+    - Person pixels outside of the hull's image become undecided, as possible dark shadows, unless
+      they show no floor or their floor point is lit in another view and darkened in none.
     """
     if all(seen.undecided_words is None for seen in observations.values()):
         return dict(observations)
@@ -98,7 +97,7 @@ def decided_by_hull(
 def _maybe_shadows(
     asked: NDArray[np.bool_], view: FloorView, others: list[FloorView], middle: FloatArray
 ) -> NDArray[np.bool_]:
-    """Which pixels (h, w) of those asked for show floor unless it is lit elsewhere."""
+    """Which of the given pixels (h, w) show a floor point that no other view sees lit."""
     rows, columns = np.nonzero(asked)
     if not rows.size:
         return asked
@@ -126,9 +125,9 @@ def _floor_view(seen: Observation, camera: CameraModel, covered: NDArray[np.bool
 def _covered(
     points_m: FloatArray, seen: Observation, camera: CameraModel, *, grown: bool = False
 ) -> NDArray[np.bool_]:
-    """Pixels (h, w) that the image of a hull's points covers, gaps of the grid closed.
+    """Pixels (h, w) that the image of a hull's points covers, gaps between them closed.
 
-    Grown by about the grid's spacing, it covers all that the points stand for.
+    With `grown` it is dilated by about the grid's spacing, to cover the points' whole cells.
     """
     u, v = _pixels(points_m, seen, camera)
     out = np.zeros((seen.height, seen.width), dtype=np.uint8)
@@ -145,7 +144,7 @@ def _covered(
 def _pixels(
     points_m: FloatArray, seen: Observation, camera: CameraModel
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Columns and rows in the region of the points (n, 3) that it shows."""
+    """Columns and rows, in the observation's region, of the points (n, 3) that lie in it."""
     pixels = project_camera(points_m, camera) - seen.offset_px
     with np.errstate(invalid="ignore"):
         u, v = np.round(pixels).T

@@ -1,4 +1,4 @@
-"""Statures and girths that are tried for an unknown person, and what each costs."""
+"""Search of the stature and the girth of an unknown person, and their costs."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -13,50 +13,53 @@ from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
 
 STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
-"""Statures that are tried for an unknown person, in heights of the hull; raised arms make it higher
-than the person."""
+"""Statures that are tried for an unknown person, as fractions of the hull's height; raised arms
+make the hull higher than the person."""
 COMMON_STATURES_M = (1.56, 1.63, 1.70, 1.77, 1.84)
 """Statures that are tried besides: a bent, squatting or sitting person is taller than the hull."""
 STANDING_M = (1.45, 1.92)
-"""A lower hull is that of a person not standing upright, a higher one of a person reaching up."""
-REACHING_M = 1.80
-"""From this height on a hull may be that of a person with raised arms, too."""
-REACH = 1.24
+"""A person with a lower hull does not stand upright; one with a higher hull has raised arms."""
+RAISED_ARMS_M = 1.80
+"""A hull of this height or more may be that of a person with raised arms."""
+RAISED_ARMS_RATIO = 1.24
 """Height of a person with raised arms, in statures."""
 GIRTHS = (0.92, 1.08, 1.16, 1.24)
-"""Factors of all radii that are tried besides 1: people differ most in girth, after stature, and
-clothes add to it. A body that is too thin hides its arms in the trunk's outline."""
+"""Factors of all radii that are tried besides 1: after stature, people differ most in girth, and
+clothes add to it. If the body is too thin, its arms are fitted inside the trunk's outline."""
 FINER = (0.94, 0.97, 1.03)
 """Factors of the stature that are tried once the girth is known."""
 _FINER_GIRTHS = (0.95, 1.05)
+"""The same for the girth."""
 _ITERATIONS, _TRUNCATION_M = 4, (0.12, 0.05)
+"""Refinement of the pose with each size."""
 _APART_M = 0.025
+"""Least difference of two statures that are tried."""
 _STATURE_RANGE_M = (1.2, 2.1)
 _STATURE_SD_M = 0.10
 _WEIGHT = 0.002
-"""A stature or girth one standard deviation from the mean must raise f_s by this much more."""
+"""Cost, in units of f_s, of a stature or girth one standard deviation from the mean."""
 _GIRTH_SD = 0.15
 
 
 def first_statures_m(hull: Hull) -> tuple[float, ...]:
-    """Statures that a search may begin with, m: what the hull's height suggests."""
+    """Statures to begin a search with, m, from the hull's height."""
     height_m = hull.height_m
     upright = STANDING_M[0] <= height_m <= STANDING_M[1]
     statures = [height_m if upright else MEAN_STATURE_M]
-    if height_m >= REACHING_M:
-        statures.append(float(np.clip(height_m / REACH, 1.5, 1.9)))
+    if height_m >= RAISED_ARMS_M:
+        statures.append(float(np.clip(height_m / RAISED_ARMS_RATIO, 1.5, 1.9)))
     return tuple(statures)
 
 
 def statures_m(hull: Hull) -> Iterator[float]:
-    """Statures to try on a pose that was found, m, ascending."""
+    """Statures to try with a pose that was found, m, ascending."""
     height_m = float(np.clip(hull.height_m, *_STATURE_RANGE_M))
     if height_m < STANDING_M[0]:
         height_m = MEAN_STATURE_M
     tried = {ratio * height_m for ratio in STATURES} | set(COMMON_STATURES_M)
     last = -np.inf
     for stature in sorted({float(np.clip(s, *_STATURE_RANGE_M)) for s in tried}):
-        # The finer factors distinguish those nearer to each other.
+        # Statures nearer to each other are tried later, by `FINER`.
         if stature - last >= _APART_M:
             last = stature
             yield stature
@@ -84,7 +87,7 @@ class Sized:
     """A population in a body of some size.
 
     Attributes:
-        frame: the frame, compared with that body.
+        frame: the frame's evidence, prepared for that body.
         population: its poses.
         searcher: searches with the body.
     """
@@ -99,8 +102,8 @@ class SizeSearch:
 
     Args:
         searcher_for: makes a searcher of a body.
-        body: the body if the stature is known.
-        sized: makes the body of a stature, if that is unknown.
+        body: the body, used if the stature is known.
+        sized: makes the body of a stature; None if the stature is known.
         girths: whether to try girths.
     """
 
@@ -121,7 +124,7 @@ class SizeSearch:
     def coarse(
         self, found: Sized, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> Sized:
-        """Try the statures that the hull's height allows, girths, then statures near the best.
+        """Try statures near the hull's height, then girths, then statures near the best.
 
         Args:
             found: the population.
@@ -160,9 +163,14 @@ class SizeSearch:
         *,
         changes: bool = False,
     ) -> Sized:
-        """The best of some statures (None: known) and girths, and of what was found before.
+        """The population in the body of the best size.
 
-        What was found counts only if its own size is one that is compared: not where `changes`.
+        Args:
+            found: the population so far.
+            sizes: pairs of stature (None: known) and girth.
+            observations: the frame's evidence.
+            stamp_ns: its time.
+            changes: whether the size so far is no candidate.
         """
         known, poses = found.searcher.body, found.population.poses
         kept, least = found, np.inf

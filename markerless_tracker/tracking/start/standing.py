@@ -1,7 +1,7 @@
-"""A person who is found stands, sits or kneels on the floor, z = 0: not above it, nor in it.
+"""Cost of feet off the floor, z = 0: a person stands, sits or kneels on the floor.
 
-Trousers of the floor's colour leave no silhouette: a body with its legs drawn up would fit best.
-Where a shadow is taken for a part of the person, a body that reaches into the floor would.
+Trousers of the floor's colour leave no silhouette, so that a body with its legs drawn up would fit
+best. Where a shadow is taken for a part of the person, a body with its feet in the floor would.
 """
 
 import numpy as np
@@ -11,12 +11,13 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.start.many_poses import markers_of_many
 
 LOWER_M, UPPER_M, IN_FLOOR_M = 0.25, 0.70, 0.05
-"""Heights of the lower and of the upper ankle, m, up to which the person may stand: the upper leg
-may be raised. Below the last one a foot is in the floor."""
+"""Heights of the lower and of the upper ankle, m, up to which a standing person costs nothing,
+since one leg may be raised; and the height below which an ankle is in the floor."""
 LOWER_COST, UPPER_COST, IN_FLOOR_COST = 0.3, 0.1, 0.3
-"""Cost of each metre above or below, in units of f_s."""
+"""Cost per metre beyond these heights, in units of f_s."""
 MOST_COST = 0.15
-"""All poses cost this much where the calibration's floor is not the room's: they still compare."""
+"""Largest cost. Where z = 0 is not the room's floor, all poses cost this much and f_s compares
+them."""
 _ANKLES = [MARKER_NAMES.index("LAnkle"), MARKER_NAMES.index("RAnkle")]
 
 

@@ -1,4 +1,4 @@
-"""The automatic start: a person is found in one frame, the heading is confirmed over some more."""
+"""The automatic start: finds a person in one frame and confirms the heading over some more."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -29,23 +29,30 @@ from markerless_tracker.tracking.start.sizing import (
 from markerless_tracker.tracking.start.two_headings import HeadingFit, TwoHeadings
 
 GENERATIONS = 7
+"""Generations of the search of the first frame."""
 SECOND_GENERATIONS = 5
+"""Generations of the search of the second frame."""
 _GENERATION_FRACTION = 0.5
+"""Size of the one generation in each later frame, as a fraction of the full size."""
 _SHAPE_FRAMES = 5
+"""Most frames that the sections are fitted to."""
 _SHAPE_SLACK = 0.01
+"""Frames that the sections are fitted to cost at most this much more than the best."""
 _RESIZED_AFTER = 3
+"""Generation after which the sizes are tried in the first frame."""
 _FINER_AFTER = 1
-"""Frames after the second look: one frame need not wait for both."""
+"""Frames between the second search and the finer sizes, so that no frame has to do both."""
 GAP_NS = 150_000_000
-"""Frames farther apart than this: a person has moved on, farther than poses are refined. Live it is
-the time that the first search takes."""
+"""After a longer gap between frames the person may be farther away than a refinement converges.
+Live, such a gap is the time that the first search takes."""
 _GAP_GENERATIONS = 2
+"""Generations after such a gap."""
 _FITS = 0.85
-"""From this f_s on a generation that gains less than `_GAIN` is the last one."""
+"""At this f_s or more, a generation that gains less than `_GAIN` is the last one."""
 _GAIN = 0.002
 _SURE_FIT, _SURE_GAP = 0.91, 0.025
-"""A first frame explained as well as this, and by so much worse with the opposite heading, is not
-searched a second time."""
+"""There is no second search if the first frame has at least this f_s, and the opposite heading's is
+lower by at least this gap."""
 _TRUNK_MARKERS = [0, 1]
 
 Select = Callable[
@@ -62,9 +69,9 @@ class StartEstimate:
     Attributes:
         searcher: searches with the body found so far.
         pose: (p,).
-        observations: the parts of the silhouettes that are this person's.
-        settled: whether the start is over.
-        notes: what the user should know, one line each.
+        observations: the parts of the silhouettes that belong to this person.
+        settled: whether the start is complete.
+        notes: messages for the user, one line each.
     """
 
     searcher: Searcher
@@ -77,20 +84,20 @@ class StartEstimate:
 class Starter:
     """Finds a person in the views, without a start pose.
 
-    From a body of the right stature (tried, if unknown) in many postures and headings the best are
-    refined, recombined and refined again. A person facing the opposite way gives nearly the same
-    silhouettes, so both headings are propagated over some frames; the one that explains them
-    better is kept, and a walking person faces the walking direction. Then the body's sections
-    are fitted with the poses held.
+    First guesses are many postures and headings of a body of the person's stature (several are
+    tried if it is unknown). The best ones are refined, recombined and refined again. The opposite
+    heading gives nearly the same silhouettes, so both headings are propagated over some frames. The
+    heading that explains them better is kept; a walking person faces the walking direction. Then
+    the body's sections are fitted with the poses held.
 
     Args:
         rig: the cameras.
         body: the body; its lengths are the person's if `sized` is None.
         searcher_for: makes a searcher of a body.
         select: keeps the parts of silhouettes that a pose explains.
-        sized: makes the body of a stature, if that is unknown.
+        sized: makes the body of a stature; None if the stature is known.
         fit_shape: whether to fit the sections in the end.
-        last_pose: (p,) where the body was when it was lost.
+        last_pose: (p,) pose at which the person was lost; None if there was none.
     """
 
     def __init__(
@@ -116,7 +123,7 @@ class Starter:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the person so far; objects that were rejected stay known."""
+        """Forget the person so far; rejected hulls are remembered."""
         self._in_view.reset()
         self._population: Population | None = None
         self._stamp_ns = 0
@@ -144,7 +151,7 @@ class Starter:
             self._headings.restart()
             population = _improved(frame, population, range(1, 1 + _GAP_GENERATIONS))
         if len(self._headings) == 1 and not self._sure:
-            population = self._second_look(frame, population, observations)
+            population = self._second_search(frame, population, observations)
         elif len(self._headings) == 1 + _FINER_AFTER:
             frame, population = self._resized((frame, population), observations, stamp_ns)
         population = frame.recombined(population, 0, fraction=_GENERATION_FRACTION)
@@ -163,14 +170,14 @@ class Starter:
         return StartEstimate(self._searcher, pose, observations, settled, notes)
 
     def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
-        looking = [self._cameras[name] for name in observed]
+        cameras = [self._cameras[name] for name in observed]
         self._rejections.begin_frame(stamp_ns)
         for hull in find_hulls(self._cameras, observed):
             if self._rejections.waits(hull):
                 continue
-            # A search takes long: not for a person that is hardly in view.
-            stands = put_at(self._body, hull, self._body.neutral)
-            if not self._in_view.enough(self._body, stands, looking, stamp_ns):
+            # A search takes long, so a person hardly in view is not searched.
+            standing = put_at(self._body, hull, self._body.neutral)
+            if not self._in_view.enough(self._body, standing, cameras, stamp_ns):
                 continue
             observations = hulls_silhouettes(observed, self._cameras, hull)
             found = self._search(hull, observations, stamp_ns)
@@ -180,7 +187,7 @@ class Starter:
             frame, population = found
             assert self._searcher is not None
             best = population.poses[0]
-            if not self._in_view.enough(self._searcher.body, best, looking, stamp_ns):
+            if not self._in_view.enough(self._searcher.body, best, cameras, stamp_ns):
                 continue
             self._population, self._stamp_ns = population, stamp_ns
             self._headings = TwoHeadings(float(population.headings[0]))
@@ -205,7 +212,7 @@ class Starter:
     ) -> dict[str, Observation]:
         """Observations whose undecided pixels the body at a pose (p,) decides.
 
-        In a second frame that is searched independently, the hull decides first.
+        If this is a second frame that is searched independently, the hull decides before the body.
         """
         assert self._searcher is not None
         if len(self._headings) == 1 and not self._sure:
@@ -214,13 +221,13 @@ class Starter:
                 observations = hulls_silhouettes(observations, self._cameras, hull)
         return decide(observations, self._cameras, self._searcher.body, pose)
 
-    def _second_look(
+    def _second_search(
         self,
         frame: FramePopulation,
         population: Population,
         observations: Mapping[str, Observation],
     ) -> Population:
-        """Search the second frame independently, too: another search finds what one missed."""
+        """Search the second frame independently, too: it may find what the first search missed."""
         hull = next(find_hulls(self._cameras, observations), None)
         if hull is None:
             return population
@@ -243,7 +250,7 @@ class Starter:
         stamp_ns: int,
         hull: Hull | None = None,
     ) -> tuple[FramePopulation, Population]:
-        """A population in the body of the size that fits best; with a hull all sizes are tried."""
+        """A population in the body of the best size; all sizes with a hull, else only near ones."""
         assert self._searcher is not None
         sized = Sized(*found, self._searcher)
         if hull is None:
@@ -256,7 +263,7 @@ class Starter:
     def _initialised(
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> tuple[FramePopulation, Population]:
-        """The population to begin with: that of the stature whose best pose fits best."""
+        """The first population: that of the stature whose best pose costs least."""
         bodies = [(self._body, 0.0)]
         if self._sized is not None:
             statures = first_statures_m(hull)
@@ -272,7 +279,7 @@ class Starter:
                 hints = np.array([self._last_pose, put_at(body, hull, self._last_pose)])
             population = frame.initialised(hull, hints)
             tried.append((float(population.costs[0]) + cost, searcher, frame, population))
-        _, self._searcher, frame, population = min(tried, key=lambda one: one[0])
+        _, self._searcher, frame, population = min(tried, key=lambda candidate: candidate[0])
         return frame, population
 
     def _note(
@@ -289,7 +296,7 @@ class Starter:
         self._headings.note(stamp_ns, (first, opposite))
 
     def _best(self, population: Population) -> Population:
-        """The part of a population that has the leading heading, or all if none has."""
+        """The poses of a population with the leading heading; all poses if none has it."""
         facing = population.facing(self._headings.leading_rad)
         return facing if len(facing) else population
 
@@ -297,9 +304,9 @@ class Starter:
         assert self._searcher is not None
         if not self._fit_shape:
             return pose
-        seen = self._headings.leading_fits
-        good = min((one.cost for one in seen), default=0.0) + _SHAPE_SLACK
-        used = [(one.contours, one.pose) for one in seen if one.cost <= good][-_SHAPE_FRAMES:]
+        fits = self._headings.leading_fits
+        good = min((fit.cost for fit in fits), default=0.0) + _SHAPE_SLACK
+        used = [(fit.contours, fit.pose) for fit in fits if fit.cost <= good][-_SHAPE_FRAMES:]
         body = fit_shape(self._searcher.body, used or [(frame.contours, pose)])
         self._searcher = self._searcher_for(body)
         return pose
@@ -319,7 +326,7 @@ def _is_sure(population: Population) -> bool:
 def _improved(
     frame: FramePopulation, population: Population, generations: Iterable[int]
 ) -> Population:
-    """A population after generations; fewer where the best fits well and hardly improves."""
+    """A population after generations; fewer if the best pose fits well and hardly improves."""
     for generation in generations:
         before = population.costs[0]
         population = frame.recombined(population, generation)

@@ -1,7 +1,7 @@
-"""Which of two opposite headings a person has: both give nearly the same silhouettes.
+"""Decides which of two opposite headings a person has: both give nearly the same silhouettes.
 
-Both are tracked for some frames. The one that explains them better is kept, and a person who walks
-faces the way that the trunk moves.
+Both are tracked for some frames. The heading that explains them better is kept; a walking person
+faces the walking direction.
 """
 
 from dataclasses import dataclass
@@ -13,16 +13,17 @@ from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 
 SETTLING_FRAMES = 8
-"""Frames from the first pose to the one from which on it is tracked like any other."""
+"""Frames of the start, after which the person is tracked."""
 SIZED_FROM = 2
-"""Number of the frame, from 0, from which on both headings count: the frames before it were
-searched for what came to lead, with a body of another size."""
+"""Index of the first frame in which the headings are compared. The frames before it had a body of
+another size, and their search favoured the heading that leads."""
 COMPARED = 4
-"""Latest frames whose f_s are compared: poses still improve."""
+"""Number of the latest frames whose f_s are compared: poses improve over the frames."""
 _MARGIN, _LAST_MARGIN = 0.01, 0.003
 """Mean rise of f_s that the opposite heading needs before the settling ends, and at its end."""
 _WALKED_M, _WALK_M_S, _WALK_BONUS = 0.05, 0.25, 0.01
-"""People walk forwards: added to f_s beyond that distance and speed."""
+"""People walk forwards. Beyond this distance and speed, this bonus is added to the f_s of the
+heading along the walking direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,7 @@ class HeadingFit:
 
 
 class TwoHeadings:
-    """A heading that leads and the opposite one, over the frames of a start.
+    """The leading heading and the opposite one, over the frames of a start.
 
     Args:
         heading_rad: the heading found first.
@@ -63,12 +64,12 @@ class TwoHeadings:
 
     @property
     def over(self) -> bool:
-        """Whether there were as many frames as the settling takes."""
+        """Whether all frames of the start have been taken."""
         return len(self) >= SETTLING_FRAMES
 
     @property
     def leading_rad(self) -> float:
-        """The heading that leads."""
+        """The leading heading."""
         return self.both_rad[self._leading]
 
     @property
@@ -78,14 +79,14 @@ class TwoHeadings:
 
     @property
     def leading_fits(self) -> list[HeadingFit]:
-        """Of the heading that leads, in the frames in which it had a pose."""
+        """The fits of the leading heading, in the frames in which it had a pose."""
         return [fit for fits in self._fits if (fit := fits[self._leading]) is not None]
 
     def restart(self) -> None:
-        """Let the next frame not count, nor those before it; only among the first frames.
+        """Exclude the next frame and those before it from the comparison; only in the first frames.
 
-        To be called after a gap in time: in that frame both headings are far from the person, and
-        which of the two is found again there is chance.
+        To be called in the first frame after a gap in time: both headings are far from the person
+        in it, and which of them is found again is chance.
         """
         if len(self) <= SIZED_FROM:
             self._counted_from = max(SIZED_FROM, len(self) + 1)
@@ -95,7 +96,7 @@ class TwoHeadings:
 
         Args:
             stamp_ns: its time.
-            fits: of the headings of `both_rad`; None where no pose has it.
+            fits: of the headings of `both_rad`; None for a heading that no pose has.
         """
         self._fits.append(fits)
         self._stamps_ns.append(stamp_ns)
@@ -119,7 +120,7 @@ class TwoHeadings:
         return True
 
     def _walks_along(self, heading_rad: float) -> float:
-        """Cosine of the angle from a heading to the way that the person walks; 0 if none does."""
+        """Cosine of the angle from a heading to the walking direction; 0 for a standing person."""
         first, last = self._fits[self._counted_from], self._fits[-1]
         moves = [b.trunk_m - a.trunk_m for a, b in zip(first, last, strict=True) if a and b]
         seconds = (self._stamps_ns[-1] - self._stamps_ns[self._counted_from]) * 1e-9

@@ -1,6 +1,6 @@
-"""Swarms compiled as a whole: a stage's samples, moves, constraints and costs in one call.
+"""Swarms compiled as a whole: samples, moves, constraints and costs of a stage in one call.
 
-Each has a twin in `optim` that minimises any function, with the same draws and the same result.
+Each has a counterpart in `optim` that minimises any function, with the same draws and results.
 """
 
 from collections.abc import Callable, Mapping

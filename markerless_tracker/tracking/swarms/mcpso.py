@@ -35,7 +35,7 @@ def run_mcpso(
     migration: float = 2.0,
     master_term: str = "printed",
 ) -> Particles:
-    """Spend a stage's budget; settings and errors as for `optim.Mcpso`."""
+    """Run a stage; settings and errors as for `optim.Mcpso`."""
     if master_term not in MASTER_TERMS:
         raise SearchError(
             f"master_term is {master_term!r}, expected one of {', '.join(MASTER_TERMS)}"
@@ -59,7 +59,7 @@ def _swarms(  # type: ignore[no-untyped-def]
     rng, particles, ends, inertias, c, c_sub, weighted, centre, sigma, bounds, constraints,
     objective,
 ):  # fmt: skip
-    """ends: (s + 2,) where each of the s sub-swarms begins, and the master, and the end."""
+    """ends: (s + 2,) first particle of each of the s sub-swarms and of the master, and n."""
     first, subs, count = np.int64(0), ends[-2], ends[-1]
     begin(rng, particles, centre, sigma, bounds, True, constraints)
     learn(particles, first, count, objective)
@@ -90,7 +90,7 @@ def _swarms(  # type: ignore[no-untyped-def]
 
 @kernel
 def _propose_master(rng, particles, count, subs, w, c, c_own, c_sub, sigma):  # type: ignore[no-untyped-def]
-    """Moves of the master's first `count` particles in `todo`, as `optim.mcpso.master_step`."""
+    """Propose moves of the master's first `count` in `todo`, as `optim.mcpso.master_step`."""
     d = sigma.size
     draw(rng, particles, 3 * count * d)
     x, best, draws = particles.x, particles.best, particles.draws
@@ -103,13 +103,13 @@ def _propose_master(rng, particles, count, subs, w, c, c_own, c_sub, sigma):  # 
             speed += c_own * draws[count * d + at] * (best[own, i] - x[n, i])
             speed += c_sub * draws[2 * count * d + at] * (best[other, i] - x[n, i])
             speed = min(max(speed, -2.0 * sigma[i]), 2.0 * sigma[i])
-            particles.moved[n, i] = speed
-            particles.there[n, i] = x[n, i] + speed
+            particles.proposed_v[n, i] = speed
+            particles.proposed_x[n, i] = x[n, i] + speed
 
 
 @kernel
 def _migrate(particles, ends):  # type: ignore[no-untyped-def]
-    """As `optim.mcpso`: the migration factor, then the sub-swarms' bests enter the master."""
+    """The migration factor; then the sub-swarms' bests enter the master, as in `optim.mcpso`."""
     subs, count = ends[-2], ends[-1]
     costs, best, x = particles.best_costs, particles.best, particles.x
     sub_cost = costs[leader(particles, 0, subs)]

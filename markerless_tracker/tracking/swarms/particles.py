@@ -1,6 +1,6 @@
-"""What the compiled swarms share: first positions, draws, moves under constraints, costs.
+"""Common parts of the compiled swarms: first positions, draws, moves under constraints, costs.
 
-As `optim.sampling`, `optim.swarm` and `optim.base` do it, draw by draw.
+They equal `optim.sampling`, `optim.swarm` and `optim.base`, draw by draw.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from markerless_tracker.fitness.raster.kernels import evaluate
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim.sampling import ATTEMPTS
 
-# Not literals, for which kernels would be compiled once more.
+# Literals would make numba compile the kernels once more.
 _FIRST, _ONE = np.int64(0), np.int64(1)
 
 
@@ -23,15 +23,15 @@ class Particles(NamedTuple):
 
     Attributes:
         x, v, best: (n, d) positions, velocities, own best positions.
-        best_costs: (n,) their costs; infinite until one is known.
-        infeasible: (n,) particles whose last move broke a constraint.
-        there, moved: (n, d) proposed positions and velocities.
+        best_costs: (n,) costs of the own best positions; infinite as long as unknown.
+        infeasible: (n,) particles whose last move violates a constraint.
+        proposed_x, proposed_v: (n, d) proposed positions and velocities.
         draws: (3 n d,) uniform draws of one attempt.
-        todo: (n,) indices of the particles that are to be moved.
+        todo: (n,) indices of the particles to be moved.
         good: (n,) whether a proposed position satisfies the constraints.
         cutoffs, costs: (n,) of the last evaluation.
-        counts: (n, v, 4) likewise.
-        found: (d,) best position of all so far.
+        counts: (n, v, 4) of the last evaluation.
+        found: (d,) best position of the swarm so far.
         found_cost: (1,) its cost.
     """
 
@@ -40,8 +40,8 @@ class Particles(NamedTuple):
     best: FloatArray
     best_costs: FloatArray
     infeasible: NDArray[np.bool_]
-    there: FloatArray
-    moved: FloatArray
+    proposed_x: FloatArray
+    proposed_v: FloatArray
     draws: FloatArray
     todo: NDArray[np.int64]
     good: NDArray[np.bool_]
@@ -53,7 +53,7 @@ class Particles(NamedTuple):
 
 
 def make_particles(count: int, centre: FloatArray, views: int) -> Particles:
-    """Room for particles about a centre (d,), which is the best until one is found."""
+    """Arrays for particles about a centre (d,), which is `found` at first."""
     d = centre.size
     return Particles(
         np.empty((count, d)), np.empty((count, d)), np.empty((count, d)), np.full(count, np.inf),
@@ -66,7 +66,7 @@ def make_particles(count: int, centre: FloatArray, views: int) -> Particles:
 
 @kernel
 def take_all(particles, start, stop):  # type: ignore[no-untyped-def]
-    """List the particles from start to stop as those to be moved; returns their number."""
+    """List the particles from start to stop in `todo`; returns their number."""
     for i in range(start, stop):
         particles.todo[i - start] = i
         particles.infeasible[i] = False
@@ -75,31 +75,31 @@ def take_all(particles, start, stop):  # type: ignore[no-untyped-def]
 
 @kernel
 def draw(rng, particles, number):  # type: ignore[no-untyped-def]
-    """Draw that many uniform numbers in [0, 1)."""
+    """Draw `number` uniform numbers in [0, 1)."""
     for i in range(number):
         particles.draws[i] = rng.random()
 
 
 @kernel
 def confine(particles, count, bounds):  # type: ignore[no-untyped-def]
-    """Put proposed positions that left the bounds (2, d) on them, where they stop."""
+    """Move proposed positions beyond the bounds (2, d) onto them; their velocity becomes 0."""
     for k in range(count):
         n = particles.todo[k]
         for i in range(bounds.shape[1]):
-            there = particles.there[n, i]
-            if there < bounds[0, i]:
-                particles.there[n, i], particles.moved[n, i] = bounds[0, i], 0.0
-            elif there > bounds[1, i]:
-                particles.there[n, i], particles.moved[n, i] = bounds[1, i], 0.0
+            proposed = particles.proposed_x[n, i]
+            if proposed < bounds[0, i]:
+                particles.proposed_x[n, i], particles.proposed_v[n, i] = bounds[0, i], 0.0
+            elif proposed > bounds[1, i]:
+                particles.proposed_x[n, i], particles.proposed_v[n, i] = bounds[1, i], 0.0
 
 
 @kernel
 def left_over(particles, count, constraints):  # type: ignore[no-untyped-def]
-    """Keep those of the first `count` in `todo` whose proposed position breaks a constraint."""
+    """Keep, of the first `count` in `todo`, those whose proposed position violates a constraint."""
     kept = 0
     for k in range(count):
         n = particles.todo[k]
-        are_feasible(particles.there[n : n + 1], constraints, particles.good[n : n + 1])
+        are_feasible(particles.proposed_x[n : n + 1], constraints, particles.good[n : n + 1])
         if not particles.good[n]:
             particles.todo[kept] = n
             kept += 1
@@ -111,8 +111,8 @@ def place(particles, start, stop, count):  # type: ignore[no-untyped-def]
     """Move particles to their proposed positions; the first `count` in `todo` are infeasible."""
     for n in range(start, stop):
         for i in range(particles.x.shape[1]):
-            particles.x[n, i] = particles.there[n, i]
-            particles.v[n, i] = particles.moved[n, i]
+            particles.x[n, i] = particles.proposed_x[n, i]
+            particles.v[n, i] = particles.proposed_v[n, i]
     for k in range(count):
         particles.infeasible[particles.todo[k]] = True
 
@@ -127,7 +127,7 @@ def begin(rng, particles, centre, sigma, bounds, confined, constraints):  # type
         for k in range(count):
             row = particles.todo[k]
             for i in range(d):
-                particles.there[row, i] = centre[i] + sigma[i] * rng.standard_normal()
+                particles.proposed_x[row, i] = centre[i] + sigma[i] * rng.standard_normal()
         if confined:
             confine(particles, count, bounds)
         count = left_over(particles, count, constraints)
@@ -135,10 +135,10 @@ def begin(rng, particles, centre, sigma, bounds, confined, constraints):  # type
             break
     for k in range(count):
         for i in range(d):
-            particles.there[particles.todo[k], i] = centre[i]
+            particles.proposed_x[particles.todo[k], i] = centre[i]
     for row in range(n):
         for i in range(d):
-            particles.moved[row, i] = (-1.0 + 2.0 * rng.random()) * sigma[i]
+            particles.proposed_v[row, i] = (-1.0 + 2.0 * rng.random()) * sigma[i]
     place(particles, start, n, start)
     for row in range(n):
         for i in range(d):
@@ -147,9 +147,9 @@ def begin(rng, particles, centre, sigma, bounds, confined, constraints):  # type
 
 @inlined
 def learn(particles, start, stop, objective):  # type: ignore[no-untyped-def]
-    """Evaluate the particles from start to stop; they and `found` learn from the costs.
+    """Evaluate the particles from start to stop; update their own bests and `found`.
 
-    A particle's evaluation stops once its cost exceeds its own best.
+    A particle's evaluation may stop when its cost exceeds that of its own best.
     """
     cutoffs, costs = particles.cutoffs, particles.costs
     for n in range(start, stop):
@@ -177,7 +177,7 @@ def learn(particles, start, stop, objective):  # type: ignore[no-untyped-def]
 
 @kernel
 def leader(particles, start, stop):  # type: ignore[no-untyped-def]
-    """Index of the particle with the best own best, of those from start to stop."""
+    """Index of the particle from start to stop with the lowest own best cost."""
     best = start
     for n in range(start, stop):
         if particles.best_costs[n] < particles.best_costs[best]:

@@ -1,4 +1,4 @@
-"""HPSO's, GLPSO's and PSO's swarm, compiled: `optim.pso` over one stage of a frame."""
+"""The swarm of HPSO, GLPSO and PSO, compiled: `optim.pso` over one stage of a frame."""
 
 import numpy as np
 
@@ -26,7 +26,7 @@ def run_pso(
     inertia_min: float = 0.1,
     acceleration: float = 2.05,
 ) -> Particles:
-    """Spend a stage's budget; settings and errors as for `optim.Pso`."""
+    """Run a stage; settings and errors as for `optim.Pso`."""
     check_inertia(inertia_max, inertia_min)
     particles = search.particles()
     steps = range(2, search.iterations + 1)
@@ -61,9 +61,10 @@ def _swarm(  # type: ignore[no-untyped-def]
 
 @kernel
 def propose(rng, particles, count, ends, w, c, sigma):  # type: ignore[no-untyped-def]
-    """Moves of the first `count` particles in `todo`, as `optim.pso.inertia_step`.
+    """Propose moves of the first `count` particles in `todo`, as `optim.pso.inertia_step`.
 
-    ends: (s + 1,) where each of s swarms begins, and the end; each follows a leader of its own.
+    ends: (s + 1,) index of the first particle of each of s swarms, and n. Each swarm follows its
+    own leader.
     """
     d = sigma.size
     draw(rng, particles, 2 * count * d)
@@ -79,5 +80,5 @@ def propose(rng, particles, count, ends, w, c, sigma):  # type: ignore[no-untype
             speed = w * particles.v[n, i] + c * r1 * (best[n, i] - x[n, i])
             speed += c * r2 * (best[first, i] - x[n, i])
             speed = min(max(speed, -2.0 * sigma[i]), 2.0 * sigma[i])
-            particles.moved[n, i] = speed
-            particles.there[n, i] = x[n, i] + speed
+            particles.proposed_v[n, i] = speed
+            particles.proposed_x[n, i] = x[n, i] + speed

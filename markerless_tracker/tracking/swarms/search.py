@@ -1,4 +1,4 @@
-"""One stage of a frame as the compiled swarms take it."""
+"""The input of the compiled swarms: one stage of a frame."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from markerless_tracker.tracking.swarms.particles import Particles, make_particl
 
 @dataclass(frozen=True, eq=False)
 class SwarmSearch:
-    """A search of d parameters; `optim.Problem` with the body and the evidence.
+    """A search over d parameters: an `optim.Problem` with the body and the evidence.
 
     Attributes:
         centre, sigma: (d,) as in `Problem`.
@@ -33,5 +33,5 @@ class SwarmSearch:
     objective: Objective
 
     def particles(self) -> Particles:
-        """Room for the particles."""
+        """Arrays for the particles."""
         return make_particles(self.count, self.centre, len(self.objective.views.size))

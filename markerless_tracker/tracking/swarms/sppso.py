@@ -1,4 +1,4 @@
-"""SPPSO's swarm, compiled: `optim.sppso` over one stage of a frame."""
+"""The swarm of SPPSO, compiled: `optim.sppso` over one stage of a frame."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from markerless_tracker.tracking.swarms.search import SwarmSearch
 
 
 def run_sppso(search: SwarmSearch, *, update: str = "iteration") -> Particles:
-    """Spend a stage's budget.
+    """Run a stage.
 
     Args:
         search: the stage.
@@ -46,7 +46,7 @@ def _swarm(  # type: ignore[no-untyped-def]
     rng, particles, batch, accelerations, constrictions, centre, sigma, bounds, constraints,
     objective,
 ):  # fmt: skip
-    """The swarm's best is that before each batch of particles."""
+    """batch: number of particles after which the swarm's best is updated."""
     count = particles.x.shape[0]
     begin(rng, particles, centre, sigma, bounds, False, constraints)
     for k in range(accelerations.size + 1):
@@ -66,7 +66,7 @@ def _swarm(  # type: ignore[no-untyped-def]
 
 @compiled(error_model="numpy")
 def _propose(rng, particles, count, c, chi, sigma):  # type: ignore[no-untyped-def]
-    """Moves of the first `count` particles in `todo`, as `optim.sppso.constricted_step`."""
+    """Propose moves of the first `count` particles in `todo`: `optim.sppso.constricted_step`."""
     d = sigma.size
     draw(rng, particles, 2 * count * d)
     x, best, found = particles.x, particles.best, particles.found
@@ -77,5 +77,5 @@ def _propose(rng, particles, count, c, chi, sigma):  # type: ignore[no-untyped-d
             own, all_ = best[n, i] - x[n, i], found[i] - x[n, i]
             speed = chi * (particles.v[n, i] + c * r1 * own + c * r2 * all_)
             speed = min(max(speed, -2.0 * sigma[i]), 2.0 * sigma[i])
-            particles.moved[n, i] = speed
-            particles.there[n, i] = x[n, i] + speed
+            particles.proposed_v[n, i] = speed
+            particles.proposed_x[n, i] = x[n, i] + speed

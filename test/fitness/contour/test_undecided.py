@@ -137,11 +137,11 @@ def test_near_the_edge_distances_are_those_of_the_whole_window(seed) -> None:
         top, left = rng.integers(0, (110, 80))
         undecided[top : top + 10, left : left + 8] = 1
     undecided[person == 1] = 0
-    reach_px = 24
+    radius_px = 24
     distance = signed_distance(person)
     wider = signed_distance(person | undecided)
     same = (np.abs(wider - distance) < 0.5) & (cv2.dilate(undecided, _NEAR_UNDECIDED) == 0)
-    known, free = _without_undecided(distance, person, undecided, reach_px)
-    near = np.abs(distance) <= reach_px
+    known, free = _without_undecided(distance, person, undecided, radius_px)
+    near = np.abs(distance) <= radius_px
     np.testing.assert_array_equal(known[near], np.where(same, distance, 1e4)[near])
     np.testing.assert_array_equal(free, cv2.dilate(undecided, _NEAR_UNDECIDED) == 0)

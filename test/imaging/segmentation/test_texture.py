@@ -251,7 +251,7 @@ def slow_labels(
     base: FloatImage,
     light: FloatImage,
     labels: Levels,
-    looked_at: Levels,
+    examined: Levels,
     *,
     agree: np.float32,
     radius: int,
@@ -268,7 +268,7 @@ def slow_labels(
         if labels[i, j] == 0:
             if reveal and covered and not explained and protect:
                 out[i, j] = 255
-        elif looked_at[i, j] != 0 and (labels[i, j] == 255 or protect):
+        elif examined[i, j] != 0 and (labels[i, j] == 255 or protect):
             if explained:
                 out[i, j] = 127
             elif covered and protect:
@@ -286,13 +286,13 @@ def test_labels_by_light(seed: int, radius: int, protect: bool, reveal: bool) ->
     light[known < 0.2] = rng.uniform(0.3, 1.0)
     light[known > 0.6] = -1.0
     labels = rng.choice(np.array([0, 127, 255], np.uint8), light.shape)
-    looked_at = rng.choice(np.array([0, 255], np.uint8), light.shape)
+    examined = rng.choice(np.array([0, 255], np.uint8), light.shape)
     gain, agree = np.float32(1.1), np.float32(12.0)
     square = np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
     near_valid = cv2.dilate((light > 0.0).astype(np.uint8), square)
     # The arrays of labels begin 3 columns and 2 rows before those of the light.
     wide = np.pad(labels, ((2, 0), (3, 0)))
-    wide_looked_at = np.pad(looked_at, ((2, 0), (3, 0)))
+    wide_looked_at = np.pad(examined, ((2, 0), (3, 0)))
     part = (4, 5, 30, 28)
     apply_light(
         image, mean, gain, agree, radius, protect, reveal, 0, 0, light, near_valid, part, (3, 2),
@@ -301,7 +301,7 @@ def test_labels_by_light(seed: int, radius: int, protect: bool, reveal: bool) ->
     expected = labels.copy()
     inner = np.s_[part[1] : part[3], part[0] : part[2]]
     expected[inner] = slow_labels(
-        image, mean * gain, light, labels, looked_at, agree=agree, radius=radius, protect=protect,
+        image, mean * gain, light, labels, examined, agree=agree, radius=radius, protect=protect,
         reveal=reveal,
     )[inner]  # fmt: skip
     np.testing.assert_array_equal(wide[2:, 3:], expected)
@@ -327,7 +327,7 @@ def test_correction_of_labels(seed: int, radius: int) -> None:
     whole = Region(0, 0, 70, 60)
     corrected = labels.copy()
     correct_labels(
-        image, mean, gain, sigma, corrected, whole, whole, whole, looked_at=labels,
+        image, mean, gain, sigma, corrected, whole, whole, whole, examined=labels,
         radius=radius, light=(0.2, 1.03), protect=True, reveal=True,
     )  # fmt: skip
     np.testing.assert_array_equal(corrected, expected)

@@ -30,7 +30,7 @@ from markerless_tracker.node.ros.process import run_executable
 def body(argv, stop):
     for _ in range(3):
         exec("os.kill(os.getpid(), int(sys.argv[1]))")
-    print("went on, asked:", stop.asked)
+    print("went on, asked:", stop.received)
     return 7
 sys.exit(run_executable("x", body, []))
 """

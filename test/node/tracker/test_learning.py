@@ -32,7 +32,7 @@ def room(seed: int, gain: float = 1.0, *, sigma: float = 3.0) -> np.ndarray:
 def collect(learning: Learning, taker: Taker, sets: list[dict[str, Any]]) -> None:
     for images in sets:
         learning.take(images)
-        if learning.looks:
+        if learning.searches_person:
             learning.saw(TrackState.SEARCHING)
         learning.finish_if_complete(taker)
 
@@ -76,7 +76,7 @@ def test_a_person_in_the_first_or_the_last_set_is_refused(which: int) -> None:
     sets = sets_of(3)
     for images in sets:
         learning.take(images)
-        if learning.looks:
+        if learning.searches_person:
             there = images is sets[which]
             learning.saw(TrackState.TRACKING if there else TrackState.SEARCHING)
         learning.finish_if_complete(taker)

@@ -18,7 +18,7 @@ from markerless_tracker.tracking.limbs.facing import (
 )
 from markerless_tracker.tracking.limbs.search import LimbSearch
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.mirror import TurnedRound, turned_by
+from markerless_tracker.tracking.start.mirror import OppositeHeading, rotated_by
 from markerless_tracker.tracking.start.own_evidence import OwnEvidence
 from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.recombination import Recombiner
@@ -39,7 +39,7 @@ def observed(scene, frame):
 
 
 def turned_away(body, pose):
-    return np.clip(TurnedRound(body).of(pose), *body.limits)
+    return np.clip(OppositeHeading(body).of(pose), *body.limits)
 
 
 def compared(scene, pose_of, count):
@@ -58,22 +58,22 @@ def compared(scene, pose_of, count):
     return found
 
 
-@pytest.mark.parametrize("way_rad", [np.pi, 1.3, -1.7])
-def test_many_comparisons_turn_a_person_who_faces_the_wrong_way(scene, way_rad) -> None:
+@pytest.mark.parametrize("direction_rad", [np.pi, 1.3, -1.7])
+def test_many_comparisons_turn_a_person_who_faces_the_wrong_way(scene, direction_rad) -> None:
     """Whichever of the turns is the best one, though others are better, too."""
     body = scene.body
 
     def wrong(true):
-        if way_rad == np.pi:
+        if direction_rad == np.pi:
             return turned_away(body, true)
-        return np.clip(turned_by(body, true, way_rad, about=true), *body.limits)
+        return np.clip(rotated_by(body, true, direction_rad, about=true), *body.limits)
 
     found = compared(scene, wrong, 3 * LEAST_COMPARISONS + 3)
     first = next(k for k, pose in enumerate(found) if pose is not None)
     assert first >= 3 * (LEAST_COMPARISONS - 1)
     true = scene.frame(15 * first)[2]
-    ways = [heading(markers(body, pose)) for pose in (found[first], true)]
-    assert heading_difference(*ways) < 0.4
+    headings = [heading(markers(body, pose)) for pose in (found[first], true)]
+    assert heading_difference(*headings) < 0.4
 
 
 def test_a_person_who_faces_the_right_way_stays(scene) -> None:
@@ -90,8 +90,8 @@ def test_a_tracker_that_starts_the_wrong_way_turns_the_person_round(scene) -> No
         result = tracker.step(seen, round(frame * 1e9 / 60))
         warnings += result.warnings
     assert "the person faces another way: turned round" in warnings
-    ways = [heading(markers(body, pose)) for pose in (result.pose, true)]
-    assert heading_difference(*ways) < 0.4
+    headings = [heading(markers(body, pose)) for pose in (result.pose, true)]
+    assert heading_difference(*headings) < 0.4
 
 
 def test_at_first_comparisons_are_frequent() -> None:

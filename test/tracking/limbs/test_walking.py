@@ -1,4 +1,4 @@
-"""A body that does not face the way that the person walks is turned."""
+"""A body that does not face the walking direction is rotated."""
 
 import numpy as np
 import pytest
@@ -19,13 +19,13 @@ from markerless_tracker.tracking.limbs.walking import (
 )
 from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.mirror import TRUNK, turned_by
+from markerless_tracker.tracking.start.mirror import TRUNK, rotated_by
 
 BODY = load_body("person31", 1.75)
 STEP_NS = 50_000_000
 
 
-def walks(watch, way_rad, faced_rad, speed_m_s, count, begin_ns=0):
+def walk_along(watch, direction_rad, faced_rad, speed_m_s, count, begin_ns=0):
     """What a walk along a way proposes, frame after frame; with the poses."""
     found = []
     for k in range(count):
@@ -33,15 +33,15 @@ def walks(watch, way_rad, faced_rad, speed_m_s, count, begin_ns=0):
         pose[BODY.index("pelvis_rz")] = faced_rad
         pose[BODY.index("l_hip_y")] += 0.4
         metres = speed_m_s * k * STEP_NS * 1e-9
-        pose[BODY.index("pelvis_tx")] += metres * np.cos(way_rad)
-        pose[BODY.index("pelvis_ty")] += metres * np.sin(way_rad)
+        pose[BODY.index("pelvis_tx")] += metres * np.cos(direction_rad)
+        pose[BODY.index("pelvis_ty")] += metres * np.sin(direction_rad)
         found.append((pose, watch.due(BODY, pose, BODY.limits, begin_ns + k * STEP_NS)))
     return found
 
 
 @pytest.mark.parametrize("off_rad", [1.0, -1.5, np.pi])
 def test_a_body_that_walks_another_way_is_turned_to_it(off_rad) -> None:
-    found = walks(WalkingWatch(), 0.5, 0.5 + off_rad, 1.0, 12)
+    found = walk_along(WalkingWatch(), 0.5, 0.5 + off_rad, 1.0, 12)
     first = next(k for k, (_, poses) in enumerate(found) if poses)
     assert first == LEAST_WALKED_NS // STEP_NS
     pose, (same, mirrored) = found[first]
@@ -61,17 +61,17 @@ def test_a_body_that_walks_another_way_is_turned_to_it(off_rad) -> None:
     ("off_rad", "speed_m_s"), [(0.9 * LEAST_ANGLE_RAD, 1.0), (np.pi, 0.9 * LEAST_SPEED_M_S)]
 )
 def test_a_body_that_faces_about_that_way_or_hardly_walks_stays(off_rad, speed_m_s) -> None:
-    found = walks(WalkingWatch(), 2.0, 2.0 + off_rad, speed_m_s, 12)
+    found = walk_along(WalkingWatch(), 2.0, 2.0 + off_rad, speed_m_s, 12)
     assert not any(poses for _, poses in found)
 
 
 def test_an_earlier_walk_is_forgotten() -> None:
     watch = WalkingWatch()
-    assert any(poses for _, poses in walks(watch, 0.0, np.pi, 1.0, 12))
-    still = walks(watch, 0.0, np.pi, 0.0, 30, begin_ns=20 * STEP_NS)
+    assert any(poses for _, poses in walk_along(watch, 0.0, np.pi, 1.0, 12))
+    still = walk_along(watch, 0.0, np.pi, 0.0, 30, begin_ns=20 * STEP_NS)
     assert not any(poses for _, poses in still[WALKED_NS // STEP_NS + 1 :])
     # Time that was set back begins anew.
-    back = walks(watch, 0.0, np.pi, 1.0, 12)
+    back = walk_along(watch, 0.0, np.pi, 1.0, 12)
     first = next(k for k, (_, poses) in enumerate(back) if poses)
     assert first == LEAST_WALKED_NS // STEP_NS
 
@@ -87,14 +87,14 @@ def test_a_walker_who_is_tracked_sideways_is_turned() -> None:
             name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
             for name, mask in masks.items()
         }
-        pose = np.clip(turned_by(body, true, 1.6, about=true), *body.limits)
+        pose = np.clip(rotated_by(body, true, 1.6, about=true), *body.limits)
         stamp_ns = round(frame * 1e9 / 60)
         contours = searcher.frame(seen, stamp_ns, pose).contours
         found = watch.recover(searcher, contours, Seen(stamp_ns, seen, seen, seen), pose)
-        assert found.turned == (stamp_ns >= LEAST_WALKED_NS)
-        if found.turned:
-            ways = [heading(markers(body, one)) for one in (found.pose, true)]
-            assert heading_difference(*ways) < 0.2
+        assert found.rotated == (stamp_ns >= LEAST_WALKED_NS)
+        if found.rotated:
+            headings = [heading(markers(body, one)) for one in (found.pose, true)]
+            assert heading_difference(*headings) < 0.2
             assert found.notes == ("the person faces another way: turned round",)
             return
     raise AssertionError("never turned")

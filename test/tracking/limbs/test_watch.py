@@ -145,22 +145,22 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
 
 
 @pytest.mark.parametrize(
-    ("moved_m", "turned", "allowed"),
+    ("moved_m", "rotated", "allowed"),
     [(0.5 * RECOVERED_M, False, 0.2), (2.0 * RECOVERED_M, False, 1.0), (0.0, True, 1.0)],
 )
-def test_a_limb_jumps_only_from_where_it_was_wrong(standing, moved_m, turned, allowed) -> None:
+def test_a_limb_jumps_only_from_where_it_was_wrong(standing, moved_m, rotated, allowed) -> None:
     body = standing[0].body
     pose, arm = body.neutral + 1.0, body.subspaces["l_arm"]
     near = [np.array([body.neutral - reach, body.neutral + reach]) for reach in (0.3, 0.2)]
-    placed = Recovered(pose, ("l_arm",), turned=turned, moved_m=moved_m).placed(body, *near)
+    placed = Recovered(pose, ("l_arm",), rotated=rotated, moved_m=moved_m).placed(body, *near)
     np.testing.assert_allclose((placed - body.neutral)[arm], allowed)
     rest = np.setdiff1d(np.arange(body.size), arm)
-    np.testing.assert_allclose((placed - body.neutral)[rest], 1.0 if turned else 0.3)
+    np.testing.assert_allclose((placed - body.neutral)[rest], 1.0 if rotated else 0.3)
 
 
 def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch) -> None:
     scene, seen, _, hidden = balancing
-    explained = "markerless_tracker.tracking.limbs.watch.look_unexplained"
+    explained = "markerless_tracker.tracking.limbs.watch.find_unexplained"
     monkeypatch.setattr(explained, lambda *_: Unexplained({}, {}))
 
     def found(stamps, threads=1):
@@ -190,7 +190,7 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
     scene, seen, pose, _ = balancing
     limbs = ("r_leg", "l_leg", "r_arm", "l_arm")
     for name, value in (
-        ("watch.look_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})),
+        ("watch.find_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})),
         (
             "search.other_limb",
             lambda _f, _r, at, limb, *_: searched.append(limb.tobytes()) or (at, 9.0),
@@ -225,7 +225,7 @@ def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_turns(
         return at, 9.0
 
     monkeypatch.setattr(
-        f"{package}.watch.look_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})
+        f"{package}.watch.find_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})
     )
     monkeypatch.setattr(f"{package}.search.other_limb", elsewhere)
     monkeypatch.setattr(f"{package}.watch.WAIT_NS", 0)
@@ -244,7 +244,7 @@ def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monk
     scene, seen, pose, _ = balancing
     searched: list[int] = []
     for name, value in (
-        ("watch.look_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})),
+        ("watch.find_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})),
         ("search.other_limb", lambda _f, _r, at, limb, *_: searched.append(now) or (at, 9.0)),
         ("watch.ROTATION_NS", 10**12),
     ):
@@ -266,7 +266,7 @@ def test_a_limb_does_not_wait_where_more_silhouette_is_unexplained_than_before(
     areas: dict[str, float] = {"l_leg": 0.01}
     searched: list[tuple[int, bytes]] = []
     for name, value in (
-        ("watch.look_unexplained", lambda *_: Unexplained(dict(areas), {})),
+        ("watch.find_unexplained", lambda *_: Unexplained(dict(areas), {})),
         (
             "search.other_limb",
             lambda _f, _r, at, limb, *_: searched.append((now, limb)) or (at, 9.0),

@@ -94,10 +94,10 @@ def test_the_fit_begins_anew_when_a_limb_was_found_elsewhere(
     fit = BodyEstimate.fit_tracked_frame
     stamps = [taken[index][0] for index in recovered]
 
-    def told(self, search, *, turned: bool, recovered: bool):
-        return fit(self, search, turned=turned, recovered=now in stamps)
+    def with_recovery(self, search, *, rotated: bool, recovered: bool):
+        return fit(self, search, rotated=rotated, recovered=now in stamps)
 
-    monkeypatch.setattr(BodyEstimate, "fit_tracked_frame", told)
+    monkeypatch.setattr(BodyEstimate, "fit_tracked_frame", with_recovery)
     lengths = []
     for now, seen in taken:
         tracker.step(seen, now)

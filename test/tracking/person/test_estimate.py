@@ -123,7 +123,7 @@ def estimated(*, known: bool) -> BodyEstimate:
 
 def test_an_unmeasured_body_is_generic_again_once_the_person_was_turned_round() -> None:
     estimate = estimated(known=False)
-    moved = estimate.turned()
+    moved = estimate.restart_lengths()
     assert moved is not None and not moved.any()
     np.testing.assert_allclose(estimate.body.cone_shape, estimate.generic.cone_shape, atol=1e-9)
     np.testing.assert_allclose(estimate.body.cone_length, estimate.generic.cone_length, atol=1e-9)
@@ -132,5 +132,5 @@ def test_an_unmeasured_body_is_generic_again_once_the_person_was_turned_round() 
 def test_a_measured_body_stays_when_the_person_is_turned_round() -> None:
     estimate = estimated(known=True)
     before = estimate.body
-    assert estimate.turned() is None
+    assert estimate.restart_lengths() is None
     assert estimate.body is before

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, load_body, markers
-from markerless_tracker.tracking.start.mirror import Mirror, TurnedRound
+from markerless_tracker.tracking.start.mirror import Mirror, OppositeHeading
 
 
 @pytest.mark.parametrize("name", ["person31", "balan31", "humaneva34"])
@@ -44,7 +44,7 @@ def test_a_body_turned_round_has_its_joints_where_those_of_the_other_side_were(n
         for side in "lr":
             pose[body.index(f"{side}_{angle}")] += 0.3 * rng.standard_normal()
     pose[[body.index(f"pelvis_{i}") for i in ("tx", "ty", "rz", "ry")]] = 0.4, -0.2, 2.0, 0.2
-    turned = TurnedRound(body).of(pose)
+    turned = OppositeHeading(body).of(pose)
     before, after = markers(body, pose), markers(body, turned)
     np.testing.assert_allclose(after[OTHER], before, atol=0.002)
 
@@ -54,7 +54,7 @@ def test_legs_and_trunk_of_other_bodies_stay_near_where_they_were(name) -> None:
     body = load_body(name, 1.7)
     pose = body.neutral.copy()
     pose[[body.index("l_hip_y"), body.index("r_hip_y")]] += 0.3, -0.2
-    before, after = markers(body, pose), markers(body, TurnedRound(body).of(pose))
+    before, after = markers(body, pose), markers(body, OppositeHeading(body).of(pose))
     rows = [
         k
         for k, marker in enumerate(MARKER_NAMES)
@@ -68,6 +68,6 @@ def test_turning_twice_changes_nothing() -> None:
     body = load_body("person32", 1.7)
     rng = np.random.default_rng(5)
     pose = body.neutral + 0.1 * rng.standard_normal(body.size)
-    again = TurnedRound(body).of(TurnedRound(body).of(pose))
+    again = OppositeHeading(body).of(OppositeHeading(body).of(pose))
     again[body.index("pelvis_rz")] -= 2.0 * np.pi
     np.testing.assert_allclose(again, pose, atol=1e-9)

@@ -84,7 +84,7 @@ def test_a_second_frame_is_searched_anew_only_in_doubt(
     monkeypatch.setattr(f"{STARTER}._SURE_FIT", sure_fit)
     monkeypatch.setattr(f"{STARTER}._SURE_GAP", sure_gap)
     monkeypatch.setattr(
-        f"{STARTER}.Starter._second_look",
+        f"{STARTER}.Starter._second_search",
         lambda _, frame, population, seen: searched.append(1) or population,
     )
     tracker = tracker_of(scene, stature=1.72)

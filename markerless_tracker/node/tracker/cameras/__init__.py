@@ -1,1 +1,1 @@
-"""Inputs of the cameras, images or evidence, and what is counted of each for `state`."""
+"""Inputs of the cameras, images or evidence, and the counts of each camera for `state`."""

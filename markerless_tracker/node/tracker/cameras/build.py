@@ -1,4 +1,4 @@
-"""The inputs of all cameras as the settings say, and what the tracker gets of their messages."""
+"""Makes the inputs of all cameras from the settings, and the tracker's views from messages."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -75,10 +75,10 @@ def make_inputs(
 
 
 def view_reader(scaled: CameraRig, inputs: Sequence[CameraInput]) -> Callable[[str, Any], Any]:
-    """Makes the tracker's image or observation of a camera's message.
+    """A function that makes the tracker's image or observation of a camera's message.
 
     Args:
-        scaled: cameras of the images as the tracker gets them.
+        scaled: cameras of the scaled images, which the tracker uses.
         inputs: of all cameras.
     """
     sizes_px = {camera.name: camera.size_px for camera in scaled}

@@ -14,12 +14,12 @@ class SyncCounts:
     """Counts of sets and views.
 
     Attributes:
-        complete: sets of which every camera's view came, in order of time.
-        skipped: complete sets that a newer one replaced before they were taken.
-        incomplete: sets dropped because a view of them never came.
-        late: complete sets dropped because a newer one was complete before.
-        duplicates: views dropped because their camera had sent that stamp just before.
-        restarts: times that the stamps were set back.
+        complete: sets with a view of every camera, in order of time.
+        skipped: complete sets that were replaced by a newer set before they were taken.
+        incomplete: sets dropped because a view never came.
+        late: complete sets dropped because a newer set was complete before.
+        duplicates: views dropped because they repeat the stamp before.
+        restarts: number of times that stamps ran backwards.
     """
 
     complete: int = 0
@@ -32,14 +32,15 @@ class SyncCounts:
 
 @dataclass(frozen=True)
 class CameraCounts:
-    """Counts of one camera's views; those that wait for others are in none but `received`.
+    """Counts of one camera's views; views that wait for others count as `received` only.
 
     Attributes:
-        received: usable views, repeated stamps included.
+        received: usable views, including repeated stamps.
         matched: views of complete sets.
-        late: views of sets that were complete after a newer one.
-        dropped: views of which no set became complete, and repeated stamps.
-        offset_ms: median distance of its stamps from the median stamp of their sets; None so far.
+        late: views of sets that were complete after a newer set.
+        dropped: views whose set never became complete, and repeated stamps.
+        offset_ms: median difference of its stamps from the median stamp of their sets; None before
+            the first set.
     """
 
     received: int = 0
@@ -61,7 +62,7 @@ class CameraCounter:
         self.reset()
 
     def reset(self) -> None:
-        """Count from 0, and forget the offsets."""
+        """Restart the counts at 0, and forget the offsets."""
         self._counts: dict[str, Counter[str]] = {name: Counter() for name in self._cameras}
         self._offsets_ns: dict[str, deque[float]] = {
             name: deque(maxlen=WINDOW) for name in self._cameras

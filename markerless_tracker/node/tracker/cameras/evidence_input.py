@@ -1,4 +1,4 @@
-"""Evidence of one camera that a segmenter made: silhouettes and edge maps are paired by stamp."""
+"""Receives a segmenter's evidence of one camera; silhouettes and edge maps are paired by stamp."""
 
 from typing import Any
 
@@ -16,21 +16,21 @@ from markerless_tracker.node.segmenter.wire import (
 from markerless_tracker.node.tracker.inputs import CameraInput
 
 _HELD = 8
-"""Silhouettes or edge maps that wait for the other one of their image."""
+"""Largest number of silhouettes or edge maps that wait for their counterpart."""
 
 
 class EvidenceInput(CameraInput):
-    """Receives one camera's evidence in place of images, and its camera infos.
+    """Receives one camera's evidence instead of images, and its camera infos.
 
     Args:
         name, camera, sets, status: as for `CameraInput`; `sets` gets `Evidence`.
         scale: factor by which images are made smaller before they are segmented.
-        digest: of the tracker's own settings of the imaging.
+        digest: of the tracker's own imaging settings.
         with_edges: whether edge maps are used.
         others: as for `CameraInput`.
 
     Attributes:
-        edges_topic: the camera's; None if edge maps are not used.
+        edges_topic: of the camera; None if edge maps are not used.
     """
 
     _what = "evidence"

@@ -1,4 +1,4 @@
-"""How the worker keeps up with the images.
+"""Keeps the worker's pace up with the images.
 
-Evidence is made ahead; a worker that is late spends less on each set.
+Evidence is made ahead; a worker that is late spends less effort on each set.
 """

@@ -1,4 +1,4 @@
-"""The next set is taken, and its evidence made, while the set before it is fitted."""
+"""Takes the next set and makes its evidence while the set before it is fitted."""
 
 import time
 from collections import deque
@@ -12,18 +12,18 @@ from markerless_tracker.node.tracker.pace.waiting import MatchedSet
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 
 _RECENT = 5
-"""Fits, and sets made ahead, by whose times the next set is taken."""
+"""Number of the latest fits, and of evidence made ahead, whose durations determine the delay."""
 _SPARE_S = 0.002
 
 
 @dataclass(frozen=True)
 class Taken:
-    """A set that was taken, and what was made of it.
+    """A set that was taken, and the evidence made of it.
 
     Attributes:
         matched: the set.
-        made: what `make` returned; None if it raised.
-        error: what it raised.
+        made: returned by `make`; None if it raised an error.
+        error: raised by `make`.
     """
 
     matched: MatchedSet[Any]
@@ -32,16 +32,16 @@ class Taken:
 
 
 class Ahead:
-    """Takes the newest set and makes its evidence, in a thread beside the one that fits.
+    """Takes the newest set and makes its evidence, in a second thread during a fit.
 
-    The set is taken as late as its evidence will be ready when the fit ends, so that it is the
-    newest. One that waits for longer is fitted, too: making the evidence of a newer one would delay
-    the tracker further.
+    The set is taken as late as possible for its evidence to be ready when the fit ends, so that it
+    is the newest one. If the fit takes longer, the set is fitted nevertheless: to make evidence of
+    a newer set would delay the tracker further.
 
     Args:
         sets: source of the complete sets.
-        make: called in the thread beside with a set.
-        poll_s: how long a set is waited for.
+        make: called with a set in the second thread.
+        poll_s: longest wait for a set.
         clock: monotonic time in s.
     """
 
@@ -65,25 +65,25 @@ class Ahead:
         self._makes_s = deque([0.0], maxlen=_RECENT)
 
     def next(self) -> Taken | None:
-        """The set to fit now; None if none came in time."""
+        """The set to fit now; None if no set came in time."""
         following, self._following = self._following, None
         return self._take(0.0) if following is None else following.result()
 
     def fitting(self) -> None:
-        """A fit begins: the next set is made beside it."""
+        """Note that a fit begins; the next set's evidence is made during it."""
         self._fitted.clear()
         self._began_s = self._clock()
-        # A single long fit must not make all sets after it wait.
+        # The shortest fit counts, so that a single long fit does not delay the sets after it.
         delay_s = max(0.0, min(self._fits_s) - max(self._makes_s) - _SPARE_S)
         self._following = self._pool.submit(self._take, delay_s)
 
     def fitted(self) -> None:
-        """The fit ended."""
+        """Note that the fit has ended."""
         self._fits_s.append(self._clock() - self._began_s)
         self._fitted.set()
 
     def close(self) -> None:
-        """Take no more sets."""
+        """Stop taking sets."""
         self._fitted.set()
         self._sets.wake()
         self._pool.shutdown()

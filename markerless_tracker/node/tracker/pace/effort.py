@@ -1,29 +1,30 @@
-"""How much is spent on each set when sets come faster than they are tracked."""
+"""Decides the effort for each set when sets come faster than they are tracked."""
 
 from collections import deque
 from dataclasses import dataclass
 
 LEAST = 0.5
-"""Least effort: searching fewer frames costs more accuracy than it saves time."""
+"""Least effort: fewer searches would cost much accuracy and save little time."""
 LATE_SETS = 2
-"""Late sets among the last `WINDOW` before the effort falls: one long search is no overload."""
+"""Number of late sets among the last `WINDOW` at which the effort falls: one long search is no
+overload."""
 WINDOW = 12
 EARLY_SETS = 12
-"""Sets in a row with time to spare before the effort rises."""
+"""Number of consecutive sets with time to spare before the effort rises."""
 SPARE = 0.2
-"""Share of the time between two sets that counts as time to spare."""
+"""Least fraction of the time between two sets that counts as time to spare."""
 _RISE = 1.15
 
 
 @dataclass(frozen=True)
 class Lateness:
-    """How late the worker is when it takes a set.
+    """Lateness of the worker when it takes a set.
 
     Attributes:
-        left_out: complete sets that newer ones replaced since the worker took its last set.
-        waited_s: time that the worker waited for the set; 0 if it lay ready.
+        left_out: number of complete sets replaced by newer ones since the worker took its last set.
+        waited_s: time that the worker waited for the set; 0 if it was ready.
         age_s: time since the set was complete.
-        period_s: time from the arrival of the last set that was complete to that of this one.
+        period_s: time from the completion of the set before to that of this set.
     """
 
     left_out: int
@@ -33,7 +34,7 @@ class Lateness:
 
     @property
     def late(self) -> bool:
-        """Whether sets were left out, or this one waited for longer than until the next came."""
+        """Whether sets were left out, or this set waited for longer than the time between sets."""
         return self.left_out > 0 or self.age_s > self.period_s > 0.0
 
     @property
@@ -45,9 +46,9 @@ class Lateness:
 class EffortRule:
     """The effort for the next set, in (0, 1].
 
-    It falls to the least at once when the worker is late: the time between the sets it takes makes
-    each of them costlier. It rises again while there is time to spare; in between it stays, so that
-    it does not swing.
+    It falls to `LEAST` when the worker is late, since longer times between the sets make each of
+    them costlier. It rises again while there is time to spare. In between it does not change, so
+    that it does not oscillate.
     """
 
     def __init__(self) -> None:
@@ -57,7 +58,7 @@ class EffortRule:
 
     @property
     def effort(self) -> float:
-        """The effort for the set that was taken last."""
+        """The effort for the last set that was taken."""
         return self._effort
 
     def take(self, lateness: Lateness) -> float:

@@ -1,18 +1,17 @@
-"""Which set is the first that is tracked."""
+"""Selects the first set that is tracked."""
 
 START_TOLERANCE_NS = 4_000_000
-"""Tolerance when a frame is compared with the start row's time: marker files round their times, and
-frames are further apart (8.3 ms at 120 fps)."""
+"""Tolerance between a frame's stamp and the start row's time: marker files round their times. It is
+less than half the time between frames at 120 fps (8.3 ms)."""
 
 
 class StartTimeGate:
-    """Drops sets before the start row's time, once.
+    """Drops the sets before the start row's time.
 
-    A stream that begins later than that time, or a start without a time, begins with its first
-    complete set.
+    Without a time, or if the stream begins after it, tracking begins with the first complete set.
 
     Args:
-        start_ns: the start row's time, None if there is none.
+        start_ns: time of the start row; None if there is none.
     """
 
     def __init__(self, start_ns: int | None) -> None:
@@ -20,7 +19,7 @@ class StartTimeGate:
         self._open = start_ns is None
 
     def admits(self, stamp_ns: int) -> bool:
-        """Whether a set of that stamp is to be tracked."""
+        """Whether a set with a stamp is to be tracked."""
         if not self._open and self._start_ns is not None:
             self._open = stamp_ns >= self._start_ns - START_TOLERANCE_NS
         return self._open

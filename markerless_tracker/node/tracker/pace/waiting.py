@@ -1,4 +1,4 @@
-"""The sets that wait for the worker: the newest alone, or some of those before it, too."""
+"""The sets that wait for the worker: only the newest, or some of the earlier ones, too."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -8,28 +8,29 @@ from typing import Generic, TypeVar
 View = TypeVar("View")
 
 SPACING_NS = 80_000_000
-"""Time between two sets that are kept: a pose is refined across it without a wider search."""
+"""Time between two kept sets, across which a pose is refined without a wider search."""
 AT_MOST, MOST_BYTES = 48, 400_000_000
-"""Sets that are kept, and the size of their images: a long search must not fill the memory."""
+"""Largest number of kept sets, and of the bytes of their images, so that a long search does not
+fill the memory."""
 CLOSE = 8
-"""Sets that stay as close as they are when there are too many: the start needs so many."""
+"""Number of the first kept sets that are never thinned out: the frames of an automatic start."""
 PLACE_NS = 250_000_000
-"""Time in which a place is lost while the worker catches up."""
+"""While the worker catches up, one place less is kept after each such time."""
 _SPARE = 2
-"""Places beyond those needed when that begins: a long step must not cost sets."""
+"""Spare places when catching up begins, so that a long step does not lose sets."""
 
 
 @dataclass(frozen=True)
 class MatchedSet(Generic[View]):
-    """One view of every camera that sends.
+    """A set: one view of every camera that sends.
 
     Attributes:
-        stamp_ns: the earliest of their stamps.
+        stamp_ns: the earliest stamp of the views.
         views: by camera, in the order of the cameras.
-        arrived_s: when the last of them came, in the caller's clock.
-        restarted: stamps were set back since the last set handed out (a bag was played again).
-        replaced: complete sets that this one replaced since the last set handed out.
-        period_s: time since the set before it was complete, 0 for the first.
+        arrived_s: time at which the last view came, of the caller's clock.
+        restarted: whether stamps ran backwards since the last set that was taken (a bag restarted).
+        replaced: number of complete sets replaced since the last set that was taken.
+        period_s: time from the completion of the set before to that of this set; 0 for the first.
     """
 
     stamp_ns: int
@@ -40,7 +41,7 @@ class MatchedSet(Generic[View]):
     period_s: float = 0.0
 
     def replacing(self, other: "MatchedSet[View]") -> "MatchedSet[View]":
-        """This set, handed out instead of another."""
+        """This set, returned instead of another."""
         return replace(
             self,
             restarted=self.restarted or other.restarted,
@@ -49,18 +50,17 @@ class MatchedSet(Generic[View]):
 
 
 def kept_sets(set_bytes: int) -> int:
-    """How many sets to keep whose images have that size."""
+    """Number of sets to keep, given the size of a set's images."""
     return max(1, min(AT_MOST, MOST_BYTES // max(1, set_bytes)))
 
 
 class WaitingSets(Generic[View]):
-    """The newest set; while sets are kept, also earlier ones that lie `SPACING_NS` apart.
+    """The newest set; while sets are kept, also earlier sets at intervals of `SPACING_NS`.
 
-    An automatic start searches its first set for about a second, and needs further sets that lie
-    near to the first and to each other. So they are kept meanwhile and handed out in their order.
-    If there are too many, every other of the later ones is dropped, and the next lie twice as far
-    apart. Then the worker catches up: there are fewer and fewer places, until only the newest set
-    waits.
+    An automatic start searches its first set for about a second, and then needs sets near in time
+    to the first and to each other. So sets are kept meanwhile and returned in their order. If there
+    are too many, every second of the later sets is dropped, and the interval doubles. Afterwards
+    the worker catches up: the number of places falls until only the newest set waits.
     """
 
     def __init__(self) -> None:
@@ -74,14 +74,14 @@ class WaitingSets(Generic[View]):
 
     @property
     def views(self) -> int:
-        """Number of views in all the sets."""
+        """Number of views in all sets."""
         return sum(len(matched.views) for matched in self._sets)
 
     def __len__(self) -> int:
         return len(self._sets)
 
     def keep(self, at_most: int) -> None:
-        """Keep so many sets from now on; 0: let the worker catch up, and keep none in the end."""
+        """Keep at most `at_most` sets from now on; 0: let the worker catch up, then keep none."""
         if at_most:
             self._places = at_most
             if not self._keeping:
@@ -92,11 +92,11 @@ class WaitingSets(Generic[View]):
         self._keeping = at_most > 0
 
     def put(self, matched: MatchedSet[View]) -> int:
-        """Add the newest set; returns how many it replaced."""
+        """Add the newest set; returns the number of sets that it replaced."""
         before = len(self._sets) + 1
         self._newest_ns = matched.stamp_ns
         if not self._keeping:
-            # Sets of a time that was set back do not continue those that wait.
+            # After stamps ran backwards, the waiting sets are not continued.
             left = -(-(self._caught_up_ns - matched.stamp_ns) // PLACE_NS)
             self._places = 1 if matched.restarted else max(1, min(self._places, left))
         if self._sets and not self._spaced():
@@ -108,7 +108,7 @@ class WaitingSets(Generic[View]):
         return before - len(self._sets)
 
     def take(self) -> MatchedSet[View] | None:
-        """The set to track next, once; None if none waits."""
+        """Remove and return the set to track next; None if none waits."""
         if not self._sets:
             return None
         taken = self._sets.popleft()
@@ -116,24 +116,24 @@ class WaitingSets(Generic[View]):
         return taken
 
     def drop_older(self) -> int:
-        """Keep the newest set alone of those that wait; returns how many were dropped."""
+        """Drop all sets but the newest; returns the number of dropped sets."""
         before = len(self._sets)
         self._drop_to(1)
         return before - len(self._sets)
 
     def clear(self) -> None:
-        """Drop all of them."""
+        """Drop all sets."""
         self._sets.clear()
 
     def _spaced(self) -> bool:
-        """Whether the newest set that waits lies far enough from the one before it to stay."""
+        """Whether the newest set is far enough from the set before it to be kept."""
         if self._places == 1:
             return False
         before_ns = self._sets[-2].stamp_ns if len(self._sets) > 1 else self._taken_ns
         return before_ns is None or self._sets[-1].stamp_ns - before_ns >= self._spacing_ns
 
     def _thin_out(self) -> None:
-        """Drop every other set of the later ones but the newest."""
+        """Drop every second of the later sets, but not the newest."""
         kept = list(self._sets)[:CLOSE]
         later = list(self._sets)[CLOSE:]
         while later:

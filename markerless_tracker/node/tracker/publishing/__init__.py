@@ -1,4 +1,4 @@
-"""What the tracker node puts out: results and frames as topics, result files, debug images.
+"""Outputs of the tracker node: results and frames as topics, result files, debug images.
 
-Publishers are created by the node and fed in the worker's thread.
+The node creates the publishers; the publishing thread calls them.
 """

@@ -1,4 +1,4 @@
-"""Outputs of the tracker node besides result topics: result files and debug images."""
+"""Result files and debug images of the tracker node."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -25,14 +25,14 @@ from markerless_tracker.tracking import Tracker
 
 
 class ResultFile:
-    """NAME.trc and NAME.json of a live run, written frame by frame; nothing if there is no NAME.
+    """NAME.trc and NAME.json of a live run, written frame by frame; writes nothing without NAME.
 
     Safe to use from several threads.
 
     Args:
-        name: path without suffix, None for no files.
-        overwrite: whether an earlier result of that name may be replaced.
-        report: called with a line if a frame cannot be written; tracking goes on.
+        name: path without suffix; None = write no files.
+        overwrite: whether an earlier result with this name may be replaced.
+        report: called with a line if a frame cannot be written; tracking continues.
 
     Raises:
         DatasetError: the files cannot be written, or there is an earlier result; names the
@@ -57,11 +57,11 @@ class ResultFile:
             raise DatasetError(f"result_file: {error}") from error
 
     def begin(self, tracker: Tracker) -> None:
-        """Set the tracker whose results are written; the file states its settings as they are."""
+        """Set the tracker whose results are written; the file records its present settings."""
         self._tracker, self._config = tracker, tracker.config
 
     def add(self, result: TrackResult, body: BodyModel) -> None:
-        """Write a result and the body as it is now; too late after `close`."""
+        """Write a result and the present body; ignored after `close`."""
         with self._lock:
             writer = self._opened()
             if writer is None:
@@ -82,10 +82,10 @@ class ResultFile:
         """Complete the files, once, with notes such as counts of skipped sets.
 
         Returns:
-            What was written, in words; None if there are no files.
+            A description of what was written; None if there are no files.
 
         Raises:
-            DatasetError: they cannot be completed; what was written so far stays.
+            DatasetError: they cannot be completed; what was written so far is kept.
         """
         with self._lock:
             writer, self._closed = self._opened(), True
@@ -121,7 +121,7 @@ class Pictures:
 
     Args:
         node: creates the publishers.
-        rig: the cameras of the images that the tracker sees.
+        rig: the cameras of the scaled images, which the tracker uses.
     """
 
     def __init__(self, node: Any, rig: CameraRig) -> None:
@@ -137,7 +137,7 @@ class Pictures:
 
         Args:
             fitted: the set.
-            segmenter: of a camera, None without a background.
+            segmenter: gives the segmenter of a camera; None without a background.
         """
         for (name, kind), publisher in self._publishers.items():
             if not publisher.get_subscription_count() or name not in fitted.images:

@@ -1,4 +1,4 @@
-"""The frames of the body and of the cameras on /tf and /tf_static."""
+"""Publishes the frames of the body and of the cameras on /tf and /tf_static."""
 
 from collections.abc import Callable
 from typing import Any
@@ -21,8 +21,8 @@ class FramePublisher:
 
     Args:
         node: creates the publishers.
-        choice: one of `TF_CHOICES`; "links": every link, viewers need no robot_state_publisher;
-            "root": the root link, for use with one; "none": no body.
+        choice: one of `TF_CHOICES`; "links": every link, so that viewers need no
+            robot_state_publisher; "root": the root link, for use with it; "none": no body.
         cameras: whether the cameras' frames are published.
         prefix: of the links' frames, such as ``person1/``.
         human: id of the person, whose frame ``body_<id>`` is the root link (REP-155); may be empty.
@@ -85,7 +85,7 @@ class FramePublisher:
         self._messages = TransformMessages(frames)
 
     def publish(self, T_world_root: FloatArray, values: dict[str, float], stamp_ns: int) -> None:
-        """Publish a pose, if anybody listens.
+        """Publish a pose, if there are subscribers.
 
         Args:
             T_world_root: (4, 4), takes points of the root link to the world.
@@ -106,7 +106,7 @@ class FramePublisher:
         return [(f"{self._prefix}{a}", f"{self._prefix}{b}") for a, b in joints.links]
 
     def _publish_static(self) -> None:
-        """One message with all static frames: late subscribers receive the last one only."""
+        """Publish all static frames in one message: late subscribers receive only the last one."""
         frames = list(self._camera_frames)
         translations, quaternions = self._camera_numbers
         if self._fixed is not None:

@@ -1,4 +1,4 @@
-"""The person under the topics of REP-155 (ROS4HRI)."""
+"""Publishes the person on the topics of REP-155 (ROS4HRI)."""
 
 from typing import Any
 
@@ -35,7 +35,7 @@ class HumanPublisher:
             self._urdfs.publish(String(data=self._human.urdf()))
 
     def publish(self, pose: FloatArray, stamp_ns: int) -> None:
-        """Publish the joints of a pose (p,) at the time of its images, if anybody listens."""
+        """Publish the joints of a pose (p,) at the time of its images, if there are subscribers."""
         if self._human is not None and self._states.get_subscription_count():
             values = self._human.joints(pose)
             self._states.publish(

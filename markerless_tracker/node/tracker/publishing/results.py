@@ -1,4 +1,4 @@
-"""Results as topics and frames."""
+"""Publishes results as topics and frames."""
 
 from collections.abc import Callable
 from typing import Any
@@ -65,7 +65,7 @@ class ResultPublishers:
         self._no_pose_shown = False
 
     def describe(self, body: BodyModel) -> None:
-        """Publish the body's URDF if it is another than the last."""
+        """Publish the body's URDF if the body has changed."""
         if body is not self._described:
             description = urdf(body)
             self._descriptions.publish(String(data=description))
@@ -83,7 +83,7 @@ class ResultPublishers:
             self._reported = body
 
     def _follow(self, body: BodyModel, stamp_ns: int) -> None:
-        """As `describe`, at most once in `DESCRIBED_EVERY_NS`: a revised body hardly differs."""
+        """As `describe`, at most once per `DESCRIBED_EVERY_NS`: a revised body hardly differs."""
         self._take(body)
         last_ns = self._described_ns
         if last_ns is None or abs(stamp_ns - last_ns) >= DESCRIBED_EVERY_NS:
@@ -91,7 +91,7 @@ class ResultPublishers:
             self.describe(body)
 
     def publish(self, result: TrackResult, body: BodyModel) -> None:
-        """Publish a result; without a pose viewers lose the body, once."""
+        """Publish a result; if it has no pose, delete the body from viewers, once."""
         self._follow(body, result.stamp_ns)
         pose, points, stamp_ns = result.pose, result.markers_m, result.stamp_ns
         if pose is None or points is None:
