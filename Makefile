@@ -9,7 +9,8 @@ DOCS_READY := $(DOCS_VENV)/.ready
 PEER := .venv-peer
 JAZZY := .venv-jazzy
 JAZZY_PYTHON ?= $(shell command -v python3.12 || echo "$(PYTHON)")
-WORKERS ?= 2
+# As many test workers as cores, at most four: each starts processes of its own.
+WORKERS ?= auto
 
 # Variables of another ROS environment would mix its libraries with those of .venv.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME AMENT_PREFIX_PATH
@@ -30,10 +31,10 @@ $(READY): requirements/lock.txt requirements/venv.sh setup.py setup.cfg
 setup: $(READY) ## make .venv (the other targets do it, too)
 
 test: $(READY) ## run the tests (a quarter of an hour on two cores)
-	$(PY) -m pytest -n $(WORKERS) $(ARGS)
+	$(PY) -m pytest -n $(WORKERS) --maxprocesses=4 $(ARGS)
 
 test-jazzy: $(JAZZY)/.ready ## run the tests with the versions of Ubuntu 24.04, on Python 3.12 if it is there
-	$(JAZZY)/bin/python -m pytest -n $(WORKERS) $(ARGS)
+	$(JAZZY)/bin/python -m pytest -n $(WORKERS) --maxprocesses=4 $(ARGS)
 
 $(JAZZY)/.ready: requirements/jazzy.txt requirements/venv.sh setup.py setup.cfg
 	@sh requirements/venv.sh "$(JAZZY_PYTHON)" "$(JAZZY)" requirements/jazzy.txt
