@@ -23,7 +23,7 @@ CAMERA, BOARD = 15, 6
 """Parameters of a camera: fx fy cx cy k1 k2 p1 p2 k3, Rodrigues vector and translation from the
 world; of a pose of the board: the same six from the board to the world."""
 OUTLIER, OUTLIER_PX = 5.0, 1.0
-"""A corner is left out if its error is above this multiple of the median, and above this."""
+"""An outlier's error exceeds both `OUTLIER` times the median error and `OUTLIER_PX`."""
 _LOSS_PX = 0.5
 _DEPTH_M = 1e-3
 
@@ -65,7 +65,7 @@ class _Data:
 def adjust(
     views: BoardViews, lenses: Mapping[str, Lens], layout: Layout, *, k3: bool = False
 ) -> Bundle:
-    """Adjust cameras and poses of the board together; the board on the floor stays where it is.
+    """Adjust cameras and poses of the board together; the pose on the floor is fixed.
 
     A robust loss first, then plain least squares without outliers.
 

@@ -1,7 +1,7 @@
 """The corners of a ChArUco board in an image, also where most of its markers are too small to read.
 
-OpenCV reads the markers. From those that it reads, the board is followed to the other corners; all
-corners are then measured with the print around them.
+OpenCV reads the markers. From these, the search extends to the other corners, neighbours first. All
+corners are then refined by comparing the image with the print around them.
 """
 
 from typing import Any
@@ -26,17 +26,17 @@ _WIDTH_PX = 2600
 _MOST_ENLARGED = 4.0
 """Enlargement for reading the markers: cells of 1 px are read then."""
 _SHARPENED = 2.0
-"""Gain of what a blur of one pixel takes away, before the markers are read."""
+"""Gain of unsharp masking (sigma: one pixel) before the markers are read."""
 _CORRECTED, _WRONG_IN_BORDER = 1.0, 0.6
 _SEEDS = 8
-"""Single markers from which the board is followed where all together do not fit."""
+"""Single markers that the search starts from if it fails from all of them."""
 _NEAR_SQUARES = 1.6
 """New corners lie nearer than this to known ones, in squares."""
 _WINDOW = 0.25
 _WINDOW_PX = (2, 44)
 """Half the window in which a corner is searched, in squares, and its limits."""
 _MOST_MOVED = 0.3
-"""How far a corner may be from where it is expected, in squares."""
+"""Largest distance of a corner from its expected position, in squares."""
 _BENT = 0.15
 """The same from the homography of all corners."""
 _ROUNDS = 12

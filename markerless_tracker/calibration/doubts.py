@@ -15,17 +15,17 @@ ASPECT = 0.03
 HEIGHTS_M = (0.25, 6.0)
 """Usual heights of cameras above the floor."""
 FOCAL_SD = 0.005
-"""A focal length known less well than this, relative, is doubted."""
+"""Largest standard deviation of a focal length without a doubt, relative."""
 POSITION_SD_MM = 15.0
-"""So is a position."""
+"""Largest standard deviation of a camera's position without a doubt."""
 ERROR_PX = 1.0
-"""So is a camera with this error, in images 1000 px wide or less; in larger ones in proportion."""
+"""Largest error of a camera without a doubt, in images up to 1000 px wide; else in proportion."""
 PAIR_RATIO, PAIR_PX = 3.0, 1.0
-"""So is a pair with an error above this multiple of the median pair's, and above this."""
+"""A pair is doubted if its error exceeds `PAIR_RATIO` times the median pair's and `PAIR_PX`."""
 COVERAGE = 0.45
-"""So is the lens of a camera that saw corners in less than this fraction of its image."""
+"""Least fraction of a camera's image with corners without a doubt about its lens."""
 OUTLIERS = 0.15
-"""So is a camera of whose corners more than this fraction was left out."""
+"""Largest fraction of a camera's corners that are outliers without a doubt."""
 LENS = 0.25
 """Largest usual displacement by the lens in the image's corner, relative to its distance from the
 middle."""

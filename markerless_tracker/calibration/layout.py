@@ -1,4 +1,4 @@
-"""Start values of a rig: where the cameras stand, by what pairs of them saw of the board."""
+"""Start values of a rig: poses of the cameras, from views of the board that pairs share."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -49,8 +49,8 @@ class _Link:
 def start_layout(views: BoardViews, lenses: Mapping[str, Lens]) -> Layout:
     """Cameras and boards in the frame of the board on the floor.
 
-    Of every shared view follow several relative poses of two cameras (`board_poses`); the right one
-    is that which most views agree on. Pairs are chained along the tree of best support.
+    Every shared view gives several relative poses of two cameras (`board_poses`); the one that most
+    views agree on is taken. Pairs are chained along the tree of best support.
 
     Raises:
         CalibrationError: cameras share no view with the others, or contradict them.

@@ -1,8 +1,8 @@
 """Levenberg-Marquardt steps on sparse residuals with a robust loss.
 
 Camera and board parameters are strongly correlated: the iterative solver of
-`scipy.optimize.least_squares` for sparse Jacobians (LSMR) needs thousands of steps there. A few
-hundred parameters are solved directly.
+`scipy.optimize.least_squares` for sparse Jacobians (LSMR) needs thousands of steps there. Here the
+normal equations of a few hundred parameters are solved directly.
 """
 
 from collections.abc import Callable

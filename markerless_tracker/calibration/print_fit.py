@@ -1,7 +1,7 @@
-"""Exact places of a board's corners: the image compared with the print around each of them.
+"""Refines a board's corners: compares the image with the print around each of them.
 
-The search for the saddle of a corner alone is drawn to whatever else is in its window, such as the
-markers of a ChArUco board (1 px at squares of 12 px); here everything around it is used.
+A saddle point search alone is biased by whatever else is in its window, such as the markers of a
+ChArUco board (1 px at squares of 12 px). Here the whole print around a corner is compared.
 """
 
 from typing import Any
@@ -24,7 +24,7 @@ _PATCH = 0.8
 """Half the part of a print that is compared, in squares: within the outer squares of the board."""
 _PATCH_PX = (4, 24)
 _MOST_MOVED = 0.3
-"""How far a corner may be from where it is expected, in squares."""
+"""Largest distance of a corner from its expected position, in squares."""
 _SAMPLES = 3
 _BLUR_PX = 0.7
 _AGREE = 0.7

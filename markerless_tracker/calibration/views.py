@@ -14,7 +14,7 @@ from markerless_tracker.errors import CalibrationError
 MOST_SETS = 100
 """Sets of images that are searched for the board, evenly spread, by default."""
 STILL = 0.0008
-"""A board is still while its corners move by less than this from their first position, in image
+"""A board is static while its corners move by less than this from their first position, in image
 widths."""
 _SIZE_TRIES = 6
 
@@ -58,8 +58,8 @@ def find_views(
 ) -> BoardViews:
     """Search a recording for the board.
 
-    The board lies on the floor in the first set in which it is found, and until it moves, or from
-    `floor_frame` on. Corners of these sets are averaged.
+    The board lies on the floor from the first set in which it is found, or from `floor_frame`,
+    until it moves. Each corner of these sets gets its median position.
 
     Args:
         recording: calibrated or not.
@@ -178,7 +178,7 @@ def _still(
 
 
 def _merged(sets: list[dict[str, Seen]]) -> dict[str, Seen]:
-    """Mean position of every corner over sets in which the board is still."""
+    """Median position of every corner over sets in which the board is static."""
     merged: dict[str, Seen] = {}
     for name in dict.fromkeys(name for seen in sets for name in seen):
         ids = np.concatenate([seen[name].ids for seen in sets if name in seen])

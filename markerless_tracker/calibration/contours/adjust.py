@@ -156,7 +156,7 @@ class ContourAdjustment:
         self.cameras = [moved(c, one) for c, one in zip(self._first, changes, strict=True)]
 
     def run(self, iterations: int, first_m: float = FIRST_TRUNCATION_M) -> None:
-        """Damped Gauss-Newton steps; the truncation shrinks, the last third has the last one.
+        """Damped Gauss-Newton steps; the truncation shrinks to its last value in the last third.
 
         Args:
             iterations: number of steps.

@@ -77,7 +77,7 @@ class BodyUnknowns:
         return np.concatenate([by_length, by_section], axis=1)
 
     def take(self, step: FloatArray) -> FloatArray:
-        """Change the unknowns by a step (size,); returns the one that bounds leave of it."""
+        """Change the unknowns by a step (size,); returns the step after clipping to the bounds."""
         split = self._lengths.size
         lengths = np.clip(step[:split], -_LONGEST_STEP, _LONGEST_STEP)
         numbers = np.clip(self._numbers + step[split:], *self._sections.bounds)

@@ -1,4 +1,4 @@
-"""From tracked frames to a corrected calibration, how sure it is, and what it could not decide."""
+"""Corrects a calibration from tracked frames, with its uncertainty and what is undetermined."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ from markerless_tracker.tracking.limits import joint_limits
 LEAST_CAMERAS = 3
 """With two cameras that disagree, either may be wrong."""
 LEAST_INDEPENDENT = 2.0
-"""Least effective number of independent frames: in fewer, a wrong camera and a wrong shape of the
-body look alike."""
+"""Least effective number of independent frames: with fewer, a wrong camera cannot be distinguished
+from a wrong body shape."""
 UNDETERMINED = 0.9
-"""A change is held if its standard deviation is above this fraction of what it was before."""
+"""A change is held if its standard deviation exceeds this fraction of its prior one."""
 NAMES = ("tilt", "pan", "roll", "x", "y", "z", "focal length")
 """Names of the seven changes; axes of the camera: x to the right, y down, z forward."""
 _LAST = 12
@@ -35,7 +35,7 @@ _NEAR_M = 0.08
 
 @dataclass(frozen=True, eq=False)
 class CameraRefinement:
-    """What became of one camera.
+    """The correction of one camera.
 
     Attributes:
         change: (7,) see `contours.cameras`; zeros if the camera is right.

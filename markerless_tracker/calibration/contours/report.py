@@ -1,4 +1,4 @@
-"""A refined calibration in lines for people."""
+"""Describes a refined calibration in lines of text."""
 
 import numpy as np
 

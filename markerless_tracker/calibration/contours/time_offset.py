@@ -6,8 +6,8 @@ that is used, eliminated as in `ContourAdjustment`, and a constant shift of each
 which a wrong calibration causes. Equal offsets of all cameras cannot be distinguished from none:
 offsets are relative to the median camera.
 
-Large offsets come out too small, by a quarter or so: the tracked pose follows the late camera, too,
-and residuals are cut off.
+Large offsets are underestimated by about a quarter: the tracked pose follows the late camera, too,
+and residuals are truncated.
 """
 
 import pickle
@@ -40,18 +40,18 @@ EVERY_NS = 60_000_000
 SELDOM_NS = 1_000_000_000
 """The same once the offsets are known, and while sets come faster than they are tracked."""
 GAP_NS = 100_000_000
-"""Greatest time between neighbouring frames whose difference is a velocity."""
+"""Greatest time between neighbouring frames from which a velocity is computed."""
 LEAST_SPEED_M_S = 0.15
 """Least root mean square speed of the markers in a frame that is used."""
 BLOCK_FRAMES = 5
 LEAST_BLOCKS = 8
 """Blocks of frames from which offsets are estimated."""
 BLOCKS = 32
-"""Blocks that count; older ones are forgotten."""
+"""Most blocks that are kept; older ones are dropped."""
 CERTAIN = 4.0
-"""Offsets count from so many standard deviations on,"""
+"""Least multiple of its standard deviation at which an offset is certain."""
 LEAST_OFFSET_S = 0.005
-"""and from this one on."""
+"""Least offset that can be certain."""
 _SETTLED_S = 0.003
 _TRUNCATION_M = 0.1
 _OFFSET_SD_S, _SHIFT_SD_PX = 0.1, 3.0
@@ -191,7 +191,7 @@ class TimeOffsetEstimate:
             slope[at] += pull
         if views < 2:
             return
-        # The pose is the estimate: it is compared with nothing but the residuals.
+        # The prior's mean is the tracked pose.
         precision = 1.0 / body.prior_sd**2
         add_pose_prior(hessian, slope, precision, np.zeros(body.size), damping=0.0)
         eliminated(hessian, slope, body.size, *self._block)

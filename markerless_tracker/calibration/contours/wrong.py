@@ -1,8 +1,8 @@
 """Which cameras are wrong: the fewest whose correction explains the contours.
 
-Images alone do not say which of two opposite cameras is wrong. A calibration was right once, so
-few wrong cameras are more likely than many: all cameras are free first, then those are held one
-after the other that need the least correction, as in backward elimination of regressors.
+Images alone do not determine which of two opposite cameras is wrong. A calibration was right once,
+so few wrong cameras are more likely than many. All cameras are free first; then the camera that
+needs the least correction is held, one after the other, as in backward elimination of regressors.
 """
 
 import numpy as np
@@ -11,8 +11,8 @@ from markerless_tracker.calibration.contours.adjust import ContourAdjustment, Ev
 from markerless_tracker.fitness.shape.section_fit import RESIDUAL_SIGMA_M
 
 LEAST_GAIN = 12.0
-"""Least drop of -log p for which a camera's seven changes are believed: half the value that
-chi-squared with seven degrees of freedom exceeds once in a thousand times."""
+"""Least drop of -log p for which a camera's seven changes are accepted: half the 0.999 quantile of
+chi-squared with seven degrees of freedom."""
 LEAST_HELD = 2
 """Cameras that are right and keep the world in its place."""
 _TRIED = 2
