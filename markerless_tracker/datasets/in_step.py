@@ -1,4 +1,4 @@
-"""Cameras that began at different times, brought into step by whole frames."""
+"""Synchronises cameras that began at different times, by whole frames."""
 
 from collections import deque
 from collections.abc import Iterator, Mapping
@@ -39,9 +39,9 @@ def read_time_offsets(text: str) -> dict[str, float]:
 class InStepRecording(Recording):
     """A recording whose cameras' clocks differ by constant offsets.
 
-    A set at time t has of each camera the frame nearest to t minus its offset: one that its camera
-    took at t if frame k was taken at k / fps + offset. Frames that are half a period off are named
-    in a warning. The first sets, which a late camera lacks, are left out.
+    Frame k of a camera was taken at k / fps + offset. A set at time t has each camera's frame that
+    was taken nearest to t. A warning states the largest error if it is above a quarter of a frame.
+    The first sets, which a late camera lacks, are left out.
 
     Args:
         recording: the recording as it is stored.

@@ -1,4 +1,4 @@
-"""The intact part of a chunk that a cut or damage ends."""
+"""The intact part of a truncated or damaged chunk."""
 
 from collections.abc import Iterator
 from io import SEEK_END, BytesIO

@@ -20,9 +20,9 @@ _UP = 4
 class AniposeRecording(VideoRecording):
     """A trial of an Anipose session.
 
-    The videos are in `videos-raw/` (or `videos/`). Which part of a name is the camera's says
-    `triangulation.cam_regex` of the project's `config.toml`; without it the names end with the
-    camera's. The world is that of the calibration.
+    The videos are in `videos-raw/` (or `videos/`). `triangulation.cam_regex` of the project's
+    `config.toml` matches the camera's name in a video's name; without it, the video's name ends
+    with the camera's. The world is that of the calibration.
 
     Args:
         path: the session's folder, or one video of the trial.

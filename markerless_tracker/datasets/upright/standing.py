@@ -1,8 +1,8 @@
 """The world turned upright by a recording itself: level cameras, and the floor under the person.
 
-Cameras on tripods are nearly level: their x axes lie nearly in the floor's plane, which gives the
-direction that is up. The lowest points of the visual hull of what moves are a person's soles, which
-gives the height of the floor.
+Cameras on tripods are nearly level: their x axes are nearly parallel to the floor, which determines
+the vertical. The lowest points of the visual hull of moving pixels are the person's soles, which
+determine the height of the floor.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,19 +20,19 @@ from markerless_tracker.imaging import Image
 PERSON = "person"
 """The choice of --up that turns the world like this."""
 SETS = 24
-"""Sets of images that are looked at, evenly spread."""
+"""Number of image sets that are evaluated, evenly spread."""
 WIDTH_PX = 240
-"""Width at which they are looked at."""
+"""Width to which their images are scaled."""
 DIFFERENCE = 16
-"""Least difference from the background, in levels of 255, of what moves."""
+"""Least difference of a moving pixel from the background, in grey levels of 255."""
 SPACING_M = 0.05
 RADIUS_M = 2.5
 BELOW_SOLES_M = 0.09
-"""So far a hull of few views reaches below the soles: 0.09 to 0.12 m on three recordings."""
+"""Extent of a hull of few views below the soles: 0.09 to 0.12 m on three recordings."""
 LEAST_HEIGHT_M, LEAST_POINTS = 0.9, 60
-"""A person's hull is at least so high, and holds so many points of the grid."""
+"""Least height of a person's hull, and least number of its grid points."""
 MOST_ROLL_DEG = 4.0
-"""Cameras that are rolled more do not tell up well."""
+"""Largest roll of a camera from which the vertical is reliable."""
 _LOWEST = 0.005
 """Share of a hull's points below its lowest height: single points are noise."""
 _LEAST_SHARE = 0.3
@@ -146,7 +146,7 @@ def _moving(image: Image, background: FloatArray) -> NDArray[np.bool_]:
 
 
 def _lowest(rig: CameraRig, sets: Sequence[Mapping[str, NDArray[np.bool_]]]) -> Iterator[float]:
-    """Lowest height (m) of the largest lump of the visual hull of each set that has a person."""
+    """Lowest height (m) of the hull's largest component, for each set that has a person."""
     # Few recordings need it, and it takes a moment to import.
     from scipy import ndimage
 

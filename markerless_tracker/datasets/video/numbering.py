@@ -10,7 +10,7 @@ from markerless_tracker.errors import DatasetError
 def check_numbers(folders: Mapping[str, Path]) -> list[str]:
     """Compare the image numbers of cameras, whose k-th images form a set.
 
-    Numbers that do not count, such as times, are not compared.
+    Numbers that do not count frames, such as times, are not compared.
 
     Args:
         folders: camera -> folder of numbered images.
