@@ -1,4 +1,4 @@
-"""Made-up people: motions, cameras, pictures. Errors on them are never accuracy.
+"""Synthetic people: motions, cameras, images. Errors on them are no measure of accuracy.
 
 `scenes` generates rooms and people in clothes that are not a tracker's cones, from `rooms` and
 `people`.

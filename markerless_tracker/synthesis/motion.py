@@ -1,4 +1,4 @@
-"""Made-up motions: smooth periodic joint angles over a path on the floor."""
+"""Synthetic motions: smooth periodic joint angles over a path on the floor."""
 
 from collections.abc import Callable, Mapping
 
@@ -108,7 +108,7 @@ class Motion:
     """
 
     courses: Mapping[str, Course] = _MOTIONS
-    """The motions that there are."""
+    """The available motions."""
 
     def __init__(self, body: BodyModel, kind: str, seed: int = 0) -> None:
         if kind not in self.courses:

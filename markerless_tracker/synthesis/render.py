@@ -130,7 +130,7 @@ class Renderer:
 
 
 def clothes(body: BodyModel, rng: np.random.Generator) -> FloatArray:
-    """Colours (c, 3) BGR of a body's cones: by the part their names tell, left a bit lighter."""
+    """Colours (c, 3) BGR of a body's cones: by the part in their names, left a bit lighter."""
     palette = np.empty((len(body.cone_names), 3))
     for i, name in enumerate(body.cone_names):
         part = next((p for p in _CLOTHES if p in name), None)

@@ -1,7 +1,7 @@
-"""A made-up person in front of made-up cameras, frame by frame, with the exact truth.
+"""A synthetic person in front of synthetic cameras, frame by frame, with the exact truth.
 
-Images and truth come from the very model that a tracker fits: errors measured on them prove that
-the parts fit together, and say nothing about accuracy on people.
+Images and truth come from the model that a tracker fits: errors measured on them show that the
+parts work together, and say nothing about accuracy on people.
 """
 
 from collections.abc import Callable, Mapping, Sequence

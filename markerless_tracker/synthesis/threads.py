@@ -1,4 +1,4 @@
-"""Cameras side by side: each picture is drawn in a thread of its own."""
+"""Cameras in parallel: each image is drawn in its own thread."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""Made-up recordings of a calibration board, with the exact calibration.
+"""Synthetic recordings of a calibration board, with the exact calibration.
 
 A board that lies on the floor, is shown to every camera and moves through their common view.
 """

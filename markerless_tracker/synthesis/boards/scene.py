@@ -1,4 +1,4 @@
-"""A made-up board in front of made-up cameras, frame by frame."""
+"""A synthetic board in front of synthetic cameras, frame by frame."""
 
 from collections.abc import Sequence
 

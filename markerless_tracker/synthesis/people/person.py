@@ -23,7 +23,7 @@ from markerless_tracker.synthesis.people.skeleton import skeleton
 from markerless_tracker.synthesis.people.spec import PersonSpec
 
 PARTS = ("skin", "hair", "upper", "lower", "shoes")
-"""What has a colour of its own."""
+"""Parts of the surface that have a colour each."""
 
 
 @dataclass(frozen=True, eq=False)

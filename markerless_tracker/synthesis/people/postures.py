@@ -1,4 +1,4 @@
-"""What generated people do: the motions, and postures in which a recording may begin."""
+"""Actions of generated people: the motions, and postures in which a recording may begin."""
 
 from collections.abc import Callable, Mapping
 

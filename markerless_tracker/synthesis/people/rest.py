@@ -1,4 +1,4 @@
-"""The rest pose of a skeleton: where joints are, and which frames move a point near them."""
+"""The rest pose of a skeleton: positions of the joints, and weights of the frames around them."""
 
 from dataclasses import dataclass
 

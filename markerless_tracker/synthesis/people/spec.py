@@ -1,4 +1,4 @@
-"""What a generated person is like: every sampled size, garment and fit.
+"""Sampled values of a generated person: sizes, garments and their fit.
 
 Statures and their spread are those of European adults; segment lengths scatter about the means of
 de Leva (1996) as they do among people of one stature.

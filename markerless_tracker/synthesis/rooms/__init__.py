@@ -1,6 +1,6 @@
 """Generated rooms: floor and walls with textures, lamps with soft shadows, cameras' sensors.
 
-`spec` samples them, `surfaces` paints them, `lighting` says how much of each lamp arrives where,
+`spec` samples them, `surfaces` paints them, `lighting` computes each lamp's light on surfaces,
 `view` makes one camera's images.
 """
 

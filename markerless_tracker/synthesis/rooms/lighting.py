@@ -1,4 +1,4 @@
-"""How much of each lamp arrives where: on floor and walls, and on the surfaces in the room."""
+"""Light of each lamp on floor and walls, and on the surfaces in the room."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ _TOLERANCE_M = 0.035
 _MOST = 1.6
 _WRAP = 0.3
 _BOUNCE = 0.4
-"""Part of the light on upright surfaces that comes back from floor and walls, from everywhere."""
+"""Part of the light on upright surfaces that floor and walls reflect, from all directions."""
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
 

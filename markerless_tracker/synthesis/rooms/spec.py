@@ -1,4 +1,4 @@
-"""What a generated room is like: surfaces, lamps, cameras and sensor, with every sampled value."""
+"""Sampled values of a generated room: surfaces, lamps, cameras and sensor."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Colours of a person's vertices: what looks like the floor or a wall is matched to its light."""
+"""Colours of a person's vertices: parts may match the floor or a wall under the room's light."""
 
 from collections.abc import Sequence
 

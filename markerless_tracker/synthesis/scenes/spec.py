@@ -22,7 +22,7 @@ from markerless_tracker.synthesis.rooms.spec import (
 DEVELOPMENT_SEEDS = tuple(range(1000, 1040))
 """Scenes on which settings may be chosen."""
 TEST_SEEDS = tuple(range(7000, 7040))
-"""Scenes for testing only: nothing may be set by them."""
+"""Scenes for testing only: no setting may be chosen on them."""
 
 SIZE_PX = (640, 480)
 MOTIONS = ("walk", "balance", "jog", "stand")
