@@ -1,4 +1,4 @@
-"""Verb `compile`: compiles the kernels for this machine, so that no program waits for it later."""
+"""Verb `compile`: compiles the kernels for this machine in advance."""
 
 import argparse
 import json
