@@ -1,6 +1,7 @@
-"""Quality of silhouettes on generated scenes, whose rooms and clothes set no threshold.
+"""Quality of silhouettes on generated scenes with sampled rooms and clothes.
 
-The sampled motion of every scene is measured, then its sampled posture.
+The sampled motion of every scene is measured, then its sampled posture. No threshold may be chosen
+on the test scenes.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -49,7 +49,7 @@ def _trial(
     name: str, source: Path, out: Path, options: Mapping[str, Any], settings: Mapping[str, Any]
 ) -> Trial:
     own = {key: _filled(key, value, name, source) for key, value in options.items()}
-    # The settings stand for the options that give them; some files hold more than a name says.
+    # The key has the settings in place of their options, and the content of files, not their names.
     files = {
         key: _content(value)
         for key, value in own.items()

@@ -21,7 +21,7 @@ Report = Callable[[str, int, int | None], None]
 
 @dataclass(frozen=True)
 class LivePlan:
-    """What is measured.
+    """The settings of a measurement.
 
     Attributes:
         config: settings of the tracker.
@@ -46,7 +46,7 @@ def measure_live(
 
     Args:
         source: the recording; it is written as a bag to a temporary folder.
-        plan: what is measured.
+        plan: the settings of the measurement.
         stature_m: stature given to the tracker if nothing else is, m; None = unknown.
         scale: factor for the images.
         report: receives progress.

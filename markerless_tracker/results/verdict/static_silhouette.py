@@ -58,7 +58,7 @@ class StaticSilhouette:
         self._comparisons = 0
 
     def warm_up(self, body: BodyModel) -> None:
-        """Compile what a comparison needs, for bodies of this kind."""
+        """Compile the kernels of a comparison, for bodies of this kind."""
         body_masks(body, body.neutral, list(self._cameras.values()))
 
     def add(self, result: TrackResult, body: BodyModel) -> dict[str, NDArray[np.bool_]]:

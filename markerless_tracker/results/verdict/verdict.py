@@ -156,7 +156,7 @@ def verdict_of(
 
 
 def limb_in_words(limb: str) -> str:
-    """A limb's name as people say it: `left arm` for `l_arm`."""
+    """A limb's name in words: `left arm` for `l_arm`."""
     side, _, part = limb.partition("_")
     sides = {"l": "left", "r": "right"}
     return f"{sides[side]} {part}" if part and side in sides else limb
