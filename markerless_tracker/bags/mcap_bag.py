@@ -1,4 +1,4 @@
-"""Writing of bag folders as rosbag2 of Jazzy writes them: one MCAP file and its metadata.yaml."""
+"""Writing of bag folders in the layout of rosbag2 (Jazzy): one MCAP file and its metadata.yaml."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -16,11 +16,11 @@ from markerless_tracker.errors import DatasetError
 LAST_SECOND = 2**31 - 1
 """Stamps of ROS have int32 seconds; later ones cannot be written."""
 CHUNK_BYTES = 768 * 1024
-"""Least size of a chunk, as rosbag2 sets it; a killed writer loses one chunk at most."""
+"""Least size of a chunk, the default of rosbag2; a killed writer loses one chunk at most."""
 
 _VERSION = 9
 _DISTRIBUTION = "jazzy"
-# What rclcpp states for a duration that is not limited.
+# The value of rclcpp for an unlimited duration.
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
 
@@ -31,7 +31,7 @@ class Topic:
     Attributes:
         name: absolute name.
         kind: message type, such as sensor_msgs/msg/Image.
-        number: of its channel.
+        number: id of its channel.
         latched: whether late subscribers receive its last message.
         digest: RIHS01 hash of its type.
     """
@@ -110,7 +110,7 @@ class BagWriter:
         return self._counts.total()
 
     def flush(self) -> None:
-        """End the current chunk and give everything to the operating system."""
+        """End the current chunk and flush all data to the operating system."""
         self._mcap.flush()
 
     def __enter__(self) -> Self:
@@ -170,7 +170,7 @@ class BagWriter:
 
 
 def _qos(latched: bool) -> Mapping[str, Any]:
-    """Reliable; a latched topic keeps its last message for late subscribers."""
+    """QoS: reliable; a latched topic keeps its last message for late subscribers."""
     return {
         "history": "keep_last",
         "depth": 1 if latched else 10,
@@ -185,7 +185,7 @@ def _qos(latched: bool) -> Mapping[str, Any]:
 
 
 class _Plain(yaml.SafeDumper):
-    """Without references: yaml-cpp reads them, people do not like to."""
+    """YAML without references, which are hard to read for people."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True

@@ -19,7 +19,7 @@ from markerless_tracker.imaging import Image
 
 WORLD_FRAME = "map"
 JPEG_QUALITY = 90
-# Quick PNG: higher levels take several times as long for a few percent.
+# Low PNG compression: higher levels take several times as long and save a few percent.
 _FORMS = {
     "jpeg": (".jpg", [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]),
     "png": (".png", [cv2.IMWRITE_PNG_COMPRESSION, 1]),
@@ -40,7 +40,7 @@ def typestore() -> Any:
 def definition(kind: str) -> str:
     """The definition of a message type and of those in it, as rosbag2 stores it.
 
-    rosbags leaves out default values; of the types that are written, one has some.
+    rosbags leaves out default values; one of the types written has some.
     """
     text, _ = typestore().generate_msgdef(kind, ros_version=2)
     return str(text).replace(_PLAIN_QUATERNION, _QUATERNION)
@@ -55,13 +55,13 @@ def serialized(message: Any, kind: str) -> tuple[Piece, ...]:
     """CDR of a message (of rosbags' types) in pieces; the data of an image are not copied."""
     if kind not in _IMAGES or message.data.dtype != np.uint8:
         return (typestore().serialize_cdr(message, kind),)
-    # The data are the last field: their number, then they.
+    # The data are the last field: their length, then the bytes.
     start = typestore().serialize_cdr(replace(message, data=_NO_DATA), kind)
     return bytes(start[:-4]) + struct.pack("=I", message.data.size), memoryview(message.data)
 
 
 def optical_frame(camera_name: str) -> str:
-    """The frame a camera's messages carry (REP-103: x right, y down, z forward)."""
+    """Frame id of a camera's messages (REP-103: x right, y down, z forward)."""
     return f"{camera_name}_optical_frame"
 
 
@@ -102,7 +102,7 @@ def encoded_message(image: Image, stamp_ns: int, camera: CameraModel, form: str)
     if not done:
         raise DatasetError(f"{camera.name}: an image {image.shape} cannot be encoded as {form}")
     kind = "mono8" if image.ndim == 2 else "bgr8"
-    # As compressed_image_transport writes it.
+    # The format string of compressed_image_transport.
     words = f"{kind}; {form} compressed {'' if image.ndim == 2 else kind}".rstrip()
     return message_type("sensor_msgs/msg/CompressedImage")(
         header=header(stamp_ns, optical_frame(camera.name)), format=words, data=data.reshape(-1)

@@ -1,8 +1,8 @@
-"""The writer of the `mcap` library, without most of its copies of large messages.
+"""The writer of the `mcap` library, with fewer copies of large messages.
 
-The library builds every record in a buffer that grows, which takes longer than decoding videos and
-writing to memory together. Here the pieces of a record are kept and joined once. The bytes of the
-file are the same.
+The library builds every record in a growing buffer, which takes longer than decoding videos and
+writing to memory together. Here the pieces of a record are collected and joined once. The bytes of
+the file are the same.
 """
 
 import struct
@@ -14,15 +14,15 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
 Piece = bytes | memoryview
-"""Bytes; of a memoryview those of one row of uint8."""
+"""Bytes; a memoryview must be one-dimensional, of uint8."""
 _START = struct.Struct("<BQ")
-"""Start of a record: opcode, length of what follows."""
+"""Start of a record: opcode, length of its content."""
 
 
 class PieceWriter(Writer):
     """A writer whose messages may be sequences of pieces.
 
-    They must not change until the chunk has ended.
+    Pieces must not change until the chunk has ended.
 
     Args:
         file: empty, open for writing, buffered.
@@ -33,7 +33,7 @@ class PieceWriter(Writer):
     def __init__(self, file: BinaryIO, *, zstd: bool, chunk_bytes: int) -> None:
         compression = CompressionType.ZSTD if zstd else CompressionType.NONE
         super().__init__(file, chunk_size=chunk_bytes, compression=compression)
-        # The library has no argument for its builders.
+        # The library's constructor does not accept other builders.
         self._Writer__record_builder = _PieceBuilder()
         self._Writer__chunk_builder.record_writer = _PieceBuilder()
 
@@ -68,7 +68,7 @@ class _PieceBuilder(RecordBuilder):
             self._count += len(piece)
 
     def end(self) -> bytes:
-        """The bytes of all records; begins again."""
+        """Return the bytes of all records, and clear the builder."""
         joined = b"".join(self._pieces)
         self._pieces, self._count = [], 0
         return joined

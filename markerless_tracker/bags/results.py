@@ -25,11 +25,11 @@ _NODE = "tracker"
 
 
 def write_result_bag(out: Path, reader: ResultReader, *, replace: bool = False) -> int:
-    """Write a result as a bag folder, in the world frame `map` (Z up, as ROS has it).
+    """Write a result as a bag folder, in the world frame `map` (Z up, as in REP-103).
 
     Topics: `/marker_poses`, `/joint_states`, `/joint_deviations`, `/root_pose`, `/tf` (`map` to the
-    body's root) and, once, the latched `/robot_description`. Frames without a pose have no message
-    but one in `/state`, which has the state of every frame.
+    body's root) and, once, the latched `/robot_description`. `/state` has one message per frame,
+    the other topics only for frames with a pose.
 
     Args:
         out: the new folder.
@@ -67,7 +67,7 @@ class _Topics:
 
     def __init__(self, writer: BagWriter, body: BodyModel, angles: tuple[str, ...]) -> None:
         self._writer, self._body = writer, body
-        # The joints of the URDF: the reported angles but the root's, if there are any.
+        # The joints of the URDF: the reported angles, if there are any, except the root's.
         root = body.root_frame
         self._columns = [k for k, name in enumerate(angles) if not name.startswith(f"{root}_")]
         self._angles = [angles[column] for column in self._columns]
@@ -120,7 +120,7 @@ class _Topics:
         )
         stamped = message_type("geometry_msgs/msg/PoseWithCovarianceStamped")(
             header=header(stamp, WORLD_FRAME),
-            # The file has no covariance of the root; zero is unknown.
+            # The file has no covariance of the root; zero means unknown.
             pose=message_type("geometry_msgs/msg/PoseWithCovariance")(
                 pose=pose, covariance=np.zeros(36)
             ),
@@ -143,7 +143,7 @@ class _Topics:
         self._put("/marker_poses", stamp, marker_poses_message(positions_m, stamp))
 
     def angles(self, stamp: int, parameters: FloatArray, angles_deg: FloatArray) -> None:
-        """Write the joints: the result's angles (k,), without them the parameters (p,)."""
+        """Write the joints: the result's angles (k,), or the parameters (p,) if it has none."""
         names, values = list(self._body.joint_names), parameters[self._body.joints]
         if self._angles:
             names, values = self._angles, np.deg2rad(angles_deg[self._columns])

@@ -33,7 +33,7 @@ COMPRESSIONS = ("none", "zstd", "png", "jpeg")
 TRUTH_TOPIC = "/ground_truth/marker_poses"
 _ENCODED = ("png", "jpeg")
 _SLACK_NS = 500_000
-"""Largest difference of the stamps of a set and of its row of reference markers."""
+"""Largest difference between the stamps of a set and of its row of reference markers."""
 
 
 @dataclass(frozen=True)
@@ -68,12 +68,11 @@ def write_bag(
     """Write a recording, at its scale, as a bag folder.
 
     Topics per camera: `/NAME/image_raw` (or `/NAME/image_raw/compressed` for png and jpeg) and
-    `/NAME/camera_info`; once `/tf_static` with `map` -> NAME_optical_frame; with a
-    `ground_truth.trc` in the recording `TRUTH_TOPIC`, geometry_msgs/PoseArray of the 15 markers in
-    order, NaN where one is missing. The folder also holds `calibration.toml`, `background/` (images
-    and learned models), scaled like the images and lossless for every `compress`, and the
-    `ground_truth.trc`. The folder appears when it is complete; a failure leaves nothing. Memory
-    does not depend on the length.
+    `/NAME/camera_info`; once `/tf_static` with `map` -> NAME_optical_frame. If the recording has a
+    `ground_truth.trc`: `TRUTH_TOPIC`, geometry_msgs/PoseArray of the 15 markers in order, NaN where
+    one is missing. The folder also holds `calibration.toml`, `background/` (images and learned
+    models, scaled like the images, lossless for every `compress`) and the `ground_truth.trc`. It
+    appears when it is complete; a failure leaves nothing. Memory does not depend on the length.
 
     Args:
         recording: the sets to write; their stamps are kept.
@@ -191,11 +190,11 @@ class _Topics:
             return
         stamps = self._truth.stamps_ns
         if self._row is None:
-            # Rows are rounded to their file's digits: the first one may be just before the set.
+            # Stamps of rows are rounded, so that the first row may be just before the set.
             self._row = int((stamps < stamp - _SLACK_NS).sum())
         while self._row < len(stamps) and stamps[self._row] <= stamp + _SLACK_NS:
             own = int(stamps[self._row])
-            # A row of this set has its stamp.
+            # The row of this set receives the set's stamp.
             own = stamp if abs(own - stamp) <= _SLACK_NS else own
             message = marker_poses_message(self._truth.positions_m[self._row], own)
             self._writer.write(self._truth_topic, own, message)
@@ -203,7 +202,7 @@ class _Topics:
 
 
 def _write_truth(path: Path, truth: MarkerTrack, recording: Recording) -> None:
-    """Put the reference markers beside a bag: their file, or what another format gave."""
+    """Write the reference markers into a bag's folder: their file, or those of another format."""
     file = truth_path(recording.path)
     if file.is_file():
         shutil.copy(file, path)

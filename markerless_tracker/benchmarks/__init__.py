@@ -1,4 +1,4 @@
 """Benchmarks: accuracy and speed measured on recordings.
 
-`track` and the nodes need nothing of it.
+`track` and the nodes do not import it.
 """

@@ -1,4 +1,4 @@
-"""Calls done by the workers of a Dask cluster."""
+"""Function calls on the workers of a Dask cluster."""
 
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -22,12 +22,12 @@ def submitted(
 ) -> Iterator[Answers]:
     """Calls of a function on the workers of a cluster; they are cancelled when the block ends.
 
-    Gives the number of each call and a function that returns its value or raises its error, in
-    order of completion. That function raises SearchError for a call whose workers died.
+    Yields, in order of completion, the number of each call and a function that returns its value or
+    raises its error. That function raises SearchError if the call's workers died.
 
     Args:
         scheduler: address, such as tcp://host:8786.
-        function: done on the workers; each worker thread does one call at a time.
+        function: runs on the workers; each worker thread runs one call at a time.
         calls: arguments of each call.
 
     Raises:
@@ -73,18 +73,18 @@ def _answer(scheduler: str, future: Any) -> Any:
 
 
 def code_and_versions() -> dict[str, str]:
-    """What must be equal on all machines: key of this package's code, and versions by name."""
+    """Key of this package's code, and versions by name; they must be equal on all machines."""
     return {"code": code_key(), **{name: str(value) for name, value in versions().items()}}
 
 
 def check_same(same: Mapping[str, str]) -> None:
-    """Make sure that this worker has the code and the versions of the machine that asks.
+    """Check that this worker has the code and the versions of the calling machine.
 
     Args:
         same: `code_and_versions` of that machine.
 
     Raises:
-        ConfigError: the worker has others; names them.
+        ConfigError: the worker's differ; names the differences.
     """
     here = code_and_versions()
     differing = [name for name, value in same.items() if here.get(name) != value]

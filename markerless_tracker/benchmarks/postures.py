@@ -1,6 +1,6 @@
-"""Automatic starts of generated people who squat, bend down, sit, raise or cross their arms.
+"""Automatic starts on generated people in postures: squat, bent, seated, arms raised or crossed.
 
-Their bodies are not a tracker's cones; rooms, clothes and cameras differ from start to start.
+Their bodies differ from the tracker's cones. Rooms, clothes and cameras vary between starts.
 """
 
 from collections.abc import Mapping
@@ -44,13 +44,13 @@ def measure_postures(
     exact: bool = False,
     report: Report = no_report,
 ) -> dict[str, Any]:
-    """Start automatically on generated people in postures, nothing known of them.
+    """Start automatically on generated people in postures, without stature or start pose.
 
     Args:
-        plan: settings, frames of each start; `every` and `seeds` do not matter.
+        plan: settings, and frames of each start; `every` and `seeds` are ignored.
         count: number of starts.
-        which: one of `SETS`; nothing may be set by the test scenes.
-        exact: from exact silhouettes, which measures the start alone, instead of images.
+        which: one of `SETS`; no setting may be chosen by the test scenes.
+        exact: exact silhouettes instead of images, which measures the start alone.
         report: receives progress.
 
     Returns:

@@ -22,7 +22,7 @@ from markerless_tracker.tracking.tracker import Tracker
 WITHIN_FRAMES = 15
 """A run has recovered if it is back within this many frames."""
 TOLERANCE_MM = 20.0
-"""A run is back when its error exceeds that of the undisturbed run by this at most."""
+"""A run is back if its error exceeds that of the undisturbed run by at most this."""
 SETTLED_S = 0.5
 """Time at the beginning of the undisturbed run that its mean error leaves out."""
 _STABLE_FRAMES = 5

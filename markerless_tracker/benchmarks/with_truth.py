@@ -17,8 +17,7 @@ from markerless_tracker.results.score import MM_PER_M, match_rows
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 
 Report = Callable[[str, int, int | None], None]
-"""Receives progress: the part in words, how much of it is done, how much there is (None if
-unknown)."""
+"""Receives progress: the part in words, its steps done, and their total (None if unknown)."""
 
 
 def no_report(part: str, done: int, total: int | None) -> None:
@@ -27,7 +26,7 @@ def no_report(part: str, done: int, total: int | None) -> None:
 
 @dataclass(frozen=True)
 class RunStart:
-    """What a run starts from.
+    """The start of a run.
 
     Attributes:
         measured: start pose and segment lengths from the first row of the reference; otherwise

@@ -1,4 +1,4 @@
-"""What a check found: green, yellow or red, and what to do."""
+"""The finding of a check: green, yellow or red, and advice."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,8 @@ class Finding:
 
     Attributes:
         check: name of the check.
-        state: green, yellow (may be right) or red (will be wrong).
-        camera: the camera, empty if it concerns all.
+        state: green, yellow (doubtful) or red (wrong).
+        camera: the camera; empty if the finding concerns all.
         text: what was found, with numbers.
         advice: what to do; empty for green.
     """

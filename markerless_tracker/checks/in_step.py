@@ -1,7 +1,8 @@
-"""Whether cameras run in step, from motion alone.
+"""Time offsets between cameras, estimated from motion alone.
 
-All cameras see the same person move: the sum of changes from frame to frame rises and falls in all
-of them at the same time. The lag of best correlation of two cameras is their offset.
+All cameras see the same person move. The sum of changes from frame to frame therefore rises and
+falls in all of them at the same time. The lag of maximum cross-correlation of two cameras is their
+offset.
 """
 
 from collections.abc import Mapping
@@ -18,7 +19,8 @@ MOST_LAG_S = 1.5
 LEAST_CORRELATION = 0.45
 """Pairs whose best correlation is lower are not used."""
 LEAST_EVIDENCE = 5.0
-"""And so are those whose best correlation times the root of the common frames is lower."""
+"""Pairs whose best correlation times the root of the number of common frames is lower are not used
+either."""
 LEAST_FRAMES = 40
 _SMOOTH_S = 1.0
 _LEAST_MOTION = 0.02
@@ -32,11 +34,11 @@ class Offsets:
     """Offsets of the cameras.
 
     Attributes:
-        frames: camera -> frames by which it shows the motion late, relative to the median camera;
-            cameras of which nothing can be said are missing.
-        correlation: camera -> mean correlation of the pairs it is in, at these offsets.
-        gained: camera -> how much higher that is than without offsets.
-        others: camera -> further such offsets that fit almost as well: motion repeats itself.
+        frames: camera -> its delay in frames, relative to the median camera; cameras with an
+            unknown offset are absent.
+        correlation: camera -> mean correlation of its pairs at these offsets.
+        gained: camera -> increase of this correlation over that without offsets.
+        others: camera -> further offsets that fit almost as well, since motion may be periodic.
         pairs: number of pairs used.
     """
 
@@ -50,10 +52,10 @@ class Offsets:
 def find_offsets(motion: Mapping[str, FloatArray], fps: float) -> Offsets:
     """Offsets of cameras by their motion signals (n,) each.
 
-    The offsets maximise the sum of the correlations of all pairs, one camera after the other, from
-    none on. Steps of a walk look alike: of similar offsets the smaller one is taken. Of a
-    camera that resembles the others less than LEAST_CORRELATION at the offsets found, nothing is
-    said.
+    The offsets maximise the sum of the correlations of all pairs by coordinate ascent over the
+    cameras from zero. Among offsets of similar correlation the smaller is taken, since the steps of
+    a walk look alike. Cameras whose correlation with the others is below LEAST_CORRELATION at the
+    offsets found are left out.
     """
     names = [n for n, m in motion.items() if len(m) >= LEAST_FRAMES and m.mean() > _LEAST_MOTION]
     signals = {n: _varying(motion[n], fps) for n in names}
@@ -96,7 +98,7 @@ def _totals(
     pairs: Mapping[tuple[str, str], FloatArray],
     lags: NDArray[np.int_],
 ) -> FloatArray:
-    """Sum of a camera's correlations with the others at each offset of it."""
+    """Mean correlation of a camera with the others, less a penalty, for each of its offsets."""
     total: FloatArray = -_LAG_PENALTY * np.abs(lags) / max(len(lags) // 2, 1)
     others = [m for m in offsets if (name, m) in pairs]
     for other in others:
@@ -120,7 +122,7 @@ def _similar(totals: FloatArray, lags: NDArray[np.int_]) -> tuple[int, ...]:
 
 
 def _peak(totals: FloatArray, lags: NDArray[np.int_]) -> float:
-    """The best offset, between frames by a parabola."""
+    """The best offset, to a fraction of a frame by a parabola."""
     best = int(np.argmax(totals))
     exact = float(lags[best])
     if 0 < best < len(totals) - 1:
@@ -131,9 +133,9 @@ def _peak(totals: FloatArray, lags: NDArray[np.int_]) -> float:
 
 
 def _varying(motion: FloatArray, fps: float) -> FloatArray:
-    """The signal without its slow part, so that lags do not hide in a trend."""
+    """The signal without its slow trend, which would hide the lag."""
     signal = np.sqrt(np.maximum(motion[1:], 0.0))
-    # Compression repeats a peak at every key frame: it is cut off.
+    # Compression causes a peak at every key frame: peaks are clipped.
     signal = np.minimum(signal, np.quantile(signal, 0.98))
     width = max(3, round(_SMOOTH_S * fps) | 1)
     padded = np.pad(signal, width // 2, mode="edge")

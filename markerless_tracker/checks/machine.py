@@ -13,11 +13,11 @@ from markerless_tracker.libraries import usable_cores
 SEGMENT_MIB = 16
 """Shared memory that each process takes with the shipped profile."""
 FREE_MIB = (4 * SEGMENT_MIB, 2 * SEGMENT_MIB)
-"""Free shared memory below which it is doubted, and is too little for a player and a tracker."""
+"""Lower limits (yellow, red) of free shared memory. A player and a tracker need the second."""
 SOCKET_BYTES = 2**21
 """Receive buffer below which images between machines get lost: two colour images of 656x490 px."""
 LOAD = 0.75
-"""Load per core from which on a live tracker skips sets."""
+"""Load per core above which a live tracker skips sets."""
 _ROS = (
     "rclpy",
     "sensor_msgs",
@@ -39,10 +39,10 @@ def check_machine(
     shared_memory: Path = Path("/dev/shm"),
     receive_buffer: Path = Path("/proc/sys/net/core/rmem_max"),
 ) -> list[Finding]:
-    """All checks that need no graph.
+    """All checks that need no running ROS graph.
 
     Args:
-        environment: variables of this process.
+        environment: environment variables of this process.
         profiles: environment variables that may name a profile of Fast DDS.
         shipped: the package's profile.
         shared_memory: folder of the system's shared memory.

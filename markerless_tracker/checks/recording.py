@@ -1,4 +1,4 @@
-"""All checks of a recording: what is seen, and what to do."""
+"""All checks of a recording: findings and advice."""
 
 from collections.abc import Callable, Mapping
 
@@ -14,17 +14,17 @@ from markerless_tracker.datasets import Recording
 from markerless_tracker.geometry import FloatArray
 
 OUT_OF_STEP = (0.8, 1.6)
-"""Offsets in frames from which on a camera is doubted, and is out of step."""
+"""Limits (yellow, red) of a camera's offset in frames. Above the second, it is out of step."""
 GAINED = 0.06
-"""An offset counts if it raises the correlation by this much."""
+"""An offset counts if it raises the correlation by more than this."""
 UNLIKE = (0.12, 0.30)
-"""Shares of pixels beside the person that differ from the empty scene: doubted, wrong."""
+"""Limits of the share of pixels beside the person that differ from the empty scene."""
 MOVED_PX = (0.6, 1.5)
-"""Shifts of the scene against its background at the size checked: doubted, wrong."""
+"""Limits of the shift of the scene against its background, at the size checked."""
 GAINS = (0.12, 0.45)
-"""Range of brightness over the recording, relative: doubted, wrong."""
+"""Limits of the relative range of brightness over the recording."""
 HEIGHTS_PX = (150.0, 80.0)
-"""Heights of the person in an image below which it is doubted, and is too little."""
+"""Lower limits of the height of the person in an image. Below the second, it is too small."""
 STATURE_M = 1.8
 LEAST_CAMERAS = 3
 
@@ -64,7 +64,7 @@ def check_recording(
 
 
 def _middle(rig: CameraRig) -> Finding:
-    """How many cameras see a person who stands in the middle of the floor."""
+    """Counts the cameras that see a person standing in the middle of the floor."""
     middle = floor_middle(rig)
     missing = [camera.name for camera in rig if not _sees_person(camera, middle)]
     seeing = len(rig) - len(missing)
@@ -80,9 +80,9 @@ def _middle(rig: CameraRig) -> Finding:
 
 
 def floor_middle(rig: CameraRig) -> FloatArray:
-    """Point (3,) m of the floor nearest to what the cameras look at, world frame.
+    """Middle of the floor (3,), m, world frame.
 
-    The point nearest to all optical axes, put on the floor.
+    The point nearest to all optical axes, projected onto the floor.
     """
     normal, right = np.zeros((3, 3)), np.zeros(3)
     for camera in rig:

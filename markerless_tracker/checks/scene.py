@@ -1,4 +1,4 @@
-"""Whether a scene is that of a background image: differing pixels, shift of the camera."""
+"""Comparison of a scene with its background image: differing pixels, shift of the camera."""
 
 import cv2
 import numpy as np
@@ -6,12 +6,12 @@ import numpy as np
 from markerless_tracker.geometry import FloatArray
 
 DIFFERENCE = 28.0
-"""Grey levels by which a pixel differs."""
+"""A pixel differs if its grey level does by more than this."""
 _LEAST_RESPONSE = 0.08
 
 
 def unlike_share(scene: FloatArray, background: FloatArray) -> float:
-    """Share of pixels (h, w) that differ, of those that are neither dark nor overexposed."""
+    """Share of differing pixels (h, w) among those neither dark nor overexposed."""
     usable = (background > 10.0) & (background < 245.0)
     if not usable.any():
         return 1.0
@@ -21,9 +21,9 @@ def unlike_share(scene: FloatArray, background: FloatArray) -> float:
 def moved_px(scene: FloatArray, background: FloatArray) -> float:
     """Length of the shift between two pictures (h, w) of a scene, by phase correlation of edges.
 
-    0 where the pictures have too little in common.
+    0 if the pictures have too little in common.
     """
-    # phaseCorrelate fills up to the next fast size, by which the shift is half a pixel off.
+    # phaseCorrelate pads to the next optimal DFT size, which biases the shift by half a pixel.
     height, width = (_fast_size(length) for length in scene.shape)
     edges = [
         cv2.Laplacian(
@@ -31,7 +31,7 @@ def moved_px(scene: FloatArray, background: FloatArray) -> float:
         )
         for image in (background, scene)
     ]
-    # A few strong edges, such as those of a person, would decide alone.
+    # Otherwise a few strong edges, such as those of a person, would dominate.
     limits = [max(3.0 * float(np.median(np.abs(e))), 1e-3) for e in edges]
     first, second = (np.clip(e, -m, m) for e, m in zip(edges, limits, strict=True))
     window = cv2.createHanningWindow((first.shape[1], first.shape[0]), cv2.CV_32F)
@@ -40,5 +40,5 @@ def moved_px(scene: FloatArray, background: FloatArray) -> float:
 
 
 def _fast_size(length: int) -> int:
-    """The largest even length, at most as long, for which a Fourier transform needs no filling."""
+    """The largest even length up to the given one whose DFT needs no padding."""
     return max(n for n in range(2, length + 1, 2) if cv2.getOptimalDFTSize(n) == n)

@@ -1,4 +1,4 @@
-"""One pass over a recording: motion, brightness, silhouettes and still scene of every camera."""
+"""One pass over a recording: motion, brightness, silhouettes and static scene of every camera."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -13,7 +13,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image
 
 MOST_FRAMES = 600
-"""Consecutive frames that are read, from the first on."""
+"""Largest number of frames that are read, consecutive from the first."""
 _WIDTH_PX = 320
 _STILLS = 31
 _DIFFERS = 28.0
@@ -22,10 +22,10 @@ _MOTION_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class CameraSignals:
-    """What one camera showed.
+    """Signals of one camera.
 
     Attributes:
-        motion: (n,) mean change within 1/20 s, grey levels, less the usual noise.
+        motion: (n,) mean change within 1/20 s above the noise, grey levels.
         gain: (n,) brightness relative to the background.
         height_px: (n,) height of the silhouette at the recording's scale, 0 without any.
         scene: (h, w) median over frames of the scene, grey, small.
@@ -46,7 +46,7 @@ def read_signals(
 ) -> dict[str, CameraSignals]:
     """Read a recording once, and measure every camera.
 
-    Without an empty scene, the median of the frames stands for it.
+    Without an empty scene, the median of the frames replaces it.
 
     Args:
         recording: the images.
@@ -89,7 +89,7 @@ def _signals(
         now = cv2.GaussianBlur(image, (0, 0), 1.2).astype(np.float32)
         if len(recent) == apart:
             change = np.abs(now - recent[0])
-            # Most of the image is still: its changes are noise.
+            # Most of the image is static, so that the median change is noise.
             noise = 3.0 * float(np.median(change)) + 0.5
             motion[number] = float(np.maximum(change - noise, 0.0).mean())
         recent.append(now)

@@ -1,4 +1,4 @@
-"""Checks of cameras that are sending: rate, jitter, stamps, sharpness, exposure, background."""
+"""Checks of live image streams: rate, jitter, stamps, sharpness, exposure, background."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,35 +14,38 @@ from markerless_tracker.imaging import Image
 from markerless_tracker.imaging.images import grey_of
 
 JITTERS = (0.25, 1.0)
-"""Deviations of the arrival, in periods (95th percentile): doubted, sets get lost."""
+"""Limits (yellow, red) of the jitter of arrival, 95th percentile in periods. Above the second, sets
+get lost."""
 AGES_S = (0.2, 1.0)
-"""Ages of images on arrival: doubted, the clocks disagree or images pile up."""
+"""Limits of the age of images on arrival. Above the second, the clocks disagree or images queue."""
 RECORDED_S = 3600.0
-"""Stamps so far from now are those of a recording."""
+"""Stamps further than this from the current time are those of a recording."""
 OFFSETS = (0.02, 0.35)
-"""Offsets between the cameras' stamps, in periods: they need a tolerance, are out of step."""
+"""Limits of the offset between the cameras' stamps, in periods. Above the first, synchronisation
+needs a tolerance; above the second, the cameras are out of step."""
 CLIPPED = (0.05, 0.25)
-"""Shares of overexposed pixels: doubted, wrong."""
+"""Limits of the share of overexposed pixels."""
 DARK = (40.0, 15.0)
-"""Mean grey levels below which an image is doubted, and is too dark."""
+"""Lower limits of the mean grey level. Below the second, the image is too dark."""
 BLURRED = (0.6, 0.35)
-"""Sharpness relative to the background's below which the lens is doubted, is out of focus."""
+"""Lower limits of the sharpness relative to the background. Below the second, the lens is out of
+focus."""
 _WIDTH_PX = 320
 _LEAST_IMAGES = 4
 
 
 @dataclass(frozen=True, eq=False)
 class CameraStream:
-    """What was received of one camera.
+    """The images received from one camera.
 
     Attributes:
-        topic: of its images.
-        stamps_ns: of the images received, in their order.
+        topic: topic of its images.
+        stamps_ns: stamps of the images received, in order of arrival.
         arrivals_s: times of arrival, of a monotonic clock.
         ages_s: time from each stamp to its arrival, by this machine's clock.
-        images: some of them, of one size.
+        images: some of the images, of one size.
         refused: number of unusable images.
-        trouble: why the last one could not be used; empty if all could.
+        trouble: why the last unusable image was refused; empty if all were usable.
     """
 
     topic: str
@@ -65,7 +68,7 @@ def check_streams(
     Args:
         streams: by camera.
         backgrounds: empty scene of some of the cameras.
-        listened_s: time for which they were listened to.
+        listened_s: duration of listening.
     """
     found: list[Finding] = []
     heard = {name: stream for name, stream in streams.items() if stream.stamps_ns}
@@ -117,7 +120,7 @@ def _rate(name: str, stream: CameraStream, listened_s: float) -> Finding:
 
 
 def _period_s(stream: CameraStream) -> float:
-    """Median distance of the stamps, s; 0 if it is unknown."""
+    """Median interval between stamps, s; 0 if it is unknown."""
     steps = np.diff(np.array(stream.stamps_ns, dtype=np.int64))
     return float(np.median(steps)) / 1e9 if len(steps) else 0.0
 
@@ -185,7 +188,7 @@ def _in_step(heard: Mapping[str, CameraStream]) -> list[Finding]:
 
 
 def _pictures(name: str, images: Sequence[Image], background: Image | None) -> list[Finding]:
-    """Exposure, sharpness and background by some images."""
+    """Checks exposure, sharpness and background on some images."""
     small = [_small(image) for image in images]
     scene = np.median(np.array(small, dtype=np.float32), axis=0).astype(np.float64)
     found = [_exposure(name, small)]

@@ -142,10 +142,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def board_of(args: argparse.Namespace, folder: Path) -> Board:
-    """The board of the arguments; what they lack is taken from the recording's `board.yaml`.
+    """The board of the arguments, with missing values from the recording's `board.yaml`.
 
     Raises:
-        ConfigError: a value is impossible, or the size of the squares is stated nowhere.
+        ConfigError: a value is impossible, or the size of the squares is unknown.
     """
     file = folder / BOARD_FILE
     stated: dict[str, Any] = read_board(file) if file.is_file() else {}

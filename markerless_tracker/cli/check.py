@@ -1,4 +1,4 @@
-"""Verb `check`: says before tracking what will go wrong with a recording."""
+"""Verb `check`: finds problems of a recording before tracking."""
 
 import argparse
 import json
@@ -23,7 +23,7 @@ HELP = (
 )
 EXAMPLE = "markerless_tracker check recordings/walk"
 SOMETHING_RED = 3
-"""Exit status when a finding is red."""
+"""Exit status if a finding is red."""
 _MARKS = {GREEN: "[green]ok  [/green]", YELLOW: "[yellow]look[/yellow]", RED: "[red]RED [/red]"}
 
 
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check; returns 0, or 3 if something is red."""
+    """Check; returns 0, or 3 if a finding is red."""
     recording = open_recording(args.source, input_fps=args.input_fps)
     with progress_bars() as bars:
         task = bars.add_task(f"reading {recording.name}", total=None)
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def print_findings(found: Sequence[Finding], source: str, *, as_json: bool) -> int:
-    """Print findings, a line each; returns the exit status: 0, or 3 if something is red."""
+    """Print findings, one line each; returns the exit status: 0, or 3 if a finding is red."""
     red = sum(finding.state == RED for finding in found)
     if as_json:
         summary = {"source": source, "red": red, "findings": [asdict(f) for f in found]}

@@ -1,4 +1,4 @@
-"""Verb `compile`: compiles the kernels for this machine, so that no program waits for it later."""
+"""Verb `compile`: compiles the kernels for this machine in advance."""
 
 import argparse
 import json
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def warm_up(config: TrackerConfig, channels: int) -> None:
-    """Compile what a tracker of these settings needs for images with 1 or 3 channels."""
+    """Compile the kernels of a tracker with these settings, for images with 1 or 3 channels."""
     rig: CameraRig = ring_rig(3, _SIZE_PX)
     shape = (_SIZE_PX[1], _SIZE_PX[0], 3)[: 2 if channels == 1 else 3]
     rng = np.random.default_rng(0)

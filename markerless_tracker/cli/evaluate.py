@@ -79,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Figures:
-    """Everything about one result."""
+    """All figures of one result."""
 
     score: Score
     measures: Measures
@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
         json.dump(single or several, sys.stdout, indent=2, allow_nan=False)
         sys.stdout.write("\n")
         return 0
-    # In a pipe rich assumes 80 columns, too few for a table of several results.
+    # Without a terminal rich assumes 80 columns, too few for a table of several results.
     console = Console(width=None if sys.stdout.isatty() else _WIDTH)
     if len(figures) > 1:
         console.print(_summary_table(args.results, figures))
@@ -137,7 +137,7 @@ def _lines(found: _Figures) -> list[str]:
 
 
 def _remarks(found: _Figures) -> list[str]:
-    """What was not compared, and how the worlds were aligned."""
+    """Remarks on what was not compared, and on the alignment of the worlds."""
     more, lines = found.measures, []
     if more.only_reference:
         lines.append(f"not compared: {', '.join(more.only_reference)} of the reference")

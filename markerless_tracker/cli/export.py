@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
             reader = ResultReader(part, keep_lost=args.keep_lost)
             path.parent.mkdir(parents=True, exist_ok=True)
             if kind == BAG:
-                # rosbags takes a moment to import.
+                # Imported late, since the import of rosbags is slow.
                 from markerless_tracker.bags.results import write_result_bag
 
                 write_result_bag(path, reader, replace=args.force)
@@ -114,7 +114,7 @@ def _formats(text: str) -> list[str]:
 
 
 def _path(base: Path, kind: str) -> Path:
-    # Readers take a name that ends in .bag for a bag of ROS 1.
+    # Readers assume that a name ending in .bag is a bag of ROS 1.
     return base.with_name(f"{base.name}{'_' if kind == BAG else '.'}{kind}")
 
 

@@ -7,7 +7,7 @@ A verb is a module of this folder with
 - ``add_arguments(parser)``;
 - ``run(args) -> int``, the exit status.
 
-Verbs are imported when called: ``--help`` does not wait for imports.
+A verb is imported when it is called, so that ``--help`` is fast.
 """
 
 import argparse
@@ -65,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit status: 0 done, 1 failed with one line on standard error, 2 wrong arguments,
-        3 no person found (`track`, `batch`) or something red (`check`, `doctor`), 130 interrupted,
+        3 no person found (`track`, `batch`) or a red finding (`check`, `doctor`), 130 interrupted,
         141 standard output was closed by its reader.
     """
     words = list(sys.argv[1:] if argv is None else argv)

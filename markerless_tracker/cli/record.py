@@ -22,7 +22,7 @@ HELP = (
 EXAMPLE = "markerless_tracker record session_bag --calibration calibration.toml"
 
 NOTHING_ARRIVED = 3
-"""Exit status when no message arrived."""
+"""Exit status if no message arrived."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record; returns 0, or 3 if no message arrived."""
-    # ROS is imported by this verb alone.
+    # Only this function imports ROS.
     from markerless_tracker.node.recorder.process import prepare, record
     from markerless_tracker.node.ros.process import StopSignals
 
@@ -88,7 +88,7 @@ def _make(folder: Path, calibration: Path | None) -> None:
     """Make the bag's folder.
 
     Raises:
-        DatasetError: something is there already, or it cannot be made.
+        DatasetError: it exists already, or it cannot be made.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise DatasetError(f"{folder}: exists and is not empty, expected a new or an empty folder")

@@ -1,4 +1,4 @@
-"""Verb `report`: one HTML page about a result, or several side by side."""
+"""Verb `report`: one HTML page about one result, or about several side by side."""
 
 import argparse
 import json
@@ -33,7 +33,7 @@ PAPERS = (
     ("sppso_2", {"evaluations": 1000}, "Lee walk", "SPPSO, Lee walk"),
     ("hmcpso_2", {"optimizer": "hmcpso"}, "S2 walk", "H-MCPSO, S2 walk"),
 )
-"""The papers' errors that are shown: table, settings of the row, recording, label."""
+"""The papers' errors shown for comparison: table, settings of the row, recording, label."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
 def _film(
     console: Console, name: Path, result: StoredResult, source: Path | None, films: int
 ) -> tuple[Film | None, str]:
-    """The film, or why there is none; images that were asked for must be there."""
+    """The film, or the reason why there is none; a given source must exist."""
     try:
         images = ResultImages(result, source, width_px=IMAGE_PX, whole=False)
         with progress_bars(console) as bars:

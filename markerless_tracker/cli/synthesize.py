@@ -45,7 +45,7 @@ HELP = (
 EXAMPLE = "markerless_tracker synthesize made_up --seconds 2 --motion balance"
 EMPTY_IMAGES = 10
 LEAST_CAMERAS = 2
-"""What tracking and calibration of a rig need."""
+"""Least number of cameras for tracking and for the calibration of a rig."""
 _MOST_FRAMES = 100_000
 _NOT_WITH_SCENE = (
     "cameras", "size", "seed", "stature", "body", "noise", "shadow", "light", "grey", "dull",
@@ -53,7 +53,7 @@ _NOT_WITH_SCENE = (
 )  # fmt: skip
 _ONLY_PEOPLE = ("scene", "motion", "stature", "body", "shadow", "light", "grey", "dull")
 _RATES = {"person": (4.0, 60.0), "board": (40.0, 10.0)}
-"""Seconds and frames per second unless given."""
+"""Default duration (s) and frame rate (1/s)."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -257,15 +257,15 @@ def synthesize(
 
     Written: `calibration.toml`, `camNN.mp4` (`.mkv` if lossless: some 0.6 MB per image of 656x490),
     `background/camNN/` with empty images, `masks/camNN/FFFFFF.png` for every `mask_every`-th frame,
-    `ground_truth.trc` (the 15 markers of every frame), `subject.yaml` and `start.yaml` (the true
-    pose of frame 0; missing where the tracker's body cannot take it), and `scene.json` with the
+    `ground_truth.trc` (the 15 markers of every frame), `subject.yaml`, `start.yaml` (the true pose
+    of frame 0; absent if the tracker's body cannot take this pose), and `scene.json` with the
     sampled values of a generated scene.
 
     Args:
         out: a new or an empty folder.
         scene: the scene, with its frame rate.
         frames: number of frames.
-        mask_every: exact masks are written for every such frame.
+        mask_every: exact masks are written for every k-th frame.
         lossless: write lossless instead of MPEG-4 videos.
         progress: called with the number of frames written so far.
 

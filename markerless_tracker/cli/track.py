@@ -47,7 +47,7 @@ EXAMPLE = "markerless_tracker track recordings/walk -o out/walk --stature 1.75"
 __all__ = ["EXAMPLE", "HELP", "add_arguments", "read_config", "run"]
 
 NO_PERSON_FOUND = 3
-"""Exit status when the person was tracked in no frame."""
+"""Exit status if the person was tracked in no frame."""
 
 _KEYS = ("optimizer", "body", "evaluations", "seed", "threads")
 
@@ -56,13 +56,14 @@ def run(args: argparse.Namespace) -> int:
     """Track; returns 0, or 3 if no person was found.
 
     Raises:
-        CalibrationError: the calibration was to be refined and cannot be; the result is complete.
+        CalibrationError: the requested refinement of the calibration failed; the result is
+            complete.
     """
     console = Console(stderr=True)
     with Bars(console) as bars:
         finished = track_source(args, bars)
     verdict = finished.outcome.verdict
-    # The verdict's lines say the rest.
+    # The verdict's lines contain the other warnings.
     for warning in finished.late_warnings if args.json else finished.recording.warnings:
         warn(console, warning)
     if args.json:
@@ -98,12 +99,12 @@ class Finished:
     """A finished run of `track_source`.
 
     Attributes:
-        recording: what was tracked.
-        outcome: what the frames gave.
+        recording: the tracked recording.
+        outcome: the outcome over all frames.
         filled: interpolated frames, None without smoothing.
-        refined: the refined calibration or why there is none; None if it was not asked for.
-        late_warnings: warnings known at the end only, one line each.
-        summary: all of it, for JSON.
+        refined: the refined calibration, or the error of the refinement; None if not requested.
+        late_warnings: warnings known only at the end, one line each.
+        summary: summary of the run, for JSON.
     """
 
     recording: Recording
@@ -115,7 +116,7 @@ class Finished:
 
 
 def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
-    """Do what the arguments of `track` ask for, and write the result's files.
+    """Run `track` with its parsed arguments, and write the result's files.
 
     Args:
         args: parsed arguments (`add_arguments`).
@@ -178,7 +179,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
 def _refined(
     args: argparse.Namespace, setup: TrackerSetup, config: TrackerConfig, choice: FrameChoice
 ) -> Refinement | CalibrationError:
-    """Refine the calibration and write it; returns why it was not refined where it was not."""
+    """Refine the calibration and write it; returns the error if the refinement failed."""
     tracker = setup.tracker
     try:
         refinement = refine_cameras(
@@ -192,14 +193,14 @@ def _refined(
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run gave.
+    """The outcome of a run over all frames.
 
     Attributes:
         trc_path: the marker file.
         seconds: duration of tracking.
         shifts: camera -> offset of its silhouettes from the body.
-        record: what the frames add up to.
-        verdict: what that means.
+        record: statistics over the frames.
+        verdict: the verdict on them.
     """
 
     trc_path: Path
@@ -210,7 +211,7 @@ class Outcome:
 
     @property
     def frames_per_s(self) -> float | None:
-        """Frames per second of tracking, None where the clock shows no duration."""
+        """Frames per second of tracking; None if the measured duration is 0."""
         return round(self.record.frames / self.seconds, 2) if self.seconds > 0 else None
 
 
@@ -290,7 +291,7 @@ def _summary(args: argparse.Namespace, recording: Recording, outcome: Outcome) -
 
 
 def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
-    """Settings of a YAML file; flags that were given take precedence, by dotted name.
+    """Settings of a YAML file, overridden by the given flags (dotted name -> value).
 
     Raises:
         ConfigError: the file cannot be read, or a setting is unknown or impossible.
@@ -324,6 +325,6 @@ def _cameras(shifts: Mapping[str, Shift]) -> dict[str, Any]:
 
 
 def given_settings(args: argparse.Namespace) -> dict[str, Any]:
-    """The settings among the arguments that were given."""
+    """The given arguments that are settings."""
     named = {key: getattr(args, key) for key in (*_KEYS, "preset")}
     return {key: value for key, value in named.items() if value is not None}

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Declare all options but those of the result's place and of the output, in groups."""
+    """Declare all options in groups, except those of the result's path and of the output."""
     _person(parser.add_argument_group("the person (all optional)"))
     _images(parser.add_argument_group("images"))
     _search(parser.add_argument_group("search"))
@@ -104,7 +104,7 @@ def _images(group: argparse._ArgumentGroup) -> None:
 
 
 def add_format(group: "argparse._ActionsContainer") -> None:
-    """Declare what says how a recording is to be read."""
+    """Declare the options for reading a recording."""
     group.add_argument(
         "--format",
         choices=FORMATS,
@@ -115,7 +115,7 @@ def add_format(group: "argparse._ActionsContainer") -> None:
 
 
 def add_world(group: "argparse._ActionsContainer") -> None:
-    """Declare what turns the world of a calibration upright."""
+    """Declare the options that rotate the world of a calibration upright."""
     group.add_argument(
         "--up",
         choices=(*AXES, PERSON),

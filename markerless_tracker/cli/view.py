@@ -32,7 +32,7 @@ HELP = (
 EXAMPLE = "markerless_tracker view out/walk --film walk.webm --sheet walk.png"
 
 MOST_RRD_PICTURES = 300
-"""Frames whose pictures go into the file for the Rerun viewer."""
+"""Largest number of frames with pictures in the file for the Rerun viewer."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -146,7 +146,7 @@ def _write(
     frames: int = 0,
     width_px: int = 0,
 ) -> None:
-    """Write the files that are named."""
+    """Write the files whose paths are given."""
     with progress_bars() as bars:
         task = bars.add_task("reading", total=None)
 
@@ -175,7 +175,7 @@ def _write(
 
 
 def _file(endings: Sequence[str]) -> Callable[[str], Path]:
-    """The type of an argument: a file with one of some endings."""
+    """Parser of an argument: a file with one of the given endings."""
 
     def parse(text: str) -> Path:
         path = Path(text)

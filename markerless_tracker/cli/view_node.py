@@ -1,4 +1,4 @@
-"""`view --node`: what a running tracker publishes, until a signal or for some time."""
+"""`view --node`: the output of a running tracker, until a signal or for a given time."""
 
 import argparse
 import json
@@ -18,14 +18,14 @@ from markerless_tracker.viewing.live import LiveRecording
 from markerless_tracker.viewing.rerun_file import require_rerun
 
 NOTHING_RECEIVED = 3
-"""Exit status when no tracker was heard."""
+"""Exit status if no message of a tracker arrived."""
 
 
 def run_node(args: argparse.Namespace) -> int:
-    """Show a running tracker; returns 0, or 3 if none was heard.
+    """Show a running tracker; returns 0, or 3 if no message of one arrived.
 
     Raises:
-        ConfigError: options that need a result, or nothing to show it with.
+        ConfigError: options that need a result, or no output to show it in.
         RosMissingError: ROS 2 is not installed.
     """
     if args.name is not None or args.film is not None or args.source is not None:
@@ -38,7 +38,7 @@ def run_node(args: argparse.Namespace) -> int:
     for path in (args.sheet, args.rrd):
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
-    # ROS is imported here alone.
+    # Only this function imports ROS.
     from markerless_tracker.node.recorder.process import prepare
     from markerless_tracker.node.ros.process import StopSignals
 

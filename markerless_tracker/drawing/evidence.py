@@ -35,9 +35,9 @@ def draw_evidence(
 ) -> Image:
     """A picture (h, 4 w, 3) BGR: the input, the mask, the edges, the body over the input.
 
-    The background and the labels (h, w), as of `Segmenter.labels`, are the second and third panel
-    if given. Undecided pixels of the mask are yellow. Pixels outside the
-    observation's region are dark grey. Without a body or pose the last panel is the input.
+    The background and the labels (h, w) from `Segmenter.labels` are the second and third panel if
+    given. Undecided pixels of the mask are yellow. Pixels outside the observation's region are dark
+    grey. Without a body or pose the last panel is the input.
 
     Raises:
         ImageError: image or observation does not fit the camera.

@@ -45,7 +45,7 @@ def outlines(
     """Outline (n, 2) in px of each cone at a pose (p,), through the lens.
 
     The convex hull of the projected cone; empty (0, 2) if a part of it is behind the camera.
-    Given `cone_surfaces` of the body are not computed again.
+    `surfaces` are the body's `cone_surfaces`, None = computed here.
     """
     local = cone_surfaces(body) if surfaces is None else surfaces
     T = cone_transforms(body, pose)

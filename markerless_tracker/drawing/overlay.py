@@ -65,10 +65,10 @@ def draw_overlay(
 ) -> Image:
     """A copy (h, w, 3) BGR of an image with the body at a pose (p,) drawn over it.
 
-    Cones are outlined, the 15 markers are dots, a given mask (h, w) is tinted. Given standard
-    deviations (15, 3) of the markers along x, y, z in m (NaN = unknown) are ellipses of
-    `ELLIPSE_SD`. Given `cone_surfaces` of the body are not computed again. Parts behind the camera
-    are left out.
+    Cones are outlined, the 15 markers are dots, a given mask (h, w) is tinted. Standard deviations
+    (15, 3) of the markers along x, y, z in m (NaN = unknown), if given, are drawn as ellipses of
+    `ELLIPSE_SD`. `surfaces` are the body's `cone_surfaces`, None = computed here. Parts behind the
+    camera are left out.
 
     Raises:
         ImageError: the image or mask does not fit the camera.
@@ -109,7 +109,7 @@ def _ellipses(
     ends = positions_m[:, None] + sd_m[:, :, None] * np.eye(3)
     centres = project_camera(positions_m, camera)
     moved = project_camera(ends.reshape(-1, 3), camera).reshape(-1, 3, 2) - centres[:, None]
-    # NaN, behind the camera or of unknown deviation, is not below any limit.
+    # NaN (behind the camera, or unknown deviation) is not below any limit.
     limit = 4.0 * max(camera.size_px)
     known = np.asarray((np.abs(centres) < limit).all(1) & (np.abs(moved) < limit).all((1, 2)))
     variances, directions = np.linalg.eigh(moved[known].transpose(0, 2, 1) @ moved[known])

@@ -1,4 +1,1 @@
-"""Pictures of a run for people.
-
-Files with the evidence and the body of every frame.
-"""
+"""Pictures, films, Rerun recordings and HTML pages of a run."""

@@ -13,7 +13,7 @@ from markerless_tracker.errors import ConfigError, DatasetError
 FORMATS = ("webm", "mp4")
 """Containers: WebM holds VP9, MP4 holds H.264."""
 
-# Fast settings: an overlay is looked at, not measured.
+# Fast settings, since overlays are for viewing, not for measurements.
 _CODECS: dict[str, tuple[str, dict[str, str], dict[str, str]]] = {
     "webm": (
         "libvpx-vp9",
@@ -48,11 +48,11 @@ def write_film(
     """Write pictures as a film; returns their number.
 
     Args:
-        target: a file, or an open one for bytes.
+        target: path of a file, or a binary file open for writing.
         pictures: (h, w, 3) BGR, all of one size; an odd last row or column is left out.
         fps: pictures per second.
         container: one of `FORMATS`.
-        bit_rate: largest rate in bit/s; None = by quality alone.
+        bit_rate: largest rate in bit/s; None = unlimited, at constant quality.
 
     Raises:
         ConfigError: PyAV is not installed, or there is no such container.

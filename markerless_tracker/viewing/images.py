@@ -1,4 +1,4 @@
-"""The images that a result was tracked in, matched by time."""
+"""The source images of a result, matched by time."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -19,9 +19,9 @@ class ResultImages:
 
     Args:
         result: the result.
-        source: the recording; None: the one that the result names.
+        source: the recording, None = the one that the result names.
         width_px: largest width of a picture.
-        whole: whether pictures show whole images; else the window in which the person moves.
+        whole: whether pictures show whole images, or only the window in which the person moves.
 
     Attributes:
         rig: the cameras of the scaled images.
@@ -29,7 +29,7 @@ class ResultImages:
         fps: rate of the source, 1/s.
 
     Raises:
-        DatasetError: the recording is not there or cannot be read.
+        DatasetError: the recording does not exist or cannot be read.
         CalibrationError, ImageError, ConfigError: as `open_recording`.
     """
 
@@ -53,7 +53,7 @@ class ResultImages:
         )
         widest = max(self.windows[camera.name].size * camera.size_px[0] for camera in rig)
         recording: Recording = open_recording(path, scale=min(1.0, width_px / widest))
-        # Sets of a bag may be missing: every k-th one is not one in k periods.
+        # Bags may lack sets, so that every k-th set is not one set per k periods.
         self._regular = isinstance(recording, VideoRecording)
         offsets = result.summary.get("time_offsets_s")
         if offsets:
@@ -95,7 +95,7 @@ class ResultImages:
         return images.stamp_ns - stamp_ns > self._tolerance_ns
 
     def _every(self, wanted: Sequence[tuple[int, int]]) -> int:
-        """Greatest step over the source that meets all the stamps; 1 where it is not regular."""
+        """Largest step over the source's frames that skips no stamp; 1 for an irregular source."""
         if not self._regular:
             return 1
         steps = np.diff([stamp_ns for _, stamp_ns in wanted]) * self.fps / 1e9

@@ -1,4 +1,4 @@
-"""What a running tracker publishes, in the Rerun viewer or a file for it."""
+"""The output of a running tracker, in the Rerun viewer or in a file for it."""
 
 import math
 from collections.abc import Mapping
@@ -50,7 +50,7 @@ class LiveRecording:
         log_world(self._rr, self._stream)
 
     def arrange(self, cameras: tuple[str, ...]) -> None:
-        """Show these cameras; without effect if they are shown."""
+        """Show these cameras; no effect if they are shown already."""
         if cameras != self._cameras:
             self._cameras = cameras
             self._stream.send_blueprint(blueprint(cameras, CURVES))
@@ -65,10 +65,10 @@ class LiveRecording:
         state: str = "",
         pictures: Mapping[str, Image] | None = None,
     ) -> None:
-        """Log what is given, at the time of its images.
+        """Log the given values at the stamp of their images.
 
         Args:
-            stamp_ns: that time.
+            stamp_ns: stamp of the images.
             markers_m: (15, 3) m, world frame.
             angles_rad: joint -> angle.
             overlap: camera -> overlap of silhouette and body.
@@ -90,6 +90,6 @@ class LiveRecording:
         log_pictures(rr, stream, pictures or {})
 
     def close(self) -> None:
-        """Write what is waiting."""
+        """Write all pending data."""
         self._stream.flush()
         self._stream.disconnect()

@@ -1,4 +1,4 @@
-"""Pictures of a result: the body over the person, in each camera, of chosen frames."""
+"""Pictures of a result: the body drawn over the images of each camera, for chosen frames."""
 
 from collections.abc import Callable, Iterator, Mapping
 
@@ -16,12 +16,12 @@ _END_POINTS = 32
 
 
 def chosen_rows(result: StoredResult, most: int) -> list[int]:
-    """At most so many rows, evenly spaced, the first one included."""
+    """At most `most` rows, evenly spaced, the first one included."""
     return list(range(0, len(result), max(1, -(-len(result) // most))))
 
 
 def spread_rows(result: StoredResult, count: int) -> list[int]:
-    """So many rows from the first to the last."""
+    """`count` rows, evenly spaced from the first to the last."""
     ends = np.linspace(0, len(result) - 1, min(count, len(result)))
     return sorted({int(row) for row in np.rint(ends)})
 
@@ -33,7 +33,7 @@ class Overlays:
         result: the result; frames without a pose show the images alone, cameras without an image
             are black.
         images: its images.
-        progress: called with the number of rows that were drawn, and that of the rows asked for.
+        progress: called with the number of rows drawn and their total.
 
     Raises:
         BodyModelError, DatasetError: the result's body is not described.
@@ -67,7 +67,7 @@ class Overlays:
             yield row, overlay_sheet(named, max_width_px=width_px)
 
     def contact_sheet(self, rows: list[int], *, width_px: int = 1920) -> Image:
-        """One picture (h, w, 3) BGR with a line of cameras for each row."""
+        """One picture (h, w, 3) BGR with all cameras side by side for each row."""
         tiles: dict[str, Image] = {}
         cameras = 1
         for row, pictures in self.pictures(rows):

@@ -27,13 +27,13 @@ BONES = (
     ("Pelvis", "LHip"), ("LHip", "LKnee"), ("LKnee", "LAnkle"),
     ("Pelvis", "RHip"), ("RHip", "RKnee"), ("RKnee", "RAnkle"),
 )  # fmt: skip
-"""Pairs of markers that a line joins."""
+"""Pairs of markers joined by a line."""
 
 _JPEG_QUALITY = 80
 _FLOOR_M = 4.0
 _BACKGROUND = (28, 30, 34)
 _END_POINTS = 16
-# Two ends of so many points each: sides, then a fan over each end.
+# Triangles of a cone with this many points on each end: its side, then a fan over each end.
 _TRIANGLES = np.array(
     [
         corner
@@ -151,7 +151,7 @@ def _cones(rr: Any, stream: Any, body: BodyModel) -> None:
 
 
 def _move_cones(rr: Any, stream: Any, body: BodyModel, pose: FloatArray) -> None:
-    """The place of each cone; without a pose none has a size."""
+    """Log the transform of each cone; without a pose its scale is zero."""
     if not np.isfinite(pose).all():
         stream.log("world/cones", rr.Transform3D(scale=0.0))
         return

@@ -12,7 +12,7 @@ from markerless_tracker.results.stored_result import StoredResult
 MARGIN = 0.12
 """Margin around the markers, relative to the height of the window."""
 WHOLE = 0.85
-"""Windows that cover so much of the image's width are the whole image."""
+"""Windows wider than this, relative to the image's width, become the whole image."""
 LEAST = 0.15
 """Least width of a window, relative to the image's."""
 
@@ -43,7 +43,7 @@ class Window:
 def windows(result: StoredResult, rig: CameraRig) -> Mapping[str, Window]:
     """Camera -> the smallest window that holds the markers of all frames, with a margin.
 
-    The whole image where the markers are never in view.
+    The whole image of a camera that never has the markers in view.
     """
     step = max(1, len(result) // _MOST_ROWS)
     points = result.positions_m[::step].reshape(-1, 3)

@@ -1,4 +1,4 @@
 """Quality of silhouettes against exact masks or a reference pose.
 
-Beside the background subtractors of OpenCV.
+OpenCV's background subtractors are measured for comparison.
 """

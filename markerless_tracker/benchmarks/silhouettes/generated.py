@@ -1,6 +1,7 @@
-"""Silhouettes on generated scenes: rooms and clothes that no threshold was chosen by.
+"""Quality of silhouettes on generated scenes with sampled rooms and clothes.
 
-Of every scene the sampled motion is measured, then the sampled posture.
+The sampled motion of every scene is measured, then its sampled posture. No threshold may be chosen
+on the test scenes.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,7 +25,7 @@ from markerless_tracker.tracking import TrackerConfig
 SETS: Mapping[str, tuple[int, ...]] = {"development": DEVELOPMENT_SEEDS, "test": TEST_SEEDS}
 """Seeds by the name of the set."""
 FRAMES = 3
-"""Frames of the motion that are measured; of the posture one."""
+"""Number of frames measured of each motion; a posture has one."""
 _APART = 40
 _EMPTY_IMAGES = 10
 _MEANS = ("cameras", "iou_mean", "undecided_share", "imaging", "ms", "opencv")
@@ -35,13 +36,13 @@ def generated_scene(seed: int, *, posture: bool = False, frames: int = FRAMES) -
 
     Args:
         seed: of the scene.
-        posture: its posture instead of its motion.
+        posture: show its posture instead of its motion.
         frames: number of frames, 40 apart.
     """
     spec = sample_scene(seed)
     scene = GeneratedScene(spec, motion=spec.posture if posture else spec.motion)
     indices = tuple(_APART * i for i in range(frames))
-    # A tracker's body, whose sections are not the person's.
+    # The tracker's body, whose cross-sections differ from the person's.
     body = build_body(load_description(BODY), scene.subject())
 
     def make() -> Iterator[ImageSet]:
@@ -64,18 +65,19 @@ def measure_generated(
     progress: Callable[[int, int], None] = lambda done, total: None,
     picture: Callable[[str], Picture] | None = None,
 ) -> dict[str, Any]:
-    """Measure silhouettes on a set of generated scenes; keys as `measure` gives them.
+    """Measure silhouettes on a set of generated scenes; keys as in `measure`.
 
-    The figures of `measure` are means over the scenes. Besides, `scenes` holds those of each one
-    with its `seed`, `motion` and `posture`; `iou_median`, `iou_worst` and `worst_seed` sum them up.
+    The figures of `measure` are means over the scenes. In addition, `scenes` holds those of each
+    scene with its `seed`, `motion` and `posture`; `iou_median`, `iou_worst` and `worst_seed`
+    summarise them.
 
     Args:
         which: one of `SETS`.
         config: settings; defaults if None.
-        scenes: only that many, the first ones.
+        scenes: measure only the first `scenes` ones; None = all.
         frames: frames of each motion.
-        progress: called with the number of scenes that are done, and of all.
-        picture: makes the receiver of pictures for a scene's name; see `measure`.
+        progress: called with the number of scenes done and their total.
+        picture: returns the receiver of pictures for a scene's name; see `measure`.
 
     Raises:
         ConfigError: there is no such set.

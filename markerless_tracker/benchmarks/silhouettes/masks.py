@@ -1,13 +1,13 @@
-"""How good silhouettes are: against exact masks, or against the body posed at the reference.
+"""Quality of silhouettes against exact masks, or against the body at the reference pose.
 
-Undecided pixels are measured apart: scores are those of the decided ones, once after imaging alone
-and once after the body at the reference pose has decided what lies near it, as the predicted body
-does when tracking.
+Undecided pixels are measured separately; the scores are those of the decided pixels. They are given
+after imaging alone, and after the body at the reference pose has decided the undecided pixels near
+it, as the predicted body does in tracking.
 
-Side by side with OpenCV's background subtractors MOG2 and KNN on the same frames. Those learn the
-same empty-scene images, learn nothing from the measured ones, remove shadows by their own rule and
-get the same repairs afterwards (`imaging.morphology.clean_mask`), which they need. One thread each;
-times are image to repaired silhouette, without the edge map.
+OpenCV's background subtractors MOG2 and KNN are measured on the same frames. They learn from the
+same empty-scene images only, remove shadows by their own rule, and need the same morphological
+cleaning afterwards (`imaging.morphology.clean_mask`). Each method uses one thread. Times run from
+the image to the cleaned silhouette, without the edge map.
 """
 
 import time
@@ -40,17 +40,17 @@ LEAK_PX = 5
 
 Mask = NDArray[np.bool_]
 Segmentation = Callable[[Image], tuple[Mask, Mask | None]]
-"""Person and undecided pixels (h, w) of an image; None if there are two classes."""
+"""Returns masks (h, w) of person and undecided pixels; the second is None with two classes."""
 Picture = Callable[[str, int, Image], None]
 
 
 @dataclass(frozen=True)
 class MaskScores:
-    """How a mask agrees with the exact one, each in 0..1 but `shadow_leak`, which may exceed 1.
+    """Agreement of a mask with the exact one; all in 0..1, only `shadow_leak` may exceed 1.
 
     Attributes:
         iou, precision, recall, shadow_leak: of the decided pixels.
-        undecided_share: undecided pixels of the person, relative to the person's.
+        undecided_share: fraction of the person's pixels that are undecided.
     """
 
     iou: float
@@ -70,7 +70,7 @@ def mask_scores(mask: Mask, exact: Mask, undecided: Mask | None = None) -> MaskS
     either = int((mask | exact).sum())
     found, true = int(mask.sum()), int(exact.sum())
     away = cv2.distanceTransform((~exact).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    # Without a single pixel of body there is no distance to it.
+    # The distance to an empty mask is undefined.
     leaked = int((mask & (np.asarray(away) > LEAK_PX)).sum()) if true else found
     return MaskScores(
         iou=both / either if either else 1.0,
@@ -83,7 +83,7 @@ def mask_scores(mask: Mask, exact: Mask, undecided: Mask | None = None) -> MaskS
 
 @dataclass
 class _Tally:
-    """What one method got, by camera."""
+    """Scores and times of one method, by camera."""
 
     rows: dict[str, list[MaskScores]] = field(default_factory=dict)
     imaging: dict[str, list[MaskScores]] = field(default_factory=dict)
@@ -119,20 +119,22 @@ def measure(
 ) -> dict[str, Any]:
     """Measure silhouettes; keys as `benchmark silhouettes --json` prints them.
 
-    With exact masks `cameras` holds iou, precision, recall, shadow_leak and ms, and `iou_mean` and
-    `undecided_share` sum up: after the body at the reference pose has decided undecided pixels
-    near it, and in `imaging` before. Without a reference pose both are the same. Without them it
-    holds `overlap`, the IoU of the silhouette with the body posed at the reference,
-    `overlap_selected`, the same for the components that this body explains, and ms; and `body` says
-    whose sections were drawn; `undecided_share` is that of imaging alone. Means over the frames, ms
-    their median.
+    With exact masks, `cameras` holds iou, precision, recall, shadow_leak and ms; `iou_mean` and
+    `undecided_share` summarise them. These figures are those after the body at the reference pose
+    has decided undecided pixels near it; `imaging` has those before. Without a reference pose both
+    are the same.
+
+    Without exact masks, `cameras` holds ms, `overlap` (IoU of the silhouette with the body at the
+    reference pose) and `overlap_selected` (the same for the components that this body explains).
+    `body` holds the body's name and radii; `undecided_share` is that of imaging alone. All are
+    means over the frames, ms is their median.
 
     Args:
-        scene: what is measured.
+        scene: the scene.
         config: settings of the imaging and of the choice of components; defaults if None.
-        progress: reports how many frames of how many are done.
-        picture: given camera, frame and a picture of every silhouette: false positives red, false
-            negatives blue, undecided yellow, the rest of the silhouette green.
+        progress: called with the number of frames done and their total.
+        picture: called with camera, frame and a picture of every silhouette: false positives red,
+            false negatives blue, undecided yellow, the rest of the silhouette green.
 
     Raises:
         TrackerError: the recording cannot be read, or its images do not fit its background.
@@ -223,9 +225,9 @@ def radii_mm(body: BodyModel) -> dict[str, list[float]]:
 
 
 def draw_mask_errors(image: Image, mask: Mask, exact: Mask, undecided: Mask | None = None) -> Image:
-    """The image (h, w, 3), darkened: silhouette green, too much red, missing blue.
+    """The image (h, w, 3), darkened: silhouette green, false positives red, false negatives blue.
 
-    Undecided pixels are yellow, of the person or not.
+    All undecided pixels are yellow.
     """
     colour = image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     out = np.asarray(colour // 2, dtype=np.uint8)
@@ -251,14 +253,14 @@ def _methods(camera: str, empty: list[Image], settings: ImagingSettings) -> dict
     ):
         methods[name] = _subtractor(make(history=max(len(empty), 2), detectShadows=True), empty,
                                    settings)  # fmt: skip
-    # Compiles what is compiled at first use, and fills caches.
+    # The first use compiles kernels and fills caches.
     for method in methods.values():
         method(empty[0])
     return methods
 
 
 def _subtractor(model: Any, empty: list[Image], settings: ImagingSettings) -> Segmentation:
-    # One still says little to a model with a memory of many frames.
+    # A model with a memory of many frames learns too little from one image.
     for image in empty * max(1, -(-10 // len(empty))):
         model.apply(image)
 
@@ -290,7 +292,7 @@ def _selected(
 def _decided(
     found: Mapping[str, tuple[Mask, Mask | None]], scene: SilhouetteScene, views: ImageSet
 ) -> Mapping[str, tuple[Mask, Mask | None]]:
-    """Person and undecided pixels after the body at the reference, if known, has decided."""
+    """Person and undecided pixels after the decision by the body at the reference, if known."""
     if views.pose is None or not views.exact:
         return found
     seen = {name: _observation(name, *of) for name, of in found.items()}
@@ -305,7 +307,7 @@ def _observation(camera: str, mask: Mask, undecided: Mask | None) -> Observation
 
 
 def _timed(method: Segmentation, image: Image) -> tuple[tuple[Mask, Mask | None], float]:
-    """The classes, and the lesser of two times: the first run meets cold caches."""
+    """The classes, and the shorter of two times, since the first run has cold caches."""
     times = []
     for _ in range(2):
         start = time.perf_counter()

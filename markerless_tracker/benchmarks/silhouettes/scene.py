@@ -1,4 +1,4 @@
-"""What silhouettes are measured on: frames with exact masks, or with a reference pose."""
+"""Input of the silhouette benchmark: frames with exact masks, or with a reference pose."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -35,19 +35,20 @@ Mask = NDArray[np.bool_]
 
 BODY = "person31"
 FRAMES = 10
-"""Frames measured by a reference pose, where exact masks do not say which."""
+"""Number of frames measured of a synthetic scene, and of a recording without exact masks."""
 _EMPTY_IMAGES = 10
 
 
 @dataclass(frozen=True, eq=False)
 class ImageSet:
-    """Images of one time and what is known about the body then.
+    """Images of one frame, with its exact masks or reference pose.
 
     Attributes:
-        index: of the frame.
-        images: camera to image.
-        exact: camera to exact mask (h, w); empty without any.
-        body, pose: the body and its reference pose (p,); no pose where nothing says it.
+        index: index of the frame.
+        images: camera -> image.
+        exact: camera -> exact mask (h, w); empty without any.
+        body: the body.
+        pose: its reference pose (p,); None if unknown.
     """
 
     index: int
@@ -57,7 +58,7 @@ class ImageSet:
     pose: FloatArray | None = None
 
     def masks(self, rig: CameraRig) -> Mapping[str, Mask]:
-        """Camera to the mask (h, w) to compare with: exact, or the body's at the reference."""
+        """Camera -> mask (h, w) to compare with: exact, or of the body at the reference pose."""
         if self.exact or self.pose is None:
             return self.exact
         return {camera.name: silhouette(self.body, self.pose, camera) for camera in rig}
@@ -65,15 +66,15 @@ class ImageSet:
 
 @dataclass(frozen=True, eq=False)
 class SilhouetteScene:
-    """A recording, or a made-up scene, as silhouettes are measured on it.
+    """A recording or a synthetic scene, as input of the benchmark.
 
     Attributes:
-        name: of the recording.
+        name: name of the recording.
         rig: its cameras.
         empty: empty-scene images by camera.
-        indices: the frames measured.
+        indices: indices of the measured frames.
         exact: whether there are exact masks.
-        body: whose silhouette stands in for exact masks.
+        body: the body whose silhouette replaces exact masks.
         frames: yields the measured sets in order.
     """
 
@@ -94,13 +95,13 @@ class SilhouetteScene:
 def recorded_scene(
     source: Path, *, scale: float = 1.0, frames: int | None = None
 ) -> SilhouetteScene:
-    """A recording with exact masks, or with a `ground_truth.trc` that says where the body is.
+    """A recording with exact masks, or with a `ground_truth.trc` for the reference pose.
 
     Args:
         source: the recording.
         scale: factor for its images.
-        frames: at most this many frames, evenly spread; None = all that have exact masks, or
-            `FRAMES` of those that have markers.
+        frames: at most this many frames, evenly spaced; None = all with exact masks, or `FRAMES` of
+            those with markers.
 
     Raises:
         TrackerError: it has neither, or cannot be read.
@@ -156,7 +157,7 @@ def recorded_scene(
 def made_up_scene(
     *, frames: int = FRAMES, size_px: tuple[int, int] = (656, 490), grey: bool = False
 ) -> SilhouetteScene:
-    """A made-up walk in front of four cameras, every sixth frame of it."""
+    """A synthetic walk in front of four cameras, every sixth frame of it."""
     scene = SyntheticScene(body=BODY, size_px=size_px, grey=grey)
     indices = tuple(6 * i for i in range(frames))
 
@@ -170,7 +171,7 @@ def made_up_scene(
 
 
 def _posed(recording: Recording, truth: Path) -> tuple[BodyModel, dict[int, FloatArray]]:
-    """The body of the first markers' lengths, and its pose (p,) in every frame with markers."""
+    """The body with lengths from the first row of markers, and its pose (p,) by frame."""
     description = load_description(BODY)
     row = first_row(truth)
     body = build_body(description, subject_from_markers(description, row.markers_m))

@@ -22,7 +22,7 @@ from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking.setup import first_row
 
 SIZE_PX = (644, 488)
-"""Image size of the made-up scene: width, height."""
+"""Image size of the synthetic scene: width, height."""
 _EMPTY_IMAGES = 5
 
 
@@ -81,7 +81,7 @@ def recorded_scene(source: Path, *, frames: int, scale: float = 1.0) -> SpeedSce
 
 
 def made_up_scene(*, frames: int, size_px: tuple[int, int] = SIZE_PX) -> SpeedScene:
-    """A made-up walk in front of four cameras."""
+    """A synthetic walk in front of four cameras."""
     scene = SyntheticScene(body="person31", size_px=size_px)
     sets = tuple(FrameSet(i, scene.stamp_ns(i), scene.frame(i)[0]) for i in range(frames))
     markers_m = dict(zip(MARKER_NAMES, scene.markers(0), strict=True))

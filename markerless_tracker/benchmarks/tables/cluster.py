@@ -54,7 +54,7 @@ def execute_there(run: Run, order: EvidenceOrder, same: Mapping[str, str]) -> di
         same: required code and versions (`code_and_versions`).
 
     Raises:
-        ConfigError: the worker has others.
+        ConfigError: the worker's code or versions differ.
         TrackerError: the run failed.
     """
     check_same(same)

@@ -1,4 +1,4 @@
-"""A recording's evidence, computed once and read by many runs, also in other processes.
+"""A recording's evidence, computed once and shared by many runs, also in other processes.
 
 Decoding and segmentation do not depend on body, seed or search. The observations that
 `Tracker.step` would make are written to plain files, which the runs map into memory. A run on them

@@ -35,7 +35,7 @@ class PaperTable:
 
     Attributes:
         name: short name.
-        title: title for people.
+        title: title for display.
         source: paper and data of the figures.
         note: remark from the paper's text; '' = none.
         rates: frames per second for which the figures hold.

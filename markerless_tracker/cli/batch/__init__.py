@@ -1,6 +1,6 @@
-"""Verb `batch`: many recordings to results and one summary table.
+"""Verb `batch`: tracks many recordings, and writes their results and one summary table.
 
-Finding the recordings, doing a trial, processes and clusters that do them, the table.
+A trial is the tracking of one recording. Trials run in parallel processes or on a cluster.
 """
 
 from markerless_tracker.cli.batch.verb import EXAMPLE, HELP, add_arguments, run

@@ -14,10 +14,10 @@ from markerless_tracker.errors import SearchError
 def on_cluster(trials: Sequence[Trial], scheduler: str) -> Iterator[tuple[Trial, dict[str, Any]]]:
     """Trials and their rows, in order of completion.
 
-    Dask gives the trial of a worker that dies to another one.
+    If a worker dies, Dask gives its trial to another one.
 
     Args:
-        trials: what is to be done.
+        trials: the trials.
         scheduler: address, such as tcp://host:8786.
 
     Raises:
@@ -35,7 +35,7 @@ def on_cluster(trials: Sequence[Trial], scheduler: str) -> Iterator[tuple[Trial,
 
 
 def do_there(trial: Trial, same: Mapping[str, str]) -> dict[str, Any]:
-    """Do a trial on a worker: see `do_trial`.
+    """Run a trial on a worker: see `do_trial`.
 
     Raises:
         ConfigError: the worker has other code or versions than `same` (`code_and_versions`).

@@ -12,12 +12,11 @@ from markerless_tracker.errors import DatasetError
 def find_recordings(source: Path) -> dict[str, Path]:
     """Name -> absolute path of every recording, in order of the names (of the lines of a list).
 
-    A folder is searched to any depth; what lies in a recording is not searched, nor are hidden
-    folders. A list is a text file with one path per line, relative to the list's folder; blank
-    lines and lines that begin with # are left out, and so are repeated paths. What a list names is
-    a recording, whether it exists or not. Of a data set's folder with several trials each is found.
-    A name is the path below the folder (below the longest common folder of a list), that of a file
-    without its suffix.
+    A folder is searched recursively, except hidden folders and the content of recordings. Each
+    trial in a data set's folder is a recording. A list is a text file with one path per line,
+    relative to the list's folder. Blank lines, lines that begin with # and repeated paths are left
+    out; the other paths are recordings, whether they exist or not. A name is the path relative to
+    the folder (to the longest common folder of a list), without the suffix of a file.
 
     Raises:
         DatasetError: there is no such folder or list, or no recording in it.
@@ -38,7 +37,7 @@ def find_recordings(source: Path) -> dict[str, Path]:
 
 
 def _below(folder: Path, seen: set[str]) -> Iterator[Path]:
-    """The recordings at and below a folder; folders that a link repeats count once."""
+    """The recordings at and below a folder; folders repeated by links count once."""
     real = os.path.realpath(folder)
     if real in seen:
         return

@@ -1,4 +1,4 @@
-"""The trials of a batch: arguments of each, and the key of all that its result depends on."""
+"""The trials of a batch: the arguments of each, and the key of its result's dependencies."""
 
 import argparse
 import os
@@ -14,18 +14,18 @@ from markerless_tracker.datasets.source import calibration_beside
 from markerless_tracker.errors import ConfigError
 
 NOT_OF_TRACK = ("source", "out", "json", "force", "jobs", "scheduler")
-"""Arguments of `batch` that are none of `track`, or differ in each trial."""
+"""Arguments of `batch` that `track` lacks, or that differ between trials."""
 _OUTPUTS = {"debug_images": "--debug-images", "refine_calibration": "--refine-calibration"}
 _MAYBE_FILES = ("body", "time_offsets")
 
 
 def plan(args: argparse.Namespace, found: Mapping[str, Path], *, threads: int) -> list[Trial]:
-    """The trials of the recordings that were found.
+    """The trials of the given recordings.
 
     Args:
         args: parsed arguments of `batch`.
         found: name -> absolute path of every recording.
-        threads: of each trial, unless the arguments say otherwise.
+        threads: threads of each trial, unless the arguments set them.
 
     Raises:
         ConfigError: a setting is impossible, or an output of all trials would be one file.
@@ -49,7 +49,7 @@ def _trial(
     name: str, source: Path, out: Path, options: Mapping[str, Any], settings: Mapping[str, Any]
 ) -> Trial:
     own = {key: _filled(key, value, name, source) for key, value in options.items()}
-    # The settings stand for the options that give them; some files hold more than a name says.
+    # The key has the settings in place of their options, and the content of files, not their names.
     files = {
         key: _content(value)
         for key, value in own.items()
@@ -65,7 +65,7 @@ def _trial(
 
 
 def _filled(option: str, value: Any, name: str, source: Path) -> Any:
-    """An argument with this trial's name and source; paths are absolute for other processes."""
+    """An argument with this trial's name and source; paths become absolute, for other processes."""
     if not isinstance(value, str | Path):
         return value
     text = str(value).replace("{source}", str(source)).replace("{name}", name)
@@ -87,5 +87,5 @@ def _recording(source: Path) -> list[str]:
         shared = calibration_beside(source)
         return [*keys, recording_key(shared)] if shared is not None else keys
     except OSError:
-        # Its trial will say what is wrong with it.
+        # Its trial will report the error.
         return [str(source)]

@@ -1,4 +1,4 @@
-"""Trials in parallel processes of this machine; a process that dies costs no trial."""
+"""Trials in parallel processes of this machine; the trial of a process that dies is repeated."""
 
 import multiprocessing
 import os
@@ -12,7 +12,7 @@ from typing import Any
 from markerless_tracker.cli.batch.trial import Trial, do_trial, failed
 
 ATTEMPTS = 3
-"""Times that a trial is tried whose process dies."""
+"""Largest number of attempts at a trial whose process dies."""
 
 Do = Callable[[Trial], dict[str, Any]]
 
@@ -22,13 +22,13 @@ def on_processes(
 ) -> Iterator[tuple[Trial, dict[str, Any]]]:
     """Trials and their rows, in order of completion.
 
-    Each process does one trial at a time, many in turn. If it dies, another process takes its
-    place and its trial is tried again, `ATTEMPTS` times in all.
+    Each process runs many trials, one at a time. If it dies, another process replaces it and its
+    trial is tried again, `ATTEMPTS` times in all.
 
     Args:
-        trials: what is to be done.
+        trials: the trials.
         jobs: number of processes.
-        do: does a trial; a function of a module.
+        do: runs a trial; a module-level function, so that it can be pickled.
     """
     waiting = deque(trials)
     deaths: Counter[str] = Counter()
@@ -63,7 +63,7 @@ def on_processes(
 
 
 class _Worker:
-    """A process and the trial that it does."""
+    """A process and the trial that it runs."""
 
     def __init__(self, do: Do) -> None:
         # Forked children would inherit threads' locks in an unknown state.
@@ -71,7 +71,7 @@ class _Worker:
         self.pipe, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs, do), daemon=True)
         self._process.start()
-        # With the other end open here, the death of the process would go unnoticed.
+        # If the other end were open here, the death of the process would go unnoticed.
         theirs.close()
         self.trial: Trial | None = None
 
@@ -80,7 +80,7 @@ class _Worker:
         try:
             self.pipe.send(trial)
         except OSError:
-            # It is dead, which reading will show.
+            # The process is dead; reading from the pipe will show it.
             pass
 
     def row(self) -> dict[str, Any] | None:
@@ -99,8 +99,8 @@ class _Worker:
 
 
 def _serve(pipe: Connection, do: Do) -> None:
-    """Do trials until the pipe is closed."""
-    # An interrupt is the business of the process that asks.
+    """Run trials until the pipe is closed."""
+    # The parent process handles interrupts.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:
@@ -115,5 +115,5 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
-        # A trial that goes on without it could be done twice.
+        # Without its parent, a trial that continued could be run twice.
         os._exit(1)

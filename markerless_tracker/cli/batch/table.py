@@ -20,7 +20,7 @@ JSON = "summary.json"
 
 
 def text_table(rows: Sequence[Row]) -> Table:
-    """The rows for people; with errors in mm if a recording has reference markers."""
+    """The rows as a table, with errors in mm if a recording has reference markers."""
     measured = any(row["mean_mm"] is not None for row in rows)
     table = Table()
     table.add_column("recording", overflow="fold")
@@ -49,7 +49,7 @@ def text_table(rows: Sequence[Row]) -> Table:
 
 
 def totals(rows: Sequence[Row]) -> dict[str, int]:
-    """Numbers of recordings: all, done, of them found and done earlier; failed."""
+    """Numbers of recordings: all; done, and of these found and done earlier; failed."""
     done = [row for row in rows if row["status"] == "done"]
     return {
         "recordings": len(rows),

@@ -1,7 +1,7 @@
 """One trial of a batch: `track` on one recording, in any process.
 
-A trial is done in a folder of its own. Its files are moved to their places when they are complete,
-and its record is written last: a trial with a record is done, one without is not.
+A trial writes to a folder of its own. Its complete files are moved to their final paths, and the
+row of its record is written last. A trial is done if its record has a row.
 """
 
 import argparse
@@ -26,21 +26,21 @@ from markerless_tracker.results.score import score
 from markerless_tracker.results.stored import stored_frames
 
 RECORDS = ".batch"
-"""Folder of the records, in that of the results."""
+"""Folder of the records, in the folder of the results."""
 PARTIAL = ".partial-"
-"""Start of the names of the folders in `RECORDS` in which trials are done."""
+"""Prefix of the folders in `RECORDS` to which running trials write."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A recording and all that is to be done with it.
+    """A recording and the arguments with which it is tracked.
 
     Attributes:
-        name: of the recording and its result, may have folders.
+        name: name of the recording and its result, may have folders.
         source: absolute path of the recording.
         out: absolute path of the batch's results.
-        key: of the recording's files and of everything that the result depends on.
-        arguments: arguments of `track` by name, but `source`, `name`, `force` and `json`.
+        key: key of the recording's files and of everything that the result depends on.
+        arguments: arguments of `track` by name, except `source`, `name`, `force` and `json`.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Trial:
         return self.out / RECORDS / f"{self.name}.json"
 
     def stored(self) -> "Record | None":
-        """What is recorded of this name, None without a readable record."""
+        """The record of this name; None without a readable one."""
         try:
             found = json.loads(self.record.read_text(encoding="utf-8"))
             files = tuple(str(name) for name in found["files"])
@@ -75,12 +75,11 @@ class Record(NamedTuple):
 def do_trial(trial: Trial) -> dict[str, Any]:
     """Track a trial's recording and write its result; returns its row of the table.
 
-    An error of the recording or of its processing is in the row, under `error`; nothing is written
-    then. Keys: `name`, `source`, `status` (done or failed), `found`, `frames`, `tracked`,
-    `overlap` (mean over the cameras of the median overlap), `mean_mm` (error against the
-    recording's reference markers, None without any) and `reference_problem` (why it is None where
-    there are some), `disagree` (names of cameras), `warnings`, `seconds`, `error`. A trial that is
-    done already is not done again.
+    If the recording or its processing fails, `error` of the row states why and nothing is written.
+    A trial that is done already is not repeated. Keys: `name`, `source`, `status` (done or failed),
+    `found`, `frames`, `tracked`, `overlap` (mean over the cameras of the median overlap), `mean_mm`
+    (error against the recording's reference markers, None without any), `reference_problem` (why it
+    is None in spite of markers), `disagree` (names of cameras), `warnings`, `seconds`, `error`.
     """
     clock = _Clock()
     stored = trial.stored()
@@ -117,7 +116,7 @@ def do_trial(trial: Trial) -> dict[str, Any]:
 
 
 def failed(trial: Trial, error: str, seconds: float | None = None) -> dict[str, Any]:
-    """Row of a trial that failed with an error of one line, after so many seconds."""
+    """Row of a trial that failed after some seconds with an error of one line."""
     nothing = dict.fromkeys(
         ("found", "frames", "tracked", "overlap", "mean_mm", "reference_problem")
     )
@@ -129,7 +128,7 @@ def failed(trial: Trial, error: str, seconds: float | None = None) -> dict[str, 
 
 
 class _Clock(Notices):
-    """Time of a trial, without the compilation that the first one of a process may wait for."""
+    """Time of a trial, without the compilation in the first trial of a process."""
 
     def __init__(self) -> None:
         self._from = time.perf_counter()
@@ -143,12 +142,12 @@ class _Clock(Notices):
 
     @property
     def seconds(self) -> float:
-        """Until now, s."""
+        """Time so far, s."""
         return time.perf_counter() - self._from
 
 
 def _track(trial: Trial, earlier: Record | None, clock: _Clock) -> tuple[Finished, list[str]]:
-    """Track and put the files in place; returns what `track` did and the files' names."""
+    """Track and move the files to their final paths; returns the run and the files' names."""
     target = trial.out / trial.name
     target.parent.mkdir(parents=True, exist_ok=True)
     trial.record.parent.mkdir(parents=True, exist_ok=True)
@@ -159,7 +158,7 @@ def _track(trial: Trial, earlier: Record | None, clock: _Clock) -> tuple[Finishe
         )
         finished = track_source(chosen, clock)
         files = sorted(file.name for file in folder.iterdir())
-        # A record without a row: from here on neither result is complete.
+        # The record has no row, since from here on neither result is complete.
         _write(trial.record, {"key": trial.key, "files": files})
         for name in earlier.files if earlier is not None else ():
             (target.parent / name).unlink(missing_ok=True)
@@ -171,7 +170,7 @@ def _track(trial: Trial, earlier: Record | None, clock: _Clock) -> tuple[Finishe
 
 
 def _mean_error(trial: Trial, finished: Finished) -> tuple[float | None, str | None]:
-    """Mean error in mm as `evaluate` has it, and why there is none although there are markers."""
+    """Mean error in mm as in `evaluate`, and why it is None in spite of reference markers."""
     path = trial.out / f"{trial.name}.trc"
     try:
         reference = finished.recording.ground_truth()

@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
             for row in _done(args, missing, jobs, len(rows)):
                 rows[row["name"]] = {**row, "earlier": False}
         finally:
-            # What an interrupted batch did is in the tables.
+            # The tables of an interrupted batch contain its completed trials.
             table = [rows[trial.name] for trial in trials if trial.name in rows]
             write_tables(args.out, table)
     numbers = totals(table)
@@ -132,7 +132,7 @@ def _done(
 
 
 def _check_targets(missing: Sequence[Trial]) -> None:
-    """Make sure that no result of other settings would be replaced."""
+    """Check that no result of other settings would be replaced."""
     for trial in missing:
         path = trial.out / f"{trial.name}.json"
         if trial.stored() is not None or (path.exists() and not trial.record.exists()):
@@ -144,7 +144,7 @@ def _check_targets(missing: Sequence[Trial]) -> None:
 
 @contextmanager
 def _alone(out: Path) -> Iterator[None]:
-    """The folder of the results for this batch alone, without what killed trials left."""
+    """Lock the folder of the results for this batch, and remove leftovers of killed trials."""
     records = out / RECORDS
     try:
         records.mkdir(parents=True, exist_ok=True)

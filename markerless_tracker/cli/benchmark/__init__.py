@@ -44,5 +44,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do it; returns the exit status."""
+    """Run the benchmark; returns the exit status."""
     return int(_KINDS[args.kind].run(args))

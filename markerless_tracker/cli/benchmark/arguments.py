@@ -17,11 +17,11 @@ def add_kind(
     """A parser of one kind of benchmark.
 
     Args:
-        kinds: receives it.
-        name: of the kind.
-        examples: the lines below the help, as they are.
+        kinds: receives the parser.
+        name: name of the kind.
+        examples: lines below the help, printed verbatim.
         help: one line in the list of kinds.
-        description: begins the help.
+        description: beginning of the help.
     """
     parser: argparse.ArgumentParser = kinds.add_parser(
         name,

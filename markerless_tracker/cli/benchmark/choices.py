@@ -17,7 +17,7 @@ from markerless_tracker.tracking import PRESETS, TrackerConfig
 
 @dataclass(frozen=True)
 class Group:
-    """Rows that are printed together.
+    """Rows of one printed table.
 
     Attributes:
         table: the paper's table that is reproduced; None = combinations of the options' values.

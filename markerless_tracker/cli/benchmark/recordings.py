@@ -32,8 +32,8 @@ def add_recordings(
 
     Args:
         parser: receives the arguments.
-        without: for the help: what holds without `--stature`.
-        sources: how many recordings, as `nargs` of argparse.
+        without: text of the help on the stature without `--stature`.
+        sources: number of recordings, as `nargs` of argparse.
     """
     parser.add_argument("sources", nargs=sources, type=Path, metavar="SOURCE", help="recording")
     parser.add_argument(

@@ -51,7 +51,8 @@ def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status.
 
     Raises:
-        ConfigError: neither recordings nor `--postures`, or both, or options of the other.
+        ConfigError: neither recordings nor `--postures` are given, or both, or options of the
+            other.
     """
     if (args.postures is None) == (not args.sources):
         raise ConfigError("expected recordings or --postures N, and not both")

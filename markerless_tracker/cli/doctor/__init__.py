@@ -1,6 +1,6 @@
-"""Verb `doctor`: what is wrong with this machine, its ROS graph and its cameras.
+"""Verb `doctor`: finds problems of this machine, its ROS graph and its cameras.
 
-`verb` has its arguments and what it prints.
+`verb` has its arguments and its output.
 """
 
 from markerless_tracker.cli.doctor.verb import EXAMPLE, HELP, add_arguments, run

@@ -1,4 +1,4 @@
-"""Arguments and findings of `doctor`."""
+"""Arguments and output of `doctor`."""
 
 import argparse
 import os
@@ -27,7 +27,7 @@ HELP = (
 EXAMPLE = "markerless_tracker doctor --calibration walk/calibration.toml"
 _ADVICE = "correct it, or make it anew with `calibrate`"
 MOST_SECONDS = 3600.0
-"""Longest time for which cameras are listened to."""
+"""Largest value of `--seconds`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check; returns 0, or 3 if something is red.
+    """Check; returns 0, or 3 if a finding is red.
 
     Raises:
         ConfigError: arguments are impossible, or contradict each other.
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"seconds is {args.seconds:g}, expected 0 to {MOST_SECONDS:g}")
     if args.background is not None and args.calibration is None:
         raise ConfigError("--background needs --calibration, whose cameras it is compared with")
-    # The environment as the user set it: listening applies the shipped profile.
+    # The user's environment is copied first, since listening applies the shipped profile.
     found = check_machine(dict(os.environ), profiles=USERS_OWN, shipped=profile_file())
     rig, calibrated = _calibration(args.calibration)
     found += calibrated
@@ -113,7 +113,7 @@ def _backgrounds(
 def _cameras(
     names: Sequence[str], backgrounds: dict[str, Image], args: argparse.Namespace
 ) -> list[Finding]:
-    # ROS is imported here alone.
+    # Only this function imports ROS.
     from markerless_tracker.node.doctor.listen import image_topics, listen
 
     bars = seconds_bar()
@@ -133,6 +133,6 @@ def _cameras(
                 progress=lambda seconds: bars.update(task, completed=seconds),
             )  # fmt: skip
     except RosMissingError:
-        return []  # `check_machine` says it.
+        return []  # `check_machine` reports it.
     streams = {name: CameraStream(*received) for name, received in heard.items()}
     return check_streams(streams, backgrounds, listened_s=args.seconds)

@@ -1,1 +1,1 @@
-"""Passes of `track` through a recording: the first one fits the body, the second tracks with it."""
+"""Passes of `track` over a recording: the first one fits the body, the second tracks with it."""

@@ -1,4 +1,4 @@
-"""The tracker that the arguments of `track` ask for, and its first pass of two."""
+"""Builds the tracker from the arguments of `track`, after the first pass if there are two."""
 
 import argparse
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ from markerless_tracker.tracking.person.whole import WholeRecording
 def set_up(
     args: argparse.Namespace, recording: Recording, config: TrackerConfig, notices: Notices
 ) -> TrackerSetup:
-    """The tracker of the last pass; with two passes the first one is gone through before.
+    """The tracker of the last pass; if there are two passes, the first one is run before.
 
     Raises:
         ConfigError: two passes, and the person is known already.

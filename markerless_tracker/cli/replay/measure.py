@@ -1,4 +1,4 @@
-"""Figures of a recording that is played to a running tracker at several rates."""
+"""Figures of a live tracker to which a recording is played at several rates."""
 
 import math
 import tempfile
@@ -16,12 +16,12 @@ from markerless_tracker.results.score import score
 from markerless_tracker.tracking import TrackerConfig
 
 Report = Callable[[str, int, int | None], None]
-"""Receives progress: the part in words, how much of it is done, how much there is."""
+"""Receives progress: the part in words, its steps done, and their total."""
 
 
 @dataclass(frozen=True)
 class LivePlan:
-    """What is measured.
+    """The settings of a measurement.
 
     Attributes:
         config: settings of the tracker.
@@ -46,7 +46,7 @@ def measure_live(
 
     Args:
         source: the recording; it is written as a bag to a temporary folder.
-        plan: what is measured.
+        plan: the settings of the measurement.
         stature_m: stature given to the tracker if nothing else is, m; None = unknown.
         scale: factor for the images.
         report: receives progress.
@@ -56,7 +56,7 @@ def measure_live(
         `played_s` (time the player took), `tracked` (sets with a pose), `per_second` (of them),
         `skipped`, `lost`, `first_pose_s`, `latency_ms` {median, p95} from the arrival of a set's
         last image to its result, `cpu_ms` {tracker, player} per tracked and per sent set, and
-        `mean_mm`, the error of the tracked sets. None for what there is no value of.
+        `mean_mm`, the error of the tracked sets. Unknown values are None.
 
     Raises:
         NodeError: a process failed.

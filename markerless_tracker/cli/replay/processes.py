@@ -1,4 +1,4 @@
-"""Nodes as processes that end with this one."""
+"""Nodes as child processes, which end together with this process."""
 
 import os
 import signal
@@ -76,7 +76,7 @@ class NodeProcess:
             raise NodeError(f"{self.name} ended with status {status}: {self._last_line()}")
 
     def output(self) -> str:
-        """What it has printed so far."""
+        """Its output so far."""
         return self._log.read_text(encoding="utf-8", errors="replace")
 
     def warnings(self) -> list[str]:

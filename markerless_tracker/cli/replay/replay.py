@@ -13,10 +13,10 @@ from markerless_tracker.node.ros.profile import apply_profile
 from markerless_tracker.node.watch import StateWatch
 
 READY_S = 900.0
-"""Time for the tracker to start; the first start compiles, on a busy machine for minutes."""
+"""Timeout for the tracker's start. The first start compiles, for minutes on a busy machine."""
 
 STUCK_S = 600.0
-"""Time without progress, in real time beyond the bag's own, after which a replay is given up."""
+"""Timeout of a replay: without progress in lockstep, beyond the bag's duration in real time."""
 
 _QUIET_S = 5.0
 _LOOK_S = 0.2
@@ -42,7 +42,7 @@ class Replay:
             without a pose.
         playing_s: time in which the player sent the sets.
         player_cpu_ms: CPU time of the player per set.
-        tracker_cpu_s: CPU time of the tracker from its being ready to the end.
+        tracker_cpu_s: CPU time of the tracker, from when it is ready to the end.
         result: the result files' path without suffix.
         warnings: the warnings of the player.
     """
@@ -162,7 +162,7 @@ def _until_through(
 
     Args:
         node, player: the processes.
-        watch: hears the tracker's `state`.
+        watch: subscriber of the tracker's `state`.
         sets: sets of images in the bag.
         lasts_s: time the bag takes; None = as long as sets are tracked.
         report: called with the progress.
@@ -176,7 +176,7 @@ def _until_through(
     latest: Mapping[str, str] = {}
     while True:
         values = watch.listen(0.1)
-        # Results come far more often; on two cores each message heard costs the tracker time.
+        # Results arrive far more often. On two cores, receiving each one would slow the tracker.
         time.sleep(_LOOK_S)
         done = _dealt_with(values)
         now_s = time.monotonic()
@@ -196,7 +196,7 @@ def _until_through(
 
 
 def _played(output: str) -> tuple[float, float]:
-    """Duration (s) and CPU time per set (ms) that the player states; NaN if it was cut short."""
+    """Duration (s) and CPU time per set (ms) printed by the player; NaN if it was interrupted."""
     found = _PLAYED.search(output)
     return (float(found[1]), float(found[2])) if found else (math.nan, math.nan)
 

@@ -1,4 +1,4 @@
-"""What commands show on standard error while they work: progress bars, notices of a run.
+"""Progress bars and notices of a run, on standard error.
 
-Nothing but warnings is shown where standard error is no terminal.
+If standard error is no terminal, only warnings are shown.
 """

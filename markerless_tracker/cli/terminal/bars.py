@@ -1,4 +1,4 @@
-"""What commands show while they work: progress on standard error, if that is a terminal."""
+"""Progress of commands on standard error, if it is a terminal."""
 
 from rich.console import Console
 from rich.progress import (
@@ -14,7 +14,7 @@ from rich.progress import (
 from rich.text import Text
 
 _BAR_WIDTH = 20
-"""Columns of a bar: a line of 80 also holds the description, the counts, the times and a note."""
+"""Columns of a bar. Description, counts, times and note must fit beside it into a line of 80."""
 
 
 class NoteColumn(ProgressColumn):
@@ -26,7 +26,7 @@ class NoteColumn(ProgressColumn):
 
 
 class _QuietProgress(Progress):
-    """Bars that leave no empty line behind where nothing is shown, as rich before 14 does."""
+    """Bars that print no empty line if they are hidden, as rich before version 14 does."""
 
     def stop(self) -> None:
         if not self.disable:
@@ -34,9 +34,9 @@ class _QuietProgress(Progress):
 
 
 def progress_bars(console: Console | None = None) -> Progress:
-    """Bars with the time since the beginning, the time that is left, and a note.
+    """Bars with the elapsed time, the remaining time, and a note.
 
-    Nothing is shown where the console is no terminal.
+    Nothing is shown if the console is no terminal.
 
     Args:
         console: default: standard error.
@@ -50,7 +50,7 @@ def progress_bars(console: Console | None = None) -> Progress:
 
 
 def seconds_bar() -> Progress:
-    """A bar of a time that was asked for, on standard error; nothing where that is no terminal."""
+    """A bar of a given duration, on standard error; nothing is shown if it is no terminal."""
     console = Console(stderr=True)
     return _QuietProgress(
         TextColumn("{task.description}"), BarColumn(_BAR_WIDTH), TimeRemainingColumn(),
@@ -59,7 +59,7 @@ def seconds_bar() -> Progress:
 
 
 def tell(console: Console, text: str) -> None:
-    """Print a line as it is, whatever the width."""
+    """Print a line without wrapping or markup."""
     console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 

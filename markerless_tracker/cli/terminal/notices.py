@@ -13,7 +13,7 @@ COMPILING = "compiling"
 
 
 class Notices:
-    """Receives what happens during `track_source`; the base class ignores it."""
+    """Receives the events of `track_source`; the base class ignores them."""
 
     def begin(self, part: str, total: int | None = None) -> None:
         """Receives the name of the next part and the number of its steps (None = unknown)."""
@@ -29,7 +29,7 @@ class Notices:
 
 
 class Bars(Notices):
-    """A progress bar from the first part on, in a terminal, and warnings above it."""
+    """A progress bar in a terminal, shown from the first part on, and warnings above it."""
 
     def __init__(self, console: Console) -> None:
         self._bars = progress_bars(console)

@@ -1,9 +1,9 @@
-"""Whether silhouettes fit together by themselves, and which camera is wrong if they do not.
+"""Consistency of the silhouettes with each other, and the camera at fault if they are inconsistent.
 
-Silhouettes of the cameras of one rig have a visual hull whose images fill them. If two cameras are
-exchanged, all are numbered from another one on, or one has another camera's background, the hull is
-small or nowhere. The rigs without one camera, with two exchanged, and with all shifted along their
-order are tried: what makes them fit names the fault.
+The images of the visual hull fill the silhouettes if the rig is correct. The hull is small or empty
+if two cameras are exchanged, if the order of the cameras is shifted, or if a camera has another
+camera's background. Each of these faults is tried: two cameras exchanged, the order shifted, one
+camera left out. The rig in which the silhouettes are consistent names the fault.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,31 +19,33 @@ from markerless_tracker.records import Observation
 from markerless_tracker.tracking.start.hull import FINE_M, Hull, find_hulls
 
 FITS = 0.95
-"""Fraction of the silhouettes that their hull fills, if cameras and silhouettes belong together; in
-recordings it is 0.985 or more."""
+"""Least fraction of the silhouettes that their hull fills in a correct rig. Recordings have 0.985
+or more."""
 GAIN, GAIN_OF_ORDER = 0.10, 0.05
-"""Least gain in that fraction by which a fault is named: without a camera, and with all in another
-order. Fewer cameras fit together more easily."""
+"""Least gain in that fraction for a fault to be reported: with a camera left out, and with cameras
+exchanged or shifted. The first is larger, since fewer cameras are consistent more easily."""
 CERTAIN = 0.985
-"""From this fraction on nothing else is tried: cameras in a ring fit nearly as well in mirrored
-order."""
+"""The trials end at a rig with at least this fraction. Cameras in a ring reach nearly the same in
+mirrored order."""
 MOST_CAMERAS = 8
-"""Exchanges are tried among so many cameras."""
+"""Largest number of cameras among which faults are tried."""
 _LEAST_LEFT = 3
-"""With two cameras left nearly all silhouettes fit together."""
+"""A camera is left out only if this many remain: silhouettes of two are nearly always consistent.
+"""
 
 Views = Mapping[str, Observation]
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What makes the silhouettes fit together.
+    """A fault of the rig, without which the silhouettes are consistent.
 
     Attributes:
-        exchanged: two cameras to be exchanged; empty if none.
-        left_out: a camera to be left out; empty if none.
-        before, after: fraction of the silhouettes that their hull fills.
-        shifted: all cameras, each with the one whose calibration it has; empty if none.
+        exchanged: the two cameras that are exchanged; empty if none.
+        left_out: the camera that contradicts the others; empty if none.
+        before, after: fraction of the silhouettes that their hull fills, with and without the
+            fault.
+        shifted: pairs of a camera and the one whose calibration it has; empty if none.
     """
 
     exchanged: tuple[str, ...]
@@ -79,11 +81,11 @@ class Fault:
 
 
 def find_fault(rig: CameraRig, frames: Sequence[Views]) -> Fault | None:
-    """The fault that explains best why silhouettes do not fit together; None if they do.
+    """The fault that best explains inconsistent silhouettes; None if they are consistent.
 
     Args:
         rig: the cameras.
-        frames: silhouettes of a few moments, by camera.
+        frames: silhouettes of a few frames, by camera.
     """
     cameras = {camera.name: camera for camera in rig}
     before = _mean_fit(cameras, frames)
@@ -92,7 +94,7 @@ def find_fault(rig: CameraRig, frames: Sequence[Views]) -> Fault | None:
     names = [name for name in cameras if all(name in views for views in frames)][:MOST_CAMERAS]
     best: Fault | None = None
     for trial in _trials(cameras, names):
-        # One moment is enough to choose.
+        # One frame is enough to choose.
         fault = trial.fault(frames[:1], before)
         if best is None or _worth(fault) > _worth(best):
             best, chosen = fault, trial
@@ -109,7 +111,7 @@ def find_fault(rig: CameraRig, frames: Sequence[Views]) -> Fault | None:
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """A rig to try, and the cameras that are not those of the given one."""
+    """A rig to try, and its differences from the given one."""
 
     cameras: Mapping[str, CameraModel]
     exchanged: tuple[str, ...] = ()
@@ -134,7 +136,7 @@ def _trials(cameras: Mapping[str, CameraModel], names: Sequence[str]) -> Iterato
 
 
 def _shifts(cameras: Mapping[str, CameraModel], names: Sequence[str]) -> Iterator[_Trial]:
-    """All cameras numbered from another one on."""
+    """Cyclic shifts of the order of all cameras."""
     count = len(names)
     same_size = len({camera.size_px for camera in cameras.values()}) == 1
     if count < 3 or count != len(cameras) or not same_size:
@@ -151,7 +153,7 @@ def largest_hull(rig: CameraRig, views: Views) -> Hull | None:
 
 
 def _worth(fault: Fault) -> float:
-    # Without a camera the others fit together more easily than with two exchanged.
+    # Leaving out a camera improves the fit more easily than exchanging two.
     return fault.after - (0.05 if fault.left_out else 0.0)
 
 

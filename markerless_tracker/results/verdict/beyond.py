@@ -1,7 +1,7 @@
-"""How far silhouettes reach beyond the body above and below: a body that is too small.
+"""Detects a body that is too small: the silhouettes extend beyond it above and below.
 
-A body of too little stature cannot fill the silhouettes: head or feet of the person lie outside of
-it. One that is too large fills them with bent knees.
+A body of too little stature cannot fill the silhouettes: the person's head or feet lie outside of
+it. A body that is too large is not detected: it fills them with bent knees.
 """
 
 import math
@@ -17,28 +17,31 @@ from markerless_tracker.results.verdict.histogram import Histogram
 from markerless_tracker.tracking.search import pixels_per_m
 
 LEAST = 6
-"""Comparisons of a camera without which it does not count."""
+"""Least number of comparisons for a camera to count."""
 LEAST_CAMERAS = 2
+"""Least number of such cameras for a result."""
 _FRAMES = 0.75
-"""Quantile over the frames: arms of a body that is too small fill the head in some of them."""
+"""Quantile over the frames. In some frames a body that is too small fills the silhouette of the
+head with its arms."""
 _UPRIGHT = 0.8
+"""Least downward component of a camera's v axis, a unit vector, for an upright image."""
 _PELVIS = MARKER_NAMES.index("Pelvis")
 _MOST_M, _BINS = 1.0, 400
 
 
 class Beyond:
-    """Sums up, by camera, how far the silhouette goes beyond the body's outline up and down."""
+    """Measures by camera how far the silhouette extends beyond the body, up and down together."""
 
     def __init__(self) -> None:
         self._found: dict[str, Histogram] = {}
 
     def add(self, result: TrackResult, camera: CameraModel, covered: NDArray[np.bool_]) -> None:
-        """Take a camera's view of a frame.
+        """Add a camera's view of a frame.
 
         Args:
             result: of the frame, with markers.
-            camera: the camera; one whose image is not upright is passed over.
-            covered: (h, w) what the body covers.
+            camera: the camera; ignored if its image is not upright.
+            covered: (h, w) mask of the pixels that the body covers.
         """
         if result.markers_m is None or -camera.T_world_cam[2, 1] < _UPRIGHT:
             return
@@ -51,7 +54,7 @@ class Beyond:
         if not person.size or not body.size:
             return
         beyond_px = (body[0] - person[0]) + (person[-1] - body[-1])
-        # Each of the two ends is known to half a row.
+        # Each of the two ends is uncertain by half a row.
         beyond_px -= np.sign(beyond_px)
         found = self._found.setdefault(camera.name, Histogram(-_MOST_M, _MOST_M, _BINS))
         found.add(float(beyond_px) / px_per_m)
@@ -64,6 +67,6 @@ class Beyond:
 
     @property
     def median_m(self) -> float:
-        """Median over the cameras, m: a shadow below the feet is one camera's; NaN if unknown."""
+        """Median over the cameras, m, robust to a shadow in one of them; NaN if unknown."""
         found = list(self.by_camera_m.values())
         return float(np.median(found)) if len(found) >= LEAST_CAMERAS else math.nan

@@ -1,4 +1,4 @@
-"""What is doubtful about a run, and why a run found nobody: a line each."""
+"""Doubts about a run, and likely causes if nobody was found, one line each."""
 
 from collections.abc import Mapping
 
@@ -10,31 +10,32 @@ from markerless_tracker.results.verdict.agreement import find_fault, largest_hul
 from markerless_tracker.results.verdict.record import RunRecord
 
 LEAST_OVERLAP = 0.75
-"""Mean overlap (median over the frames, mean over the cameras) of a fit to real silhouettes; to
-exact ones it is 0.9."""
+"""Least overlap (median over the frames, mean over the cameras) of a good fit to real silhouettes.
+With exact silhouettes it is 0.9."""
 CAMERA_OVERLAP, CAMERA_RATIO = 0.60, 0.75
 """A camera contradicts the others if its overlap is below the first, and below this fraction of the
 median of the others'."""
 STATURES_M = (1.40, 2.10)
-"""Statures outside of these are doubted."""
+"""Range of plausible statures; others are doubtful."""
 USUAL_STATURES_M, USUAL_OVERLAP = (1.50, 2.00), 0.85
-"""So are those outside of these where the overlap is below that: the scale may be wrong."""
+"""Narrower range where the overlap is below the second value, since the scale may be wrong."""
 COMMON_STATURES_M = (1.60, 1.90)
-"""So are those outside of these where the overlap is below `LEAST_OVERLAP`."""
+"""Narrowest range, where the overlap is below `LEAST_OVERLAP`."""
 PROPORTION = 0.25
 """Largest deviation of a length, relative to the stature, from the body's description."""
 FLOOR_M = (0.01, 0.20)
-"""Height of the lowest joint, an ankle, of a person who stands on the floor, z = 0: 0.06 to 0.10 m,
-and what a sole, a mat or a board adds. The person is higher on a machine, which is asked about."""
+"""Range of the height of the lowest joint, an ankle, of a person standing on the floor, z = 0. The
+ankle alone is at 0.06 to 0.10 m; a sole, a mat or a board adds to it. A person on a machine is
+higher, so the doubt asks about it."""
 _STANDING = 0.25
-"""Fraction of the frames, those with the lowest ankles, in which a foot stands."""
+"""Quantile over the frames for this height: a foot stands in at least this fraction of them."""
 BEYOND_M = 0.05
-"""Silhouettes reach so much farther than the body, up and down together, where it is too small;
-with the right sizes at most 0.02 m."""
+"""A body is too small if the silhouettes extend farther beyond it, up and down together. With the
+right sizes they extend by at most 0.02 m."""
 
 
 def stature_m(description: BodyDescription, body: BodyModel) -> float:
-    """The stature that the lengths of a body sum to, m."""
+    """The stature in m that fits the summed lengths of a body."""
     fractions = {name: float(v["stature"]) for name, v in description.lengths.items()}
     return sum(body.lengths_m[name] for name in fractions) / sum(fractions.values())
 
@@ -74,7 +75,7 @@ def doubts_about_fit(
     found += _unused(record)
     if record.body is not None:
         found += _sizes(record.body, description, mean)
-    # What ends at the ankles stands on nothing and cannot fill silhouettes down to the floor.
+    # A body that ends at the ankles cannot fill silhouettes down to the floor.
     if fault is None and record.body is not None and _has_feet(record.body):
         found += [*_too_small(record), *_floor(record)]
     return [*found, *_static(record)]
@@ -97,7 +98,7 @@ def causes_of_nobody(
 
     Args:
         record: of the run.
-        start_given: whether it was to begin with a start pose.
+        start_given: whether a start pose was given.
         search_faults: see `verdict_of`.
     """
     found = []

@@ -1,4 +1,4 @@
-"""A histogram for medians and quantiles of a run: its memory does not grow with the frames."""
+"""A histogram for medians and quantiles of a run, in constant memory."""
 
 import math
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 class Histogram:
-    """Counts numbers in bins of equal width; those beyond the ends count in the last ones.
+    """Counts numbers in bins of equal width; those beyond an end count in its bin.
 
     Args:
         low: lower end of the first bin.
@@ -36,7 +36,7 @@ class Histogram:
         return self.quantile(0.5)
 
     def quantile(self, fraction: float) -> float:
-        """The number that a fraction of them lies below, as the middle of its bin, or NaN."""
+        """The quantile at a fraction, as the middle of its bin; NaN if there is no number."""
         if not self.count:
             return math.nan
         place = int(np.searchsorted(np.cumsum(self._counts), fraction * self.count))

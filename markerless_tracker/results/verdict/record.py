@@ -1,4 +1,4 @@
-"""What the frames of a run add up to; memory does not grow with them."""
+"""Statistics over the frames of a run, in constant memory."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -15,20 +15,21 @@ from markerless_tracker.results.verdict.static_silhouette import StaticSilhouett
 from markerless_tracker.tracking.evidence.views import MOST_COVER
 
 SAMPLES = 3
-"""Moments whose silhouettes are kept."""
+"""Number of frames whose silhouettes are kept."""
 APART_NS = 500_000_000
 """Least time between them."""
 _LEAST_VIEWS = 2
+"""Least number of cameras with a silhouette in them."""
 
 
 @dataclass
 class Silhouettes:
-    """What one camera's silhouettes were like.
+    """Counts of one camera's silhouettes.
 
     Attributes:
         images: frames with an observation of the camera.
-        empty: those without any silhouette.
-        full: those whose silhouette covers more than `MOST_COVER` of the image.
+        empty: frames without any silhouette.
+        full: frames whose silhouette covers more than `MOST_COVER` of the image.
     """
 
     images: int = 0
@@ -48,11 +49,11 @@ class Silhouettes:
 
 @dataclass
 class Stretch:
-    """A time without a tracked person.
+    """A period without a tracked person.
 
     Attributes:
         from_ns, to_ns: stamps of its first and last frame.
-        frames: their number; 0 if there is none.
+        frames: number of its frames; 0 if there is no such period.
     """
 
     from_ns: int = 0
@@ -71,14 +72,14 @@ class RunRecord:
         overlap: camera -> overlap (IoU) of its silhouette and the body, in frames with a pose.
         lost_limbs: limb -> tracked frames in which it was lost.
         lowest_m: height of the lowest marker, in tracked frames.
-        silhouettes: camera -> its silhouettes.
-        samples: silhouettes of some moments, by camera.
-        stretch: the longest time without a tracked person, from the first tracked frame on.
-        before: the time before the first tracked frame.
+        silhouettes: camera -> counts of its silhouettes.
+        samples: silhouettes of some frames, by camera.
+        stretch: the longest period without a tracked person after the first tracked frame.
+        before: the period before the first tracked frame.
         warnings: of the frames.
         body: the body of the last tracked frame; None before the first.
-        static: silhouette that never moves.
-        beyond: how far silhouettes reach beyond the body.
+        static: static parts of the silhouettes.
+        beyond: how far the silhouettes extend beyond the body.
     """
 
     rig: CameraRig

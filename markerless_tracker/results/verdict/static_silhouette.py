@@ -1,8 +1,8 @@
-"""Silhouette that never moves with any limb: furniture or a machine that the background lacks.
+"""Detects static parts of the silhouettes: furniture or a machine that the background lacks.
 
-Now and then, seldom while the tracker is overloaded, the silhouettes are compared with the tracked
-body. Pixels that are person throughout, and lie beside the body in most of the comparisons, are
-no person's.
+The silhouettes are compared with the tracked body at intervals, which are longer while the tracker
+is overloaded. Pixels that are nearly always person, and lie beside the body in most comparisons,
+are not the person's.
 """
 
 from dataclasses import dataclass
@@ -19,21 +19,21 @@ from markerless_tracker.records import Observation, TrackResult, TrackState
 from markerless_tracker.tracking.search import pixels_per_m
 
 EVERY_NS, LATER_EVERY_NS = 60_000_000, 2_000_000_000
-"""Time between the first `MANY` comparisons, and between those after them and while the tracker's
-effort is below 1."""
+"""Time between the first `MANY` comparisons, and between later ones. The second applies also while
+the tracker's effort is below 1."""
 MANY = 12
 LEAST = 6
-"""Comparisons without which nothing is said."""
+"""Least number of comparisons for a result."""
 ALWAYS = 0.9
-"""Fraction of the comparisons in which such a pixel is person."""
+"""Least fraction of the comparisons in which a static pixel is person."""
 BESIDE = 0.5
-"""Fraction in which it lies beside the body, so."""
+"""Least fraction of the comparisons in which it is person beside the body."""
 BESIDE_M = 0.05
 """Pixels nearer to the body than this may be its clothes."""
 THICK_M = 0.06
-"""Thinner parts are the outline's error."""
+"""Thinner parts are errors of the outline."""
 LEAST_M2 = 0.02
-"""Area at the person's distance from which on it is reported."""
+"""Least area, at the person's distance, to be reported."""
 
 
 @dataclass(eq=False)
@@ -58,16 +58,16 @@ class StaticSilhouette:
         self._comparisons = 0
 
     def warm_up(self, body: BodyModel) -> None:
-        """Compile what a comparison needs, for bodies of this kind."""
+        """Compile the kernels of a comparison, for bodies of this kind."""
         body_masks(body, body.neutral, list(self._cameras.values()))
 
     def add(self, result: TrackResult, body: BodyModel) -> dict[str, NDArray[np.bool_]]:
-        """Take a frame; returns, by camera, what the body covers (h, w), empty if passed over."""
+        """Add a frame; returns the body's mask (h, w) by camera, {} without a comparison."""
         if result.state is not TrackState.TRACKING or result.pose is None:
             return {}
         seldom = self._comparisons >= MANY or result.effort < 1.0
         every_ns = LATER_EVERY_NS if seldom else EVERY_NS
-        # Stamps may be set back.
+        # Stamps may jump backwards.
         if self._last_ns is not None and abs(result.stamp_ns - self._last_ns) < every_ns:
             return {}
         self._last_ns = result.stamp_ns
@@ -82,7 +82,7 @@ class StaticSilhouette:
         return covered
 
     def found_m2(self) -> dict[str, float]:
-        """Area of such silhouette by camera, where there is any, m2 at the person's distance."""
+        """Static area by camera, in m2 at the person's distance; cameras without any are absent."""
         found = {}
         for name, view in self._views.items():
             if view.comparisons < LEAST or not view.px_per_m > 0.0:
@@ -104,7 +104,7 @@ class StaticSilhouette:
             empty = np.zeros(covered.shape, dtype=np.uint32)
             view = self._views[camera.name] = _View(empty, empty.copy())
         view.comparisons += 1
-        # The distance of the first comparison will do for the margin.
+        # The margin uses the distance of earlier comparisons, which is exact enough.
         margin = _disc(BESIDE_M * view.px_per_m) if view.px_per_m else _disc(1.0)
         # Outside of the region there is no person.
         region = Region(

@@ -17,9 +17,9 @@ from markerless_tracker.results.verdict.doubts import (
 from markerless_tracker.results.verdict.record import RunRecord
 
 CLEARLY = 0.02
-"""Overlap by which a camera must lie below all others to be named."""
+"""A camera fits worst only if its overlap is lower than all others by this difference."""
 PICTURES = "`track --debug-images DIR` shows silhouettes and body of every frame"
-"""Where to look, offline."""
+"""Advice on where to look, for a run of the verb `track`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,14 +28,14 @@ class Verdict:
 
     Attributes:
         frames: frames processed.
-        tracked, searching, lost: of them in that state.
+        tracked, searching, lost: number of frames in that state.
         overlap: camera -> median overlap (IoU) of its silhouette and the body.
-        stature_m: of the body; None without one.
-        stature_plausible: whether that is a grown person's; None without a body.
+        stature_m: stature of the body; None without a body.
+        stature_plausible: whether it is that of a grown person; None without a body.
         worst_limb: the limb lost in most tracked frames; empty if none was lost.
         worst_limb_lost: the number of those frames.
         frames_with_warnings: frames with any warning.
-        warnings: kinds of them.
+        warnings: number of kinds of warnings.
         doubts: what is doubtful, one line each.
         causes: why nobody may have been found, one line each; empty if somebody was.
         look: where to look next.
@@ -122,11 +122,11 @@ def verdict_of(
     Args:
         record: its frames.
         description: of the body that was tracked.
-        known: doubts that were found otherwise, such as those about the calibration.
-        start_given: whether the run was to begin with a start pose.
-        search_faults: whether to find out, where the run is doubtful, which cameras may be
-            exchanged; takes some seconds.
-        pictures: what shows silhouettes and body.
+        known: doubts from elsewhere, such as those about the calibration.
+        start_given: whether a start pose was given.
+        search_faults: whether to search for exchanged cameras in a doubtful run; takes some
+            seconds.
+        pictures: advice on how to see silhouettes and body.
     """
     somebody = record.tracked > 0
     stature = None if record.body is None else stature_m(description, record.body)
@@ -156,7 +156,7 @@ def verdict_of(
 
 
 def limb_in_words(limb: str) -> str:
-    """A limb's name as people say it: `left arm` for `l_arm`."""
+    """A limb's name in words: `left arm` for `l_arm`."""
     side, _, part = limb.partition("_")
     sides = {"l": "left", "r": "right"}
     return f"{sides[side]} {part}" if part and side in sides else limb

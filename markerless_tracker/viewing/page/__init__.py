@@ -1,4 +1,4 @@
-"""One HTML page about a result or several: charts, tables, film.
+"""One HTML page about one or several results: charts, tables, film.
 
-Everything is in the page: it opens from disk and asks no network for anything.
+The page is self-contained: it opens from disk and loads nothing over the network.
 """

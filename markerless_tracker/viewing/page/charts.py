@@ -1,8 +1,8 @@
 """Line charts as inline SVG with labels in HTML.
 
-The curves stretch with the page (`preserveAspectRatio="none"`), texts keep their size: a chart can
-be read on a phone and on paper. Colours are classes of the page's style sheet, so that they follow
-its light and dark scheme.
+The curves scale with the page (`preserveAspectRatio="none"`) while texts keep their size, so that a
+chart is legible on a phone and on paper. Colours are classes of the page's style sheet, so that
+they follow its light and dark scheme.
 """
 
 from collections.abc import Sequence
@@ -46,7 +46,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Mark:
-    """A vertical line at a place, in a style, with a label for the legend."""
+    """A vertical line at an x, in a style, with a label for the legend."""
 
     label: str
     style: str
@@ -63,7 +63,7 @@ def line_chart(
     low: float | None = None,
     x_unit: str = "s",
 ) -> str:
-    """A chart as HTML (`<figure>`); without any finite value one that says so.
+    """A chart as HTML (`<figure>`); without finite values a note in place of the curves.
 
     Args:
         title: heading.
@@ -71,7 +71,7 @@ def line_chart(
         curves: the curves.
         levels: horizontal lines.
         marks: vertical lines.
-        low: lower end of y; None = as the values are.
+        low: lower end of y; None = from the values.
         x_unit: of x.
     """
     heading = f'{escape(title)} <span class="unit">{escape(unit)}</span>'
@@ -193,7 +193,7 @@ def _legend(curves: Sequence[Curve], marks: Sequence[Mark]) -> str:
 
 
 def _levels(levels: Sequence[Level]) -> str:
-    """The labels of levels as a list, for screens on which they would cover the curves."""
+    """The labels of levels as a list, for screens too small for labels beside the curves."""
     if not levels:
         return ""
     items = "".join(

@@ -15,11 +15,11 @@ from markerless_tracker.viewing.overlays import Overlays, spread_rows
 from markerless_tracker.viewing.page.report import Film
 
 WIDTH_PX, IMAGE_PX = 960, 476
-"""Width of the pictures, and of the images in them: two beside each other are not scaled again."""
+"""Width of the pictures, and of the images in them. Two images side by side need no rescaling."""
 MOST_FPS, MOST_FRAMES = 30.0, 300
-"""Pictures of a film; of a longer result every k-th frame is shown."""
+"""Limits of a film. Of results beyond them, every k-th frame is shown."""
 MOST_BYTES = 12_000_000
-"""Bytes of all films of a page, before they are written as text."""
+"""Limit of the bytes of all films of a page, before base64 encoding."""
 MOST_BIT_RATE = 3_000_000
 
 _STILL_QUALITY = 80
@@ -33,7 +33,7 @@ def embedded_film(
     films: int = 1,
     progress: Callable[[int, int], None] = lambda done, most: None,
 ) -> Film:
-    """A film of a result in its own time, and a still picture.
+    """A film of a result in real time, and a still picture.
 
     Args:
         result: the result.

@@ -1,4 +1,4 @@
-"""The page: composed of its sections."""
+"""Composes the page of its sections."""
 
 from base64 import b64encode
 from collections.abc import Sequence
@@ -22,14 +22,14 @@ from markerless_tracker.viewing.page.tables import (
 )
 
 FIRST_ANGLES = ("hip_flexion", "knee_angle", "ankle_angle", "arm_flex", "elbow_flex", "lumbar")
-"""Beginnings of the angles that are shown first; the others are folded."""
+"""Prefixes of the angles that are shown first; the others are collapsed."""
 
 _LONG = {
     "clav": "clavicle", "prot": "protraction", "elev": "elevation", "flex": "flexion",
     "add": "adduction", "rot": "rotation", "dev": "deviation", "pro": "pronation,",
     "sup": "supination",
 }  # fmt: skip
-"""Words that the angles' names cut short."""
+"""Abbreviations in the angles' names, and their words."""
 _SIDES = (("_l", "left"), ("_r", "right"))
 _STYLES = 8
 
@@ -40,7 +40,7 @@ def write_page(path: Path, reports: Sequence[Report], *, levels: Sequence[Level]
     Args:
         path: the file; its folder is made.
         reports: the results, in order.
-        levels: errors of others, for the error curves.
+        levels: errors from elsewhere, as lines in the charts of the error.
 
     Raises:
         DatasetError: it cannot be written.
@@ -63,7 +63,7 @@ def page(reports: Sequence[Report], *, levels: Sequence[Level] = ()) -> str:
     return (
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        # Browsers ask for an icon otherwise.
+        # Without it browsers request an icon.
         f'<link rel="icon" href="data:,"><title>{escape(title)}</title>'
         f"<style>{STYLE}</style></head><body>"
         f"<header><h1>{escape(title)}</h1></header><main>"
@@ -113,7 +113,7 @@ def _parts(report: Report) -> str:
 
 
 def _joints_words(report: Report) -> str:
-    """What the columns of the joints' table are."""
+    """Explains the columns of the joints' table."""
     sd = "sd: the standard deviation that the tracker itself states, of x, y and z together."
     if report.score is None:
         return sd
@@ -198,7 +198,7 @@ def _angles(report: Report) -> str:
 
 
 def _words(angle: str) -> str:
-    """An angle's name as people say it."""
+    """An angle's name in words."""
     return " ".join(_LONG.get(word, word) for word in angle.split("_"))
 
 

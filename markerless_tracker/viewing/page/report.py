@@ -1,4 +1,4 @@
-"""What the page says of a result: values from its files, and from a comparison with a reference."""
+"""Content of the page for a result: its stored values and its comparison with a reference."""
 
 import math
 from collections.abc import Mapping
@@ -38,10 +38,10 @@ class Report:
     Attributes:
         name: its heading.
         result: the result.
-        score, measures: comparison with the reference; None without one.
-        gait: where the person walks; None elsewhere.
-        film: None without images.
-        why_no_film: the reason; empty with a film.
+        score, measures: comparison with the reference; None without a reference.
+        gait: gait parameters; None if the person does not walk.
+        film: the film; None without images.
+        why_no_film: why there is no film; empty with a film.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Report:
 
     @property
     def verdict(self) -> Mapping[str, Any]:
-        """The verdict in the result's files; {} of a run without end."""
+        """The verdict in the result's files; {} if the run did not end."""
         found = self.result.summary.get("verdict")
         return found if isinstance(found, Mapping) else {}
 

@@ -12,7 +12,7 @@ from markerless_tracker.viewing.page.report import Report
 
 
 def table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, kind: str = "wide") -> str:
-    """A table; its first column is text, the others are numbers, or words if `kind` says so."""
+    """A table; its first column is text, the others are numbers, or text by `kind`."""
     head = "".join(f"<th>{escape(text)}</th>" for text in headings)
     body = "".join(
         "<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows
@@ -24,12 +24,12 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, kind: str =
 
 
 def number(value: float | None, digits: int = 1, *, sign: str = "") -> str:
-    """A number, a dash for none."""
+    """A number as text; a dash for None."""
     return "-" if value is None or not math.isfinite(value) else f"{value:{sign}.{digits}f}"
 
 
 def figures_table(reports: Sequence[Report]) -> str:
-    """The figures of all results, a column each."""
+    """The figures of all results, one column per result."""
     rows = [("figure", *(report.name for report in reports))]
     rows += [(label, *values) for label, values in _figures(reports)]
     return table(rows[0], rows[1:])
@@ -91,7 +91,7 @@ def dotted(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def _plain(value: Any) -> str:
-    """A setting as it is written in YAML and for ROS."""
+    """The value of a setting in the notation of YAML and ROS."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
