@@ -35,6 +35,7 @@ def rotation_from_euler(axes: str, angles_rad: Any) -> FloatArray:
         axes: ``x``, ``y`` or ``z`` for each turn; the later ones are about axes already turned.
         angles_rad: an angle for each.
     """
+    # Every process needs it, and `scipy.spatial` takes a tenth of a second to import.
     rotation = np.eye(3)
     for axis, angle in zip(axes, angles_rad, strict=True):
         rotation = rotation @ rotation_from_rodrigues(float(angle) * np.eye(3)["xyz".index(axis)])

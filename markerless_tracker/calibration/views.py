@@ -184,8 +184,8 @@ def _merged(sets: list[dict[str, Seen]]) -> dict[str, Seen]:
         ids = np.concatenate([seen[name].ids for seen in sets if name in seen])
         pixels = np.concatenate([seen[name].pixels for seen in sets if name in seen])
         unique, place = np.unique(ids, return_inverse=True)
-        mean = np.array([np.median(pixels[place == k], axis=0) for k in range(len(unique))])
-        merged[name] = Seen(unique, mean)
+        medians = np.array([np.median(pixels[place == k], axis=0) for k in range(len(unique))])
+        merged[name] = Seen(unique, medians)
     return merged
 
 

@@ -51,21 +51,21 @@ def run_node(args: argparse.Namespace) -> int:
     with StopSignals() as stop, Spectator() as spectator:
         recording = LiveRecording(args.rrd) if shows else None
         tell(Console(stderr=True), "listening; Ctrl-C ends")
-        for heard in spectator.listen(until=lambda: stop.received, seconds=args.seconds):
-            if heard is None:
+        for message in spectator.listen(until=lambda: stop.received, seconds=args.seconds):
+            if message is None:
                 continue
             any_received = True
-            results += heard.markers_m is not None
-            pictures.update(heard.pictures)
+            results += message.markers_m is not None
+            pictures.update(message.pictures)
             if recording is not None:
                 recording.arrange(spectator.cameras)
                 recording.add(
-                    heard.stamp_ns,
-                    markers_m=heard.markers_m,
-                    angles_rad=heard.angles_rad,
-                    overlap=heard.overlap,
-                    state=heard.state,
-                    pictures=heard.pictures,
+                    message.stamp_ns,
+                    markers_m=message.markers_m,
+                    angles_rad=message.angles_rad,
+                    overlap=message.overlap,
+                    state=message.state,
+                    pictures=message.pictures,
                 )
         if recording is not None:
             recording.close()
@@ -83,7 +83,7 @@ def run_node(args: argparse.Namespace) -> int:
         print(f"{results} results, pictures of {', '.join(pictures) or 'no camera'}")
     if any_received:
         return 0
-    tell(Console(stderr=True), "no tracker was heard: is it running, in this ROS_DOMAIN_ID?")
+    tell(Console(stderr=True), "no tracker was message: is it running, in this ROS_DOMAIN_ID?")
     return NOTHING_RECEIVED
 
 

@@ -292,11 +292,11 @@ def test_labels_by_light(seed: int, radius: int, protect: bool, reveal: bool) ->
     near_valid = cv2.dilate((light > 0.0).astype(np.uint8), square)
     # The arrays of labels begin 3 columns and 2 rows before those of the light.
     wide = np.pad(labels, ((2, 0), (3, 0)))
-    wide_looked_at = np.pad(examined, ((2, 0), (3, 0)))
+    wide_examined = np.pad(examined, ((2, 0), (3, 0)))
     part = (4, 5, 30, 28)
     apply_light(
         image, mean, gain, agree, radius, protect, reveal, 0, 0, light, near_valid, part, (3, 2),
-        wide_looked_at, wide,
+        wide_examined, wide,
     )  # fmt: skip
     expected = labels.copy()
     inner = np.s_[part[1] : part[3], part[0] : part[2]]
