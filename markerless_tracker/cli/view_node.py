@@ -83,7 +83,7 @@ def run_node(args: argparse.Namespace) -> int:
         print(f"{results} results, pictures of {', '.join(pictures) or 'no camera'}")
     if any_received:
         return 0
-    tell(Console(stderr=True), "no tracker was message: is it running, in this ROS_DOMAIN_ID?")
+    tell(Console(stderr=True), "no tracker was heard: is it running, in this ROS_DOMAIN_ID?")
     return NOTHING_RECEIVED
 
 
