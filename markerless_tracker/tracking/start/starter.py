@@ -155,7 +155,7 @@ class Starter:
         elif len(self._headings) == 1 + _FINER_AFTER:
             frame, population = self._resized((frame, population), observations, stamp_ns)
         population = frame.recombined(population, 0, fraction=_GENERATION_FRACTION)
-        if not _fits(frame, population):
+        if 1.0 - population.costs[0] < LEAST_FIT:
             self.reset()
             return None
         self._population, self._stamp_ns = population, stamp_ns
@@ -241,7 +241,7 @@ class Starter:
         population = _improved(frame, population, range(1 + _RESIZED_AFTER))
         found = self._resized((frame, population), observations, stamp_ns, hull)
         found = found[0], _improved(*found, range(1 + _RESIZED_AFTER, GENERATIONS))
-        return found if _fits(*found) else None
+        return found if 1.0 - found[1].costs[0] >= LEAST_FIT else None
 
     def _resized(
         self,
@@ -314,11 +314,6 @@ class Starter:
     def _trunk(self, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None
         return np.asarray(markers(self._searcher.body, pose)[_TRUNK_MARKERS].mean(axis=0))
-
-
-def _fits(frame: FramePopulation, population: Population) -> bool:
-    """Whether the best pose explains the silhouettes as a person would."""
-    return bool(1.0 - frame.costs(population.poses[:1])[0] >= LEAST_FIT)
 
 
 def _is_sure(population: Population) -> bool:
