@@ -19,9 +19,9 @@ from markerless_tracker.tracking.refinement import pose_prior, refined_on_contou
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.many_poses import markers_of_many
+from markerless_tracker.tracking.start.posture_costs import off_floor, unlike_postures
 from markerless_tracker.tracking.start.postures import first_guesses
 from markerless_tracker.tracking.start.recombination import Recombiner
-from markerless_tracker.tracking.start.standing import off_floor
 
 PER_QUARTER = 4
 """Poses that are kept in each quarter of the headings, relative to the best pose's heading."""
@@ -55,7 +55,7 @@ class Population:
 
     Attributes:
         poses: (n, p).
-        costs: (n,) of `FramePopulation.costs_on_floor`, ascending.
+        costs: (n,) of `FramePopulation.total_costs`, ascending.
         headings: (n,) rad.
     """
 
@@ -84,9 +84,11 @@ class FramePopulation:
         near: (p,) a pose whose root is near the person.
         contours: the frame's contour evidence, if it exists already.
         radius_m: as in `FrameSearch`, if it does not.
+        usual: whether unusual postures cost something.
 
     Attributes:
         near: as given.
+        usual: as given.
     """
 
     def __init__(
@@ -98,7 +100,9 @@ class FramePopulation:
         *,
         contours: ContourFrame | None = None,
         radius_m: float = RADIUS_M,
+        usual: bool = False,
     ) -> None:
+        self.usual = usual
         self._searcher = searcher
         self._stamp_ns = stamp_ns
         self.near = near
@@ -128,7 +132,7 @@ class FramePopulation:
         """The first population: the best first guesses, and hints (n, p), refined."""
         rng = keyed_generator(self._searcher.config.seed, self._stamp_ns, "sow")
         guesses = first_guesses(self._searcher.body, self._searcher.limits, hull, rng)
-        costs = self.costs_on_floor(guesses.reshape(-1, guesses.shape[2]))
+        costs = self.total_costs(guesses.reshape(-1, guesses.shape[2]))
         costs = costs.reshape(guesses.shape[:2])
         best = np.argsort(costs, axis=1, kind="stable")[:, :_PER_HEADING]
         order = np.argsort(np.take_along_axis(costs, best, axis=1).ravel(), kind="stable")[
@@ -157,7 +161,7 @@ class FramePopulation:
 
     def _promising(self, children: FloatArray, parents: FloatArray, count: int) -> FloatArray:
         """`count` of the children (n, p): the best, and the best of those that are novel."""
-        order = np.argsort(self.costs_on_floor(children), kind="stable")
+        order = np.argsort(self.total_costs(children), kind="stable")
         chosen = [int(i) for i in order[: count - round(_NOVEL * count)]]
         body = self._searcher.body
         points = markers_of_many(body, children)
@@ -183,9 +187,15 @@ class FramePopulation:
         costs = self._costs(poses)
         return np.where(np.isfinite(costs), costs, np.inf)
 
-    def costs_on_floor(self, poses: FloatArray) -> FloatArray:
-        """`costs` plus the cost of feet off the floor, if the settings have a floor."""
+    def best_cost(self, population: Population) -> float:
+        """1 - f_s of the best pose of a population."""
+        return float(self.costs(population.poses[:1])[0])
+
+    def total_costs(self, poses: FloatArray) -> FloatArray:
+        """`costs` plus those of unusual postures (`usual`) and, with a floor, of feet off it."""
         costs = self.costs(poses)
+        if self.usual:
+            costs += unlike_postures(self._searcher.body, poses)
         if self._searcher.config.refine.floor_sd_m > 0.0:
             costs += off_floor(self._searcher.body, poses)
         return costs
@@ -222,7 +232,7 @@ class FramePopulation:
 
     def selected(self, poses: FloatArray) -> Population:
         """The best poses of (n, p) that differ, at most `PER_QUARTER` per quarter of headings."""
-        costs = self.costs_on_floor(poses)
+        costs = self.total_costs(poses)
         order = [int(i) for i in np.argsort(costs, kind="stable") if np.isfinite(costs[i])]
         points = markers_of_many(self._searcher.body, poses)
         headings = {i: heading(points[i]) for i in order}

@@ -180,9 +180,12 @@ class SizeSearch:
             searcher = self._searcher_for(self._made(stature_m, girth))
             moved = scaled_to(known, searcher.body, poses)
             contours = found.frame.contours.with_body(searcher.body)
-            frame = FramePopulation(searcher, observations, stamp_ns, moved[0], contours=contours)
+            frame = FramePopulation(
+                searcher, observations, stamp_ns, moved[0],
+                contours=contours, usual=found.frame.usual,
+            )  # fmt: skip
             refined = frame.refined(moved[:1], _ITERATIONS, _TRUNCATION_M)
-            cost = float(frame.costs_on_floor(refined)[0]) + self._cost(stature_m, girth)
+            cost = float(frame.total_costs(refined)[0]) + self._cost(stature_m, girth)
             if cost < least:
                 scaled = Population(moved, found.population.costs, found.population.headings)
                 kept, least = Sized(frame, scaled, searcher), cost

@@ -50,6 +50,8 @@ _GAP_GENERATIONS = 2
 _FITS = 0.85
 """At this f_s or more, a generation that gains less than `_GAIN` is the last one."""
 _GAIN = 0.002
+_DOUBTFUL = 0.12
+"""If the first search's best pose costs more, it is repeated with a cost of unusual postures."""
 _SURE_FIT, _SURE_GAP = 0.91, 0.025
 """There is no second search if the first frame has at least this f_s, and the opposite heading's is
 lower by at least this gap."""
@@ -129,7 +131,7 @@ class Starter:
         self._stamp_ns = 0
         self._searcher: Searcher | None = None
         self._headings = TwoHeadings(0.0)
-        self._sure = False
+        self._sure = self._usual = False
         self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
 
     def step(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
@@ -145,7 +147,8 @@ class Starter:
         observations = imaged
         if any(seen.undecided_words is not None for seen in imaged.values()):
             observations = self._decide(imaged, best)
-        frame = FramePopulation(self._searcher, observations, stamp_ns, population.poses[0])
+        near = population.poses[0]
+        frame = FramePopulation(self._searcher, observations, stamp_ns, near, usual=self._usual)
         population = frame.propagated(population, far=far)
         if far:
             self._headings.restart()
@@ -155,7 +158,7 @@ class Starter:
         elif len(self._headings) == 1 + _FINER_AFTER:
             frame, population = self._resized((frame, population), observations, stamp_ns)
         population = frame.recombined(population, 0, fraction=_GENERATION_FRACTION)
-        if 1.0 - population.costs[0] < LEAST_FIT:
+        if 1.0 - frame.best_cost(population) < LEAST_FIT:
             self.reset()
             return None
         self._population, self._stamp_ns = population, stamp_ns
@@ -237,11 +240,22 @@ class Starter:
     def _search(
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> tuple[FramePopulation, Population] | None:
+        """The population found in a hull; None if it is no person."""
+        self._usual = False
+        found = self._search_once(hull, observations, stamp_ns)
+        if found[0].best_cost(found[1]) > _DOUBTFUL:
+            self._usual = True
+            found = self._search_once(hull, observations, stamp_ns)
+        return found if 1.0 - found[0].best_cost(found[1]) >= LEAST_FIT else None
+
+    def _search_once(
+        self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
+    ) -> tuple[FramePopulation, Population]:
+        self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
         frame, population = self._initialised(hull, observations, stamp_ns)
         population = _improved(frame, population, range(1 + _RESIZED_AFTER))
         found = self._resized((frame, population), observations, stamp_ns, hull)
-        found = found[0], _improved(*found, range(1 + _RESIZED_AFTER, GENERATIONS))
-        return found if 1.0 - found[1].costs[0] >= LEAST_FIT else None
+        return found[0], _improved(*found, range(1 + _RESIZED_AFTER, GENERATIONS))
 
     def _resized(
         self,
@@ -273,7 +287,7 @@ class Starter:
             searcher = self._searcher_for(body)
             near = body.neutral.copy()
             near[[body.index(f"pelvis_t{axis}") for axis in "xyz"]] = hull.trunk_m.mean(axis=0)
-            frame = FramePopulation(searcher, observations, stamp_ns, near)
+            frame = FramePopulation(searcher, observations, stamp_ns, near, usual=self._usual)
             hints = None
             if self._last_pose is not None:
                 hints = np.array([self._last_pose, put_at(body, hull, self._last_pose)])

@@ -47,6 +47,22 @@ def test_a_walking_person_is_found_and_tracked(walk) -> None:
     assert heading_difference(heading(results[-1].markers_m), heading(taken[-1][2])) < 0.5
 
 
+def test_silhouettes_with_holes_alone_are_searched_for_a_usual_posture(walk) -> None:
+    scene, taken = walk
+    stamp, seen, _ = taken[0]
+    torn = {}
+    for name, view in seen.items():
+        mask = view.mask.copy()
+        rows = np.flatnonzero(mask.any(axis=1))
+        mask[rows[0] : rows[-1] : 12] = mask[rows[0] + 1 : rows[-1] : 12] = False
+        mask[rows[len(rows) // 3] : rows[len(rows) // 2]] = False
+        torn[name] = Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+    for views, usual in ((seen, False), (torn, True)):
+        tracker = tracker_of(scene, stature=1.72)
+        tracker.step(views, stamp)
+        assert tracker._starter._usual is usual
+
+
 def test_the_stature_need_not_be_known(walk) -> None:
     scene, taken = walk
     tracker = tracker_of(scene)

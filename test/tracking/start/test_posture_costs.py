@@ -1,4 +1,4 @@
-"""Feet are on the floor when a person is found."""
+"""A person that is found stands on the floor and takes a posture that people take."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,14 @@ from markerless_tracker.body import load_description, markers
 from markerless_tracker.body.anatomy import posture
 from markerless_tracker.body.model import MARKER_NAMES
 from markerless_tracker.body.sizes import Sizes
+from markerless_tracker.tracking.start.posture_costs import (
+    MOST_COST,
+    UNLIKE_COST_PER_M2,
+    UNLIKE_MOST_M,
+    off_floor,
+    unlike_postures,
+)
 from markerless_tracker.tracking.start.postures import POSTURES
-from markerless_tracker.tracking.start.standing import MOST_COST, off_floor
 
 BODY = Sizes(load_description("person31")).of_stature(1.70)
 ANKLES = [MARKER_NAMES.index("LAnkle"), MARKER_NAMES.index("RAnkle")]
@@ -53,3 +59,31 @@ def test_another_floor_costs_all_poses_the_same() -> None:
         poses[:, UP] += shift_m
         np.testing.assert_allclose(off_floor(BODY, poses), MOST_COST)
         poses[:, UP] -= shift_m
+
+
+def unlike(pose: np.ndarray) -> float:
+    return float(unlike_postures(BODY, pose[None])[0])
+
+
+@pytest.mark.parametrize("number", range(len(POSTURES)))
+def test_a_known_posture_costs_nothing_anywhere_and_in_any_heading(number: int) -> None:
+    pose = posture(BODY, POSTURES[number])
+    pose[[BODY.index(f"pelvis_t{axis}") for axis in "xyz"]] += (1.0, -2.0, 0.3)
+    pose[BODY.index("pelvis_rz")] += 2.0
+    assert unlike(pose) < 1e-12
+
+
+def test_the_cost_is_that_of_the_markers_distances_each_limited() -> None:
+    pose = posture(BODY, {})
+    bent = posture(BODY, {"l_elbow": 0.3})
+    moved_m = np.linalg.norm(markers(BODY, bent) - markers(BODY, pose), axis=1)
+    assert unlike(bent) == pytest.approx(UNLIKE_COST_PER_M2 * (moved_m**2).sum(), rel=1e-6)
+    # One leg to the side moves only its knee and its ankle.
+    assert unlike(posture(BODY, {"l_hip_x": 1.5})) <= UNLIKE_COST_PER_M2 * 2 * UNLIKE_MOST_M**2
+
+
+def test_a_crouch_upside_down_costs_more_than_a_kick() -> None:
+    crouch = posture(BODY, {"l_hip_y": 2.0, "r_hip_y": 2.0, "l_knee": 2.0, "r_knee": 2.0})
+    crouch[BODY.index("pelvis_ry")] += np.pi
+    kick = posture(BODY, {"l_hip_y": 1.6, "l_knee": 0.1})
+    assert unlike(kick) < 0.04 < unlike(crouch)
