@@ -14,6 +14,7 @@ from markerless_tracker.errors import BodyModelError, ImageError
 from markerless_tracker.fitness.raster.bits import ALL, count_bits
 from markerless_tracker.fitness.raster.mask_words import paste_words
 from markerless_tracker.fitness.raster.outline_arrays import LANES
+from markerless_tracker.fitness.soles import ankles, floor_share
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import MaskWords, Observation
 
@@ -23,6 +24,7 @@ class BodyArrays(NamedTuple):
 
     Attributes:
         floor_share: (c, 2) returned by the function of that name.
+        ankle_cone, ankle_height: (k,) the fields of `Ankles`.
     """
 
     parent: NDArray[np.int64]
@@ -35,6 +37,8 @@ class BodyArrays(NamedTuple):
     cone_length: FloatArray
     cone_shape: FloatArray
     floor_share: FloatArray
+    ankle_cone: NDArray[np.int64]
+    ankle_height: FloatArray
 
 
 class ViewArrays(NamedTuple):
@@ -97,18 +101,8 @@ def body_arrays(body: BodyModel) -> BodyArrays:
         body.cone_length.copy(),
         body.cone_shape.copy(),
         floor_share(body),
+        *ankles(body),
     )
-
-
-TOE_SHARE = 0.25
-"""Weight of the toes, or of an upright foot's whole sole, below the floor. Most bodies' feet are
-fixed to their shanks, so that they point into the floor at the end of a step."""
-
-
-def floor_share(body: BodyModel) -> FloatArray:
-    """Weight of each end (c, 2) of a cone below the floor: `TOE_SHARE` for toes or sole, else 1."""
-    toes = [name.endswith("foot") for name in body.cone_names]
-    return np.array([(1.0, TOE_SHARE if toe else 1.0) for toe in toes])
 
 
 def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Observation]) -> Views:

@@ -12,9 +12,9 @@ from markerless_tracker.body import BodyModel, cone_transforms, transforms
 from markerless_tracker.body.kinematics import carried, move_axes
 from markerless_tracker.body.model import IntArray, is_translation
 from markerless_tracker.compiled import inlined, kernel
-from markerless_tracker.fitness.arrays import floor_share
-from markerless_tracker.fitness.contour.floor import SLACK_M, robust_weight
+from markerless_tracker.fitness.contour.floor import SLACK_M, STANDING, robust_weight
 from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.soles import ankles, floor_share
 from markerless_tracker.geometry import FloatArray
 
 
@@ -55,12 +55,12 @@ def outline_rows(frame: ContourFrame) -> OutlineRows:
 
 
 def floor_rows(body: BodyModel, pose: FloatArray, weight: float) -> OutlineRows:
-    """The residuals of `add_floor` at a pose (p,), at the lowest points of the cones' ends.
+    """The residuals of `add_floor` at a pose (p,): of the cones' ends at their lowest points.
 
     Args:
         body: the body.
         pose: its pose.
-        weight: of each residual, before its robust weight.
+        weight: of each residual, before its share and its robust weight.
     """
     placed, shape = cone_transforms(body, pose), body.cone_shape
     down = -placed[:, None, 2, :2] * shape[:, :, :2]
@@ -70,18 +70,35 @@ def floor_rows(body: BodyModel, pose: FloatArray, weight: float) -> OutlineRows:
     middle = (placed[:, None, 2, :2] * shape[:, :, 2:4]).sum(axis=2)
     low = middle + placed[:, None, 2, 2] * ends + placed[:, None, 2, 3] - drop
     cone, end = np.nonzero(low < -SLACK_M)
-    value = low[cone, end] + SLACK_M
     place = np.zeros((len(cone), 5))
     place[np.arange(len(cone)), 2 * end] = round_[cone, end, 0]
     place[np.arange(len(cone)), 2 * end + 1] = round_[cone, end, 1]
     place[:, 4] = end
+    share = floor_share(body)[cone, end]
+    sunk = _above_floor(cone, place, low[cone, end] + SLACK_M, weight * share)
+    feet, height = ankles(body)
+    above = middle[feet, 1] + placed[feet, 2, 2] * body.cone_length[feet] + placed[feet, 2, 3]
+    above -= height
+    deep = above < -SLACK_M
+    used = deep | ((above > 0.0) & (above <= above.min(initial=np.inf)))
+    at_end = np.tile([0.0, 0.0, 0.0, 0.0, 1.0], (int(used.sum()), 1))
+    value = np.where(deep, above + SLACK_M, above)[used]
+    return joined_rows(
+        sunk, _above_floor(feet[used], at_end, value, weight * np.where(deep, 1.0, STANDING)[used])
+    )
+
+
+def _above_floor(
+    cone: IntArray, place: FloatArray, value: FloatArray, weight: FloatArray
+) -> OutlineRows:
+    """Residuals (n,) of heights; the weights without the robust ones."""
     return OutlineRows(
         view=np.full(len(cone), -1),
         cone=cone,
         place=place,
         gradient=np.tile([0.0, 0.0, 1.0], (len(cone), 1)),
         value=value,
-        weight=weight * floor_share(body)[cone, end] * np.array([robust_weight(v) for v in value]),
+        weight=weight * np.array([robust_weight(each) for each in value]),
     )
 
 
