@@ -12,6 +12,8 @@ TOE_SHARE = 0.05
 """Weight of the toes, or of an upright foot's whole sole, below the floor. Most bodies' feet are
 fixed to their shanks, so that they point into the floor at the end of a step; the height of the
 ankles keeps feet on the floor."""
+FREE_TOE_SHARE = 0.25
+"""The same where the ankles' height is not used."""
 _SAME_M = 1e-3
 
 

@@ -76,6 +76,7 @@ def refined_on_contours(
     limits: FloatArray,
     iterations: int,
     truncation_m: tuple[float, float],
+    standing: bool = True,
 ) -> FloatArray:
     """Refine a pose (p,) on the contour evidence of a frame; returns the refined pose.
 
@@ -87,6 +88,8 @@ def refined_on_contours(
         limits: (2, p) of the pose.
         iterations: Gauss-Newton steps.
         truncation_m: residuals beyond it are outliers, in the first and in the last step.
+        standing: whether the floor's prior uses the height of the ankles, for which the person's
+            sizes must be known.
     """
     return contours.refined(
         start,
@@ -96,4 +99,5 @@ def refined_on_contours(
         iterations=iterations,
         truncation_m=truncation_m,
         floor_precision=floor_precision(config),
+        standing=standing,
     )

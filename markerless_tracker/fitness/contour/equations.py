@@ -91,6 +91,7 @@ def descend(  # type: ignore[no-untyped-def]
     prior_precision,
     bounds,
     floor_precision,
+    standing,
     body,
     views,
     contours,
@@ -114,6 +115,7 @@ def descend(  # type: ignore[no-untyped-def]
         prior_mean, prior_precision: (k, p) of Gaussian priors.
         bounds: (2, p) of the pose.
         floor_precision: 1 / m², of the prior that no part lies below the floor; 0 = none.
+        standing: whether the floor's prior uses the height of the ankles.
         body, views, contours: `BodyArrays`, `ViewArrays`, `ContourViews`.
         spacing_m: distance of neighbouring outline points, at the body.
         step_px: distance outward of an outline point at which no cone may cover the pixel.
@@ -140,7 +142,9 @@ def descend(  # type: ignore[no-untyped-def]
                 for k in range(SUMS):
                     scratch.sums[0, m, k] += scratch.sums[view, m, k]
         if floor_precision > 0.0 and i < steps:
-            add_floor(body, scratch.world, floor_precision / precision, scratch.sums[0])
+            add_floor(
+                body, scratch.world, floor_precision / precision, standing, scratch.sums[0]
+            )
         sum_chain(body, scratch.nodes, scratch.sums[0], hessian, slope)
         if i >= steps:
             continue

@@ -11,6 +11,7 @@ import numpy as np
 from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.contour.chain_kernels import add_wrench
 from markerless_tracker.fitness.raster.outline_arrays import LANES
+from markerless_tracker.fitness.soles import FREE_TOE_SHARE
 
 SLACK_M = 0.01
 """Soles may lie this far below the floor without a residual: calibration and sections are not
@@ -37,7 +38,7 @@ def _above(k, body, world):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_floor(body, world, weight, sums):  # type: ignore[no-untyped-def]
+def add_floor(body, world, weight, standing, sums):  # type: ignore[no-untyped-def]
     """Add a residual for each end of a cone below the floor, and those of the ankles.
 
     No ankle is lower than in a foot that stands flat, and the lower one is not much higher.
@@ -46,6 +47,7 @@ def add_floor(body, world, weight, sums):  # type: ignore[no-untyped-def]
         body: `BodyArrays`.
         world: (18 * LANES,) the cones' ends, filled by `cone_ends`.
         weight: of each residual, before its share and its robust weight.
+        standing: whether the ankles' heights are used.
         sums: (m, SUMS) of the parts, added to.
     """
     for c in range(body.cone_node.size):
@@ -55,11 +57,15 @@ def add_floor(body, world, weight, sums):  # type: ignore[no-untyped-def]
             low = world[at + 2 * LANES] - np.sqrt(first * first + second * second)
             if low < -SLACK_M:
                 value = low + SLACK_M
-                robust = body.floor_share[c, end] * robust_weight(value)
+                share = body.floor_share[c, end]
+                if not standing:
+                    share = max(share, FREE_TOE_SHARE)
                 add_wrench(
-                    world[at], world[at + LANES], low, 0.0, 0.0, 1.0, weight * robust,
-                    value, sums, body.cone_node[c],
+                    world[at], world[at + LANES], low, 0.0, 0.0, 1.0,
+                    weight * share * robust_weight(value), value, sums, body.cone_node[c],
                 )  # fmt: skip
+    if not standing:
+        return
     lowest = np.inf
     for k in range(body.ankle_cone.size):
         lowest = min(lowest, _above(k, body, world))

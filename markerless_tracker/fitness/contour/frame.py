@@ -121,7 +121,8 @@ class ContourFrame:
         """Fill `samples` and `residuals` at a pose (p,), with another body's shape if given."""
         arrays = self._arrays if body is None else body_arrays(body)
         none = np.empty((0, pose.size))
-        self._descend(pose, 0, np.array([truncation_m]), 1.0, none, none, _NO_BOUNDS, 0.0, arrays)
+        truncations_m = np.array([truncation_m])
+        self._descend(pose, 0, truncations_m, 1.0, none, none, _NO_BOUNDS, 0.0, False, arrays)
 
     def refined(
         self,
@@ -133,6 +134,7 @@ class ContourFrame:
         iterations: int,
         truncation_m: tuple[float, float],
         floor_precision: float = 0.0,
+        standing: bool = True,
     ) -> FloatArray:
         """A pose (p,) refined as by `optim.refine`, in one compiled call.
 
@@ -142,6 +144,7 @@ class ContourFrame:
             priors, bounds, iterations: as for `optim.refine`.
             truncation_m: residuals beyond it are outliers, in the first and in the last step.
             floor_precision: of each part below z = 0 (`floor`), 1 / m²; 0 for no floor.
+            standing: whether the ankles' heights are used.
         """
         mean = np.array([prior.mean for prior in priors]).reshape(-1, start.size)
         weight = np.array([prior.precision for prior in priors]).reshape(-1, start.size)
@@ -149,7 +152,7 @@ class ContourFrame:
         begin = np.clip(start, *bounds)
         return self._descend(
             begin, iterations, truncations_m, precision, mean, weight, bounds, floor_precision,
-            self._arrays,
+            standing, self._arrays,
         )  # fmt: skip
 
     def _descend(
@@ -162,6 +165,7 @@ class ContourFrame:
         weight: FloatArray,
         bounds: FloatArray,
         floor_precision: float,
+        standing: bool,
         arrays: BodyArrays,
     ) -> FloatArray:
         """The pose (p,) after `equations.descend`; same arguments."""
@@ -169,7 +173,7 @@ class ContourFrame:
         bounds = np.array(bounds, dtype=np.float64)
         descend(
             pose, steps, truncations_m, precision, mean, weight, bounds, floor_precision,
-            arrays, self.views.arrays, self.contours, SPACING_M, self._step_px, self.samples,
-            self.residuals, self._scratch, self._outlines,
+            standing, arrays, self.views.arrays, self.contours, SPACING_M, self._step_px,
+            self.samples, self.residuals, self._scratch, self._outlines,
         )  # fmt: skip
         return pose

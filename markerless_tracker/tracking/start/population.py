@@ -225,6 +225,7 @@ class FramePopulation:
                 out[i] = refined_on_contours(
                     self._per_thread[thread], out[i], searcher.config, priors=(prior,),
                     limits=searcher.limits, iterations=iterations, truncation_m=truncation,
+                    standing=False,
                 )  # fmt: skip
 
         side_by_side(work, threads)

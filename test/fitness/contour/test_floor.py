@@ -105,7 +105,7 @@ def test_the_kernel_sums_the_same_rows(sunk, lift_m: float) -> None:
     nodes, world = np.empty((body.node_parent.size, 3, 4)), np.ones(18 * LANES)
     cone_ends(pose, arrays, nodes, world)
     sums = np.zeros((body.node_parent.size, SUMS))
-    add_floor(arrays, world, 7.0, sums)
+    add_floor(arrays, world, 7.0, True, sums)
     hessian, slope = np.empty((body.size, body.size)), np.empty(body.size)
     sum_chain(arrays, nodes, sums, hessian, slope)
     # The kernel takes the points below the axes instead of the lowest ones, which a translation of
