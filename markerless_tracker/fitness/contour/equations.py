@@ -142,9 +142,7 @@ def descend(  # type: ignore[no-untyped-def]
                 for k in range(SUMS):
                     scratch.sums[0, m, k] += scratch.sums[view, m, k]
         if floor_precision > 0.0 and i < steps:
-            add_floor(
-                body, scratch.world, floor_precision / precision, standing, scratch.sums[0]
-            )
+            add_floor(body, scratch.world, floor_precision / precision, standing, scratch.sums[0])
         sum_chain(body, scratch.nodes, scratch.sums[0], hessian, slope)
         if i >= steps:
             continue
