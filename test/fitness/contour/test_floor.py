@@ -13,7 +13,7 @@ from markerless_tracker.fitness.contour.floor import BELIEVED_M, SLACK_M, STANDI
 from markerless_tracker.fitness.raster.kernels import cone_ends
 from markerless_tracker.fitness.raster.outline_arrays import LANES
 from markerless_tracker.fitness.shape import BodyFit
-from markerless_tracker.fitness.soles import TOE_SHARE, ankles
+from markerless_tracker.fitness.soles import FREE_TOE_SHARE, TOE_SHARE, ankles
 from markerless_tracker.optim import Prior
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
@@ -115,6 +115,20 @@ def test_the_kernel_sums_the_same_rows(sunk, lift_m: float) -> None:
     assert hessian[up, up] == pytest.approx(rows.weight.sum())
     assert slope[up] == pytest.approx(rows.weight @ rows.value)
     np.testing.assert_allclose(slopes[:, up], 1.0)
+
+
+def test_without_the_ankles_heights_toes_count_more(sunk) -> None:
+    body, pose = sunk
+    rows, arrays = floor_rows(body, pose, 7.0), body_arrays(body)
+    nodes, world = np.empty((body.node_parent.size, 3, 4)), np.ones(18 * LANES)
+    cone_ends(pose, arrays, nodes, world)
+    sums = np.zeros((body.node_parent.size, SUMS))
+    add_floor(arrays, world, 7.0, False, sums)
+    own = ~of_ankles(rows)
+    toes = [body.cone_names[c].endswith("foot") for c in rows.cone] * (rows.place[:, 4] == 1.0)
+    expected = 7.0 * np.where(toes, FREE_TOE_SHARE, 1.0) * robust(rows.value)
+    # The product of the vertical gradients is the third number of the upper triangle's diagonal.
+    assert sums[:, 11].sum() == pytest.approx(expected[own].sum())
 
 
 def test_a_body_far_from_the_floor_is_hardly_held(sunk) -> None:

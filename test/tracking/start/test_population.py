@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from markerless_tracker.body import cone_transforms, load_body, markers
 from markerless_tracker.drawing import silhouette
@@ -16,16 +17,13 @@ from markerless_tracker.tracking.start.postures import POSTURES, postures
 from markerless_tracker.tracking.start.starter import _improved
 
 
-def made_up(threads: int) -> tuple[FramePopulation, np.ndarray]:
-    """A frame of a made-up person, and the pose (p,) in it."""
+def made_up(threads: int, *, blank: bool = False) -> tuple[FramePopulation, np.ndarray]:
+    """A frame of a made-up person, and the pose (p,) in it; blank: without the silhouettes."""
     scene = SyntheticScene(body="person31", size_px=(256, 192), seed=2)
     pose = scene.motion.pose(0.0)
-    views = {
-        camera.name: Observation.from_mask(
-            camera.name, 0, silhouette(scene.body, pose, camera), np.zeros((192, 256), np.uint8)
-        )
-        for camera in scene.rig
-    }
+    nothing = np.zeros((192, 256), np.uint8)
+    masks = {c.name: nothing > 0 if blank else silhouette(scene.body, pose, c) for c in scene.rig}
+    views = {name: Observation.from_mask(name, 0, mask, nothing) for name, mask in masks.items()}
     searcher = make_searcher(
         scene.body, rig=scene.rig, config=TrackerConfig(threads=threads), threads=threads
     )
@@ -40,6 +38,13 @@ def refined(threads: int) -> np.ndarray:
 
 def test_refined_poses_are_the_same_with_any_number_of_threads() -> None:
     np.testing.assert_array_equal(refined(1), refined(2))
+
+
+def test_feet_above_the_floor_stay_there_since_the_size_is_unknown() -> None:
+    frame, pose = made_up(1, blank=True)
+    up = load_body("person31", 1.75).index("pelvis_tz")
+    pose[up] += 0.05
+    assert frame.refined(pose[None], 3, (0.15, 0.05))[0, up] == pytest.approx(pose[up], abs=1e-6)
 
 
 def test_a_limbs_costs_are_those_of_the_whole_body() -> None:
