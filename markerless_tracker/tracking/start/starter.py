@@ -87,10 +87,10 @@ class Starter:
     """Finds a person in the views, without a start pose.
 
     First guesses are many postures and headings of a body of the person's stature (several are
-    tried if it is unknown). The best ones are refined, recombined and refined again. The opposite
-    heading gives nearly the same silhouettes, so both headings are propagated over some frames. The
-    heading that explains them better is kept; a walking person faces the walking direction. Then
-    the body's sections are fitted with the poses held.
+    tried if it is unknown). The best ones are refined, recombined and refined again; if they fit
+    poorly, once more with a cost of unusual postures. The opposite heading gives nearly the same
+    silhouettes, so both are propagated over some frames and the better one is kept; a walking
+    person faces the walking direction. Then the sections are fitted with the poses held.
 
     Args:
         rig: the cameras.
