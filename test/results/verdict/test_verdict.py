@@ -80,7 +80,7 @@ def test_what_was_known_before_stays_first(judge: Judge, result: Any) -> None:
     assert found.doubts[0] == "said before" and len(found.doubts) == 2
 
 
-@pytest.mark.parametrize(("raised_m", "at"), [(0.9, "0.97"), (0.2, "0.27"), (-0.09, "-0.02")])
+@pytest.mark.parametrize(("raised_m", "at"), [(0.9, "0.99"), (0.2, "0.29"), (-0.11, "-0.02")])
 def test_a_person_where_no_floor_is(judge: Judge, result: Any, raised_m: float, at: str) -> None:
     (doubt,) = judge([result(index, raised_m=raised_m) for index in range(3)]).doubts
     assert doubt.startswith(
