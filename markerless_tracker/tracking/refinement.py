@@ -88,8 +88,8 @@ def refined_on_contours(
         limits: (2, p) of the pose.
         iterations: Gauss-Newton steps.
         truncation_m: residuals beyond it are outliers, in the first and in the last step.
-        standing: whether the floor's prior uses the height of the ankles, for which the person's
-            sizes must be known.
+        standing: whether the floor's prior uses the height of the ankles; not before the person's
+            sizes are known.
     """
     return contours.refined(
         start,

@@ -164,6 +164,7 @@ def test_a_refinement_lifts_the_feet_to_the_floor(sunk) -> None:
         )  # fmt: skip
 
     np.testing.assert_array_equal(refined(0.0), np.clip(pose, *body.limits))
+    # Toes, which count little, may lie a few millimetres lower than the ankles allow.
     assert lowest_m(body, refined(1.0 / 0.01**2)).min() > -SLACK_M - 0.008
 
 
