@@ -43,16 +43,19 @@ class BagRecording(Recording):
         path: the bag's folder, or its `.mcap`.
         scale: factor for all images.
         nominal: take any calibration for missing: the rig has the cameras' names and sizes only.
+        checked: as for `McapFiles`.
 
     Raises:
         DatasetError: not an MCAP bag, topics are missing, or no set is complete.
         CalibrationError: the calibration is missing or malformed.
     """
 
-    def __init__(self, path: Path, *, scale: float = 1.0, nominal: bool = False) -> None:
+    def __init__(
+        self, path: Path, *, scale: float = 1.0, nominal: bool = False, checked: bool = True
+    ) -> None:
         folder = path if path.is_dir() else path.parent
         names: tuple[str, ...]
-        self._files = McapFiles(_mcap_files(path))
+        self._files = McapFiles(_mcap_files(path), checked=checked)
         self._store = get_typestore(Stores.ROS2_JAZZY)
         if self._files.counts is None:
             for _ in self._files:  # the topics of a damaged bag are known only after reading it

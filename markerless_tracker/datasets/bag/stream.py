@@ -10,6 +10,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.summary import Summary
 
 from markerless_tracker.datasets.bag.cut_chunk import intact_records
+from markerless_tracker.datasets.bag.plain_chunk import plain_chunk, records_of
 from markerless_tracker.errors import DatasetError
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -52,6 +53,11 @@ class IndexDamaged(Exception):
 class McapFiles:
     """The messages of one or more MCAP files, in the order of the files.
 
+    Args:
+        paths: the files.
+        checked: whether the checksums of all chunks are verified. Without it, the content of an
+            uncompressed chunk is not verified, and reading takes less than half of the time.
+
     Attributes:
         paths: the files.
         counts: topic -> number of messages, None for a damaged bag (known only after reading it).
@@ -62,8 +68,9 @@ class McapFiles:
         DatasetError: a file is missing, unreadable or no MCAP at all.
     """
 
-    def __init__(self, paths: Sequence[Path]) -> None:
+    def __init__(self, paths: Sequence[Path], *, checked: bool = True) -> None:
         self.paths = tuple(paths)
+        self._checked = checked
         self.types: dict[str, str] = {}
         self.damage: str | None = None
         self.counts: dict[str, int] | None = {}
@@ -152,6 +159,11 @@ class McapFiles:
             )
             while True:
                 place = Place(number, file.tell())
+                plain = None if self._checked else plain_chunk(file, place.offset)
+                if plain is not None:
+                    yield from self._known(number, records_of(file, plain), place)
+                    file.seek(plain.end)
+                    continue
                 try:
                     record = next(records, None)
                     parts = (

@@ -263,4 +263,5 @@ def _open_bag(settings: PlayerSettings) -> BagRecording:
             f"bag: {settings.bag}: no bag, expected a folder with metadata.yaml or a .mcap file "
             "(`markerless_tracker convert` makes one of a recording)"
         )
-    return BagRecording(settings.bag)
+    # Checksums would take a quarter of the player's time; other commands verify them.
+    return BagRecording(settings.bag, checked=False)
