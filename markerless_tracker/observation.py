@@ -1,6 +1,7 @@
 """What one camera's image says about the body: masks packed into words, and `Observation`."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ class Observation:
     def __getstate__(self) -> dict[str, Any]:
         """For another process: of an empty edge map its shape alone."""
         state = dict(self.__dict__)
-        if not self.edges.any():
+        if not self.has_edges:
             state["edges"] = self.edges.shape
         return state
 
@@ -103,6 +104,11 @@ class Observation:
         if isinstance(edges, tuple):
             state = {**state, "edges": locked(np.zeros(edges, dtype=np.uint8), np.uint8)}
         self.__dict__.update(state)
+
+    @cached_property
+    def has_edges(self) -> bool:
+        """Whether the edge map holds any edge."""
+        return bool(self.edges.any())
 
     @property
     def width(self) -> int:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,10 @@ from markerless_tracker.fitness.raster.outline_arrays import LANES
 from markerless_tracker.fitness.soles import ankles, floor_share
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import MaskWords, Observation
+
+
+_KEPT = 32
+"""Bodies and rigs whose arrays are kept."""
 
 
 class BodyArrays(NamedTuple):
@@ -79,8 +83,9 @@ class Views:
     arrays: ViewArrays
 
 
+@lru_cache(maxsize=_KEPT)
 def body_arrays(body: BodyModel) -> BodyArrays:
-    """The kernels' arrays of a body.
+    """The kernels' arrays of a body; must not be changed.
 
     Raises:
         BodyModelError: more cones than `LANES`.
@@ -131,7 +136,12 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
             known.append(np.full(masks[-1].shape, ALL))
         else:
             known.append(~_in_full_frame(observation, observation.undecided_words))
-    arrays = camera_arrays(seen)._replace(
+    shared = camera_arrays(tuple(seen))
+    arrays = shared._replace(
+        # Copied, since fits of a calibration change them.
+        rotation=shared.rotation.copy(),
+        translation=shared.translation.copy(),
+        intrinsics=shared.intrinsics.copy(),
         mask=np.concatenate([mask.T.ravel() for mask in masks]),
         mask_start=_starts(masks),
         edges=_joined(edges),
@@ -154,7 +164,7 @@ def _in_full_frame(observation: Observation, words: MaskWords) -> MaskWords:
 
 def _edges(observation: Observation) -> NDArray[np.uint8]:
     """The edge map (h, w) of the full frame."""
-    if observation.edges.any():
+    if observation.has_edges:
         return np.asarray(observation.in_full_frame(observation.edges))
     return _no_edges(observation.size_px)
 
@@ -173,8 +183,9 @@ def _joined(edges: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     return np.concatenate([edge.ravel() for edge in edges])
 
 
-def camera_arrays(cameras: Sequence[CameraModel]) -> ViewArrays:
-    """The arrays of cameras without any evidence."""
+@lru_cache(maxsize=_KEPT)
+def camera_arrays(cameras: tuple[CameraModel, ...]) -> ViewArrays:
+    """The arrays of cameras without any evidence; must not be changed."""
     k = np.array([camera.matrix for camera in cameras])
     words, levels = np.empty(0, dtype=np.uint64), np.empty(0, dtype=np.uint8)
     none = np.zeros(len(cameras), dtype=np.int64)
