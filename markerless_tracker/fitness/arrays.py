@@ -18,7 +18,6 @@ from markerless_tracker.fitness.soles import ankles, floor_share
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import MaskWords, Observation
 
-
 _KEPT = 32
 """Bodies and rigs whose arrays are kept."""
 

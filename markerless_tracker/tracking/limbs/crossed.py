@@ -11,6 +11,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 from markerless_tracker.tracking.confidence import slopes
 
+PAIRS = ("legs", "arms")
 _JOINTS = {"legs": ("Hip", "Knee", "Ankle"), "arms": ("Shoulder", "Elbow", "Wrist")}
 _STEPS = 8
 _PLACE_M = 0.02

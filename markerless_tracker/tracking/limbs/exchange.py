@@ -11,10 +11,9 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.limbs.crossed import in_each_others_place, is_crossed
+from markerless_tracker.tracking.limbs.crossed import PAIRS, in_each_others_place, is_crossed
 from markerless_tracker.tracking.start.mirror import mirror_of
 
-PAIRS = ("legs", "arms")
 EVERY_NS = 50_000_000
 """Interval at which an exchange is tried, of the two pairs in rotation. Each is tried several times
 within half a step."""

@@ -15,10 +15,12 @@ from markerless_tracker.fitness.threads import side_by_side, usable_threads
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
+from markerless_tracker.tracking.limbs.crossed import PAIRS, in_each_others_place
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.many_poses import markers_of_many
+from markerless_tracker.tracking.start.mirror import mirror_of
 from markerless_tracker.tracking.start.posture_costs import off_floor, unlike_postures
 from markerless_tracker.tracking.start.postures import first_guesses
 from markerless_tracker.tracking.start.recombination import Recombiner
@@ -45,8 +47,12 @@ _PRIOR_WEIGHT = 4.0
 _INITIALISE = (6, (0.25, 0.08))
 _RECOMBINE = (5, (0.15, 0.05))
 _PROPAGATE = (3, (0.12, 0.05))
+_EXCHANGE = (6, (0.25, 0.05))
 """Iterations of refinement, and first and last truncation in m: of an initialised population, of a
-recombined one, and of one propagated from the frame before."""
+recombined one, of one propagated from the frame before, and of a pose with exchanged limbs."""
+_EXCHANGED_SLACK = 0.006
+"""A pose with exchanged limbs that costs at most this much more than the best has children."""
+_EXCHANGE_GENERATIONS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +164,32 @@ class FramePopulation:
         children = self._recombiner.children(population.poses, round(fraction * _CHILDREN), rng)
         best = self._promising(children, population.poses, max(1, round(fraction * _REFINED)))
         return self.selected(np.concatenate([population.poses, self.refined(best, *_RECOMBINE)]))
+
+    def with_exchanged_pairs(self, population: Population, generation: int) -> Population:
+        """A population, and its best pose with the legs, or the arms, in each other's place.
+
+        If such a pose costs about as much as the best one, it has children of its own first: the
+        rest of the body was refined with the limbs of the best pose.
+
+        Args:
+            population: the poses.
+            generation: keys the draws.
+        """
+        body, limits = self._searcher.body, self._searcher.limits
+        for pair in PAIRS:
+            if pair not in body.subspaces:
+                continue
+            best, own = population.poses[0], body.subspaces[pair]
+            begin = best.copy()
+            begin[own] = np.clip(mirror_of(body).of(best)[own], *limits[:, own])
+            other = in_each_others_place(body, best, pair, begin, limits)
+            branch = self.selected(self.refined(other[None], *_EXCHANGE))
+            if not len(branch) or branch.costs[0] > population.costs[0] + _EXCHANGED_SLACK:
+                continue
+            for number in range(generation, generation + _EXCHANGE_GENERATIONS):
+                branch = self.recombined(branch, number)
+            population = self.selected(np.concatenate([population.poses, branch.poses]))
+        return population
 
     def _promising(self, children: FloatArray, parents: FloatArray, count: int) -> FloatArray:
         """`count` of the children (n, p): the best, and the best of those that are novel."""

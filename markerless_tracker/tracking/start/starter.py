@@ -43,8 +43,7 @@ _RESIZED_AFTER = 3
 _FINER_AFTER = 1
 """Frames between the second search and the finer sizes, so that no frame has to do both."""
 GAP_NS = 150_000_000
-"""After a longer gap between frames the person may be farther away than a refinement converges.
-Live, such a gap is the time that the first search takes."""
+"""After a longer gap, such as a live first search, a refinement may not reach the person."""
 _GAP_GENERATIONS = 2
 """Generations after such a gap."""
 _FITS = 0.85
@@ -88,9 +87,9 @@ class Starter:
 
     First guesses are many postures and headings of a body of the person's stature (several are
     tried if it is unknown). The best ones are refined, recombined and refined again; if they fit
-    poorly, once more with a cost of unusual postures. The opposite heading gives nearly the same
-    silhouettes, so both are propagated over some frames and the better one is kept; a walking
-    person faces the walking direction. Then the sections are fitted with the poses held.
+    poorly, once more with a cost of unusual postures. Legs and arms are tried in each other's
+    place. The opposite heading is propagated, too, until one is kept (`two_headings`). Then the
+    sections are fitted with the poses held.
 
     Args:
         rig: the cameras.
@@ -255,7 +254,8 @@ class Starter:
         frame, population = self._initialised(hull, observations, stamp_ns)
         population = _improved(frame, population, range(1 + _RESIZED_AFTER))
         found = self._resized((frame, population), observations, stamp_ns, hull)
-        return found[0], _improved(*found, range(1 + _RESIZED_AFTER, GENERATIONS))
+        population = _improved(*found, range(1 + _RESIZED_AFTER, GENERATIONS))
+        return found[0], found[0].with_exchanged_pairs(population, GENERATIONS)
 
     def _resized(
         self,

@@ -1,5 +1,6 @@
 """Populations of one frame: the same with any number of threads."""
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,17 +11,29 @@ from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.limbs.crossed import PAIRS
 from markerless_tracker.tracking.search import make_searcher
 from markerless_tracker.tracking.start.many_poses import markers_of_many, transforms_of_many
+from markerless_tracker.tracking.start.mirror import mirror_of
 from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.postures import POSTURES, postures
 from markerless_tracker.tracking.start.starter import _improved
 
 
-def made_up(threads: int, *, blank: bool = False) -> tuple[FramePopulation, np.ndarray]:
-    """A frame of a made-up person, and the pose (p,) in it; blank: without the silhouettes."""
+def made_up(
+    threads: int, *, blank: bool = False, change: Mapping[str, float] | None = None
+) -> tuple[FramePopulation, np.ndarray]:
+    """A frame of a made-up person, and the pose (p,) in it.
+
+    Args:
+        threads: of the searcher.
+        blank: whether the silhouettes are left out.
+        change: rad, added to parameters of the pose.
+    """
     scene = SyntheticScene(body="person31", size_px=(256, 192), seed=2)
     pose = scene.motion.pose(0.0)
+    for name, angle_rad in (change or {}).items():
+        pose[scene.body.index(name)] += angle_rad
     nothing = np.zeros((192, 256), np.uint8)
     masks = {c.name: nothing > 0 if blank else silhouette(scene.body, pose, c) for c in scene.rig}
     views = {name: Observation.from_mask(name, 0, mask, nothing) for name, mask in masks.items()}
@@ -72,6 +85,32 @@ def test_many_poses_at_once_are_placed_as_one_by_one() -> None:
         [cone_transforms(body, pose)[:, :, 3] for pose in poses],
         atol=1e-12,
     )
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_exchanged_legs_and_arms_are_found(pair: str) -> None:
+    raised = {"legs": {"hip_y": -0.9}, "arms": {"shoulder_y": 1.0, "elbow": 0.6}}
+    frame, pose = made_up(1, change={f"l_{n}": v for n, v in raised[pair].items()})
+    body = SyntheticScene(body="person31", seed=2).body
+    wrong = pose.copy()
+    own = body.subspaces[pair]
+    wrong[own] = mirror_of(body).of(pose)[own]
+    population = frame.selected(frame.refined(wrong[None], 5, (0.15, 0.05)))
+
+    def error_m(found: np.ndarray) -> float:
+        return float(np.linalg.norm(markers(body, found) - markers(body, pose), axis=1).max())
+
+    assert error_m(population.poses[0]) > 0.3
+    better = frame.with_exchanged_pairs(population, 7)
+    assert error_m(better.poses[0]) < 0.1
+    assert better.costs[0] < population.costs[0]
+
+
+def test_limbs_in_their_own_places_stay() -> None:
+    frame, pose = made_up(1, change={"l_hip_y": -0.9, "r_shoulder_y": 1.0})
+    population = frame.selected(frame.refined(pose[None], 5, (0.15, 0.05)))
+    kept = frame.with_exchanged_pairs(population, 7)
+    np.testing.assert_array_equal(kept.poses[0], population.poses[0])
 
 
 class Improving:

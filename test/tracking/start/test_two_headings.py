@@ -46,7 +46,8 @@ def test_the_heading_that_explains_the_frames_better_leads() -> None:
 def test_a_small_gain_counts_in_the_end_alone() -> None:
     assert changes([(0.1, 0.095)] * (SETTLING_FRAMES - 1)) == []
     assert changes([(0.1, 0.095)] * SETTLING_FRAMES) == [SETTLING_FRAMES - 1]
-    assert changes([(0.1, 0.098)] * SETTLING_FRAMES) == []
+    assert changes([(0.1, 0.0999)] * SETTLING_FRAMES) == [SETTLING_FRAMES - 1]
+    assert changes([(0.1, 0.1)] * SETTLING_FRAMES) == []
 
 
 def test_frames_that_were_searched_for_the_first_heading_do_not_count() -> None:
