@@ -50,9 +50,9 @@ _PROPAGATE = (3, (0.12, 0.05))
 _EXCHANGE = (6, (0.25, 0.05))
 """Iterations of refinement, and first and last truncation in m: of an initialised population, of a
 recombined one, of one propagated from the frame before, and of a pose with exchanged limbs."""
-_EXCHANGED_SLACK = 0.006
-"""A pose with exchanged limbs that costs at most this much more than the best has children."""
-_EXCHANGE_GENERATIONS = 2
+_EXCHANGED_SLACK = (0.012, 0.007)
+"""A pose with exchanged limbs has a first and a second generation of children if it costs at most
+this much more than the best pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,10 +184,9 @@ class FramePopulation:
             begin[own] = np.clip(mirror_of(body).of(best)[own], *limits[:, own])
             other = in_each_others_place(body, best, pair, begin, limits)
             branch = self.selected(self.refined(other[None], *_EXCHANGE))
-            if not len(branch) or branch.costs[0] > population.costs[0] + _EXCHANGED_SLACK:
-                continue
-            for number in range(generation, generation + _EXCHANGE_GENERATIONS):
-                branch = self.recombined(branch, number)
+            for number, slack in enumerate(_EXCHANGED_SLACK):
+                if len(branch) and branch.costs[0] <= population.costs[0] + slack:
+                    branch = self.recombined(branch, generation + number)
             population = self.selected(np.concatenate([population.poses, branch.poses]))
         return population
 
