@@ -57,6 +57,19 @@ def test_views_are_in_the_order_of_the_cameras(cameras):
     assert arrays.edges.size == sum(c.size_px[0] * c.size_px[1] for c in cameras)
 
 
+def test_a_camera_that_is_changed_in_one_frame_is_unchanged_in_the_next(cameras):
+    seen = {c.name: observation(c, i) for i, c in enumerate(cameras)}
+    first = lay_out_views(cameras, seen).arrays
+    before = [values.copy() for values in (first.rotation, first.translation, first.intrinsics)]
+    for values in (first.rotation, first.translation, first.intrinsics):
+        values += 1.0
+    again = lay_out_views(cameras, seen).arrays
+    for values, unchanged in zip(
+        (again.rotation, again.translation, again.intrinsics), before, strict=True
+    ):
+        np.testing.assert_array_equal(values, unchanged)
+
+
 def test_a_camera_without_observation_is_left_out(cameras):
     views = lay_out_views(cameras, {"b": observation(cameras[1], 0)})
     assert views.names == ("b",)
