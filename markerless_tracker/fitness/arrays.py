@@ -135,12 +135,7 @@ def lay_out_views(cameras: Sequence[CameraModel], observations: Mapping[str, Obs
             known.append(np.full(masks[-1].shape, ALL))
         else:
             known.append(~_in_full_frame(observation, observation.undecided_words))
-    shared = camera_arrays(tuple(seen))
-    arrays = shared._replace(
-        # Copied, since fits of a calibration change them.
-        rotation=shared.rotation.copy(),
-        translation=shared.translation.copy(),
-        intrinsics=shared.intrinsics.copy(),
+    arrays = camera_arrays(seen)._replace(
         mask=np.concatenate([mask.T.ravel() for mask in masks]),
         mask_start=_starts(masks),
         edges=_joined(edges),
@@ -182,9 +177,19 @@ def _joined(edges: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     return np.concatenate([edge.ravel() for edge in edges])
 
 
+def camera_arrays(cameras: Sequence[CameraModel]) -> ViewArrays:
+    """The arrays of cameras without any evidence."""
+    shared = _shared_arrays(tuple(cameras))
+    # Copied, since fits of a calibration change them.
+    return shared._replace(
+        rotation=shared.rotation.copy(),
+        translation=shared.translation.copy(),
+        intrinsics=shared.intrinsics.copy(),
+    )
+
+
 @lru_cache(maxsize=_KEPT)
-def camera_arrays(cameras: tuple[CameraModel, ...]) -> ViewArrays:
-    """The arrays of cameras without any evidence; must not be changed."""
+def _shared_arrays(cameras: tuple[CameraModel, ...]) -> ViewArrays:
     k = np.array([camera.matrix for camera in cameras])
     words, levels = np.empty(0, dtype=np.uint64), np.empty(0, dtype=np.uint8)
     none = np.zeros(len(cameras), dtype=np.int64)

@@ -34,7 +34,7 @@ def body_words(
     body: BodyModel, pose: FloatArray, cameras: Sequence[CameraModel]
 ) -> dict[str, MaskWords]:
     """As `body_masks`, packed as `pack_mask` does."""
-    views = camera_arrays(tuple(cameras))
+    views = camera_arrays(cameras)
     arrays = body_arrays(body)
     height = int(views.size[:, 1].max())
     outlines = make_outlines(1, height)
