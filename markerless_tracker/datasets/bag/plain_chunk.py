@@ -11,8 +11,10 @@ from mcap.records import Channel, McapRecord, Message, Schema
 
 # Bytes of a record before its content: opcode and length.
 _RECORD_HEAD = 1 + 8
-# Bytes of a chunk's fields without a compression: two times, size, checksum, name, length.
-_FIELDS = 8 + 8 + 8 + 4 + 4 + 8
+# Bytes of a chunk's fields before the length of its compression's name: two times, size, checksum.
+_BEFORE_NAME = 8 + 8 + 8 + 4
+# All its fields if that name is empty: then follows the length of the records.
+_FIELDS = _BEFORE_NAME + 4 + 8
 # Bytes of a message's fields before its data: channel, sequence and two times.
 _MESSAGE_FIELDS = 2 + 4 + 8 + 8
 _DEFINITIONS: dict[int, type[Schema] | type[Channel]] = {
@@ -53,7 +55,7 @@ def plain_chunk(file: IO[bytes], offset: int) -> PlainChunk | None:
     head = os.pread(number, _RECORD_HEAD + _FIELDS, offset)
     if len(head) < _RECORD_HEAD + _FIELDS or head[0] != Opcode.CHUNK:
         return None
-    named = _uint(head[_RECORD_HEAD + 28 : _RECORD_HEAD + 32])
+    named = _uint(head[_RECORD_HEAD + _BEFORE_NAME :][:4])
     at = offset + _RECORD_HEAD + _FIELDS
     end = at + _uint(head[-8:])
     whole = offset + _RECORD_HEAD + _uint(head[1:_RECORD_HEAD])

@@ -5,11 +5,14 @@ cross their legs. Exchanging the joint angles of left and right, as in a mirror,
 them.
 """
 
+import numpy as np
+
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.model import MARKER_NAMES
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 from markerless_tracker.tracking.confidence import slopes
+from markerless_tracker.tracking.start.mirror import mirror_of
 
 PAIRS = ("legs", "arms")
 _JOINTS = {"legs": ("Hip", "Knee", "Ankle"), "arms": ("Shoulder", "Elbow", "Wrist")}
@@ -32,25 +35,39 @@ def is_crossed(body: BodyModel, pose: FloatArray, pair: str) -> bool:
     return all(float((points[f"L{j}"] - points[f"R{j}"]) @ leftward) < 0.0 for j in joints)
 
 
-def in_each_others_place(
-    body: BodyModel, pose: FloatArray, pair: str, begin: FloatArray, limits: FloatArray
-) -> FloatArray:
-    """A pose (p,) with its left limb where the right one was, and its right where the left one was.
-
-    By damped least squares over the pair's parameters, as far as the limits allow.
+def mirrored(body: BodyModel, pose: FloatArray, pair: str, limits: FloatArray) -> FloatArray:
+    """A pose (p,) with the joint angles of left and right exchanged, within limits (2, p).
 
     Args:
         body: the body.
         pose: (p,) the present pose.
         pair: "legs" or "arms".
-        begin: (p,) initial pose of the least squares.
+        limits: (2, p).
+    """
+    own, out = body.subspaces[pair], pose.copy()
+    out[own] = np.clip(mirror_of(body).of(pose)[own], *limits[:, own])
+    return out
+
+
+def in_each_others_place(
+    body: BodyModel, pose: FloatArray, pair: str, limits: FloatArray
+) -> FloatArray:
+    """A pose (p,) with its left limb where the right one was, and its right where the left one was.
+
+    By damped least squares over the pair's parameters from the mirrored pose, as far as the limits
+    allow.
+
+    Args:
+        body: the body.
+        pose: (p,) the present pose.
+        pair: "legs" or "arms".
         limits: (2, p).
     """
     _, *joints = _JOINTS[pair]
     moved = [MARKER_NAMES.index(side + joint) for side in "LR" for joint in joints]
     places = [MARKER_NAMES.index(side + joint) for side in "RL" for joint in joints]
     goal_m = markers(body, pose)[places]
-    parameters, other = body.subspaces[pair], begin.copy()
+    parameters, other = body.subspaces[pair], mirrored(body, pose, pair, limits)
 
     def equations(values: FloatArray, _: float) -> tuple[FloatArray, FloatArray]:
         other[parameters] = values
@@ -61,7 +78,7 @@ def in_each_others_place(
 
     usual = Prior(body.prior_mean[parameters], 1.0 / body.prior_sd[parameters] ** 2)
     other[parameters] = refine(
-        equations, begin[parameters], priors=(usual,), bounds=limits[:, parameters],
+        equations, other[parameters], priors=(usual,), bounds=limits[:, parameters],
         iterations=_STEPS, truncation=(1.0, 1.0),
     )  # fmt: skip
     return other

@@ -11,8 +11,12 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.limbs.crossed import PAIRS, in_each_others_place, is_crossed
-from markerless_tracker.tracking.start.mirror import mirror_of
+from markerless_tracker.tracking.limbs.crossed import (
+    PAIRS,
+    in_each_others_place,
+    is_crossed,
+    mirrored,
+)
 
 EVERY_NS = 50_000_000
 """Interval at which an exchange is tried, of the two pairs in rotation. Each is tried several times
@@ -70,11 +74,9 @@ def _exchanged(name: str, body: BodyModel, pose: FloatArray, limits: FloatArray)
     """A pair exchanged in a pose (p,), unless that changes nothing."""
     if name not in body.subspaces:
         return None
-    pair, other = body.subspaces[name], pose.copy()
-    other[pair] = np.clip(mirror_of(body).of(pose)[pair], *limits[:, pair])
-    least_gain = LEAST_GAIN
+    other, least_gain = mirrored(body, pose, name, limits), LEAST_GAIN
     if is_crossed(body, pose, name):
-        other = in_each_others_place(body, pose, name, other, limits)
+        other = in_each_others_place(body, pose, name, limits)
         least_gain = LEAST_GAIN if is_crossed(body, other, name) else 0.0
     moved_m = np.linalg.norm(markers(body, other) - markers(body, pose), axis=1)
     return Exchange(name, other, least_gain) if moved_m.max() >= LEAST_M else None

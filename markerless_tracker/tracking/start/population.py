@@ -20,7 +20,6 @@ from markerless_tracker.tracking.refinement import pose_prior, refined_on_contou
 from markerless_tracker.tracking.search import FrameSearch, Searcher
 from markerless_tracker.tracking.start.hull import Hull
 from markerless_tracker.tracking.start.many_poses import markers_of_many
-from markerless_tracker.tracking.start.mirror import mirror_of
 from markerless_tracker.tracking.start.posture_costs import off_floor, unlike_postures
 from markerless_tracker.tracking.start.postures import first_guesses
 from markerless_tracker.tracking.start.recombination import Recombiner
@@ -179,10 +178,7 @@ class FramePopulation:
         for pair in PAIRS:
             if pair not in body.subspaces:
                 continue
-            best, own = population.poses[0], body.subspaces[pair]
-            begin = best.copy()
-            begin[own] = np.clip(mirror_of(body).of(best)[own], *limits[:, own])
-            other = in_each_others_place(body, best, pair, begin, limits)
+            other = in_each_others_place(body, population.poses[0], pair, limits)
             branch = self.selected(self.refined(other[None], *_EXCHANGE))
             for number, slack in enumerate(_EXCHANGED_SLACK):
                 if len(branch) and branch.costs[0] <= population.costs[0] + slack:

@@ -130,7 +130,7 @@ def standing() -> Walking:
         name: Observation.from_mask(name, 0, mask.astype(np.uint8), np.zeros(mask.shape, np.uint8))
         for name, mask in masks.items()
     }
-    crossed = in_each_others_place(body, apart, "legs", apart, body.limits)
+    crossed = in_each_others_place(body, apart, "legs", body.limits)
     return Walking("legs", scene, seen, apart, crossed)
 
 

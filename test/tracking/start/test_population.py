@@ -1,4 +1,4 @@
-"""Populations of one frame: the same with any number of threads."""
+"""Populations of one frame: any number of threads, costs, generations, exchanged limbs."""
 
 from collections.abc import Mapping
 from types import SimpleNamespace
