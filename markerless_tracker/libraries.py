@@ -1,14 +1,20 @@
-"""Cores, threads of the numerical libraries (none beside the package's own), and collections.
+"""Cores, memory, threads of the numerical libraries (none beside the package's own), collections.
 
 A pose has some thirty parameters. For matrices of that size a library's threads only wait for each
 other, and take the cores from the threads that work.
 """
 
+import ctypes
 import gc
 import os
 
 VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """They are read when the library is loaded."""
+# Parameters of glibc's `mallopt`, and their values in bytes.
+_TRIM_THRESHOLD, _KEPT = -1, 256 << 20
+_MMAP_THRESHOLD, _LARGEST = -3, 32 << 20
+# With less, a thread's heap of 64 MB is unmapped as soon as it is empty.
+_TOP_PAD, _SPARE = -2, 16 << 20
 
 
 def single_threaded() -> None:
@@ -18,6 +24,23 @@ def single_threaded() -> None:
     """
     for name in VARIABLES:
         os.environ.setdefault(name, "1")
+
+
+def keep_freed_memory() -> None:
+    """Let glibc keep up to 256 MB of freed memory, unless the environment sets its `malloc`.
+
+    For programs. Images come and go at the cameras' rate. By default their memory is returned to
+    the kernel each time, and each page of the next image costs a page fault. Without effect with
+    other C libraries.
+    """
+    own = "glibc.malloc." in os.environ.get("GLIBC_TUNABLES", "")
+    if own or any(name.startswith("MALLOC_") for name in os.environ):
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(_TRIM_THRESHOLD, _KEPT)
+        mallopt(_MMAP_THRESHOLD, _LARGEST)
+        mallopt(_TOP_PAD, _SPARE)
 
 
 def quiet_decoders() -> None:

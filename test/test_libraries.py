@@ -1,6 +1,7 @@
-"""The programs give NumPy's libraries one thread, unless the user says otherwise."""
+"""The programs set threads and memory of the libraries, unless the user says otherwise."""
 
 import os
+import platform
 import subprocess
 import sys
 
@@ -44,3 +45,40 @@ def test_one_thread_when_numpy_is_imported(name) -> None:
 
 def test_what_the_user_says_stays() -> None:
     assert threads(PROGRAMS["cli"], {"OMP_NUM_THREADS": "3"}) == ["1", "3", "1"]
+
+
+def faults(before: str, given: dict[str, str]) -> int:
+    """Page faults of 100 images of 1 MB, of which 4 exist at a time."""
+    code = (
+        "import resource\n"
+        f"{before}\n"
+        "images = [bytes(1 << 20) for _ in range(4)]\n"
+        "first = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
+        "for _ in range(25):\n"
+        "    images.clear()\n"
+        "    images += [b'x' * (1 << 20) for _ in range(4)]\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - first)\n"
+    )
+    own = {k: v for k, v in os.environ.items() if not k.startswith(("MALLOC_", "GLIBC_"))}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=own | given, check=True
+    )
+    return int(done.stdout)
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="sets glibc's malloc only")
+def test_freed_images_cost_no_page_faults() -> None:
+    keep = "from markerless_tracker.libraries import keep_freed_memory; keep_freed_memory()"
+    trimmed = {"MALLOC_TRIM_THRESHOLD_": str(128 << 10)}
+    assert 4 * faults(keep, {}) < faults(keep, trimmed)
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_programs_keep_freed_memory(name) -> None:
+    code = (
+        "import markerless_tracker.libraries as libraries\n"
+        "libraries.keep_freed_memory = lambda: print('kept')\n"
+        f"{PROGRAMS[name]}"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.startswith("kept")

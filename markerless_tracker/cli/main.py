@@ -22,7 +22,7 @@ from typing import NoReturn
 
 from markerless_tracker import __version__
 from markerless_tracker.errors import TrackerError
-from markerless_tracker.libraries import quiet_decoders, single_threaded
+from markerless_tracker.libraries import keep_freed_memory, quiet_decoders, single_threaded
 
 PROGRAM = "markerless_tracker"
 
@@ -112,6 +112,7 @@ def parser_of(verb: str) -> argparse.ArgumentParser:
 
 def _run(verb: str, words: Sequence[str]) -> int:
     single_threaded()
+    keep_freed_memory()
     quiet_decoders()
     parser = parser_of(verb)
     module = importlib.import_module(f"markerless_tracker.cli.{verb}")

@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import Any, Self
 
 from markerless_tracker.errors import ConfigError, TrackerError
-from markerless_tracker.libraries import single_threaded
+from markerless_tracker.libraries import keep_freed_memory, single_threaded
 from markerless_tracker.node.ros.profile import apply_profile
 
 NOT_INSTALLED = (
@@ -90,6 +90,7 @@ def run_executable(
         argv: arguments without the program's name; None = those of this process.
     """
     single_threaded()
+    keep_freed_memory()
     with StopSignals() as stop:
         try:
             apply_profile()

@@ -9,12 +9,13 @@ import sys
 import time
 from typing import Any, BinaryIO
 
-from markerless_tracker.libraries import collect_for_good, single_threaded
+from markerless_tracker.libraries import collect_for_good, keep_freed_memory, single_threaded
 
 
 def main(memory_fd: int) -> int:
     """Serve until the parent ends; returns the exit status."""
     single_threaded()
+    keep_freed_memory()
     from markerless_tracker.tracking.processes.child import take_output
 
     memory = mmap.mmap(memory_fd, 0, prot=mmap.PROT_READ)
