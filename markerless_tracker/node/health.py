@@ -51,6 +51,7 @@ class Facts:
         repeating: whether images arrive whose stamps repeat the previous ones.
         last_error: error of the last set; empty if it was tracked.
         clock_missing: whether `use_sim_time` is set and no /clock is received.
+        doubts: about the run so far, one line each.
     """
 
     ready: bool
@@ -68,6 +69,7 @@ class Facts:
     repeating: bool = False
     last_error: str = ""
     clock_missing: bool = False
+    doubts: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ class Health:
 def assess(facts: Facts) -> Health:
     """The level and message of a tracker's diagnostics.
 
-    OK: the person is tracked with every camera. STALE: no image arrives. WARN: anything else.
+    OK: the person is tracked with every camera, and nothing is doubtful. STALE: no image arrives.
+    WARN: anything else.
     """
     health = _assess(facts)
     if not facts.clock_missing:
@@ -125,6 +128,8 @@ def _working(facts: Facts) -> Health:
         return Health(Level.WARN, f"{message}; {without}" if without else message, "", without)
     if without:
         return Health(Level.WARN, f"{facts.state.value}: {without}", "", without)
+    if facts.doubts:
+        return Health(Level.WARN, f"{facts.state.value}: doubt: {facts.doubts[0]}")
     return Health(Level.OK, facts.state.value)
 
 

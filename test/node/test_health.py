@@ -30,6 +30,10 @@ def facts(**changes: Any) -> Facts:
     [
         ({}, Level.OK, "TRACKING"),
         ({"state": TrackState.LOST}, Level.WARN, "LOST: person lost"),
+        ({"doubts": ("too small", "too low")}, Level.WARN, "TRACKING: doubt: too small"),
+        (
+            {"doubts": ("too small",), "state": TrackState.LOST}, Level.WARN, "LOST: person lost",
+        ),
         (
             {"state": TrackState.SEARCHING, "activity": "waiting for learn_background"},
             Level.WARN,

@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from markerless_tracker.calibration.contours.time_offset import TimeOffset
 from markerless_tracker.node.health import NEWS, Health
@@ -57,7 +57,7 @@ class CompilingLines:
 
 
 class Announcer:
-    """Logs changes: the person found, lost and found again, cameras lost and recovered, warnings.
+    """Logs changes: the person found and lost, cameras lost and recovered, warnings, doubts.
 
     A line about the person begins like the message of `state`. Repetitions are counted.
 
@@ -73,6 +73,7 @@ class Announcer:
         self._found = False
         self._trouble = self._without = ""
         self._late: set[str] = set()
+        self._doubted: set[str] = set()
 
     def result(self, result: TrackResult) -> None:
         """Log a change of state, and the warnings of a result."""
@@ -84,6 +85,13 @@ class Announcer:
             self._state = result.state
         for warning in result.warnings:
             self._notices.say(f"stamp {result.stamp_ns}: {warning}")
+
+    def doubts(self, found: Iterable[str]) -> None:
+        """Log each kind of doubt about the run, once."""
+        for doubt in found:
+            if kind_of(doubt) not in self._doubted:
+                self._doubted.add(kind_of(doubt))
+                self._notices.say(f"doubt: {doubt}")
 
     def health(self, health: Health) -> None:
         """Log lost and recovered cameras, the reason for missing results, and its end."""

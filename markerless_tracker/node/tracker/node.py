@@ -246,6 +246,7 @@ class TrackerNode(GivenNode):
         self._result_file.add(tracked.result, tracked.body)
         self._report.add(tracked.result, tracked.body)
         self._announcer.result(tracked.result)
+        self._announcer.doubts(self._report.doubts)
         self._found = self._found or tracked.result.state is TrackState.TRACKING
         if not self.context.ok():  # a signal was received while this set was tracked
             return
@@ -280,6 +281,7 @@ class TrackerNode(GivenNode):
                 views=self._sets.camera_counts,
                 time_offsets={} if self._time_offsets is None else self._time_offsets.by_camera,
             )
+            values["doubts"] = "; ".join(self._report.doubts)
             message = messages.state_message(
                 self.get_fully_qualified_name(), values, health, self._status.stamp_ns
             )
@@ -315,6 +317,7 @@ class TrackerNode(GivenNode):
             clock_missing=simulated
             and now_s - self._started_s > QUIET_S
             and self.get_clock().now().nanoseconds == 0,
+            doubts=self._report.doubts,
         )
 
     def _tick(self) -> None:

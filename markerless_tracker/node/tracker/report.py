@@ -1,9 +1,10 @@
 """The verdict of a live run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from threading import Lock
 
 from markerless_tracker.body import BodyModel, load_description
+from markerless_tracker.body.description import BodyDescription
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.doubts import calibration_doubts
 from markerless_tracker.records import TrackResult
@@ -20,6 +21,10 @@ _LEFT_OUT = {
     "dropped_on_error": "with an error",
 }
 """Count of `state` -> words, for sets that were not tracked, except skipped ones."""
+
+LOOK_NS = 2_000_000_000
+"""Time between two looks for doubts, by the images' stamps. The first look comes that long after
+the first result."""
 
 _PICTURES = "while it runs the topics debug/NAME/evidence show silhouettes and body"
 
@@ -45,15 +50,24 @@ class RunReport:
     def __init__(self, *, start_given: bool) -> None:
         self._start_given = start_given
         self._lock = Lock()
-        self._tracker: Tracker | None = None
         self._record: RunRecord | None = None
+        self._description: BodyDescription | None = None
+        self._known: tuple[str, ...] = ()
         self._doubts: tuple[str, ...] = ()
+        self._looked_ns: int | None = None
 
     def begin(self, tracker: Tracker, rig: CameraRig) -> tuple[str, ...]:
         """Set the tracker; returns doubts about the cameras, one line each."""
         with self._lock:
-            self._tracker, self._record = tracker, RunRecord(tracker.rig)
-            self._doubts = calibration_doubts(rig)
+            self._record = RunRecord(tracker.rig)
+            self._description = load_description(tracker.config.body)
+            self._known = calibration_doubts(rig)
+            return self._known
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Doubts about the run so far, one line each, without those that `begin` returned."""
+        with self._lock:
             return self._doubts
 
     def warm_up(self, body: BodyModel) -> None:
@@ -66,18 +80,32 @@ class RunReport:
         with self._lock:
             if self._record is not None:
                 self._record.add(result, body)
+                self._look(result.stamp_ns)
 
     def verdict(self) -> Verdict | None:
         """The verdict so far; None before the first result."""
         with self._lock:
-            if self._record is None or self._tracker is None or not self._record.frames:
-                return None
-            # Without the search for exchanged cameras, since a node must end soon after a signal.
-            return verdict_of(
-                self._record,
-                load_description(self._tracker.config.body),
-                known=self._doubts,
-                start_given=self._start_given,
-                search_faults=False,
-                pictures=_PICTURES,
-            )
+            return self._verdict(self._known)
+
+    def _look(self, stamp_ns: int) -> None:
+        """Look for doubts if it is time to; stamps may run backwards."""
+        if self._looked_ns is None:
+            self._looked_ns = stamp_ns
+        if abs(stamp_ns - self._looked_ns) < LOOK_NS:
+            return
+        self._looked_ns = stamp_ns
+        verdict = self._verdict(())
+        self._doubts = () if verdict is None else verdict.doubts
+
+    def _verdict(self, known: Sequence[str]) -> Verdict | None:
+        if self._record is None or self._description is None or not self._record.frames:
+            return None
+        # Without the search for exchanged cameras, which would delay the results and the end.
+        return verdict_of(
+            self._record,
+            self._description,
+            known=known,
+            start_given=self._start_given,
+            search_faults=False,
+            pictures=_PICTURES,
+        )

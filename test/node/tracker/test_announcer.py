@@ -1,20 +1,25 @@
-"""Log lines of a running tracker, without the middleware."""
+"""Log lines of a running tracker and its doubts about the run, without the middleware."""
 
 import math
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
+from markerless_tracker.body import markers
 from markerless_tracker.calibration.contours.time_offset import TimeOffset
 from markerless_tracker.node.health import Health, Level
 from markerless_tracker.node.ros.notices import Notices
 from markerless_tracker.node.tracker.announcer import Announcer, CompilingLines, ready_line
 from markerless_tracker.node.tracker.cameras.counts import SyncCounts
-from markerless_tracker.node.tracker.report import sets_line
+from markerless_tracker.node.tracker.report import LOOK_NS, RunReport, sets_line
 from markerless_tracker.node.tracker.status import TrackerStatus
-from markerless_tracker.records import TrackResult, TrackState
+from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import Tracker, TrackerConfig
 
+FRAME_NS = LOOK_NS // 10
 TRACKING, LOST, SEARCHING = TrackState.TRACKING, TrackState.LOST, TrackState.SEARCHING
 
 
@@ -52,6 +57,14 @@ def test_a_state_that_changes_all_the_time_does_not_fill_the_log() -> None:
     log.now_s += 20.0
     log.news.flush()
     assert [line for line in log.lines[3:] if "times in 10 s" in line] == log.lines[3:] != []
+
+
+def test_each_kind_of_doubt_is_said_once() -> None:
+    log = Log()
+    for overlap in (0.71, 0.73):
+        log.now_s += 60.0
+        log.announcer.doubts((f"body and silhouettes overlap by {overlap}", "too low"))
+    assert log.warnings == ["doubt: body and silhouettes overlap by 0.71", "doubt: too low"]
 
 
 def test_a_camera_that_is_gone_and_back_is_said_once_each() -> None:
@@ -114,3 +127,48 @@ def test_the_sets_that_were_not_tracked_are_counted() -> None:
         "sets of images not tracked: 7 skipped for newer ones, 2 incomplete, "
         "4 before the tracker was ready"
     )
+
+
+def report_and_scene() -> tuple[RunReport, SyntheticScene]:
+    scene = SyntheticScene(body="person32", size_px=(64, 48), fps=30.0, samples=2, motion="stand")
+    report = RunReport(start_given=False)
+    tracker = Tracker(scene.rig, scene.body, TrackerConfig(body="person32"))
+    assert report.begin(tracker, scene.rig) == ()
+    return report, scene
+
+
+def result(scene: SyntheticScene, frame: int, overlap: float) -> TrackResult:
+    pose, masks = scene.pose(0), scene.frame(0)[1]
+    seen = {
+        name: Observation.from_mask(name, frame * FRAME_NS, mask, np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+    }
+    return TrackResult(
+        frame * FRAME_NS, TrackState.TRACKING, pose, markers(scene.body, pose), 1.0,
+        dict.fromkeys(scene.rig.names, overlap), 0, observations=seen,
+    )  # fmt: skip
+
+
+def test_a_run_is_looked_at_after_some_time() -> None:
+    report, scene = report_and_scene()
+    for frame in range(11):
+        assert report.doubts == ()
+        report.add(result(scene, frame, 0.5), scene.body)
+    assert report.doubts[0].startswith("body and silhouettes overlap by 0.5")
+    verdict = report.verdict()
+    assert verdict is not None and verdict.doubts == report.doubts
+
+
+def test_a_doubt_ends_when_most_of_the_run_is_well() -> None:
+    report, scene = report_and_scene()
+    overlaps = [0.5] * 11 + [0.9] * 30
+    for frame, overlap in enumerate(overlaps):
+        report.add(result(scene, frame, overlap), scene.body)
+    assert not any("overlap" in doubt for doubt in report.doubts)
+
+
+def test_stamps_that_run_backwards_do_not_end_the_looks() -> None:
+    report, scene = report_and_scene()
+    report.add(result(scene, 1000, 0.5), scene.body)
+    report.add(result(scene, 0, 0.5), scene.body)
+    assert report.doubts

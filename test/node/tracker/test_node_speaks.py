@@ -10,6 +10,9 @@ import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
+from markerless_tracker.body import load_description, subject_from_stature, write_subject
+from markerless_tracker.node.health import Level
+
 
 def test_a_run_from_ready_to_the_result(tmp_path: Path, begin: Any, scenes: Any) -> None:
     live = begin(result_file=tmp_path / "walk")
@@ -75,3 +78,15 @@ def test_a_doubtful_calibration_is_said_before_the_run(
     log = live.process.output
     assert log.count("are the translations in millimetres instead of metres?") == 1
     assert log.index("millimetres") < log.index("ready, ")
+
+
+def test_a_doubtful_run_is_said_while_it_runs(tmp_path: Path, begin: Any) -> None:
+    # The subject of a child, and a grown person before the cameras.
+    subject = subject_from_stature(load_description("balan31"), 1.30)
+    write_subject(tmp_path / "subject.yaml", subject)
+    live = begin(subject_file=tmp_path / "subject.yaml")
+    live.until(lambda: "ready, " in live.process.output, "ready in the log")
+    live.send_until(lambda: "TRACKING: doubt: " in live.message, "a doubt")
+    assert live.level == Level.WARN.value
+    assert "stature of 1.30 m" in live.value("doubts")
+    live.send_until(lambda: "doubt: the body has" in live.process.output, "in the log, too")
