@@ -26,10 +26,10 @@ from markerless_tracker.tracking.start.recombination import Recombiner
 
 PER_QUARTER = 4
 """Poses that are kept in each quarter of the headings, relative to the best pose's heading."""
-_PER_HEADING = 4
-"""First guesses of each heading that are refined a little: before that, their costs say little."""
 _INITIALISED_COUNT = 24
-"""The best of them, which are refined further."""
+"""First guesses that are refined."""
+_PER_HEADING = 2
+"""First guesses of each heading that are candidates for it."""
 _CHILDREN = 480
 """Children of a generation."""
 _REFINED = 10
@@ -43,15 +43,12 @@ _ALIKE_M = 0.07
 """Poses are the same if their markers lie nearer to each other than this, on average."""
 _PRIOR_WEIGHT = 4.0
 """Weight of the pose prior: a generic body's outline fits within some centimetres only."""
-_ROUGHLY = (2, (0.25, 0.15))
-_INITIALISE = (4, (0.15, 0.08))
-_FAR = (6, (0.25, 0.08))
+_INITIALISE = (6, (0.25, 0.08))
 _RECOMBINE = (5, (0.15, 0.05))
 _PROPAGATE = (3, (0.12, 0.05))
 _EXCHANGE = (6, (0.25, 0.05))
-"""Iterations of refinement, and first and last truncation in m: of the first guesses, of the best
-of them, of a population after a gap in time, of a recombined one, of one propagated from the frame
-before, and of a pose with exchanged limbs."""
+"""Iterations of refinement, and first and last truncation in m: of an initialised population, of a
+recombined one, of one propagated from the frame before, and of a pose with exchanged limbs."""
 _EXCHANGED_SLACK = (0.012, 0.007)
 """A pose with exchanged limbs has a first and a second generation of children if it costs at most
 this much more than the best pose."""
@@ -143,12 +140,12 @@ class FramePopulation:
         costs = self.total_costs(guesses.reshape(-1, guesses.shape[2]))
         costs = costs.reshape(guesses.shape[:2])
         best = np.argsort(costs, axis=1, kind="stable")[:, :_PER_HEADING]
+        order = np.argsort(np.take_along_axis(costs, best, axis=1).ravel(), kind="stable")[
+            :_INITIALISED_COUNT
+        ]
         chosen = np.take_along_axis(guesses, best[:, :, None], axis=1).reshape(-1, guesses.shape[2])
-        if hints is not None:
-            chosen = np.concatenate([hints, chosen])
-        roughly = self.refined(chosen, *_ROUGHLY)
-        order = np.argsort(self.total_costs(roughly), kind="stable")[:_INITIALISED_COUNT]
-        return self.selected(self.refined(roughly[order], *_INITIALISE))
+        initialised = chosen[order] if hints is None else np.concatenate([hints, chosen[order]])
+        return self.selected(self.refined(initialised, *_INITIALISE))
 
     def recombined(
         self, population: Population, generation: int, *, fraction: float = 1.0
@@ -210,7 +207,7 @@ class FramePopulation:
 
     def propagated(self, population: Population, *, far: bool = False) -> Population:
         """The population of the frame before, refined in this one; `far`: after a gap in time."""
-        return self.selected(self.refined(population.poses, *(_FAR if far else _PROPAGATE)))
+        return self.selected(self.refined(population.poses, *(_INITIALISE if far else _PROPAGATE)))
 
     def costs(self, poses: FloatArray) -> FloatArray:
         """1 - f_s (n,) of poses (n, p); infinite where it is undefined."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,18 +13,17 @@ from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.limbs.crossed import PAIRS
 from markerless_tracker.tracking.search import make_searcher
-from markerless_tracker.tracking.start.hull import Hull, find_hulls
 from markerless_tracker.tracking.start.many_poses import markers_of_many, transforms_of_many
 from markerless_tracker.tracking.start.mirror import mirror_of
 from markerless_tracker.tracking.start.population import FramePopulation
-from markerless_tracker.tracking.start.postures import HEADINGS, POSTURES, postures
+from markerless_tracker.tracking.start.postures import POSTURES, postures
 from markerless_tracker.tracking.start.starter import _improved
 
 
-def room(
+def made_up(
     threads: int, *, blank: bool = False, change: Mapping[str, float] | None = None
-) -> tuple[FramePopulation, np.ndarray, Hull | None]:
-    """A frame of a made-up person, the pose (p,) in it, and the hull of the silhouettes.
+) -> tuple[FramePopulation, np.ndarray]:
+    """A frame of a made-up person, and the pose (p,) in it.
 
     Args:
         threads: of the searcher.
@@ -42,13 +40,7 @@ def room(
     searcher = make_searcher(
         scene.body, rig=scene.rig, config=TrackerConfig(threads=threads), threads=threads
     )
-    hull = next(find_hulls({camera.name: camera for camera in scene.rig}, views), None)
-    return FramePopulation(searcher, views, 0, pose), pose, hull
-
-
-def made_up(threads: int, **person: Any) -> tuple[FramePopulation, np.ndarray]:
-    """As `room`, without the hull."""
-    return room(threads, **person)[:2]
+    return FramePopulation(searcher, views, 0, pose), pose
 
 
 def refined(threads: int) -> np.ndarray:
@@ -59,28 +51,6 @@ def refined(threads: int) -> np.ndarray:
 
 def test_refined_poses_are_the_same_with_any_number_of_threads() -> None:
     np.testing.assert_array_equal(refined(1), refined(2))
-
-
-def test_first_guesses_are_compared_after_a_rough_refinement(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    frame, _, hull = room(1)
-    assert hull is not None
-    calls: list[tuple[np.ndarray, np.ndarray]] = []
-    refine = frame.refined
-
-    def spied(poses: np.ndarray, *how: Any) -> np.ndarray:
-        calls.append((poses, refine(poses, *how)))
-        return calls[-1][1]
-
-    monkeypatch.setattr(frame, "refined", spied)
-    frame.initialised(hull)
-    (guesses, roughly), (chosen, _) = calls
-    assert len(guesses) == 4 * HEADINGS and len(chosen) == 24
-    order = np.argsort(frame.total_costs(roughly), kind="stable")
-    np.testing.assert_array_equal(chosen, roughly[order[:24]])
-    # Which ones are chosen would differ without it.
-    assert set(order[:24]) != set(np.argsort(frame.total_costs(guesses), kind="stable")[:24])
 
 
 def test_feet_above_the_floor_stay_there_since_the_size_is_unknown() -> None:
