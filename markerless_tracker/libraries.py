@@ -7,6 +7,7 @@ other, and take the cores from the threads that work.
 import ctypes
 import gc
 import os
+import sys
 
 VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """They are read when the library is loaded."""
@@ -30,9 +31,11 @@ def keep_freed_memory() -> None:
     """Let glibc keep up to 256 MB of freed memory, unless the environment sets its `malloc`.
 
     For programs. Images come and go at the cameras' rate. By default their memory is returned to
-    the kernel each time, and each page of the next image costs a page fault. Without effect with
-    other C libraries.
+    the kernel each time, and each page of the next image costs a page fault. Without effect on
+    other systems than Linux, and with other C libraries.
     """
+    if sys.platform != "linux":
+        return
     own = "glibc.malloc." in os.environ.get("GLIBC_TUNABLES", "")
     if own or any(name.startswith("MALLOC_") for name in os.environ):
         return

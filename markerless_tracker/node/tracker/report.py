@@ -88,14 +88,16 @@ class RunReport:
             return self._verdict(self._known)
 
     def _look(self, stamp_ns: int) -> None:
-        """Look for doubts if it is time to; stamps may run backwards."""
+        """Look for doubts if it is time to and a person was tracked; stamps may run backwards."""
         if self._looked_ns is None:
             self._looked_ns = stamp_ns
         if abs(stamp_ns - self._looked_ns) < LOOK_NS:
             return
         self._looked_ns = stamp_ns
-        verdict = self._verdict(())
-        self._doubts = () if verdict is None else verdict.doubts
+        # Why nobody may have been found is said at the end: it takes the hull of the silhouettes.
+        if self._record is not None and self._record.tracked:
+            verdict = self._verdict(())
+            self._doubts = () if verdict is None else verdict.doubts
 
     def _verdict(self, known: Sequence[str]) -> Verdict | None:
         if self._record is None or self._description is None or not self._record.frames:

@@ -137,14 +137,16 @@ def report_and_scene() -> tuple[RunReport, SyntheticScene]:
     return report, scene
 
 
-def result(scene: SyntheticScene, frame: int, overlap: float) -> TrackResult:
+def result(
+    scene: SyntheticScene, frame: int, overlap: float, state: TrackState = TRACKING
+) -> TrackResult:
     pose, masks = scene.pose(0), scene.frame(0)[1]
     seen = {
         name: Observation.from_mask(name, frame * FRAME_NS, mask, np.zeros(mask.shape, np.uint8))
         for name, mask in masks.items()
     }
     return TrackResult(
-        frame * FRAME_NS, TrackState.TRACKING, pose, markers(scene.body, pose), 1.0,
+        frame * FRAME_NS, state, pose, markers(scene.body, pose), 1.0,
         dict.fromkeys(scene.rig.names, overlap), 0, observations=seen,
     )  # fmt: skip
 
@@ -157,6 +159,17 @@ def test_a_run_is_looked_at_after_some_time() -> None:
     assert report.doubts[0].startswith("body and silhouettes overlap by 0.5")
     verdict = report.verdict()
     assert verdict is not None and verdict.doubts == report.doubts
+
+
+def test_while_nobody_was_tracked_no_causes_are_sought(monkeypatch: pytest.MonkeyPatch) -> None:
+    report, scene = report_and_scene()
+    with monkeypatch.context() as patched:
+        patched.delattr("markerless_tracker.node.tracker.report.verdict_of")
+        for frame in range(21):
+            report.add(result(scene, frame, 0.5, LOST), scene.body)
+    assert report.doubts == ()
+    verdict = report.verdict()
+    assert verdict is not None and verdict.causes
 
 
 def test_a_doubt_ends_when_most_of_the_run_is_well() -> None:
