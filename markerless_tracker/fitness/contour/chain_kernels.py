@@ -9,7 +9,7 @@ import numpy as np
 
 from markerless_tracker.body.kinematics import move_axis
 from markerless_tracker.body.model import FIRST_TRANSLATION, SWING_X
-from markerless_tracker.compiled import compiled, kernel
+from markerless_tracker.compiled import kernel
 
 SUMS = 27
 """Sums per part: upper triangle of Σ W f fᵀ (21 numbers), then Σ W r f (6), f the wrench."""
@@ -34,7 +34,7 @@ def add_wrench(x, y, z, gx, gy, gz, weight, value, sums, node):  # type: ignore[
         sums[node, 21 + i] += weight * value * wrench[i]
 
 
-@compiled()
+@kernel
 def twist_of(node, body, nodes, twist):  # type: ignore[no-untyped-def]
     """Fill twist (6,) of a node's joint; returns whether it has one."""
     kind = body.kind[node]
@@ -51,22 +51,27 @@ def twist_of(node, body, nodes, twist):  # type: ignore[no-untyped-def]
     return True
 
 
-@compiled()
-def sum_chain(body, nodes, sums, hessian, slope):  # type: ignore[no-untyped-def]
+@kernel
+def sum_chain(body, nodes, sums, twists, hessian, slope):  # type: ignore[no-untyped-def]
     """Fill hessian (p, p) and slope (p,) from the parts' sums (m, SUMS).
 
-    The sums become those of the subtrees. Parents must come before their children.
+    The sums become those of the subtrees, and twists (m + 1, 6) those of the joints; its last row
+    is scratch. Parents must come before their children.
     """
     hessian[:] = 0.0
     slope[:] = 0.0
-    twist, other, force = np.empty(6), np.empty(6), np.empty(6)
-    for node in range(body.parent.size - 1, -1, -1):
+    count = body.parent.size
+    for node in range(count):
+        twist_of(node, body, nodes, twists[node])
+    force = twists[count]
+    for node in range(count - 1, -1, -1):
         above = body.parent[node]
         if above >= 0:
             for k in range(SUMS):
                 sums[above, k] += sums[node, k]
-        if not twist_of(node, body, nodes, twist):
+        if body.kind[node] < 0:
             continue
+        twist = twists[node]
         force[:] = 0.0
         k = 0
         for i in range(6):
@@ -81,7 +86,8 @@ def sum_chain(body, nodes, sums, hessian, slope):  # type: ignore[no-untyped-def
             slope[p] += twist[i] * sums[node, 21 + i]
             hessian[p, p] += twist[i] * force[i]
         while above >= 0:
-            if twist_of(above, body, nodes, other):
+            if body.kind[above] >= 0:
+                other = twists[above]
                 entry = 0.0
                 for i in range(6):
                     entry += other[i] * force[i]

@@ -33,6 +33,7 @@ class ContourScratch(NamedTuple):
     start: NDArray[np.int64]  # (v, h / BAND_PX + 2)
     order: NDArray[np.int64]  # (v, MAX_SAMPLES)
     sums: FloatArray  # (v, m, SUMS)
+    twists: FloatArray  # (m + 1, 6)
     hessian: FloatArray  # (p, p)
     slope: FloatArray  # (p,)
     step: StepScratch
@@ -50,6 +51,7 @@ def make_contour_scratch(
         np.empty((views, height // BAND_PX + 2), dtype=np.int64),
         np.empty((views, MAX_SAMPLES), dtype=np.int64),
         np.empty((views, nodes, SUMS)),
+        np.empty((nodes + 1, 6)),
         np.empty((parameters, parameters)),
         np.empty(parameters),
         make_step_scratch(parameters),
@@ -143,7 +145,7 @@ def descend(  # type: ignore[no-untyped-def]
                     scratch.sums[0, m, k] += scratch.sums[view, m, k]
         if floor_precision > 0.0 and i < steps:
             add_floor(body, scratch.world, floor_precision / precision, standing, scratch.sums[0])
-        sum_chain(body, scratch.nodes, scratch.sums[0], hessian, slope)
+        sum_chain(body, scratch.nodes, scratch.sums[0], scratch.twists, hessian, slope)
         if i >= steps:
             continue
         for a in range(pose.size):

@@ -33,9 +33,12 @@ def sort_into_bands(count, height, pixel, start, order):  # type: ignore[no-unty
 
 
 @kernel
-def nearest_facing(u, v, nu, nv, bands, pixel, normal, start, order):  # type: ignore[no-untyped-def]
-    """Index of the nearest outline point whose normal is within 60° of (nu, nv); -1: none."""
-    best = np.inf
+def nearest_facing(u, v, nu, nv, most, bands, pixel, normal, start, order):  # type: ignore[no-untyped-def]
+    """Index of the nearest outline point whose normal is within 60° of (nu, nv); -1: none.
+
+    Only points at less than a squared distance of `most`, px², are found.
+    """
+    best = most
     nearest = -1
     home = min(max(np.int64(v) // BAND_PX, 0), bands - 1)
     for away in range(bands):

@@ -137,8 +137,9 @@ def residuals_one_by_one(made: Scene, view: int, truncation: float) -> SlowResid
         facing = np.flatnonzero(normal @ out > 0.5)
         away = np.linalg.norm(pixel[facing] - at, axis=1)
         near = int(facing[away.argmin()]) if facing.size else 0
-        metres = depth[near] / focal
-        far = away.min() * metres if facing.size else np.inf
+        far = away.min() * depth[near] / focal if facing.size else np.inf
+        # An outlier has no depth of its own.
+        metres = depth[near if far < truncation else 0] / focal
         cost += px * metres * tukey(min(far, truncation), truncation)
         if far < truncation:
             value = (pixel[near] - at) @ out * metres

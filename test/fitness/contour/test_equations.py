@@ -50,7 +50,7 @@ def test_slopes_along_the_chain(posed, disturbed) -> None:
     for i, c in enumerate(cone):
         sums = np.zeros((nodes.shape[0], SUMS))
         add_wrench(*world[i], *gradient[i], 2.0, 0.5, sums, body.cone_node[c])
-        sum_chain(arrays, nodes, sums, hessian, fast)
+        sum_chain(arrays, nodes, sums, np.empty((len(nodes) + 1, 6)), hessian, fast)
         np.testing.assert_allclose(fast, slow[i], atol=1e-7)
         np.testing.assert_allclose(hessian, 2.0 * np.outer(slow[i], slow[i]), atol=1e-6)
         reached.update(np.flatnonzero(fast))

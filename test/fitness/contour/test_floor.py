@@ -107,7 +107,7 @@ def test_the_kernel_sums_the_same_rows(sunk, lift_m: float) -> None:
     sums = np.zeros((body.node_parent.size, SUMS))
     add_floor(arrays, world, 7.0, True, sums)
     hessian, slope = np.empty((body.size, body.size)), np.empty(body.size)
-    sum_chain(arrays, nodes, sums, hessian, slope)
+    sum_chain(arrays, nodes, sums, np.empty((len(nodes) + 1, 6)), hessian, slope)
     # The kernel takes the points below the axes instead of the lowest ones, which a translation of
     # the body does not tell apart.
     slopes = pose_slopes(body, pose, rows)
