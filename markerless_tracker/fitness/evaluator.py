@@ -235,4 +235,5 @@ class Evaluator:
                 and then returns a lower bound of the cost that is at least the cutoff.
         """
         cutoff_costs = np.full(len(points), np.inf) if cutoff_costs is None else cutoff_costs
-        return self._fitness._run(self.objective, np.array(points), cutoff_costs)[1]
+        # In another order of memory, numba would compile the evaluation once more.
+        return self._fitness._run(self.objective, np.array(points, order="C"), cutoff_costs)[1]

@@ -5,8 +5,6 @@ wrench (g, X x g), with the gradient g at the point X. So JᵀWJ needs no row pe
 products of wrenches are summed per part, then up the tree. Derivation: docs/normal-equations.md.
 """
 
-import numpy as np
-
 from markerless_tracker.body.kinematics import move_axis
 from markerless_tracker.body.model import FIRST_TRANSLATION, SWING_X
 from markerless_tracker.compiled import kernel

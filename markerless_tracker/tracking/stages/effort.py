@@ -28,9 +28,10 @@ class Effort:
 
     The refinement follows a body that moves as predicted. Swarms find what it has lost, so they are
     needed if a frame is explained worse than usual in this track, or if a limb is in doubt. With an
-    effort below 1 and no limb in doubt, swarms and the limbs' searches alternate, and frames count
-    as far apart only beyond `FAR_S` / effort: a search takes longer than `FAR_S`, so a tracker that
-    is late would search every frame and remain late.
+    effort below 1, frames explained as usual and without a limb in doubt get less: swarms and the
+    limbs' searches alternate, and frames count as far apart only beyond `FAR_S` / effort. A search
+    takes longer than `FAR_S`, so a tracker that is late would search every frame and remain late. A
+    frame explained worse than usual gets all searches: a limb that is lost costs many more.
 
     Args:
         needed_only: whether swarms search only the frames that need them; else all frames.
@@ -53,6 +54,8 @@ class Effort:
         self._limbs_frame = False
         self._swarms = False
         self._doubt = False
+        self._badly = True
+        self._allowed = True
 
     def begin(self, effort: float, *, doubt: bool, since_s: float = 0.0) -> None:
         """Begin a frame.
@@ -75,7 +78,7 @@ class Effort:
             self._credit = 0.0
             self._limbs_frame = not self._limbs_frame
         self._reduced, self._swarms = effort < 1.0 and not doubt, False
-        self._doubt = doubt
+        self._doubt, self._allowed = doubt, effort > 0.0
 
     @property
     def granted(self) -> bool:
@@ -111,7 +114,8 @@ class Effort:
             return
         begin = search.pose
         search.run((contour_stage("align", body, config, centre, sigma),))
-        swarms = self._swarms = self.wants_swarms(search.cost)
+        self.judge(search.cost)
+        swarms = self._swarms = self.wants_swarms
         if swarms:
             search.run(rescue_stages(body, config, centre, sigma))
         # A refinement that moved the pose by little has converged.
@@ -119,17 +123,23 @@ class Effort:
             search.run((contour_stage("polish", body, config, centre, sigma),))
         self.end(search.cost)
 
-    def wants_swarms(self, cost: float) -> bool:
-        """Whether swarms search this frame.
+    def judge(self, cost: float) -> None:
+        """Grant all searches to a frame that is explained badly, unless the effort is 0.
 
         Args:
             cost: of the pose after the first refinement.
         """
+        usual = self._usual_cost
+        self._badly = usual is None or cost > usual + WORSE
+        if self._badly and self._allowed:
+            self._granted, self._reduced, self._credit = True, False, 0.0
+
+    @property
+    def wants_swarms(self) -> bool:
+        """Whether swarms search this frame; valid after `judge`."""
         if not self._granted or (self._reduced and self._limbs_frame):
             return False
-        usual = self._usual_cost
-        badly = usual is None or cost > usual + WORSE
-        return badly or self._doubt or not self._needed_only
+        return self._badly or self._doubt or not self._needed_only
 
     def end(self, cost: float) -> None:
         """End a frame: add the cost of its result to the running mean."""

@@ -18,31 +18,36 @@ def _settled() -> Effort:
     return effort
 
 
+def _wants_swarms(effort: Effort, cost: float) -> bool:
+    effort.judge(cost)
+    return effort.wants_swarms
+
+
 def test_the_first_frame_is_searched_by_swarms() -> None:
     effort = Effort(needed_only=True)
     effort.begin(1.0, doubt=False)
-    assert effort.wants_swarms(0.01)
+    assert _wants_swarms(effort, 0.01)
 
 
 def test_a_frame_as_usual_needs_no_swarms() -> None:
-    assert not _settled().wants_swarms(0.05 + 0.9 * WORSE)
+    assert not _wants_swarms(_settled(), 0.05 + 0.9 * WORSE)
 
 
 def test_a_frame_worse_than_usual_needs_swarms() -> None:
-    assert _settled().wants_swarms(0.05 + 1.1 * WORSE)
+    assert _wants_swarms(_settled(), 0.05 + 1.1 * WORSE)
 
 
 def test_a_limb_in_doubt_needs_swarms() -> None:
     effort = _settled()
     effort.begin(1.0, doubt=True)
-    assert effort.wants_swarms(0.05)
+    assert _wants_swarms(effort, 0.05)
 
 
 def test_all_frames_are_searched_if_not_only_the_needed_ones_are() -> None:
     effort = Effort(needed_only=False)
     for _ in range(5):
         effort.begin(1.0, doubt=False)
-        assert effort.wants_swarms(0.05)
+        assert _wants_swarms(effort, 0.05)
         effort.end(0.05)
 
 
@@ -50,18 +55,20 @@ def test_reset_forgets_the_usual_cost() -> None:
     effort = _settled()
     effort.reset()
     effort.begin(1.0, doubt=False)
-    assert effort.wants_swarms(0.05)
+    assert _wants_swarms(effort, 0.05)
 
 
 @pytest.mark.parametrize(("fraction", "granted"), [(1.0, 100), (0.5, 50), (0.1, 10), (0.0, 0)])
 def test_effort_is_the_fraction_of_frames_that_are_searched(fraction: float, granted: int) -> None:
     effort = Effort(needed_only=False)
+    effort.begin(1.0, doubt=False)
+    effort.end(0.05)
     count = 0
     swarms = 0
     for _ in range(100):
         effort.begin(fraction, doubt=False)
         count += effort.granted
-        swarms += effort.wants_swarms(1.0)
+        swarms += _wants_swarms(effort, 0.05)
         assert effort.granted or not effort.for_limbs
     assert count == granted
     # With less than everything, every other search is left to the limbs.
@@ -115,16 +122,36 @@ def test_frames_far_apart_are_all_searched() -> None:
     assert not effort.granted
 
 
+def _searches(effort: Effort, cost: float) -> tuple[bool, bool]:
+    """Whether swarms search a frame of a cost, and whether the limbs' searches may."""
+    body, search = load_body("person31", 1.75), Recorder(0.0, cost)
+    effort.search(search, body, TrackerConfig(), body.neutral, body.sigma)  # type: ignore[arg-type]
+    return len(search.names) > 2, effort.for_limbs
+
+
 def test_who_is_late_searches_by_swarms_or_by_limbs_in_turn() -> None:
-    body = load_body("person31", 1.75)
     found = []
     for fraction in (1.0, 0.5):
         effort = _settled()
+        effort.configure(TrackerConfig.from_mapping({"refine.swarms": "always"}))
         for _ in range(6):
             effort.begin(fraction, doubt=False, since_s=0.2)
-            search = Recorder(0.0, 0.05 + 2.0 * WORSE)
-            effort.search(search, body, TrackerConfig(), body.neutral, body.sigma)  # type: ignore[arg-type]
-            found.append((len(search.names) > 2, effort.for_limbs))
+            found.append(_searches(effort, 0.05))
     assert found[:6] == [(True, True)] * 6
     assert sorted(found[6:8]) == [(False, True), (True, False)]
     assert found[6:8] == found[8:10] == found[10:12]
+
+
+def test_a_badly_explained_frame_gets_all_searches_even_of_who_is_late() -> None:
+    effort = _settled()
+    for _ in range(6):
+        effort.begin(0.1, doubt=False)
+        assert not effort.granted
+        assert _searches(effort, 0.05) == (False, False)
+        effort.begin(0.1, doubt=False)
+        assert _searches(effort, 0.05 + 2.0 * WORSE) == (True, True)
+        assert not effort.reduced
+        # With this frame the others have their turn again.
+        effort.end(0.05)
+    effort.begin(0.0, doubt=False)
+    assert _searches(effort, 0.05 + 2.0 * WORSE) == (False, False)
