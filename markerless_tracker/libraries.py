@@ -16,6 +16,7 @@ _TRIM_THRESHOLD, _KEPT = -1, 256 << 20
 _MMAP_THRESHOLD, _LARGEST = -3, 32 << 20
 # With less, a thread's heap of 64 MB is unmapped as soon as it is empty.
 _TOP_PAD, _SPARE = -2, 16 << 20
+_PIECE = 1 << 20
 
 
 def single_threaded() -> None:
@@ -44,6 +45,19 @@ def keep_freed_memory() -> None:
         mallopt(_TRIM_THRESHOLD, _KEPT)
         mallopt(_MMAP_THRESHOLD, _LARGEST)
         mallopt(_TOP_PAD, _SPARE)
+
+
+def touch_memory(size_bytes: int) -> None:
+    """Let this thread's allocator have memory that the kernel has provided already.
+
+    For programs, after `keep_freed_memory` and in the thread that will need the memory. The kernel
+    provides new memory page by page, which takes milliseconds for an image in a virtual machine.
+
+    Args:
+        size_bytes: memory that will be needed at once.
+    """
+    pieces = [b"x" * _PIECE for _ in range(size_bytes // _PIECE)]
+    pieces.clear()
 
 
 def quiet_decoders() -> None:

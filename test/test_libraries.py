@@ -84,6 +84,25 @@ def test_freed_images_cost_no_page_faults() -> None:
         assert 4 * kept < faults(keep, {name: value})
 
 
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="sets glibc's malloc only")
+def test_images_in_touched_memory_cost_no_page_faults() -> None:
+    code = (
+        "import resource, sys\n"
+        "from markerless_tracker.libraries import keep_freed_memory, touch_memory\n"
+        "keep_freed_memory()\n"
+        "touch_memory(int(sys.argv[1]) << 20)\n"
+        "first = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
+        "images = [b'x' * (3 << 20) for _ in range(10)]\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - first)\n"
+    )
+    own = {k: v for k, v in os.environ.items() if not k.startswith(("MALLOC_", "GLIBC_"))}
+    touched, untouched = (
+        int(subprocess.check_output([sys.executable, "-c", code, size], text=True, env=own))
+        for size in ("64", "0")
+    )
+    assert 20 * touched < untouched
+
+
 @pytest.mark.parametrize("program", [*PROGRAMS.values(), *PROCESSES])
 def test_programs_keep_freed_memory(program) -> None:
     code = (

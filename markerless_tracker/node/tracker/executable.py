@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 
 from markerless_tracker.errors import TrackerError
+from markerless_tracker.libraries import touch_memory
 from markerless_tracker.node.ros.process import (
     NOTICE_S,
     StopSignals,
@@ -21,6 +22,9 @@ _EXAMPLE = (
 _CLOSE_S = 3.0
 _SWITCH_S = 0.001
 """Python's thread switch interval."""
+_WAITING_BYTES = 128 << 20
+"""Images that wait during the search for a person: four cameras of 800x600 px for about a second
+and a half. Receiving into new memory can take longer than the images take to come."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -44,6 +48,7 @@ def _run(argv: list[str], stop: StopSignals) -> int:
 
     if stop.received:
         return 0
+    touch_memory(_WAITING_BYTES)
     with running(TrackerNode, argv) as (node, executor):
         while node.fatal is None and not stop.received:
             executor.spin_once(timeout_sec=NOTICE_S)

@@ -129,3 +129,23 @@ def test_a_listener_that_cannot_subscribe_leaves_no_node() -> None:
     with pytest.raises(ValueError, match="no such topic"), listener:
         pass
     assert not listener._node.context.ok()
+
+
+def test_the_tracker_touches_memory_for_the_first_images(project_root: Path) -> None:
+    pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    code = (
+        "import markerless_tracker.libraries as libraries\n"
+        "kept = []\n"
+        "libraries.keep_freed_memory = lambda: kept.append(True)\n"
+        "libraries.touch_memory = lambda size_bytes: exit(f'{kept} {size_bytes >> 20} MB')\n"
+        "from markerless_tracker.node.tracker.executable import main\n"
+        "main([])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, "PYTHONPATH": str(project_root)},
+    )
+    assert done.stderr == "[True] 128 MB\n"
