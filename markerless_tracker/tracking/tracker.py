@@ -31,7 +31,7 @@ from markerless_tracker.tracking.person.first_frame import StartMarkers
 from markerless_tracker.tracking.person.resting import at_rest
 from markerless_tracker.tracking.search import make_searcher
 from markerless_tracker.tracking.stages.effort import Effort
-from markerless_tracker.tracking.stages.frame import frame_stages
+from markerless_tracker.tracking.stages.frame import frame_stages, swarm_stages
 from markerless_tracker.tracking.start.starter import Starter
 from markerless_tracker.tracking.states import Phase, Track
 
@@ -141,12 +141,12 @@ class Tracker:
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
         blank = self.evidence.warm_up()
-        self._starter, self._assessor.track = None, Track(Phase.TRACKING)
-        self.step(blank, 0)
         pose = self._motion.pose
         seen = Seen(0, blank, decide(blank, self._cameras, self.body, pose), blank)
         search = self._searcher.frame(seen.used, 0, pose)
-        search.run(frame_stages(self.body, self.config, pose, self.body.sigma))
+        search.run(swarm_stages(self.body, self.config, pose, self.body.sigma))
+        self._starter, self._assessor.track = None, Track(Phase.TRACKING)
+        self.step(blank, 0)
         if self.config.refinement != "none":
             self._assessor.limbs.recover(self._searcher, search.contours, seen, pose)
         self._assessor.warm_up(Found(search, 0, seen.used), self.body, self._body.limits)

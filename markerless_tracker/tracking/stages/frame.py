@@ -40,6 +40,17 @@ def frame_stages(
     )
 
 
+def swarm_stages(
+    body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
+) -> tuple[Stage, ...]:
+    """The stages of `frame_stages` but for the contour refinement; same arguments.
+
+    They are compiled first, since the segmenting process compiles the refinement meanwhile.
+    """
+    stages = frame_stages(body, config, centre, sigma)
+    return tuple(stage for stage in stages if stage.plan.algorithm != CONTOUR)
+
+
 def rescue_stages(
     body: BodyModel, config: TrackerConfig, centre: FloatArray, sigma: FloatArray
 ) -> tuple[Stage, ...]:
