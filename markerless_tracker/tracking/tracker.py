@@ -216,7 +216,7 @@ class Tracker:
             views: camera name to its image, (h, w, 3) uint8 BGR or (h, w) grey, not rectified, or
                 to a ready-made observation; cameras may be missing. Or the result of `prepare`.
             stamp_ns: time of the images; the search widens with the time since the last step.
-            effort: fraction of the frames, 0 to 1, that swarms and limb searches may search.
+            effort: fraction, 0 to 1, of the frames explained as usual that more searches may take.
 
         Raises:
             ConfigError: the effort is not between 0 and 1.

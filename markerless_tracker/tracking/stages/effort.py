@@ -61,7 +61,8 @@ class Effort:
         """Begin a frame.
 
         Args:
-            effort: fraction of the frames that may be searched in addition, 0 to 1.
+            effort: fraction of the frames explained as usual that may be searched in addition, 0 to
+                1. With 0 no frame is.
             doubt: whether a limb is in doubt.
             since_s: time since the last frame.
 
