@@ -242,13 +242,12 @@ def _occupied(
         index = np.flatnonzero(cells[np.ix_(*within)])
     at = np.unravel_index(index, tuple(size))
     # Only the points that are left are projected.
-    points = np.empty((int(size.prod()), 3))
-    points[index] = np.column_stack([axis[i] for axis, i in zip(axes, at, strict=True)])
-    view_count = np.zeros(len(points), dtype=np.int8)
-    person_count = np.zeros(len(points), dtype=np.int8)
+    points = np.column_stack([axis[i] for axis, i in zip(axes, at, strict=True)])
+    view_count = np.zeros(int(size.prod()), dtype=np.int8)
+    person_count = np.zeros(len(view_count), dtype=np.int8)
     for view in views:
         camera = view.camera
-        pixels = project_camera(points[index], camera)
+        pixels = project_camera(points, camera)
         mask = view.masks[spacing]
         with np.errstate(invalid="ignore"):
             u, v = np.round(pixels[:, 0]), np.round(pixels[:, 1])
@@ -258,11 +257,11 @@ def _occupied(
         keep[framed] = shown > 0
         view_count[index] += framed
         person_count[index[framed]] += shown > 1
-        index = index[keep]
+        index, points = index[keep], points[keep]
     person = person_count >= LEAST_VIEWS
-    inside = np.zeros(len(points), dtype=np.bool_)
-    inside[index] = view_count[index] >= LEAST_VIEWS
-    inside &= person | (points[:, 2] > FLOOR_M)
+    inside = np.zeros(len(view_count), dtype=np.bool_)
+    seen = view_count[index] >= LEAST_VIEWS
+    inside[index] = seen & (person[index] | (points[:, 2] > FLOOR_M))
     shape = tuple(int(n) for n in size)
     return inside.reshape(shape), view_count.reshape(shape), person.reshape(shape)
 
