@@ -33,20 +33,17 @@ def add_wrench(x, y, z, gx, gy, gz, weight, value, sums, node):  # type: ignore[
 
 
 @kernel
-def twist_of(node, body, nodes, twist):  # type: ignore[no-untyped-def]
-    """Fill twist (6,) of a node's joint; returns whether it has one."""
+def fill_twist(node, body, nodes, twist):  # type: ignore[no-untyped-def]
+    """Fill twist (6,) of a node's joint."""
     kind = body.kind[node]
-    if kind < 0:
-        return False
     move_axis(node, body.kind, body.sign, nodes, twist[3:])
     wx, wy, wz = twist[3], twist[4], twist[5]
     if FIRST_TRANSLATION <= kind < SWING_X:
         twist[0], twist[1], twist[2] = wx, wy, wz
         twist[3], twist[4], twist[5] = 0.0, 0.0, 0.0
-        return True
+        return
     x, y, z = nodes[node, 0, 3], nodes[node, 1, 3], nodes[node, 2, 3]
     twist[0], twist[1], twist[2] = y * wz - z * wy, z * wx - x * wz, x * wy - y * wx
-    return True
 
 
 @kernel
@@ -60,7 +57,8 @@ def sum_chain(body, nodes, sums, twists, hessian, slope):  # type: ignore[no-unt
     slope[:] = 0.0
     count = body.parent.size
     for node in range(count):
-        twist_of(node, body, nodes, twists[node])
+        if body.kind[node] >= 0:
+            fill_twist(node, body, nodes, twists[node])
     force = twists[count]
     for node in range(count - 1, -1, -1):
         above = body.parent[node]

@@ -33,12 +33,12 @@ def sort_into_bands(count, height, pixel, start, order):  # type: ignore[no-unty
 
 
 @kernel
-def nearest_facing(u, v, nu, nv, most, bands, pixel, normal, start, order):  # type: ignore[no-untyped-def]
+def nearest_facing(u, v, nu, nv, most_px2, bands, pixel, normal, start, order):  # type: ignore[no-untyped-def]
     """Index of the nearest outline point whose normal is within 60° of (nu, nv); -1: none.
 
-    Only points at less than a squared distance of `most`, px², are found.
+    Only points at less than a squared distance of `most_px2` are found.
     """
-    best = most
+    best = most_px2
     nearest = -1
     home = min(max(np.int64(v) // BAND_PX, 0), bands - 1)
     for away in range(bands):

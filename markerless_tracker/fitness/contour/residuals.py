@@ -110,10 +110,10 @@ def collect_residuals(view, views, contours, truncation_m, samples, start, order
     cost = 0.0
     limit = truncation_m * truncation_m / 6.0
     focal = 1.0 / k[0]
-    least = np.inf
+    least_depth = np.inf
     for s in range(count):
         metres = depth[s] * focal
-        least = min(least, depth[s])
+        least_depth = min(least_depth, depth[s])
         length = lengths[s]
         cost += length * limit
         inside, value, along_u, along_v = _distance_at(
@@ -133,15 +133,17 @@ def collect_residuals(view, views, contours, truncation_m, samples, start, order
         sample[n] = s
         _world_gradient(r, t, k, d, world, s, metres * along_u, metres * along_v, gradient, n)
         n += 1
-    # No point farther off than this, px, lies within the truncation.
-    reach = truncation_m / (least * focal)
+    # No point farther off than this radius lies within the truncation.
+    radius_px = truncation_m / (least_depth * focal)
     bands = sort_into_bands(count, views.size[view, 1], pixel, start, order)
     points, normals, spacing = contours.points, contours.normals, contours.spacing
     first_m = depth[0] * focal if count > 0 else 0.0
     for m in range(contours.point_start[view], contours.point_start[view + 1]):
         u, v = points[m, 0], points[m, 1]
         nu, nv = normals[m, 0], normals[m, 1]
-        nearest = nearest_facing(u, v, nu, nv, reach * reach, bands, pixel, normal, start, order)
+        nearest = nearest_facing(
+            u, v, nu, nv, radius_px * radius_px, bands, pixel, normal, start, order
+        )
         metres, gap = 0.0, np.inf
         if nearest >= 0:
             metres = depth[nearest] * focal

@@ -31,7 +31,7 @@ class Effort:
     effort below 1, frames explained as usual and without a limb in doubt get less: swarms and the
     limbs' searches alternate, and frames count as far apart only beyond `FAR_S` / effort. A search
     takes longer than `FAR_S`, so a tracker that is late would search every frame and remain late. A
-    frame explained worse than usual gets all searches: a limb that is lost costs many more.
+    frame explained worse than usual gets all searches: a lost limb would cost many more.
 
     Args:
         needed_only: whether swarms search only the frames that need them; else all frames.
