@@ -27,3 +27,9 @@ class ImageError(TrackerError):
 
 class SearchError(TrackerError):
     """A search was set up with impossible numbers (bounds, particles, budget)."""
+
+
+def one_line(error: BaseException) -> str:
+    """An error in one line, with its type unless it is a `TrackerError`."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, TrackerError) else f"{type(error).__name__}: {text}"

@@ -100,6 +100,15 @@ def faults(path: str, source: str) -> list[str]:
     return found
 
 
+def beside(module: str, name: str) -> tuple[str, str]:
+    """Where two dotted names part: the two folders, or modules, beside each other."""
+    ours, theirs = module.split("."), name.split(".")
+    depth = 0
+    while depth < min(len(ours), len(theirs)) and ours[depth] == theirs[depth]:
+        depth += 1
+    return ".".join(ours[: depth + 1]), ".".join(theirs[: depth + 1])
+
+
 MODULES = sorted(p.relative_to(SOURCE).as_posix() for p in SOURCE.rglob("*.py"))
 FILES = sorted(
     p.relative_to(ROOT).as_posix()
@@ -146,6 +155,24 @@ def test_no_file_is_long(file: str) -> None:
 def test_no_folder_is_crowded(folder: str) -> None:
     names = [p.name for p in (ROOT / folder).glob("*.py") if p.name != "__init__.py"]
     assert len(names) <= MOST_FILES, f"{folder} has {len(names)} files, at most {MOST_FILES}"
+
+
+def test_no_two_folders_import_each_other() -> None:
+    edges: dict[tuple[str, str], str] = {}
+    for path in MODULES:
+        module = ".".join([PACKAGE, *path.removesuffix(".py").split("/")])
+        source = (SOURCE / path).read_text(encoding="utf-8")
+        for name in imported(ast.parse(source), module):
+            pair = beside(module, name)
+            if all((ROOT / part.replace(".", "/")).is_dir() for part in pair):
+                edges[pair] = f"{module} imports {name}"
+    assert len(edges) > 100
+    mutual = [
+        f"{text}; {edges[other, one]}"
+        for (one, other), text in edges.items()
+        if one < other and (other, one) in edges
+    ]
+    assert mutual == []
 
 
 def test_no_module_is_a_drawer() -> None:

@@ -17,7 +17,7 @@ PROGRAMS = {
 
 PROCESSES = (
     "from markerless_tracker.tracking.processes.fitting_main import main; main(0, 0, 0)",
-    "from markerless_tracker.tracking.processes.segmenting_main import main; main(0)",
+    "from markerless_tracker.tracking.evidence.segmenting_main import main; main(0)",
 )
 """The tracker's own processes."""
 

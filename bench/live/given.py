@@ -26,12 +26,12 @@ from markerless_tracker.benchmarks.machine import machine
 from markerless_tracker.body import write_pose
 from markerless_tracker.cli.replay.processes import ros_arguments
 from markerless_tracker.imaging import Segmenter, learn_background
+from markerless_tracker.node.inputs.wire import FORMAT, settings_digest, silhouette_data
 from markerless_tracker.node.ros.camera_info import info_of
 from markerless_tracker.node.ros.cdr import image_bytes, with_stamp
 from markerless_tracker.node.ros.messages import header
 from markerless_tracker.node.ros.profile import apply_profile
 from markerless_tracker.node.ros.qos import image_qos
-from markerless_tracker.node.segmenter.wire import FORMAT, settings_digest, silhouette_data
 from markerless_tracker.tracking import TrackerConfig
 
 

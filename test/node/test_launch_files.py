@@ -11,12 +11,12 @@ import yaml
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from markerless_tracker.errors import ConfigError
+from markerless_tracker.node.inputs.wire import settings_digest
 from markerless_tracker.node.player.parameters import descriptions as player_parameters
 from markerless_tracker.node.segmenter.parameters import (
     known_parameters,
     read_segmenter_settings,
 )
-from markerless_tracker.node.segmenter.wire import settings_digest
 from markerless_tracker.node.tracker.parameters import parameter_names, read_settings
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,9 +8,9 @@ import pytest
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from markerless_tracker.datasets.bag.encodings import ENCODINGS
+from markerless_tracker.node.inputs.wire import EDGES_TOPIC, FORMAT, SILHOUETTE_TOPIC
 from markerless_tracker.node.player.parameters import descriptions as player_parameters
 from markerless_tracker.node.segmenter.parameters import known_parameters
-from markerless_tracker.node.segmenter.wire import EDGES_TOPIC, FORMAT, SILHOUETTE_TOPIC
 from markerless_tracker.node.tracker.cameras.counts import CameraCounter
 from markerless_tracker.node.tracker.changes import LIVE
 from markerless_tracker.node.tracker.parameters import parameter_names

@@ -20,22 +20,56 @@ from markerless_tracker.imaging.segmentation.kernels import LEVELS
 _NEAR_PX = 3
 
 
+# Sums of one row each. Sums of the channels and the number of pixels share one integer: no sum over
+# a window exceeds 16 bits.
+_FIELD = 16
+_COUNT = np.int64(1) << np.int64(3 * _FIELD)
+
+
 @kernel
-def _sum_near(image, source, top, bottom, left, right, sums):  # type: ignore[no-untyped-def]
-    """Number of the pixels of a window that are in ``source``, and their sums by channel."""
-    count = 0
-    sums[:] = 0
+def _slide(image, source, entering, old, total):  # type: ignore[no-untyped-def]
+    """Replace the row ``old`` in the column sums ``total`` by a row of the image.
+
+    Args:
+        image: (b, c) uint8, the row; pixels outside of ``source`` are left out.
+        source: (b,) uint8, 0 or 255.
+        entering: whether there is such a row; if not, the sums get nothing.
+        old: (b,) int64, the row that leaves; becomes the one that enters.
+        total: (b,) int64, fields of `_FIELD` bits: the sums of up to three channels, and the number
+            of pixels at the fourth.
+    """
+    if not entering:
+        for j in range(total.size):
+            total[j] -= old[j]
+            old[j] = 0
+        return
+    # Without a loop over the channels the compiler can vectorise this one. The last two channels
+    # count nothing if there is one alone.
+    last = image.shape[1] - 1
+    second, third = np.int64(last > 0) << _FIELD, np.int64(last > 0) << (2 * _FIELD)
+    for j in range(total.size):
+        new = _COUNT + np.int64(image[j, 0])
+        new += second * np.int64(image[j, last // 2]) + third * np.int64(image[j, last])
+        new = new if source[j] != 0 else np.int64(0)
+        total[j] += new - old[j]
+        old[j] = new
+
+
+@kernel
+def _sum_near(image, source, top, bottom, left, right):  # type: ignore[no-untyped-def]
+    """The pixels of a window that are in ``source``, summed as by `_slide`."""
+    total = np.int64(0)
     for y in range(top, bottom):
         for x in range(left, right):
             if source[y, x] != 0:
-                count += 1
-                for c in range(sums.size):
-                    sums[c] += image[y, x, c]
-    return count
+                total += _COUNT
+                for c in range(image.shape[2]):
+                    total += np.int64(image[y, x, c]) << np.int64(c * _FIELD)
+    return total
 
 
 @kernel
-def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, sums, cleared):  # type: ignore[no-untyped-def]
+def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, scratch, cleared):  # type: ignore[no-untyped-def]
     """Mark pixels of the mask's border that the body covers by less than half.
 
     Args:
@@ -46,29 +80,41 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, su
         mask: (a, b) uint8, 0 or 255.
         inner, deep: (a, b) the mask without its border, and without two layers.
         least: least squared difference of body and background for which a pixel is decided.
-        sums: (c,) int32, scratch.
+        scratch: (2 `_NEAR_PX` + 2, b) int64, 0; overwritten.
         cleared: (a, b) uint8, 255 at pixels to clear; written.
     """
     rows, columns = mask.shape
     channels = image.shape[2]
     white, level = np.float32(255.0), np.float32(1.0 / LEVELS)
-    for i in range(rows):
-        first, last = max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)
+    side = 2 * _NEAR_PX + 1
+    field = np.int64((1 << _FIELD) - 1)
+    total = scratch[side]
+    for y in range(rows + _NEAR_PX):
+        v = min(y, rows - 1)
+        _slide(image[v], deep[v], y < rows, scratch[y % side], total)
+        i = y - _NEAR_PX
+        if i < 0:
+            continue
         for j in range(columns):
             cleared[i, j] = 0
-            if mask[i, j] == 0 or inner[i, j] != 0:
+            if mask[i, j] == inner[i, j]:
                 continue
             begin, end = max(j - _NEAR_PX, 0), min(j + _NEAR_PX + 1, columns)
-            count = _sum_near(image, deep, first, last, begin, end, sums)
-            if count == 0:
-                count = _sum_near(image, inner, first, last, begin, end, sums)
-            if count == 0:
+            near = np.int64(0)
+            for x in range(begin, end):
+                near += total[x]
+            if near == 0:
+                first, last = max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)
+                near = _sum_near(image, inner, first, last, begin, end)
+            if near == 0:
                 continue
+            count = np.float32(near >> np.int64(3 * _FIELD))
             along = np.float32(0.0)
             length = np.float32(0.0)
             for c in range(channels):
+                body = np.float32((near >> np.int64(c * _FIELD)) & field) / count
                 base = min(gain[c] * level * np.float32(mean[c, top + i, left + j]), white)
-                contrast = np.float32(sums[c]) / np.float32(count) - base
+                contrast = body - base
                 along += (np.float32(image[i, j, c]) - base) * contrast
                 length += contrast * contrast
             if length >= least and along < np.float32(0.5) * length:
@@ -101,8 +147,9 @@ def trim_border(
         layers: largest number of border layers to clear, one after the other.
         least: least difference of body and background for which a pixel is decided, grey levels.
     """
-    cleared, sums = np.empty_like(mask), np.empty(image.shape[2], dtype=np.int32)
+    cleared = np.empty_like(mask)
     for _ in range(layers):
+        scratch = np.zeros((2 * _NEAR_PX + 2, mask.shape[1]), dtype=np.int64)
         inner = cv2.erode(mask, SOLID)
         deep = cv2.erode(inner, SOLID)
         mark_half_covered(
@@ -115,7 +162,7 @@ def trim_border(
             inner,
             deep,
             np.float32(least**2),
-            sums,
+            scratch,
             cleared,
         )
         cv2.subtract(mask, cleared, dst=mask)

@@ -116,8 +116,8 @@ def listen(
         RosMissingError: ROS is not installed.
     """
     with _own_node() as (node, executor):
-        from markerless_tracker.node.tracker.inputs import CameraInput
-        from markerless_tracker.node.tracker.topics import CameraTopics
+        from markerless_tracker.node.inputs.images import CameraInput
+        from markerless_tracker.node.inputs.topics import CameraTopics
 
         sinks = {name: _Sink(seconds) for name in cameras}
         inputs = [

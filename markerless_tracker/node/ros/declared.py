@@ -15,6 +15,8 @@ from markerless_tracker.settings import Setting, similar
 
 ROS_OWN = ("use_sim_time", "start_type_description_service")
 """Parameters that every ROS node has."""
+FIXED = "fixed while the node runs"
+"""Constraint of parameters that cannot be set later, in their descriptors."""
 
 
 class GivenNode(Node):
@@ -74,7 +76,6 @@ def declare_effective(
     settings: Iterable[Setting] = (),
     *,
     live: Collection[str] = (),
-    fixed: str = "",
 ) -> None:
     """Declare the parameters in effect with descriptors, instead of the given ones.
 
@@ -84,7 +85,6 @@ def declare_effective(
         lines: a one-line description of each.
         settings: the settings with ranges and choices, for the descriptors.
         live: names of parameters that may be set; the others are read-only.
-        fixed: why the others are read-only, for their descriptors.
     """
     held = {setting.name: setting for setting in settings}
     for name in given_parameters(node):
@@ -94,7 +94,7 @@ def declare_effective(
             description=lines.get(name, ""),
             read_only=name not in live,
             dynamic_typing=value is None,
-            additional_constraints="" if name in live else fixed,
+            additional_constraints="" if name in live else FIXED,
         )
         if name in held and value is not None:
             _hold(descriptor, held[name])

@@ -20,6 +20,16 @@ from markerless_tracker.datasets.background import (
 from markerless_tracker.errors import ConfigError, TrackerError
 from markerless_tracker.imaging import BackgroundModel, Segmenter, learn_background, scale_image
 from markerless_tracker.node.health import QUIET_S
+from markerless_tracker.node.inputs.images import CameraInput
+from markerless_tracker.node.inputs.topics import ImageSubscription
+from markerless_tracker.node.inputs.wire import (
+    EDGES_TOPIC,
+    FORMAT,
+    SILHOUETTE_TOPIC,
+    edges_data,
+    settings_digest,
+    silhouette_data,
+)
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
 from markerless_tracker.node.ros.images import decode_received
 from markerless_tracker.node.ros.messages import header, optical_frame
@@ -31,23 +41,12 @@ from markerless_tracker.node.segmenter.parameters import (
     segmenter_descriptions,
     segmenter_values,
 )
-from markerless_tracker.node.segmenter.wire import (
-    EDGES_TOPIC,
-    FORMAT,
-    SILHOUETTE_TOPIC,
-    edges_data,
-    settings_digest,
-    silhouette_data,
-)
 from markerless_tracker.node.segmenter.worker import (
     ImageQueue,
     SegmenterStatus,
     SegmentWorker,
     Waiting,
 )
-from markerless_tracker.node.tracker.changes import FIXED
-from markerless_tracker.node.tracker.inputs import CameraInput
-from markerless_tracker.node.tracker.topics import ImageSubscription
 from markerless_tracker.observation import Observation
 
 STATE_PERIOD_S = 0.5
@@ -71,7 +70,7 @@ class SegmenterNode(GivenNode):
     def __init__(self, **node_arguments: Any) -> None:
         super().__init__("segmenter", **node_arguments)
         self._settings = settings = read_segmenter_settings(given_parameters(self))
-        declare_effective(self, segmenter_values(settings), segmenter_descriptions(), fixed=FIXED)
+        declare_effective(self, segmenter_values(settings), segmenter_descriptions())
         self._notices = Notices(self._log_warning, time.monotonic)
         self._name = settings.camera
         self._edges = settings.config.edge_weight > 0.0

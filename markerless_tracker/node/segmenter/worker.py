@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from markerless_tracker.node.tracker.worker import one_line
+from markerless_tracker.errors import one_line
 from markerless_tracker.observation import Observation
 
 QUEUE = 8

@@ -18,8 +18,6 @@ from markerless_tracker.tracking.stages.frame import frame_stages
 
 LIVE = live_settings()
 """Parameters that may be set while the tracker runs."""
-FIXED = "fixed while the tracker runs"
-"""Constraint of all other parameters, in their descriptors."""
 
 
 class SettableTracker:

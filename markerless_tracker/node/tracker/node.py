@@ -15,6 +15,7 @@ from markerless_tracker.calibration.contours.time_offset import TimeOffsetEstima
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.libraries import usable_cores
 from markerless_tracker.node.health import QUIET_S, Facts, assess
+from markerless_tracker.node.inputs.topics import CameraTopics
 from markerless_tracker.node.ros import messages
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
 from markerless_tracker.node.ros.notices import Notices
@@ -22,7 +23,7 @@ from markerless_tracker.node.ros.qos import latched_qos
 from markerless_tracker.node.tracker import parameters
 from markerless_tracker.node.tracker.announcer import Announcer
 from markerless_tracker.node.tracker.cameras.build import make_inputs, view_reader
-from markerless_tracker.node.tracker.changes import FIXED, LIVE, LiveSettings
+from markerless_tracker.node.tracker.changes import LIVE, LiveSettings
 from markerless_tracker.node.tracker.pace.states import StatePace
 from markerless_tracker.node.tracker.pace.waiting import kept_sets
 from markerless_tracker.node.tracker.publishing.files import Pictures, ResultFile
@@ -32,7 +33,6 @@ from markerless_tracker.node.tracker.services import Services
 from markerless_tracker.node.tracker.setup import RigSource, build
 from markerless_tracker.node.tracker.status import NOTED, TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
-from markerless_tracker.node.tracker.topics import CameraTopics
 from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, TrackWorker
 from markerless_tracker.records import TrackState
 from markerless_tracker.tracking import Tracker
@@ -66,7 +66,6 @@ class TrackerNode(GivenNode):
             parameters.descriptions(),
             parameters.held_settings(),
             live=LIVE,
-            fixed=FIXED,
         )
         self._live = LiveSettings(
             self, parameters.tracker_settings(given), self._settings.config, self._inform

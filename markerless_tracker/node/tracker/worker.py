@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.compiled import compilation
-from markerless_tracker.errors import ImageError, TrackerError
+from markerless_tracker.errors import ImageError, one_line
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.libraries import collect_for_good
 from markerless_tracker.node.health import PROCESSING
@@ -342,9 +342,3 @@ class TrackWorker:
         text = one_line(error)
         self._status.failed(text)
         self._report(f"stamp {stamp_ns}: {text}")
-
-
-def one_line(error: BaseException) -> str:
-    """An error in one line, with its type unless it is a `TrackerError`."""
-    text = " ".join(str(error).split())
-    return text if isinstance(error, TrackerError) else f"{type(error).__name__}: {text}"

@@ -14,6 +14,7 @@ from markerless_tracker.libraries import usable_cores
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.prepared import Outlook, SeenView
+from markerless_tracker.tracking.evidence.segmenting import SegmentingProcess
 from markerless_tracker.tracking.evidence.selection import (
     BodyLines,
     body_lines,
@@ -23,7 +24,6 @@ from markerless_tracker.tracking.evidence.selection import (
     place_cones,
 )
 from markerless_tracker.tracking.processes.child import SharedMemory
-from markerless_tracker.tracking.processes.segmenting import SegmentingProcess
 
 WIDE_MARGIN_M = 0.5
 """Margin around the predicted body of the second region, used if the first cuts the person off."""

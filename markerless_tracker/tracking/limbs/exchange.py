@@ -11,7 +11,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.limbs.crossed import (
+from markerless_tracker.tracking.candidates.crossed import (
     PAIRS,
     in_each_others_place,
     is_crossed,

@@ -11,8 +11,8 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.candidates.mirror import opposite_heading, rotated_by
 from markerless_tracker.tracking.limbs.search import LimbSearch
-from markerless_tracker.tracking.start.mirror import opposite_heading, rotated_by
 
 EVERY_NS, FIRST_EVERY_NS, DOUBTED_EVERY_NS = 600_000_000, 250_000_000, 80_000_000
 """Time between two comparisons: usually; in the first `FIRST_NS`, since a start may be wrong; and

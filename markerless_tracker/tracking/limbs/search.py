@@ -7,10 +7,10 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
+from markerless_tracker.tracking.candidates.population import FramePopulation
+from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.search import LIMB_M
-from markerless_tracker.tracking.start.own_evidence import OwnEvidence
-from markerless_tracker.tracking.start.population import FramePopulation
-from markerless_tracker.tracking.start.recombination import Recombiner
 
 DRAWS = 120
 """First draws of a limb: half from the pose prior, half uniform."""

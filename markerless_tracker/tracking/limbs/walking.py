@@ -12,7 +12,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.start.mirror import TRUNK, mirror_of, rotated_by
+from markerless_tracker.tracking.candidates.mirror import TRUNK, mirror_of, rotated_by
 
 EVERY_NS = 100_000_000
 """Time between two comparisons, while heading and walking direction differ."""

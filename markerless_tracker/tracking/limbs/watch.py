@@ -23,6 +23,9 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.observation import locked
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import LimbState, Observation, TrackState
+from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
+from markerless_tracker.tracking.candidates.population import FramePopulation
+from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.aimed import most_aimed
 from markerless_tracker.tracking.limbs.exchange import CLOSE, PairExchange
@@ -34,9 +37,6 @@ from markerless_tracker.tracking.limbs.walking import LEAST_GAIN as WALKING_GAIN
 from markerless_tracker.tracking.limbs.walking import WalkingWatch
 from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.own_evidence import OwnEvidence
-from markerless_tracker.tracking.start.population import FramePopulation
-from markerless_tracker.tracking.start.recombination import Recombiner
 
 ROTATION_NS = 100_000_000
 """Interval at which the next limb in rotation is searched: six frames at 60 frames/s."""

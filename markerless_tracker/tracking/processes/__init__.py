@@ -1,5 +1,5 @@
-"""Segmentation and tracking in separate processes, so that neither waits for another's interpreter.
+"""Child processes, and what they share with this one; tracking in a process of its own.
 
-`segmenting` and `fitting` start the processes and send them requests; `*_main` are their main
-programs.
+No process waits for another's interpreter. `fitting` starts the process that tracks and sends it
+requests; `fitting_main` is its main program. `evidence.segmenting` does the same for segmentation.
 """

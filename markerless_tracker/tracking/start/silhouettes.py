@@ -16,7 +16,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.observation import locked
 from markerless_tracker.records import Observation, pack_mask
 from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, lit_elsewhere
-from markerless_tracker.tracking.start.hull import FINE_M, Hull
+from markerless_tracker.tracking.evidence.hull import FINE_M, Hull
 
 FLOOR_RADIUS_M = 3.0
 """Floor points farther than this from the hull are not tested: they may lie behind a wall."""

@@ -8,9 +8,9 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.sizes import MEAN_STATURE_M
 from markerless_tracker.records import Observation
+from markerless_tracker.tracking.candidates.population import FramePopulation, Population, scaled_to
+from markerless_tracker.tracking.evidence.hull import Hull
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.hull import Hull
-from markerless_tracker.tracking.start.population import FramePopulation, Population, scaled_to
 
 STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
 """Statures that are tried for an unknown person, as fractions of the hull's height; raised arms

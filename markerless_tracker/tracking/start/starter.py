@@ -10,14 +10,14 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.fitness.shape import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
+from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
+from markerless_tracker.tracking.candidates.population import FramePopulation, Population
+from markerless_tracker.tracking.candidates.postures import put_at
+from markerless_tracker.tracking.evidence.hull import Hull, find_hulls
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.hull import Hull, find_hulls
 from markerless_tracker.tracking.start.in_view import InViewGate
-from markerless_tracker.tracking.start.own_evidence import OwnEvidence
-from markerless_tracker.tracking.start.population import FramePopulation, Population
-from markerless_tracker.tracking.start.postures import put_at
 from markerless_tracker.tracking.start.rejections import Rejections
 from markerless_tracker.tracking.start.silhouettes import hulls_silhouettes
 from markerless_tracker.tracking.start.sizing import (

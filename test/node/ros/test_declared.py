@@ -59,7 +59,7 @@ def test_settings_in_groups_are_parameters_with_ranges_and_choices(node: Any) ->
     (truncation,) = node.describe_parameter("refine.truncation_m").floating_point_range
     assert (truncation.from_value, truncation.to_value) == (0.001, 10.0)
     form = node.describe_parameter("edges.form")
-    assert form.additional_constraints == "one of soft, published"
+    assert form.additional_constraints == "one of soft, published; fixed while the node runs"
     assert form.read_only and "gradient" in form.description
     for entry in TrackerConfig.settings():
         descriptor = node.describe_parameter(entry.name)

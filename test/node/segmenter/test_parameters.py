@@ -8,12 +8,12 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import ImagingSettings
+from markerless_tracker.node.inputs.wire import settings_digest
 from markerless_tracker.node.segmenter.parameters import (
     read_segmenter_settings,
     segmenter_descriptions,
     segmenter_values,
 )
-from markerless_tracker.node.segmenter.wire import settings_digest
 from markerless_tracker.node.tracker.parameters import read_settings
 
 GIVEN = {"camera": "cam02", "background_dir": "empty"}

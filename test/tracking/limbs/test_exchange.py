@@ -11,8 +11,10 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.candidates.crossed import in_each_others_place, is_crossed
+from markerless_tracker.tracking.candidates.mirror import Mirror
+from markerless_tracker.tracking.candidates.postures import postures
 from markerless_tracker.tracking.evidence.seen import Seen
-from markerless_tracker.tracking.limbs.crossed import in_each_others_place, is_crossed
 from markerless_tracker.tracking.limbs.exchange import (
     EVERY_NS,
     LEAST_GAIN,
@@ -22,8 +24,6 @@ from markerless_tracker.tracking.limbs.exchange import (
 )
 from markerless_tracker.tracking.limbs.watch import LimbWatch, Recovered
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.mirror import Mirror
-from markerless_tracker.tracking.start.postures import postures
 
 ENDS = {"legs": ("LAnkle", "RAnkle"), "arms": ("LWrist", "RWrist")}
 

@@ -8,6 +8,10 @@ from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
+from markerless_tracker.tracking.candidates.mirror import OppositeHeading, rotated_by
+from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
+from markerless_tracker.tracking.candidates.population import FramePopulation
+from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.limbs.facing import (
     DOUBTED_EVERY_NS,
     EVERY_NS,
@@ -18,10 +22,6 @@ from markerless_tracker.tracking.limbs.facing import (
 )
 from markerless_tracker.tracking.limbs.search import LimbSearch
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.mirror import OppositeHeading, rotated_by
-from markerless_tracker.tracking.start.own_evidence import OwnEvidence
-from markerless_tracker.tracking.start.population import FramePopulation
-from markerless_tracker.tracking.start.recombination import Recombiner
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ from markerless_tracker.body import MARKER_NAMES, markers
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
+from markerless_tracker.tracking.candidates.population import FramePopulation
+from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.limbs.search import CLOSE, LimbSearch, other_limb
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.own_evidence import OwnEvidence
-from markerless_tracker.tracking.start.population import FramePopulation
-from markerless_tracker.tracking.start.recombination import Recombiner
 
 SEARCH = "markerless_tracker.tracking.limbs.search"
 ANKLE = MARKER_NAMES.index("LAnkle")

@@ -8,6 +8,7 @@ from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.candidates.mirror import TRUNK, rotated_by
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.walking import (
     EVERY_NS,
@@ -19,7 +20,6 @@ from markerless_tracker.tracking.limbs.walking import (
 )
 from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.mirror import TRUNK, rotated_by
 
 BODY = load_body("person31", 1.75)
 STEP_NS = 50_000_000

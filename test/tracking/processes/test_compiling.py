@@ -11,8 +11,8 @@ import pytest
 from markerless_tracker.imaging import learn_background
 from markerless_tracker.synthesis.rig import ring_rig
 from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.evidence.segmenting_main import serve
 from markerless_tracker.tracking.processes import compiling
-from markerless_tracker.tracking.processes.segmenting_main import serve
 from markerless_tracker.tracking.processes.wire import receive, send
 
 PROGRAM = """

@@ -8,7 +8,7 @@ import pytest
 from markerless_tracker.camera import project_camera
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.start.hull import find_hulls
+from markerless_tracker.tracking.evidence.hull import find_hulls
 from markerless_tracker.tracking.start.silhouettes import (
     decided_by_hull,
     hulls_part,

@@ -9,9 +9,9 @@ from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.candidates.population import FramePopulation
+from markerless_tracker.tracking.evidence.hull import Hull, find_hulls
 from markerless_tracker.tracking.search import make_searcher
-from markerless_tracker.tracking.start.hull import Hull, find_hulls
-from markerless_tracker.tracking.start.population import FramePopulation
 from markerless_tracker.tracking.start.sizing import (
     GIRTHS,
     Sized,

@@ -1,1 +1,1 @@
-"""Inputs of the cameras, images or evidence, and the counts of each camera for `state`."""
+"""The cameras of the tracker: their inputs, and the counts of each for `state`."""

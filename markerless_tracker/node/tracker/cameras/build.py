@@ -7,10 +7,10 @@ from typing import Any
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import scale_image
+from markerless_tracker.node.inputs.evidence import EvidenceInput
+from markerless_tracker.node.inputs.images import CameraInput
+from markerless_tracker.node.inputs.wire import Evidence, settings_digest, unpack
 from markerless_tracker.node.ros.images import decode_received
-from markerless_tracker.node.segmenter.wire import Evidence, settings_digest, unpack
-from markerless_tracker.node.tracker.cameras.evidence_input import EvidenceInput
-from markerless_tracker.node.tracker.inputs import CameraInput
 from markerless_tracker.node.tracker.parameters import NodeSettings
 from markerless_tracker.node.tracker.setup import RigSource
 

@@ -14,15 +14,15 @@ from sensor_msgs.msg import CompressedImage
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.camera.calibration import read_calibration
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.node.ros.messages import header
-from markerless_tracker.node.segmenter.wire import (
+from markerless_tracker.node.inputs.evidence import EvidenceInput
+from markerless_tracker.node.inputs.wire import (
     Evidence,
     edges_data,
     settings_digest,
     silhouette_data,
 )
+from markerless_tracker.node.ros.messages import header
 from markerless_tracker.node.tracker.cameras.build import make_inputs
-from markerless_tracker.node.tracker.cameras.evidence_input import EvidenceInput
 from markerless_tracker.node.tracker.parameters import read_settings
 from markerless_tracker.node.tracker.setup import RigSource, build
 from markerless_tracker.node.tracker.status import TrackerStatus

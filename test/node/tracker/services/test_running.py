@@ -134,7 +134,7 @@ def test_descriptors_say_what_may_be_set(running: Any) -> None:
     ).descriptors
     assert {d.name for d in described if not d.read_only} == set(LIVE)
     for descriptor in described:
-        fixed = "fixed while the tracker runs" in descriptor.additional_constraints
+        fixed = "fixed while the node runs" in descriptor.additional_constraints
         assert fixed == descriptor.read_only, descriptor.name
 
 

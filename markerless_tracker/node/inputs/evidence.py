@@ -4,7 +4,8 @@ from typing import Any
 
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.errors import ImageError
-from markerless_tracker.node.segmenter.wire import (
+from markerless_tracker.node.inputs.images import CameraInput
+from markerless_tracker.node.inputs.wire import (
     EDGES,
     EDGES_TOPIC,
     SILHOUETTE,
@@ -13,7 +14,6 @@ from markerless_tracker.node.segmenter.wire import (
     EvidenceMessage,
     read_evidence,
 )
-from markerless_tracker.node.tracker.inputs import CameraInput
 
 _HELD = 8
 """Largest number of silhouettes or edge maps that wait for their counterpart."""

@@ -12,7 +12,7 @@ from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging import BackgroundModel, Region, learn_background
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
-from markerless_tracker.tracking.processes.segmenting import SegmentingProcess
+from markerless_tracker.tracking.evidence.segmenting import SegmentingProcess
 
 WIDTH, HEIGHT = 96, 80
 CONFIG = TrackerConfig.from_mapping({"threads": 2})

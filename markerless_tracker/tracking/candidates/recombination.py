@@ -11,8 +11,8 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.start.mirror import Mirror, mirror_of
-from markerless_tracker.tracking.start.postures import joint_sd, postures
+from markerless_tracker.tracking.candidates.mirror import Mirror, mirror_of
+from markerless_tracker.tracking.candidates.postures import joint_sd, postures
 
 _ONE_LIMB, _KNOWN = 0.35, 0.3
 """Fractions of two kinds of children: one limb drawn at random; and one limb, or both arms or legs,

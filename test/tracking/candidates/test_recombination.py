@@ -3,11 +3,11 @@
 import numpy as np
 
 from markerless_tracker.body import load_body
+from markerless_tracker.tracking.candidates.mirror import Mirror
+from markerless_tracker.tracking.candidates.postures import POSTURES, postures
+from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limits import joint_limits
-from markerless_tracker.tracking.start.mirror import Mirror
-from markerless_tracker.tracking.start.postures import POSTURES, postures
-from markerless_tracker.tracking.start.recombination import Recombiner
 
 
 def test_some_children_take_an_arm_of_the_other_side_or_of_a_posture() -> None:

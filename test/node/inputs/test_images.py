@@ -14,9 +14,9 @@ from std_msgs.msg import Header
 
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.node.health import QUIET_S
+from markerless_tracker.node.inputs.images import CameraInput
 from markerless_tracker.node.ros.camera_info import info_of
 from markerless_tracker.node.ros.stamps import time_message
-from markerless_tracker.node.tracker.inputs import CameraInput
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 

@@ -5,10 +5,10 @@ import pytest
 
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
+from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.own_evidence import OwnEvidence
-from markerless_tracker.tracking.start.population import FramePopulation
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_the_evidence_of_a_pose_is_decided_once(legs_undecided, monkeypatch) -> 
         poses.append(pose)
         return decide(imaged, cameras, body, pose)
 
-    monkeypatch.setattr("markerless_tracker.tracking.start.own_evidence.decide", counted)
+    monkeypatch.setattr("markerless_tracker.tracking.candidates.own_evidence.decide", counted)
     first, again, other = own.cost(true), own.cost(true.copy()), own.cost(wrong)
     assert first == again != other and len(poses) == 2
 

@@ -15,14 +15,14 @@ from markerless_tracker.fitness.threads import side_by_side, usable_threads
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
-from markerless_tracker.tracking.limbs.crossed import PAIRS, in_each_others_place
+from markerless_tracker.tracking.candidates.crossed import PAIRS, in_each_others_place
+from markerless_tracker.tracking.candidates.many_poses import markers_of_many
+from markerless_tracker.tracking.candidates.posture_costs import off_floor, unlike_postures
+from markerless_tracker.tracking.candidates.postures import first_guesses
+from markerless_tracker.tracking.candidates.recombination import Recombiner
+from markerless_tracker.tracking.evidence.hull import Hull
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
 from markerless_tracker.tracking.search import FrameSearch, Searcher
-from markerless_tracker.tracking.start.hull import Hull
-from markerless_tracker.tracking.start.many_poses import markers_of_many
-from markerless_tracker.tracking.start.posture_costs import off_floor, unlike_postures
-from markerless_tracker.tracking.start.postures import first_guesses
-from markerless_tracker.tracking.start.recombination import Recombiner
 
 PER_QUARTER = 4
 """Poses that are kept in each quarter of the headings, relative to the best pose's heading."""

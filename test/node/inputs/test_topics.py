@@ -11,8 +11,8 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
+from markerless_tracker.node.inputs.topics import CameraTopics
 from markerless_tracker.node.ros.qos import latched_qos, output_qos
-from markerless_tracker.node.tracker.topics import CameraTopics
 
 REMAPPED = ["cam01/image_raw:=/left/image", "cam01/camera_info:=/left/info"]
 

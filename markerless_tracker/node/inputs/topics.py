@@ -6,9 +6,9 @@ from typing import Any
 
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
+from markerless_tracker.node.inputs.evidence import EvidenceInput
+from markerless_tracker.node.inputs.images import COMPRESSED_SUFFIX, CameraInput
 from markerless_tracker.node.ros.qos import FollowingSubscription
-from markerless_tracker.node.tracker.cameras.evidence_input import EvidenceInput
-from markerless_tracker.node.tracker.inputs import COMPRESSED_SUFFIX, CameraInput
 
 POLL_INFOS_S = 0.1
 """Interval at which camera infos are taken: they come with every image and rarely change."""

@@ -5,7 +5,7 @@ import pytest
 
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.start.hull import find_hulls
+from markerless_tracker.tracking.evidence.hull import find_hulls
 
 
 @pytest.fixture(scope="module")

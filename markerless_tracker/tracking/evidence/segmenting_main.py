@@ -1,6 +1,6 @@
 """Main program of the segmenting process: images in, observations out, until its input ends.
 
-Started as ``python -m markerless_tracker.tracking.processes.segmenting_main FD``, where FD is the
+Started as ``python -m markerless_tracker.tracking.evidence.segmenting_main FD``, where FD is the
 shared memory. Standard input gives the parent's requests; standard output takes only the answers.
 """
 
@@ -41,9 +41,9 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
     import cv2
 
     from markerless_tracker.tracking.evidence.gather import EvidenceMaker
+    from markerless_tracker.tracking.evidence.segmenting import SegmentRequest
     from markerless_tracker.tracking.processes.compiling import compile_refinement
     from markerless_tracker.tracking.processes.images import get
-    from markerless_tracker.tracking.processes.segmenting import SegmentRequest
     from markerless_tracker.tracking.processes.wire import receive, send
 
     # OpenCV's threads wait in busy loops, which would take cores from the other processes.

@@ -12,9 +12,9 @@ import numpy as np
 from markerless_tracker.fitness.contour import RADIUS_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
+from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.search import Searcher
-from markerless_tracker.tracking.start.population import FramePopulation
 
 
 class OwnEvidence:

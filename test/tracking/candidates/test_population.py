@@ -11,12 +11,12 @@ from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.limbs.crossed import PAIRS
+from markerless_tracker.tracking.candidates.crossed import PAIRS
+from markerless_tracker.tracking.candidates.many_poses import markers_of_many, transforms_of_many
+from markerless_tracker.tracking.candidates.mirror import mirror_of
+from markerless_tracker.tracking.candidates.population import FramePopulation
+from markerless_tracker.tracking.candidates.postures import POSTURES, postures
 from markerless_tracker.tracking.search import make_searcher
-from markerless_tracker.tracking.start.many_poses import markers_of_many, transforms_of_many
-from markerless_tracker.tracking.start.mirror import mirror_of
-from markerless_tracker.tracking.start.population import FramePopulation
-from markerless_tracker.tracking.start.postures import POSTURES, postures
 from markerless_tracker.tracking.start.starter import _improved
 
 

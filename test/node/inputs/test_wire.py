@@ -14,8 +14,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import CompressedImage
 
 from markerless_tracker.errors import ImageError
-from markerless_tracker.node.ros.messages import header
-from markerless_tracker.node.segmenter.wire import (
+from markerless_tracker.node.inputs.wire import (
     EDGES,
     FORMAT,
     SILHOUETTE,
@@ -26,6 +25,7 @@ from markerless_tracker.node.segmenter.wire import (
     silhouette_data,
     unpack,
 )
+from markerless_tracker.node.ros.messages import header
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking import TrackerConfig
 

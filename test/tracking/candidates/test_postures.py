@@ -6,11 +6,8 @@ import pytest
 from markerless_tracker.body import load_body
 from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.body.model import MARKER_NAMES
-from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.limits import joint_limits
-from markerless_tracker.tracking.start.hull import FINE_M, Hull
-from markerless_tracker.tracking.start.many_poses import markers_of_many
-from markerless_tracker.tracking.start.postures import (
+from markerless_tracker.tracking.candidates.many_poses import markers_of_many
+from markerless_tracker.tracking.candidates.postures import (
     ANKLE_M,
     HEADINGS,
     POSTURES,
@@ -19,6 +16,9 @@ from markerless_tracker.tracking.start.postures import (
     first_guesses,
     postures,
 )
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.evidence.hull import FINE_M, Hull
+from markerless_tracker.tracking.limits import joint_limits
 
 ANKLES = [MARKER_NAMES.index(name) for name in ("LAnkle", "RAnkle")]
 

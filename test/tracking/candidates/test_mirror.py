@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, load_body, markers
-from markerless_tracker.tracking.start.mirror import Mirror, OppositeHeading
+from markerless_tracker.tracking.candidates.mirror import Mirror, OppositeHeading
 
 
 @pytest.mark.parametrize("name", ["person31", "balan31", "humaneva34"])

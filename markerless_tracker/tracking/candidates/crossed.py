@@ -11,8 +11,8 @@ from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.model import MARKER_NAMES
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
+from markerless_tracker.tracking.candidates.mirror import mirror_of
 from markerless_tracker.tracking.confidence import slopes
-from markerless_tracker.tracking.start.mirror import mirror_of
 
 PAIRS = ("legs", "arms")
 _JOINTS = {"legs": ("Hip", "Knee", "Ankle"), "arms": ("Shoulder", "Elbow", "Wrist")}

@@ -6,7 +6,7 @@ import pytest
 from markerless_tracker.camera import project_camera
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.start.hull import (
+from markerless_tracker.tracking.evidence.hull import (
     FINE_M,
     FLOOR_M,
     FOOT_M,

@@ -7,14 +7,14 @@ from markerless_tracker.body import load_description, markers
 from markerless_tracker.body.anatomy import posture
 from markerless_tracker.body.model import MARKER_NAMES
 from markerless_tracker.body.sizes import Sizes
-from markerless_tracker.tracking.start.posture_costs import (
+from markerless_tracker.tracking.candidates.posture_costs import (
     MOST_COST,
     UNLIKE_COST_PER_M2,
     UNLIKE_MOST_M,
     off_floor,
     unlike_postures,
 )
-from markerless_tracker.tracking.start.postures import POSTURES
+from markerless_tracker.tracking.candidates.postures import POSTURES
 
 BODY = Sizes(load_description("person31")).of_stature(1.70)
 ANKLES = [MARKER_NAMES.index("LAnkle"), MARKER_NAMES.index("RAnkle")]

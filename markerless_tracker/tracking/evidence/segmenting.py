@@ -11,7 +11,7 @@ from markerless_tracker.tracking.evidence.prepared import SeenView
 from markerless_tracker.tracking.processes.child import Child, SharedMemory
 from markerless_tracker.tracking.processes.images import Place, put, set_bytes
 
-_MAIN = "markerless_tracker.tracking.processes.segmenting_main"
+_MAIN = "markerless_tracker.tracking.evidence.segmenting_main"
 
 
 class SegmentRequest(NamedTuple):

@@ -1,0 +1,1 @@
+"""Inputs of a camera: images or evidence, received, checked and passed on; for several nodes."""
