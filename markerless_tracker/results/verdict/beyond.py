@@ -7,6 +7,7 @@ it. A body that is too large is not detected: it fills them with bent knees.
 import math
 from collections.abc import Mapping
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,7 +50,8 @@ class Beyond:
         if not px_per_m > 0.0:
             return
         observation = result.observations[camera.name]
-        person = np.flatnonzero(observation.in_full_frame(observation.mask).any(axis=1))
+        silhouette = _touching(observation.in_full_frame(observation.mask), covered)
+        person = np.flatnonzero(silhouette.any(axis=1))
         body = np.flatnonzero(covered.any(axis=1))
         if not person.size or not body.size:
             return
@@ -70,3 +72,10 @@ class Beyond:
         """Median over the cameras, m, robust to a shadow in one of them; NaN if unknown."""
         found = list(self.by_camera_m.values())
         return float(np.median(found)) if len(found) >= LEAST_CAMERAS else math.nan
+
+
+def _touching(silhouette: NDArray[np.bool_], covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The patches (h, w) of a silhouette that the body covers in part; others are specks."""
+    _, patches = cv2.connectedComponents(silhouette.view(np.uint8), connectivity=8)
+    touched = np.unique(patches[silhouette & covered])
+    return np.isin(patches, touched) & silhouette

@@ -62,3 +62,26 @@ def test_a_camera_that_lies_on_its_side_is_passed_over(scene: Any, result: Any, 
     for index in range(LEAST):
         found.add(result(index), aside, masks[index][camera.name] > 0)
     assert found.by_camera_m == {} and np.isnan(found.median_m)
+
+
+def test_specks_beside_the_person_do_not_count(scene: Any, result: Any, masks: Any) -> None:
+    found = Beyond()
+    for index in range(LEAST):
+        for camera in scene.rig:
+            there = result(index)
+            seen = there.observations[camera.name]
+            speck = seen.mask.copy()
+            speck[-3:-1, :2] = True
+            assert not seen.mask[-6:, :8].any()
+            views = {**there.observations, camera.name: seen.with_masks(speck, seen.undecided)}
+            found.add(replace(there, observations=views), camera, masks[index][camera.name] > 0)
+    assert abs(found.median_m) < 0.01
+
+
+def test_what_is_connected_with_the_person_counts(scene: Any, result: Any, masks: Any) -> None:
+    found = Beyond()
+    for index in range(LEAST):
+        for camera in scene.rig:
+            covered = cut(masks[index][camera.name], 8, 0)
+            found.add(result(index), camera, covered)
+    assert found.median_m > 0.06
