@@ -5,6 +5,7 @@ from threading import Lock, Thread
 from typing import Any, NamedTuple, cast
 
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.compiled import compiled_elsewhere
 from markerless_tracker.imaging import BackgroundModel, Image, Region
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.prepared import SeenView
@@ -20,6 +21,12 @@ class SegmentRequest(NamedTuple):
     stamp_ns: int
     images: dict[str, Place]
     regions: dict[str, Region | None]
+
+
+class Ready(NamedTuple):
+    """Answer to new backgrounds: the process uses them, and has compiled so many kernels."""
+
+    compiled: int
 
 
 class SegmentingProcess:
@@ -97,7 +104,10 @@ class SegmentingProcess:
 
     def _begin(self, message: Any) -> None:
         try:
-            self._ready = self._ask(message) is True
+            answer = self._ask(message)
+            self._ready = isinstance(answer, Ready)
+            if isinstance(answer, Ready):
+                compiled_elsewhere("segmentation", answer.compiled, answer.compiled)
         finally:
             self._lock.release()
 

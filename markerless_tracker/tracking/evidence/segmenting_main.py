@@ -30,9 +30,9 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
     """Answer messages: segmentation requests, or a new rig, configuration and backgrounds.
 
     The answer to a request is the result of `EvidenceMaker.segment_regions` without the images, or
-    the exception it raised. The answer to new backgrounds is True, once the kernels of this process
-    and some of the parent's have been compiled. Each answer is sent with the CPU time of this
-    process.
+    the exception it raised. The answer to new backgrounds is `Ready`, once the kernels of this
+    process and some of the parent's have been compiled. Each answer is sent with the CPU time of
+    this process.
 
     Raises:
         EOFError, BrokenPipeError: the parent has ended.
@@ -40,8 +40,9 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
     # Imported while the parent starts.
     import cv2
 
+    from markerless_tracker.compiled import compilation
     from markerless_tracker.tracking.evidence.gather import EvidenceMaker
-    from markerless_tracker.tracking.evidence.segmenting import SegmentRequest
+    from markerless_tracker.tracking.evidence.segmenting import Ready, SegmentRequest
     from markerless_tracker.tracking.processes.compiling import compile_refinement
     from markerless_tracker.tracking.processes.images import get
     from markerless_tracker.tracking.processes.wire import receive, send
@@ -56,11 +57,12 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
             if not isinstance(message, SegmentRequest):
                 rig, config, backgrounds = message
                 maker = EvidenceMaker(rig, config, backgrounds, map)
-                # First what the parent needs soonest.
-                compile_refinement(rig, config, maker.warm_up())
-                maker.wait()
+                with compilation(lambda *_: None) as kernels:
+                    # First what the parent needs soonest.
+                    compile_refinement(rig, config, maker.warm_up())
+                    maker.wait()
                 collect_for_good()
-                answer = True
+                answer = Ready(kernels.done)
             elif maker is None:
                 raise RuntimeError("images came before the backgrounds")
             else:

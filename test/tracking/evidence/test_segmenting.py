@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.compiled import compilation
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging import BackgroundModel, Region, learn_background
 from markerless_tracker.tracking import TrackerConfig
@@ -105,3 +106,13 @@ def test_without_backgrounds_nothing_is_segmented_there(images) -> None:
     process = SegmentingProcess(RIG)
     assert process.segment(images, 0, dict.fromkeys(images)) is None
     process.close()
+
+
+def test_what_it_has_compiled_counts_here(backgrounds, tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    with compilation(lambda *_: None) as kernels:
+        process = SegmentingProcess(RIG)
+        process.use(CONFIG, backgrounds)
+        process.wait()
+        process.close()
+    assert kernels.done > 10

@@ -11,6 +11,7 @@ import pytest
 from markerless_tracker.imaging import learn_background
 from markerless_tracker.synthesis.rig import ring_rig
 from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.evidence.segmenting import Ready
 from markerless_tracker.tracking.evidence.segmenting_main import serve
 from markerless_tracker.tracking.processes import compiling
 from markerless_tracker.tracking.processes.wire import receive, send
@@ -68,7 +69,7 @@ def test_the_process_compiles_it_before_it_is_ready(monkeypatch: pytest.MonkeyPa
     with pytest.raises(EOFError):
         serve(requests, answers, None)  # type: ignore[arg-type]
     answers.seek(0)
-    assert receive(answers)[0] is True
+    assert isinstance(receive(answers)[0], Ready)
     ((used, settings, observations),) = compiled
     assert used.names == rig.names and settings == config
     assert sorted(observations) == sorted(rig.names)
