@@ -17,6 +17,7 @@ from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.tracking.candidates.crossed import PAIRS, in_each_others_place
 from markerless_tracker.tracking.candidates.many_poses import markers_of_many
+from markerless_tracker.tracking.candidates.pose_costs import pose_costs
 from markerless_tracker.tracking.candidates.posture_costs import off_floor, unlike_postures
 from markerless_tracker.tracking.candidates.postures import first_guesses
 from markerless_tracker.tracking.candidates.recombination import Recombiner
@@ -214,13 +215,19 @@ class FramePopulation:
         costs = self._costs(poses)
         return np.where(np.isfinite(costs), costs, np.inf)
 
+    def pose_costs(self, poses: FloatArray) -> FloatArray:
+        """`costs` plus those of limbs where people hardly have them; to compare poses."""
+        return self.costs(poses) + pose_costs(self._searcher.body, poses)
+
     def best_cost(self, population: Population) -> float:
         """1 - f_s of the best pose of a population."""
         return float(self.costs(population.poses[:1])[0])
 
     def total_costs(self, poses: FloatArray) -> FloatArray:
-        """`costs` plus those of unusual postures (`usual`) and, with a floor, of feet off it."""
-        costs = self.costs(poses)
+        """`pose_costs` plus those of unusual postures (`usual`) and, with a floor, of feet off
+        it.
+        """
+        costs = self.pose_costs(poses)
         if self.usual:
             costs += unlike_postures(self._searcher.body, poses)
         if self._searcher.config.refine.floor_sd_m > 0.0:

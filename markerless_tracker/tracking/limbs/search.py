@@ -73,12 +73,12 @@ class LimbSearch:
     def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
         """Search a limb; return whether it was found elsewhere. Arguments as for `other_limb`."""
         frame = self._own.undecided
-        cost = float(frame.costs(self.pose[None])[0])
+        cost = float(frame.pose_costs(self.pose[None])[0])
         other, other_cost = other_limb(frame, self._recombiner, self.pose, limb, rng, aim, cost)
         better = other_cost < cost - self._least_gain
         if better:
             refined = frame.refined(self.pose[None], *_REFINE)
-            better = other_cost < float(frame.costs(refined)[0]) - self._least_gain
+            better = other_cost < float(frame.pose_costs(refined)[0]) - self._least_gain
         if self._own.differs:
             if other_cost > cost + CLOSE or _distance_m(self._own.body, other, self.pose) < LEAST_M:
                 return False
@@ -102,7 +102,7 @@ class LimbSearch:
         return True
 
     def compared(self, other: FloatArray, close: float) -> tuple[FloatArray, float]:
-        """Another pose (p,), refined, and its f_s less that of the estimate.
+        """Another pose (p,), refined, and what it gains: the estimate's `pose_costs` less its own.
 
         Args:
             other: the pose, which may be far from the estimate.
@@ -110,7 +110,7 @@ class LimbSearch:
                 more in the evidence decided with the predicted pose.
         """
         refined = self._frame.refined(other[None], *_REFINE_FAR)
-        costs = self._frame.costs(np.concatenate([self.pose[None], refined]))
+        costs = self._frame.pose_costs(np.concatenate([self.pose[None], refined]))
         if not self._own.differs or costs[1] > costs[0] + close:
             return refined[0], float(costs[0] - costs[1])
         found, cost = self._own.refined(refined[0], *_REFINE)
@@ -122,9 +122,9 @@ class LimbSearch:
 
     @property
     def own_cost(self) -> float:
-        """1 - f_s of the estimate in its own evidence."""
+        """The estimate's `pose_cost` in its own evidence."""
         if self._known_cost is None:
-            self._known_cost = self._own.cost(self.pose)
+            self._known_cost = self._own.pose_cost(self.pose)
         return self._known_cost
 
 
@@ -137,7 +137,7 @@ def other_limb(
     aim: Aim | None = None,
     most_cost: float = np.inf,
 ) -> tuple[FloatArray, float]:
-    """The best pose (p,) with a limb elsewhere, and its cost 1 - f_s.
+    """The best pose (p,) with a limb elsewhere, and its cost (`FramePopulation.pose_costs`).
 
     The draws are sparse for a limb of six joints, so the best ones are varied twice, as in an
     annealed particle filter. A contour refinement of the whole body then refines the best pose. If
@@ -184,7 +184,7 @@ def other_limb(
     if _distance_m(recombiner.body, best_pose, pose) < NEAR_M:
         return pose, most_cost
     refined = frame.refined(best_pose[None], *_REFINE)
-    return refined[0], float(frame.costs(refined)[0])
+    return refined[0], float(frame.pose_costs(refined)[0])
 
 
 def _distance_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:
