@@ -8,6 +8,7 @@ from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
+from markerless_tracker.tracking.candidates.pose_costs import pose_costs
 from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.search import LIMB_M
@@ -167,7 +168,8 @@ def other_limb(
         ]
         poses = np.concatenate([poses, aim(np.concatenate(many), AIMED)])
     costs_of = frame.limb_costs(pose, limb)
-    costs = costs_of(poses[:, limb])
+    body = recombiner.body
+    costs = costs_of(poses[:, limb]) + pose_costs(body, poses)
     for layer, fraction in enumerate(LAYERS, 1):
         best = np.argsort(costs, kind="stable")[:_PARENTS]
         near = recombiner.with_limb_near(
@@ -176,12 +178,12 @@ def other_limb(
         # Only the best of the last layer is used, and only the parents of the others.
         cutoff = costs[best[0 if layer == len(LAYERS) else -1]]
         poses = np.concatenate([poses[best], near])
-        more = costs_of(near[:, limb], np.full(len(near), cutoff))
+        more = costs_of(near[:, limb], np.full(len(near), cutoff)) + pose_costs(body, near)
         costs = np.concatenate([costs[best], more])
     if costs.min() > most_cost + HOPELESS:
         return pose, float(costs.min())
     best_pose = poses[int(costs.argmin())]
-    if _distance_m(recombiner.body, best_pose, pose) < NEAR_M:
+    if _distance_m(body, best_pose, pose) < NEAR_M:
         return pose, most_cost
     refined = frame.refined(best_pose[None], *_REFINE)
     return refined[0], float(frame.pose_costs(refined)[0])
