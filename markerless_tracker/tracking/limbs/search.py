@@ -8,8 +8,8 @@ from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
-from markerless_tracker.tracking.candidates.pose_costs import pose_costs
 from markerless_tracker.tracking.candidates.population import FramePopulation
+from markerless_tracker.tracking.candidates.pose_costs import pose_costs
 from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.search import LIMB_M
 
