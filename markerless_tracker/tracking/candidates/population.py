@@ -51,8 +51,8 @@ _EXCHANGE = (6, (0.25, 0.05))
 """Iterations of refinement, and first and last truncation in m: of an initialised population, of a
 recombined one, of one propagated from the frame before, and of a pose with exchanged limbs."""
 _EXCHANGED_SLACK = (0.012, 0.007)
-"""A pose with exchanged limbs has a first and a second generation of children if it costs at most
-this much more than the best pose."""
+"""A pose with exchanged limbs has a first and a second generation of children if its f_s is at most
+this much less than that of the best pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +181,9 @@ class FramePopulation:
                 continue
             other = in_each_others_place(body, population.poses[0], pair, limits)
             branch = self.selected(self.refined(other[None], *_EXCHANGE))
+            least = self.best_cost(population)
             for number, slack in enumerate(_EXCHANGED_SLACK):
-                if len(branch) and branch.costs[0] <= population.costs[0] + slack:
+                if len(branch) and self.best_cost(branch) <= least + slack:
                     branch = self.recombined(branch, generation + number)
             population = self.selected(np.concatenate([population.poses, branch.poses]))
         return population
