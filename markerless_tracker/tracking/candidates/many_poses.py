@@ -28,11 +28,6 @@ def transforms_of_many(body: BodyModel, poses: FloatArray) -> FloatArray:
 
 def markers_of_many(body: BodyModel, poses: FloatArray) -> FloatArray:
     """The markers (n, 15, 3) in m, world frame, at poses (n, p)."""
-    return markers_at(body, transforms_of_many(body, poses))
-
-
-def markers_at(body: BodyModel, nodes: FloatArray) -> FloatArray:
-    """The markers (n, 15, 3) in m, world frame, of nodes (n, m, 3, 4)."""
-    own = nodes[:, body.marker_node]
-    rotated = np.matmul(own[..., :3], body.marker_offset[:, :, None])[..., 0]
-    return np.asarray(rotated + own[..., 3])
+    nodes = transforms_of_many(body, poses)[:, body.marker_node]
+    rotated = np.matmul(nodes[..., :3], body.marker_offset[:, :, None])[..., 0]
+    return np.asarray(rotated + nodes[..., 3])

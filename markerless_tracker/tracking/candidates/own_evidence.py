@@ -61,14 +61,10 @@ class OwnEvidence:
         """1 - f_s of a pose (p,)."""
         return float(self._decided(pose).costs(pose[None])[0])
 
-    def pose_cost(self, pose: FloatArray) -> float:
-        """The cost of a pose (p,) as `FramePopulation.pose_costs`; to compare poses."""
-        return float(self._decided(pose).pose_costs(pose[None])[0])
-
     def refined(
         self, pose: FloatArray, iterations: int, truncation_m: tuple[float, float]
     ) -> tuple[FloatArray, float]:
-        """A pose (p,) refined in its own evidence, and its `pose_cost` there.
+        """A pose (p,) refined in its own evidence, and its cost there.
 
         Args:
             pose: the initial pose.
@@ -76,7 +72,7 @@ class OwnEvidence:
             truncation_m: residuals beyond it are outliers, in the first and in the last iteration.
         """
         found = self._decided(pose).refined(pose[None], iterations, truncation_m)[0]
-        return found, self.pose_cost(found)
+        return found, self.cost(found)
 
     def _decided(self, pose: FloatArray) -> FramePopulation:
         """The evidence that the body at a pose (p,) decides; cached for the last pose."""

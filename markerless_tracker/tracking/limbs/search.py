@@ -9,7 +9,6 @@ from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
 from markerless_tracker.tracking.candidates.population import FramePopulation
-from markerless_tracker.tracking.candidates.pose_costs import pose_costs
 from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.search import LIMB_M
 
@@ -74,12 +73,12 @@ class LimbSearch:
     def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
         """Search a limb; return whether it was found elsewhere. Arguments as for `other_limb`."""
         frame = self._own.undecided
-        cost = float(frame.pose_costs(self.pose[None])[0])
+        cost = float(frame.costs(self.pose[None])[0])
         other, other_cost = other_limb(frame, self._recombiner, self.pose, limb, rng, aim, cost)
         better = other_cost < cost - self._least_gain
         if better:
             refined = frame.refined(self.pose[None], *_REFINE)
-            better = other_cost < float(frame.pose_costs(refined)[0]) - self._least_gain
+            better = other_cost < float(frame.costs(refined)[0]) - self._least_gain
         if self._own.differs:
             if other_cost > cost + CLOSE or _distance_m(self._own.body, other, self.pose) < LEAST_M:
                 return False
@@ -103,7 +102,7 @@ class LimbSearch:
         return True
 
     def compared(self, other: FloatArray, close: float) -> tuple[FloatArray, float]:
-        """Another pose (p,), refined, and what it gains: the estimate's `pose_costs` less its own.
+        """Another pose (p,), refined, and its f_s less that of the estimate.
 
         Args:
             other: the pose, which may be far from the estimate.
@@ -111,7 +110,7 @@ class LimbSearch:
                 more in the evidence decided with the predicted pose.
         """
         refined = self._frame.refined(other[None], *_REFINE_FAR)
-        costs = self._frame.pose_costs(np.concatenate([self.pose[None], refined]))
+        costs = self._frame.costs(np.concatenate([self.pose[None], refined]))
         if not self._own.differs or costs[1] > costs[0] + close:
             return refined[0], float(costs[0] - costs[1])
         found, cost = self._own.refined(refined[0], *_REFINE)
@@ -123,9 +122,9 @@ class LimbSearch:
 
     @property
     def own_cost(self) -> float:
-        """The estimate's `pose_cost` in its own evidence."""
+        """1 - f_s of the estimate in its own evidence."""
         if self._known_cost is None:
-            self._known_cost = self._own.pose_cost(self.pose)
+            self._known_cost = self._own.cost(self.pose)
         return self._known_cost
 
 
@@ -138,7 +137,7 @@ def other_limb(
     aim: Aim | None = None,
     most_cost: float = np.inf,
 ) -> tuple[FloatArray, float]:
-    """The best pose (p,) with a limb elsewhere, and its cost (`FramePopulation.pose_costs`).
+    """The best pose (p,) with a limb elsewhere, and its cost 1 - f_s.
 
     The draws are sparse for a limb of six joints, so the best ones are varied twice, as in an
     annealed particle filter. A contour refinement of the whole body then refines the best pose. If
@@ -168,8 +167,7 @@ def other_limb(
         ]
         poses = np.concatenate([poses, aim(np.concatenate(many), AIMED)])
     costs_of = frame.limb_costs(pose, limb)
-    body = recombiner.body
-    costs = costs_of(poses[:, limb]) + pose_costs(body, poses)
+    costs = costs_of(poses[:, limb])
     for layer, fraction in enumerate(LAYERS, 1):
         best = np.argsort(costs, kind="stable")[:_PARENTS]
         near = recombiner.with_limb_near(
@@ -178,15 +176,15 @@ def other_limb(
         # Only the best of the last layer is used, and only the parents of the others.
         cutoff = costs[best[0 if layer == len(LAYERS) else -1]]
         poses = np.concatenate([poses[best], near])
-        more = costs_of(near[:, limb], np.full(len(near), cutoff)) + pose_costs(body, near)
+        more = costs_of(near[:, limb], np.full(len(near), cutoff))
         costs = np.concatenate([costs[best], more])
     if costs.min() > most_cost + HOPELESS:
         return pose, float(costs.min())
     best_pose = poses[int(costs.argmin())]
-    if _distance_m(body, best_pose, pose) < NEAR_M:
+    if _distance_m(recombiner.body, best_pose, pose) < NEAR_M:
         return pose, most_cost
     refined = frame.refined(best_pose[None], *_REFINE)
-    return refined[0], float(frame.pose_costs(refined)[0])
+    return refined[0], float(frame.costs(refined)[0])
 
 
 def _distance_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:

@@ -107,20 +107,3 @@ def test_a_draw_where_the_limb_is_is_not_refined(bent, monkeypatch) -> None:
         found, cost = other_limb(frame, Recombiner(body, searcher.limits), true, limb, rng)
         assert len(refined) == times
         assert (found is true) == (times == 0) and (cost == np.inf) == (times == 0)
-
-
-def test_an_arm_through_the_trunk_is_not_better_by_what_hair_explains(bent, monkeypatch) -> None:
-    """Poses are compared with what their limbs cost beside f_s."""
-    searcher, seen, true, _ = bent
-    frame = FramePopulation(searcher, seen, 0, true)
-    own = OwnEvidence(searcher, seen, 0, frame)
-    plain = own.cost(true)
-    monkeypatch.setattr(
-        "markerless_tracker.tracking.candidates.population.pose_costs",
-        lambda body, poses: np.full(len(poses), 0.25),
-    )
-    assert own.pose_cost(true) == pytest.approx(plain + 0.25)
-    assert own.cost(true) == plain
-    assert frame.total_costs(true[None])[0] >= frame.costs(true[None])[0] + 0.25
-    search = LimbSearch(Recombiner(searcher.body, searcher.limits), frame, own, true, 0.003)
-    assert search.own_cost == pytest.approx(plain + 0.25)
