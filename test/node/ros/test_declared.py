@@ -35,7 +35,7 @@ def node(tmp_path: Path) -> Iterator[Any]:
 
 
 def test_settings_in_groups_are_parameters_with_ranges_and_choices(node: Any) -> None:
-    from markerless_tracker.node.ros.declared import declare_effective, given_parameters
+    from markerless_tracker.node.ros.declared import FIXED, declare_effective, given_parameters
     from markerless_tracker.node.tracker.parameters import (
         descriptions,
         effective_values,
@@ -65,7 +65,9 @@ def test_settings_in_groups_are_parameters_with_ranges_and_choices(node: Any) ->
         descriptor = node.describe_parameter(entry.name)
         ranges = (len(descriptor.integer_range), len(descriptor.floating_point_range))
         assert ranges == (entry.type is int, entry.type is float), entry.name
-        assert bool(descriptor.additional_constraints) == bool(entry.choices), entry.name
+        constraints = descriptor.additional_constraints
+        assert ("one of " in constraints) == bool(entry.choices), entry.name
+        assert constraints.endswith(FIXED), entry.name
 
 
 def test_nothing_but_messages_wakes_the_executor(tmp_path: Path) -> None:
