@@ -1,11 +1,13 @@
 """The silhouette's border against bodies whose coverage of each pixel is known."""
 
+import cv2
 import numpy as np
 import pytest
 
 from markerless_tracker.imaging import ImagingSettings, Segmenter, learn_background
+from markerless_tracker.imaging.masks import SOLID
 from markerless_tracker.imaging.region import Region
-from markerless_tracker.imaging.segmentation.border import trim_border
+from markerless_tracker.imaging.segmentation.border import mark_half_covered, trim_border
 from markerless_tracker.imaging.segmentation.kernels import LEVELS
 
 SIZE_PX = (120, 90)
@@ -70,3 +72,41 @@ def test_the_segmenter_finds_the_area_without_bias(channels: int) -> None:
         areas[layers] = segmenter.observe(image, 0).mask.sum() / covered.sum()
     assert areas[1] == pytest.approx(1.0, abs=0.01)
     assert areas[0] > 1.02
+
+
+def twin(image, floor, mask, inner, deep, least):
+    """`mark_half_covered` pixel by pixel."""
+    cleared = np.zeros_like(mask)
+    for i, j in np.argwhere((mask > 0) & (inner == 0)):
+        near = np.s_[max(i - 3, 0) : i + 4, max(j - 3, 0) : j + 4]
+        source = next((s[near] > 0 for s in (deep, inner) if (s[near] > 0).any()), None)
+        if source is None:
+            continue
+        contrast = image[near][source].mean(axis=0) - floor
+        along = (image[i, j] - floor) @ contrast
+        if contrast @ contrast >= least and along < 0.5 * contrast @ contrast:
+            cleared[i, j] = 255
+    return cleared
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("shape", [(40, 33), (5, 9), (1, 4)])
+def test_half_covered_pixels_are_those_of_a_slow_twin(shape, channels) -> None:
+    rng = np.random.default_rng(channels)
+    image = rng.integers(0, 256, (*shape, channels)).astype(np.uint8)
+    mask = 255 * (cv2.blur(rng.random(shape), (3, 3)) > 0.42).astype(np.uint8)
+    inner = np.asarray(cv2.erode(mask, SOLID), np.uint8)
+    deep = np.asarray(cv2.erode(inner, SOLID), np.uint8)
+    floor = np.array((90.0, 120.0, 150.0)[:channels])
+    mean = np.empty((channels, *shape), np.uint16)
+    mean[:] = LEVELS * floor[:, None, None]
+    cleared = np.empty_like(mask)
+    scratch = np.zeros((8, shape[1]), np.int64)
+    mark_half_covered(
+        image, mean, np.ones(channels, np.float32), 0, 0, mask, inner, deep, np.float32(100.0),
+        scratch, cleared,
+    )  # fmt: skip
+    expected = twin(image.astype(float), floor, mask, inner, deep, 100.0)
+    np.testing.assert_array_equal(cleared, expected)
+    if shape[0] > 30:
+        assert (expected > 0).any() and ((mask > 0) & (inner == 0) & (expected == 0)).any()
