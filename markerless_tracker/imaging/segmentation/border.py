@@ -97,6 +97,7 @@ def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, sc
             continue
         for j in range(columns):
             cleared[i, j] = 0
+            # The border is the difference, since ``inner`` lies within the mask.
             if mask[i, j] == inner[i, j]:
                 continue
             begin, end = max(j - _NEAR_PX, 0), min(j + _NEAR_PX + 1, columns)
