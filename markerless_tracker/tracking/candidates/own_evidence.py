@@ -61,10 +61,14 @@ class OwnEvidence:
         """1 - f_s of a pose (p,)."""
         return float(self._decided(pose).costs(pose[None])[0])
 
+    def cost_with_prior(self, pose: FloatArray) -> float:
+        """The cost of a pose (p,) as `FramePopulation.costs_with_prior`; to compare poses."""
+        return float(self._decided(pose).costs_with_prior(pose[None])[0])
+
     def refined(
         self, pose: FloatArray, iterations: int, truncation_m: tuple[float, float]
     ) -> tuple[FloatArray, float]:
-        """A pose (p,) refined in its own evidence, and its cost there.
+        """A pose (p,) refined in its own evidence, and its `cost_with_prior` there.
 
         Args:
             pose: the initial pose.
@@ -72,7 +76,7 @@ class OwnEvidence:
             truncation_m: residuals beyond it are outliers, in the first and in the last iteration.
         """
         found = self._decided(pose).refined(pose[None], iterations, truncation_m)[0]
-        return found, self.cost(found)
+        return found, self.cost_with_prior(found)
 
     def _decided(self, pose: FloatArray) -> FramePopulation:
         """The evidence that the body at a pose (p,) decides; cached for the last pose."""

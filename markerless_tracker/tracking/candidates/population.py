@@ -19,6 +19,7 @@ from markerless_tracker.tracking.candidates.crossed import PAIRS, in_each_others
 from markerless_tracker.tracking.candidates.many_poses import markers_of_many
 from markerless_tracker.tracking.candidates.posture_costs import off_floor, unlike_postures
 from markerless_tracker.tracking.candidates.postures import first_guesses
+from markerless_tracker.tracking.candidates.prior_costs import prior_costs
 from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.evidence.hull import Hull
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
@@ -50,8 +51,8 @@ _EXCHANGE = (6, (0.25, 0.05))
 """Iterations of refinement, and first and last truncation in m: of an initialised population, of a
 recombined one, of one propagated from the frame before, and of a pose with exchanged limbs."""
 _EXCHANGED_SLACK = (0.012, 0.007)
-"""A pose with exchanged limbs has a first and a second generation of children if it costs at most
-this much more than the best pose."""
+"""A pose with exchanged limbs has a first and a second generation of children if its f_s is at most
+this much less than that of the best pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,8 +181,9 @@ class FramePopulation:
                 continue
             other = in_each_others_place(body, population.poses[0], pair, limits)
             branch = self.selected(self.refined(other[None], *_EXCHANGE))
+            least = self.best_cost(population)
             for number, slack in enumerate(_EXCHANGED_SLACK):
-                if len(branch) and branch.costs[0] <= population.costs[0] + slack:
+                if len(branch) and self.best_cost(branch) <= least + slack:
                     branch = self.recombined(branch, generation + number)
             population = self.selected(np.concatenate([population.poses, branch.poses]))
         return population
@@ -214,13 +216,17 @@ class FramePopulation:
         costs = self._costs(poses)
         return np.where(np.isfinite(costs), costs, np.inf)
 
+    def costs_with_prior(self, poses: FloatArray) -> FloatArray:
+        """`costs` plus `prior_costs`, to compare poses."""
+        return self.costs(poses) + prior_costs(self._searcher.body, poses)
+
     def best_cost(self, population: Population) -> float:
         """1 - f_s of the best pose of a population."""
         return float(self.costs(population.poses[:1])[0])
 
     def total_costs(self, poses: FloatArray) -> FloatArray:
-        """`costs` plus those of unusual postures (`usual`) and, with a floor, of feet off it."""
-        costs = self.costs(poses)
+        """`costs_with_prior`, unusual postures (`usual`) and, with a floor, feet off it."""
+        costs = self.costs_with_prior(poses)
         if self.usual:
             costs += unlike_postures(self._searcher.body, poses)
         if self._searcher.config.refine.floor_sd_m > 0.0:

@@ -9,6 +9,7 @@ from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
 from markerless_tracker.tracking.candidates.population import FramePopulation
+from markerless_tracker.tracking.candidates.prior_costs import prior_costs
 from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.search import LIMB_M
 
@@ -28,8 +29,9 @@ LEAST_M = 0.05
 """A limb with every marker nearer than this to its place was not found elsewhere."""
 CLOSE = 0.01
 """A pose that costs at most this much more in undecided evidence may be better in its own."""
-_PARENTS, _CHILDREN = 6, 10
-"""Draws that are varied in each layer, and variations of each."""
+_PARENTS, _CHILDREN = 3, 10
+"""Draws that are varied in each layer: the best by f_s, and as many with the prior, too (many are
+the same); and variations of each."""
 _REFINE = (3, (LIMB_M, 0.035))
 """Iterations of the refinement of the best draw; truncation (m) in the first and the last one."""
 _REFINE_FAR = (8, (0.15, 0.035))
@@ -73,12 +75,12 @@ class LimbSearch:
     def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
         """Search a limb; return whether it was found elsewhere. Arguments as for `other_limb`."""
         frame = self._own.undecided
-        cost = float(frame.costs(self.pose[None])[0])
+        cost = float(frame.costs_with_prior(self.pose[None])[0])
         other, other_cost = other_limb(frame, self._recombiner, self.pose, limb, rng, aim, cost)
         better = other_cost < cost - self._least_gain
         if better:
             refined = frame.refined(self.pose[None], *_REFINE)
-            better = other_cost < float(frame.costs(refined)[0]) - self._least_gain
+            better = other_cost < float(frame.costs_with_prior(refined)[0]) - self._least_gain
         if self._own.differs:
             if other_cost > cost + CLOSE or _distance_m(self._own.body, other, self.pose) < LEAST_M:
                 return False
@@ -102,7 +104,7 @@ class LimbSearch:
         return True
 
     def compared(self, other: FloatArray, close: float) -> tuple[FloatArray, float]:
-        """Another pose (p,), refined, and its f_s less that of the estimate.
+        """Another pose (p,), refined, and its gain: the estimate's `costs_with_prior` less its own.
 
         Args:
             other: the pose, which may be far from the estimate.
@@ -110,7 +112,7 @@ class LimbSearch:
                 more in the evidence decided with the predicted pose.
         """
         refined = self._frame.refined(other[None], *_REFINE_FAR)
-        costs = self._frame.costs(np.concatenate([self.pose[None], refined]))
+        costs = self._frame.costs_with_prior(np.concatenate([self.pose[None], refined]))
         if not self._own.differs or costs[1] > costs[0] + close:
             return refined[0], float(costs[0] - costs[1])
         found, cost = self._own.refined(refined[0], *_REFINE)
@@ -122,9 +124,9 @@ class LimbSearch:
 
     @property
     def own_cost(self) -> float:
-        """1 - f_s of the estimate in its own evidence."""
+        """The estimate's `cost_with_prior` in its own evidence."""
         if self._known_cost is None:
-            self._known_cost = self._own.cost(self.pose)
+            self._known_cost = self._own.cost_with_prior(self.pose)
         return self._known_cost
 
 
@@ -137,11 +139,13 @@ def other_limb(
     aim: Aim | None = None,
     most_cost: float = np.inf,
 ) -> tuple[FloatArray, float]:
-    """The best pose (p,) with a limb elsewhere, and its cost 1 - f_s.
+    """The best pose (p,) with a limb elsewhere, and its cost (`FramePopulation.costs_with_prior`).
 
     The draws are sparse for a limb of six joints, so the best ones are varied twice, as in an
-    annealed particle filter. A contour refinement of the whole body then refines the best pose. If
-    its limb is near its former place, the given pose is returned with `most_cost`.
+    annealed particle filter. They are the best by f_s, and the best if the prior counts, too: where
+    the limb explains few pixels, f_s tells little; where people have it seldom, the prior misleads.
+    A contour refinement of the whole body refines the best pose of either kind, and the better one
+    is returned. If both limbs are near the former place, it is the given pose with `most_cost`.
 
     Args:
         frame: the evidence.
@@ -153,7 +157,7 @@ def other_limb(
             silhouette; None for no such draws.
         most_cost: largest useful cost; the result matters only below it.
     """
-    half = DRAWS // 2
+    body, half = recombiner.body, DRAWS // 2
     poses = np.concatenate(
         [
             recombiner.with_prior_limb(pose, limb, half, rng),
@@ -168,23 +172,35 @@ def other_limb(
         poses = np.concatenate([poses, aim(np.concatenate(many), AIMED)])
     costs_of = frame.limb_costs(pose, limb)
     costs = costs_of(poses[:, limb])
-    for layer, fraction in enumerate(LAYERS, 1):
-        best = np.argsort(costs, kind="stable")[:_PARENTS]
+    best = _best(body, poses, costs, _PARENTS)
+    for fraction in LAYERS:
         near = recombiner.with_limb_near(
             np.repeat(poses[best], _CHILDREN, axis=0), limb, fraction, rng
         )
-        # Only the best of the last layer is used, and only the parents of the others.
-        cutoff = costs[best[0 if layer == len(LAYERS) else -1]]
+        # Of the last layer only the best draws are used, of the others only the parents.
+        count = 1 if fraction == LAYERS[-1] else _PARENTS
+        cutoff = costs[_best(body, poses, costs, count)].max()
         poses = np.concatenate([poses[best], near])
         more = costs_of(near[:, limb], np.full(len(near), cutoff))
         costs = np.concatenate([costs[best], more])
+        best = _best(body, poses, costs, count)
     if costs.min() > most_cost + HOPELESS:
         return pose, float(costs.min())
-    best_pose = poses[int(costs.argmin())]
-    if _distance_m(recombiner.body, best_pose, pose) < NEAR_M:
+    far = [other for other in poses[best] if _distance_m(body, other, pose) >= NEAR_M]
+    if not far:
         return pose, most_cost
-    refined = frame.refined(best_pose[None], *_REFINE)
-    return refined[0], float(frame.costs(refined)[0])
+    refined = frame.refined(np.array(far), *_REFINE)
+    costs = frame.costs_with_prior(refined)
+    return refined[int(costs.argmin())], float(costs.min())
+
+
+def _best(body: BodyModel, poses: FloatArray, costs: FloatArray, count: int) -> IntArray:
+    """Indices of the poses (n, p) that are among the `count` of least cost, 1 - f_s (n,), or of
+    least cost with the prior; in that order.
+    """
+    first = np.argsort(costs, kind="stable")[:count]
+    second = np.argsort(costs + prior_costs(body, poses), kind="stable")[:count]
+    return np.concatenate([first, second[~np.isin(second, first)]])
 
 
 def _distance_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:

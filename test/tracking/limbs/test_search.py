@@ -11,6 +11,7 @@ from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
 from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.evidence.undecided import decide
+from markerless_tracker.tracking.limbs import search as search_module
 from markerless_tracker.tracking.limbs.search import CLOSE, LimbSearch, other_limb
 from markerless_tracker.tracking.search import Searcher
 
@@ -107,3 +108,59 @@ def test_a_draw_where_the_limb_is_is_not_refined(bent, monkeypatch) -> None:
         found, cost = other_limb(frame, Recombiner(body, searcher.limits), true, limb, rng)
         assert len(refined) == times
         assert (found is true) == (times == 0) and (cost == np.inf) == (times == 0)
+
+
+def test_poses_are_compared_with_the_prior_of_their_limbs(bent, monkeypatch) -> None:
+    searcher, seen, true, _ = bent
+    frame = FramePopulation(searcher, seen, 0, true)
+    own = OwnEvidence(searcher, seen, 0, frame)
+    plain = own.cost(true)
+    monkeypatch.setattr(
+        "markerless_tracker.tracking.candidates.population.prior_costs",
+        lambda body, poses: np.full(len(poses), 0.25),
+    )
+    assert own.cost_with_prior(true) == pytest.approx(plain + 0.25)
+    assert own.cost(true) == plain
+    assert frame.total_costs(true[None])[0] >= frame.costs(true[None])[0] + 0.25
+    search = LimbSearch(Recombiner(searcher.body, searcher.limits), frame, own, true, 0.003)
+    assert search.own_cost == pytest.approx(plain + 0.25)
+    found, cost = own.refined(true, 3, (0.1, 0.03))
+    assert cost == pytest.approx(own.cost(found) + 0.25)
+
+
+def test_the_best_draws_are_those_by_f_s_and_those_with_the_prior(bent) -> None:
+    body, usual = bent[0].body, bent[0].body.prior_mean
+    poses = np.tile(usual, (4, 1))
+    elbow = body.index("l_elbow")
+    poses[:, elbow] -= np.array([9.0, 0.0, 9.0, 0.0]) * body.prior_sd[elbow]
+    # The prior of the first and the third: 10 units of 0.001.
+    costs = np.array([0.100, 0.105, 0.101, 0.108])
+    assert list(search_module._best(body, poses, costs, 1)) == [0, 1]
+    assert list(search_module._best(body, poses, costs, 2)) == [0, 2, 1, 3]
+    assert list(search_module._best(body, poses, costs, 4)) == [0, 2, 1, 3]
+    assert list(search_module._best(body, poses, np.array([0.1, 0.05, 0.2, 0.3]), 1)) == [1]
+
+
+def test_a_limb_with_the_prior_is_refined_beside_the_best_one(bent, monkeypatch) -> None:
+    """Of two draws the better one after refinement is returned, whichever was the best before."""
+    searcher, seen, true, _ = bent
+    body = searcher.body
+    frame = FramePopulation(searcher, decide(seen, searcher.cameras, body, true), 0, true)
+    knee, limb = body.index("l_knee"), body.subspaces["l_leg"]
+    drawn = np.tile(true, (2, 1))
+    drawn[:, knee] += (0.5, 0.8)
+    monkeypatch.setattr(f"{SEARCH}.DRAWS", 4)
+    monkeypatch.setattr(Recombiner, "with_prior_limb", lambda _, at, limb, n, rng: drawn)
+    monkeypatch.setattr(Recombiner, "with_limb", lambda _, at, limb, n, rng: drawn)
+    monkeypatch.setattr(Recombiner, "with_limb_near", lambda _, at, limb, f, rng: at.copy())
+    monkeypatch.setattr(f"{SEARCH}._best", lambda body, poses, costs, count: np.array([0, 1]))
+    monkeypatch.setattr(FramePopulation, "refined", lambda _, poses, *args: poses.copy())
+    for better in (0, 1):
+        costs = np.full(2, 0.2)
+        costs[better] = 0.1
+        monkeypatch.setattr(
+            FramePopulation, "costs_with_prior", lambda _, poses, costs=costs: costs[: len(poses)]
+        )
+        rng = keyed_generator(0, 0, "leg")
+        found, cost = other_limb(frame, Recombiner(body, searcher.limits), true, limb, rng)
+        assert found[knee] == drawn[better, knee] and cost == 0.1
