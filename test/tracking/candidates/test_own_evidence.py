@@ -61,8 +61,8 @@ def test_a_pose_is_refined_in_its_own_evidence(legs_undecided) -> None:
     off = true.copy()
     off[:3] += 0.03
     found, cost = own.refined(off, 6, (0.12, 0.035))
-    assert cost < own.cost(off)
-    assert cost == own.cost(found)
+    assert cost < own.cost_with_prior(off)
+    assert cost == own.cost_with_prior(found)
 
 
 def test_the_evidence_of_a_pose_is_decided_once(legs_undecided, monkeypatch) -> None:
