@@ -1,6 +1,7 @@
 """First guesses of the pose: generic postures, placed at a hull's trunk, in every heading."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -71,10 +72,28 @@ POSTURES: tuple[Mapping[str, float], ...] = (
 squat, a deep squat, sitting, bending down, arms overhead, crossed arms."""
 
 
-@lru_cache(maxsize=4)
+@dataclass(frozen=True)
+class _Joints:
+    """What postures depend on: a body's joints, whatever its sizes."""
+
+    body: BodyModel = field(compare=False)
+    name: str
+    neutral: bytes
+    axes: bytes
+
+
 def postures(body: BodyModel) -> FloatArray:
-    """The postures (k, p) at the origin, facing along x; not to be changed."""
-    return np.array([posture(body, angles) for angles in POSTURES])
+    """The postures (k, p) at the origin, facing along x; not to be changed.
+
+    They are made once for all sizes of a body, of which a start tries many.
+    """
+    axes = body.node_fixed[:, :, :3].tobytes() + body.node_sign.tobytes()
+    return _made(_Joints(body, body.name, body.neutral.tobytes(), axes))
+
+
+@lru_cache(maxsize=4)
+def _made(joints: _Joints) -> FloatArray:
+    return np.array([posture(joints.body, angles) for angles in POSTURES])
 
 
 def joint_sd(body: BodyModel) -> FloatArray:

@@ -43,6 +43,7 @@ def prior_costs(body: BodyModel, poses: FloatArray) -> FloatArray:
 def _means(body: BodyModel, limb: str) -> tuple[FloatArray, FloatArray]:
     """Means (k, d) of a limb's angles, in standard deviations; units (k,) of a limb there."""
     angles = body.subspaces[limb]
-    known = np.unique(postures(body)[:, angles], axis=0)
+    # In many postures a limb is the same. (`np.unique` takes longer than all the rest.)
+    known = np.array(list(dict.fromkeys(map(tuple, postures(body)[:, angles]))))
     means = np.concatenate([body.prior_mean[None, angles], known]) / body.prior_sd[angles]
     return means, np.append(0.0, np.full(len(known), POSTURE))

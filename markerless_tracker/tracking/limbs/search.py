@@ -177,7 +177,7 @@ def other_limb(
         near = recombiner.with_limb_near(
             np.repeat(poses[best], _CHILDREN, axis=0), limb, fraction, rng
         )
-        # Of the last layer only the best draws are used, of the others only the parents.
+        # Of the last layer only the best draws of both kinds are used, of the others the parents.
         count = 1 if fraction == LAYERS[-1] else _PARENTS
         cutoff = costs[_best(body, poses, costs, count)].max()
         poses = np.concatenate([poses[best], near])

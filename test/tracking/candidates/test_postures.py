@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import load_body
-from markerless_tracker.body.anatomy import heading, heading_difference
+from markerless_tracker.body.anatomy import heading, heading_difference, posture
 from markerless_tracker.body.model import MARKER_NAMES
 from markerless_tracker.tracking.candidates.many_poses import markers_of_many
 from markerless_tracker.tracking.candidates.postures import (
@@ -69,3 +69,16 @@ def test_a_hull_that_ends_above_the_floor_may_lack_the_feet() -> None:
     assert ankle_heights_m(hull_from(-0.04, [0.0, 0.0, 1.0])) == (ANKLE_M,)
     heights = ankle_heights_m(hull_from(0.5, [0.0, 0.0, 1.0]))
     assert heights == pytest.approx((0.5 + ANKLE_M, ANKLE_M))
+
+
+@pytest.mark.parametrize("name", ["person32", "person35", "humaneva34", "balan31"])
+def test_postures_are_made_once_for_all_sizes_of_a_body(name: str) -> None:
+    small, tall = load_body(name, 1.5), load_body(name, 1.9)
+    assert postures(small) is postures(tall)
+    for body in (small, tall):
+        own = np.array([posture(body, angles) for angles in POSTURES])
+        np.testing.assert_array_equal(postures(body), own)
+
+
+def test_other_bodies_have_postures_of_their_own() -> None:
+    assert postures(load_body("person32")) is not postures(load_body("person34"))
