@@ -15,7 +15,7 @@ from markerless_tracker.tracking.candidates.postures import postures
 
 COST = 0.001
 """Cost of a unit of the negative log of a limb's prior density, in units of f_s. The limbs of
-people who walk are at 0 to 3 units, wrong ones at 5 to 25."""
+people who walk are at 0 to 3 units, an arm through the trunk or behind the neck at 5 to 25."""
 POSTURE = 3.0
 """A limb that is as in a known posture is at this many units: people seldom squat or cross their
 arms."""

@@ -45,7 +45,8 @@ class LimbSearch:
 
     After a search of a limb the whole body is refined. The result is taken if it explains the frame
     better than the estimate, and better than the estimate after the same refinement: a gain of the
-    rest of the body is not due to the limb.
+    rest of the body is not due to the limb. Poses are compared by f_s less `prior_costs`; a rise of
+    f_s means that, also where other modules name one.
 
     Args:
         recombiner: draws limbs of the body.
