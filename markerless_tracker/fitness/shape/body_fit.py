@@ -106,13 +106,11 @@ class BodyFit:
         """Add a frame: its contours and its approximate pose (p,)."""
         self._frames.append(_Frame(contours, pose))
 
-    def iterate(self, truncation_m: float) -> None:
-        """One damped Gauss-Newton step of lengths, sections and all poses; see `pieces`."""
-        for _ in self.pieces(truncation_m):
-            pass
-
     def pieces(self, truncation_m: float) -> Iterator[None]:
-        """`iterate` in pieces: each makes one frame's equations; the last also solves them.
+        """One damped Gauss-Newton step of lengths, sections and all poses, in pieces.
+
+        Each piece makes one frame's equations; the last also solves them. Frames that are added
+        meanwhile take part.
 
         The poses are eliminated first (Schur complement), since only the body couples them
         (docs/normal-equations.md). Equations that cannot be solved change nothing.

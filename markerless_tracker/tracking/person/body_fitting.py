@@ -1,6 +1,6 @@
 """Lengths that were not measured, fitted over the first tracked frames."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +15,13 @@ FRAMES = 10
 """Number of frames that a body is fitted to; the pose should change over them."""
 EVERY = 2
 """Every second tracked frame is taken."""
-POLISH = 5
-"""Iterations after the last frame was taken; before, there is one iteration per frame."""
+STEPS = 3
+"""Gauss-Newton steps after the last frame was taken."""
+PIECES, PIECES_THEN = 1, 5
+"""Pieces of a step (`BodyFit.pieces`) that are computed in each tracked frame while frames are
+taken, and afterwards. The steps before the last frame only bring the poses near."""
 TRUNCATION_M = (0.10, 0.05)
-"""Outline points farther than this from the contour are outliers: first and last iteration."""
+"""Outline points farther than this from the contour are outliers: first and last step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,7 @@ class Unmeasured:
 
 
 class BodyFitting:
-    """Fits the body while it is tracked, one iteration per frame, so that no frame takes long.
+    """Fits the body while it is tracked, in pieces, so that no frame takes much longer than others.
 
     Args:
         person: what is known of the person.
@@ -68,7 +71,8 @@ class BodyFitting:
         self._person = person
         self._limits = limits
         self._fit: BodyFit | None = None
-        self._seen = self._rounds = 0
+        self._pieces: Iterator[None] = iter(())
+        self._seen = 0
         self._last = np.zeros(limits.shape[1])
 
     def add(self, body: BodyModel, contours: ContourFrame, pose: FloatArray) -> Fitted | None:
@@ -85,18 +89,26 @@ class BodyFitting:
             self._fit = BodyFit(
                 sizes, body, prior, self._limits, floor_precision=self._floor_precision
             )
+            self._pieces = self._fitting(self._fit)
         self._seen += 1
-        if self._seen <= EVERY * FRAMES:
-            if self._seen % EVERY:
-                return None
+        taking = self._seen <= EVERY * FRAMES
+        if taking and self._seen % EVERY == 0:
             self._fit.add(contours, pose)
             self._last = pose
-        share = self._rounds / (FRAMES + POLISH - 1)
-        self._fit.iterate(TRUNCATION_M[0] * (TRUNCATION_M[1] / TRUNCATION_M[0]) ** share)
-        self._rounds += 1
-        if self._rounds < FRAMES + POLISH:
+        if self._seen < EVERY:
             return None
-        return Fitted(self._fit.body, self._fit.poses[-1] - self._last)
+        try:
+            for _ in range(PIECES if taking else PIECES_THEN):
+                next(self._pieces)
+        except StopIteration:
+            return Fitted(self._fit.body, self._fit.poses[-1] - self._last)
+        return None
+
+    def _fitting(self, fit: BodyFit) -> Iterator[None]:
+        while self._seen < EVERY * FRAMES:
+            yield from fit.pieces(TRUNCATION_M[0])
+        for truncation_m in np.geomspace(*TRUNCATION_M, STEPS):
+            yield from fit.pieces(float(truncation_m))
 
     def warm_up(self, body: BodyModel, contours: ContourFrame, pose: FloatArray) -> None:
         """Compile what `add` needs; same arguments. This object must not be used afterwards."""

@@ -12,8 +12,9 @@ from markerless_tracker.body.anatomy import heading_difference
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 
-SETTLING_FRAMES = 8
-"""Frames of the start, after which the person is tracked."""
+SETTLING_FRAMES, MOST_FRAMES = 8, 12
+"""Frames of the start, after which the person is tracked; and most frames, of a start whose latest
+frame favours the other heading than the mean does: the poses of that heading still improve."""
 SIZED_FROM = 2
 """Index of the first frame in which the headings are compared. The frames before it had a body of
 another size, and their search favoured the heading that leads."""
@@ -66,7 +67,9 @@ class TwoHeadings:
     @property
     def over(self) -> bool:
         """Whether all frames of the start have been taken."""
-        return len(self) >= SETTLING_FRAMES
+        gains = [] if self._changed else self._gains
+        changing = bool(gains) and (gains[-1] > 0.0) != (float(np.mean(gains)) > 0.0)
+        return len(self) >= (MOST_FRAMES if changing else SETTLING_FRAMES)
 
     @property
     def leading_rad(self) -> float:
@@ -108,17 +111,23 @@ class TwoHeadings:
         Returns:
             Whether it leads from now on.
         """
-        lead, other = self._leading, 1 - self._leading
-        pairs = [(fits[lead], fits[other]) for fits in self._fits[self._counted_from :]]
-        if self._changed or not pairs or pairs[-1][1] is None:
+        other = 1 - self._leading
+        last = self._fits[self._counted_from :][-1:]
+        if self._changed or not last or last[0][other] is None:
             return False
-        gains = [a.cost - b.cost for a, b in pairs[-COMPARED:] if a and b]
-        rise = float(np.mean(gains)) if gains and pairs[-1][0] else 1.0
+        gains = self._gains
+        rise = float(np.mean(gains)) if gains and last[0][self._leading] else 1.0
         rise += 2.0 * _WALK_BONUS * self._walks_along(self.both_rad[other])
         if rise <= (0.0 if self.over else _MARGIN):
             return False
         self._leading, self._changed = other, True
         return True
+
+    @property
+    def _gains(self) -> list[float]:
+        """What the opposite heading gains over the leading one, in each of the latest frames."""
+        pairs = [(f[self._leading], f[1 - self._leading]) for f in self._fits[self._counted_from :]]
+        return [a.cost - b.cost for a, b in pairs[-COMPARED:] if a and b]
 
     def _walks_along(self, heading_rad: float) -> float:
         """Cosine of the angle from a heading to the walking direction; 0 for a standing person."""

@@ -56,7 +56,7 @@ def fit(request, contours_of):
         about[GENERIC.root[3:]] += rng.normal(0.0, 0.02, 3)
         fit.add(contours_of(true, pose, RIG, GENERIC), np.clip(about, *LIMITS))
     for truncation_m in np.geomspace(0.10, 0.035, 12):
-        fit.iterate(truncation_m)
+        list(fit.pieces(truncation_m))
     return true, moves, fit
 
 
@@ -99,8 +99,8 @@ def test_both_sides_stay_equal_and_all_bounds_are_kept(fit) -> None:
 def test_without_evidence_the_prior_remains(contours_of) -> None:
     """Without evidence the lengths move to the prior mean, the sections stay generic."""
     fit = BodyFit(SIZES, SIZES.of_stature(1.9), SIZES.prior(None), LIMITS)
-    fit.iterate(0.1)
-    fit.iterate(0.1)
+    list(fit.pieces(0.1))
+    list(fit.pieces(0.1))
     np.testing.assert_allclose(SIZES.of(fit.body), SIZES.of(GENERIC), rtol=1e-3)
     np.testing.assert_allclose(fit.body.cone_shape, SIZES.of_stature(1.9).cone_shape, rtol=1e-9)
 
@@ -112,7 +112,7 @@ def test_a_frame_without_silhouettes_changes_nothing(contours_of) -> None:
     fit = BodyFit(SIZES, GENERIC, SIZES.prior(None), LIMITS)
     fit.add(contours_of(GENERIC, away, RIG, GENERIC), pose)
     for _ in range(3):
-        fit.iterate(0.1)
+        list(fit.pieces(0.1))
     np.testing.assert_allclose(SIZES.of(fit.body), SIZES.of(GENERIC), rtol=1e-6)
     np.testing.assert_allclose(fit.poses[0, GENERIC.root], pose[GENERIC.root], atol=1e-6)
 
@@ -123,7 +123,7 @@ def test_equations_that_are_not_finite_change_nothing(contours_of) -> None:
     frame = contours_of(GENERIC, pose, RIG, GENERIC)
     fit.add(frame, np.where(np.arange(pose.size) == 3, np.nan, pose))
     before = SIZES.of(fit.body)
-    fit.iterate(0.1)
+    list(fit.pieces(0.1))
     np.testing.assert_array_equal(SIZES.of(fit.body), before)
 
 
@@ -136,7 +136,7 @@ def test_a_given_stature_restrains_the_lengths(contours_of) -> None:
         for pose in moves:
             fit.add(contours_of(true, pose, RIG, GENERIC), pose)
         for truncation_m in np.geomspace(0.10, 0.035, 6):
-            fit.iterate(truncation_m)
+            list(fit.pieces(truncation_m))
         sizes.append(np.log(SIZES.of(fit.body)).mean())
     given = np.log(SIZES.of(SIZES.of_stature(1.60))).mean()
     assert given < sizes[0] < sizes[1] - 0.01
@@ -150,7 +150,7 @@ def error_m(frames, contours_of, true, rig, *, varied):
         seen.contours = contours_of(true, pose, rig, GENERIC).contours
         fit.add(seen, pose)
     for truncation_m in np.geomspace(0.10, 0.05, 8):
-        fit.iterate(truncation_m)
+        list(fit.pieces(truncation_m))
     gaps = [
         np.linalg.norm(markers(fit.body, found) - markers(true, pose), axis=1).mean()
         for found, pose in zip(fit.poses, frames, strict=True)

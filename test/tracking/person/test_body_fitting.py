@@ -8,7 +8,7 @@ from markerless_tracker.body.sizes import Sizes
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig, build_tracker
-from markerless_tracker.tracking.person.body_fitting import EVERY, FRAMES, POLISH
+from markerless_tracker.tracking.person.body_fitting import EVERY, FRAMES
 from markerless_tracker.tracking.person.estimate import (
     MOST_RECOVERED,
     RECOVERED_FRAMES,
@@ -18,7 +18,9 @@ from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
 
 SIZES = Sizes(load_description("person31"))
-TAKEN = EVERY * FRAMES + POLISH
+TAKEN = EVERY * FRAMES + 8
+"""Frames of a fit: after those in which others are taken, 6 pieces are left of the step in progress
+and 30 of the last steps, 5 in a frame; then the last piece is complete."""
 LAST = SETTLING_FRAMES + TAKEN - 1
 """The step, from 0, that ends with the fitted body."""
 

@@ -7,6 +7,7 @@ import pytest
 
 from markerless_tracker.tracking.start.two_headings import (
     COMPARED,
+    MOST_FRAMES,
     SETTLING_FRAMES,
     SIZED_FROM,
     HeadingFit,
@@ -59,6 +60,40 @@ def test_frames_that_were_searched_for_the_first_heading_do_not_count() -> None:
 def test_poses_that_improved_count_as_they_are_now() -> None:
     before = SETTLING_FRAMES - COMPARED
     assert changes([(0.109, 0.1)] * before + [(0.1, 0.1)] * COMPARED) == []
+
+
+def test_a_start_goes_on_while_the_latest_frame_contradicts_the_mean() -> None:
+    before = [0.11] * (SETTLING_FRAMES - COMPARED)
+    improving = [0.104, 0.091, 0.084, 0.077]
+    both = TwoHeadings(0.0)
+    for number, cost in enumerate(before + improving):
+        assert not both.over
+        both.note(number * FRAME_NS, (fit(0.085), fit(cost)))
+        assert not both.change()
+    assert not both.over
+    # One frame more, and the mean says the same as the latest frame.
+    both.note(SETTLING_FRAMES * FRAME_NS, (fit(0.085), fit(0.077)))
+    assert both.over and both.change() and both.over
+
+
+def test_a_start_that_changed_ends_in_time() -> None:
+    both = TwoHeadings(0.0)
+    for number in range(SETTLING_FRAMES):
+        costs = (0.1, 0.05) if number < SETTLING_FRAMES - 1 else (0.01, 0.05)
+        both.note(number * FRAME_NS, (fit(costs[0]), fit(costs[1])))
+        assert both.change() == (number == SIZED_FROM)
+    assert both.over
+
+
+def test_a_start_does_not_go_on_for_ever() -> None:
+    # From the eighth frame on the latest one always contradicts the mean of four.
+    gains = [0.0, 0.0, 0.0, 0.0, 0.0, 6.0, 1.0, -2.0, -3.0, 1.0, 1.0, 0.5]
+    assert len(gains) == MOST_FRAMES
+    both = TwoHeadings(0.0)
+    for number, gain in enumerate(gains):
+        assert not both.over
+        both.note(number * FRAME_NS, (fit(0.1), fit(0.1 - 0.001 * gain)))
+    assert both.over
 
 
 def test_it_changes_once() -> None:
