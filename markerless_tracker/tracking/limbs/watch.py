@@ -9,18 +9,12 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from markerless_tracker.body import BodyModel, cone_transforms, markers
+from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.body.model import IntArray
-from markerless_tracker.body.parts import cones_of
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.camera.lens import projected
-from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contour import ContourFrame
-from markerless_tracker.fitness.raster.mask_words import has
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.observation import locked
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import LimbState, Observation, TrackState
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
@@ -30,6 +24,7 @@ from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.aimed import most_aimed
 from markerless_tracker.tracking.limbs.exchange import CLOSE, PairExchange
 from markerless_tracker.tracking.limbs.facing import FacingWatch
+from markerless_tracker.tracking.limbs.inside import inside_fractions
 from markerless_tracker.tracking.limbs.search import LimbSearch
 from markerless_tracker.tracking.limbs.unexplained import find_unexplained
 from markerless_tracker.tracking.limbs.walking import CLOSE as WALKING_CLOSE
@@ -38,8 +33,11 @@ from markerless_tracker.tracking.limbs.walking import WalkingWatch
 from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
 
-ROTATION_NS = 100_000_000
-"""Interval at which the next limb in rotation is searched: six frames at 60 frames/s."""
+ROTATION_NS, LONGEST_NS = 100_000_000, 200_000_000
+"""Interval at which the next limb in rotation is searched: six frames at 60 frames/s; and longest
+interval, while frames have other searches."""
+DENSE_NS = 40_000_000
+"""Searches that can wait are spread over frames nearer in time than this: late sets are lost."""
 WAIT_NS = 16_000_000
 """Half the time before a limb near unexplained silhouette is searched again, after one search
 without gain."""
@@ -49,9 +47,6 @@ _DOUBLINGS = 4
 """That time doubles with each further search without gain, at most this often."""
 _GROWN = 2.0
 """Earlier searches do not count once the unexplained area has grown by this factor."""
-_NONE = locked(np.empty((0, 0), dtype=np.uint64), np.uint64)
-_ALONG = np.linspace(0.1, 0.9, 5)
-"""Points along each cone's axis that `inside_fractions` tests, as fractions of its length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +131,7 @@ class LimbWatch:
         self._next = 0
         self._calls = 0
         self._unexplained = 0
+        self._last_ns: int | None = None
         self._rotated_ns: int | None = None
         self._waits: dict[str, _Wait] = {}
         self._exchange = PairExchange()
@@ -200,14 +196,18 @@ class LimbWatch:
         unexplained = find_unexplained(body, pose, observations, self._rig)
         if not unexplained.limbs:
             self._waits.clear()
-        due = self._due(body, stamp_ns, unexplained.areas_m2)
         pair, facing, walking = None, False, []
         self._calls += 1
+        dense = self._last_ns is not None and 0 <= stamp_ns - self._last_ns < DENSE_NS
+        self._last_ns = stamp_ns
         if not one or self._calls % 2:
             pair = self._exchange.due(body, pose, searcher.limits, stamp_ns)
-            facing = self._facing.due(stamp_ns)
-            walking = self._walking.due(body, pose, searcher.limits, stamp_ns)
+            if not (dense and pair):
+                facing = self._facing.due(stamp_ns)
+            if not (dense and (pair or facing)):
+                walking = self._walking.due(body, pose, searcher.limits, stamp_ns)
         whole = facing or pair is not None or bool(walking)
+        due = self._due(body, stamp_ns, unexplained.areas_m2, dense=dense, busy=whole)
         if one and due:
             due = [] if whole else [due[self._calls // 2 % len(due)]]
         if not due and not whole:
@@ -252,11 +252,20 @@ class LimbWatch:
             failures = min(before.failures + 1, 1 + _DOUBLINGS)
         self._waits[name] = _Wait(failures, stamp_ns, area_m2)
 
-    def _due(self, body: BodyModel, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
+    def _due(
+        self,
+        body: BodyModel,
+        stamp_ns: int,
+        areas_m2: Mapping[str, float],
+        *,
+        dense: bool,
+        busy: bool,
+    ) -> list[str]:
         """Limbs to search: the lost ones, those near unexplained silhouette, one in rotation."""
         lost = self.lost
         due = [*lost, *(n for n in self._suspects(stamp_ns, areas_m2) if n not in lost)]
-        if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < ROTATION_NS:
+        waits_ns = LONGEST_NS if dense and (busy or due) else ROTATION_NS
+        if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < waits_ns:
             return due
         self._rotated_ns = stamp_ns
         name = body.limbs[self._next % len(body.limbs)]
@@ -276,65 +285,3 @@ class LimbWatch:
         names = [first, *others[(self._unexplained - 1) % len(others) :][:1]] if others else [first]
         waits = self._waits
         return [n for n in names if n not in waits or waits[n].over(stamp_ns, areas_m2[n])]
-
-
-def inside_fractions(
-    body: BodyModel,
-    pose: FloatArray,
-    observations: Mapping[str, Observation],
-    rig: CameraRig,
-) -> dict[str, float]:
-    """Fraction of each limb's cone axes inside the silhouettes, mean over the views.
-
-    Points outside of a view's region count as outside of its silhouette. Points outside of its
-    frame, or on undecided pixels, do not count.
-    """
-    placed = cone_transforms(body, pose)
-    along = (body.cone_length[:, None] * _ALONG)[:, :, None]
-    points = (placed[:, None, :, 3] + along * placed[:, None, :, 2]).reshape(-1, 3)
-    seen = [_located(points, observation, rig) for observation in observations.values()]
-    fractions = {}
-    for name in body.limbs:
-        own = np.repeat(cones_of(body, name), _ALONG.size)
-        values = [
-            float(inside[own].sum()) / float(framed[own].sum())
-            for framed, inside in seen
-            if framed[own].any()
-        ]
-        if values:
-            fractions[name] = float(np.mean(values))
-    return fractions
-
-
-def _located(
-    points: FloatArray, observation: Observation, rig: CameraRig
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which of the points (n, 3) lie in a view's frame, and which in its silhouette."""
-    camera = rig[observation.camera]
-    undecided = observation.undecided_words
-    framed, inside = np.zeros((2, len(points)), dtype=np.bool_)
-    _find(
-        points, camera.T_cam_world, camera.matrix, camera.distortion, observation.size_px,
-        observation.offset_px, (observation.width, observation.height), observation.mask_words,
-        _NONE if undecided is None else undecided,
-        framed, inside,
-    )  # fmt: skip
-    return framed, inside
-
-
-@kernel
-def _find(  # type: ignore[no-untyped-def]
-    points, to_camera, matrix, distortion, size, offset, region, mask, undecided, framed, inside
-):
-    for i in range(points.shape[0]):
-        u, v = projected(points[i, 0], points[i, 1], points[i, 2], to_camera, matrix, distortion)
-        # Not for NaN either.
-        if not (u >= 0.0 and v >= 0.0 and u <= size[0] - 1.0 and v <= size[1] - 1.0):
-            continue
-        framed[i] = True
-        column, row = np.int64(np.rint(u)) - offset[0], np.int64(np.rint(v)) - offset[1]
-        if column < 0 or row < 0 or column >= region[0] or row >= region[1]:
-            continue
-        inside[i] = has(mask, column, row)
-        if undecided.size > 0 and has(undecided, column, row):
-            framed[i] = False

@@ -12,14 +12,13 @@ from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import (
+    LONGEST_NS,
     RECOVERED_M,
     ROTATION_NS,
     WAIT_NS,
     LimbWatch,
     Recovered,
-    inside_fractions,
 )
-from markerless_tracker.tracking.loss import LIMB_LOST_BELOW, LIMB_REGAINED_ABOVE
 from markerless_tracker.tracking.search import Searcher
 
 TRACKING, LOST = TrackState.TRACKING, TrackState.LOST
@@ -73,16 +72,6 @@ def balancing():
     arm = scene.body.subspaces["l_arm"]
     hidden[arm] = scene.body.neutral[arm]
     return scene, observed(masks), pose, hidden
-
-
-def test_shares_tell_the_limb_that_is_off(standing) -> None:
-    scene, seen, pose, raised = standing
-    true = inside_fractions(scene.body, pose, seen, scene.rig)
-    assert set(true) == {"l_arm", "r_arm", "l_leg", "r_leg"}
-    assert min(true.values()) > 0.9
-    wrong = inside_fractions(scene.body, raised, seen, scene.rig)
-    assert wrong["l_arm"] < LIMB_LOST_BELOW
-    assert wrong["r_arm"] == true["r_arm"] > LIMB_REGAINED_ABOVE
 
 
 def test_states_name_the_limb_that_is_off(standing) -> None:
@@ -175,6 +164,55 @@ def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch)
     assert scene.body.limbs[0] == "l_arm"
 
 
+def searches_of(monkeypatch, standing, every_ns, count, areas_m2=None):
+    """What each of `count` frames searches, while an exchange is always possible."""
+    scene, seen, pose, _ = standing
+    package = "markerless_tracker.tracking.limbs"
+    now: list[str] = []
+    for name, value in (
+        ("watch.find_unexplained", lambda *_: Unexplained(dict(areas_m2 or {}), {})),
+        ("watch.WAIT_NS", 0),
+        ("facing.FacingWatch.compare", lambda *_: now.append("facing")),
+        ("exchange.LEAST_M", 0.0),
+        ("search.LimbSearch.takes", lambda *_: now.append("exchange")),
+        ("search.LimbSearch.elsewhere", lambda *_: now.append("limb")),
+    ):
+        monkeypatch.setattr(f"{package}.{name}", value)
+    searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
+    contours = contours_of(searcher, seen, pose)
+    frames = []
+    for number in range(count):
+        now.clear()
+        recover(watch, searcher, contours, seen, number * every_ns, pose)
+        frames.append(sorted(now))
+    return frames
+
+
+def test_searches_that_can_wait_are_spread_over_dense_frames(monkeypatch, standing) -> None:
+    frames = searches_of(monkeypatch, standing, 16_666_667, 61)
+    first, *others = frames
+    assert first == ["exchange", "facing", "limb"]
+    assert max(map(len, others)) == 1
+    counts = {name: sum(frame == [name] for frame in others) for name in first}
+    # In a second: every 50, 250 and 100 ms, the last two up to three frames later.
+    assert counts == {"exchange": 20, "facing": 3, "limb": 9}
+
+
+def test_searches_of_frames_far_apart_do_not_wait(monkeypatch, standing) -> None:
+    frames = searches_of(monkeypatch, standing, 50_000_000, 21)
+    assert frames[2::10] == [["exchange", "limb"]] * 2
+    assert sum("exchange" in frame for frame in frames) == 21
+    assert sum("limb" in frame for frame in frames) == 11
+
+
+def test_the_rotation_goes_on_while_every_dense_frame_is_searched(monkeypatch, standing) -> None:
+    frames = searches_of(monkeypatch, standing, 16_666_667, 61, {"r_leg": 0.01})
+    # The leg near unexplained silhouette, and the limb in rotation; once that is the leg itself.
+    both = [number for number, frame in enumerate(frames) if frame.count("limb") == 2]
+    every = LONGEST_NS // 16_666_667 + 1
+    assert np.diff(both).tolist() == [every, every, 2 * every, every]
+
+
 def test_a_limb_near_unexplained_silhouette_is_searched_in_every_frame(balancing) -> None:
     scene, seen, _, hidden = balancing
     searcher = searcher_of(scene)
@@ -247,6 +285,7 @@ def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monk
         ("watch.find_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})),
         ("search.other_limb", lambda _f, _r, at, limb, *_: searched.append(now) or (at, 9.0)),
         ("watch.ROTATION_NS", 10**12),
+        ("watch.LONGEST_NS", 10**12),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
