@@ -12,7 +12,6 @@ from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import (
-    LONGEST_NS,
     RECOVERED_M,
     ROTATION_NS,
     WAIT_NS,
@@ -162,55 +161,6 @@ def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch)
     assert found([0, 1, ROTATION_NS - 1]) == [("l_arm",), (), ()]
     assert found([0, ROTATION_NS], threads=2) == found([0, ROTATION_NS])
     assert scene.body.limbs[0] == "l_arm"
-
-
-def searches_of(monkeypatch, standing, every_ns, count, areas_m2=None):
-    """What each of `count` frames searches, while an exchange is always possible."""
-    scene, seen, pose, _ = standing
-    package = "markerless_tracker.tracking.limbs"
-    now: list[str] = []
-    for name, value in (
-        ("watch.find_unexplained", lambda *_: Unexplained(dict(areas_m2 or {}), {})),
-        ("watch.WAIT_NS", 0),
-        ("facing.FacingWatch.compare", lambda *_: now.append("facing")),
-        ("exchange.LEAST_M", 0.0),
-        ("search.LimbSearch.takes", lambda *_: now.append("exchange")),
-        ("search.LimbSearch.elsewhere", lambda *_: now.append("limb")),
-    ):
-        monkeypatch.setattr(f"{package}.{name}", value)
-    searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
-    contours = contours_of(searcher, seen, pose)
-    frames = []
-    for number in range(count):
-        now.clear()
-        recover(watch, searcher, contours, seen, number * every_ns, pose)
-        frames.append(sorted(now))
-    return frames
-
-
-def test_searches_that_can_wait_are_spread_over_dense_frames(monkeypatch, standing) -> None:
-    frames = searches_of(monkeypatch, standing, 16_666_667, 61)
-    first, *others = frames
-    assert first == ["exchange", "facing", "limb"]
-    assert max(map(len, others)) == 1
-    counts = {name: sum(frame == [name] for frame in others) for name in first}
-    # In a second: every 50, 250 and 100 ms, the last two up to three frames later.
-    assert counts == {"exchange": 20, "facing": 3, "limb": 9}
-
-
-def test_searches_of_frames_far_apart_do_not_wait(monkeypatch, standing) -> None:
-    frames = searches_of(monkeypatch, standing, 50_000_000, 21)
-    assert frames[2::10] == [["exchange", "limb"]] * 2
-    assert sum("exchange" in frame for frame in frames) == 21
-    assert sum("limb" in frame for frame in frames) == 11
-
-
-def test_the_rotation_goes_on_while_every_dense_frame_is_searched(monkeypatch, standing) -> None:
-    frames = searches_of(monkeypatch, standing, 16_666_667, 61, {"r_leg": 0.01})
-    # The leg near unexplained silhouette, and the limb in rotation; once that is the leg itself.
-    both = [number for number, frame in enumerate(frames) if frame.count("limb") == 2]
-    every = LONGEST_NS // 16_666_667 + 1
-    assert np.diff(both).tolist() == [every, every, 2 * every, every]
 
 
 def test_a_limb_near_unexplained_silhouette_is_searched_in_every_frame(balancing) -> None:
