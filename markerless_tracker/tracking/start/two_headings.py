@@ -13,8 +13,8 @@ from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
 
 SETTLING_FRAMES, MOST_FRAMES = 8, 12
-"""Frames of the start, after which the person is tracked; and most frames, of a start whose latest
-frame favours the other heading than the mean does: the poses of that heading still improve."""
+"""Frames of the start, after which the person is tracked; and most frames, while the latest frame
+and the mean favour different headings: the poses of one heading still improve."""
 SIZED_FROM = 2
 """Index of the first frame in which the headings are compared. The frames before it had a body of
 another size, and their search favoured the heading that leads."""
