@@ -15,11 +15,11 @@ from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contour import OutlineRows
 from markerless_tracker.geometry import FloatArray
 
-RADIUS_SD_RATIO = 0.20
-"""Standard deviation of radii among people, relative to the generic ones (prior)."""
+RADIUS_SD_RATIO = 0.30
+"""Standard deviation of radii among clothed people, relative to the generic ones (prior)."""
 OFFSET_SD_M = 0.015
 """Standard deviation of offsets among people (prior)."""
-RADIUS_RANGE = (0.6, 1.6)
+RADIUS_RANGE = (0.6, 2.0)
 """Radii stay within this multiple of the generic ones (bounds)."""
 OFFSET_RANGE_M = 0.06
 """Offsets stay within this distance of the generic ones (bounds)."""

@@ -31,9 +31,10 @@ than others. A piece is the sums of one step over one frame."""
 
 SearcherFor = Callable[[BodyModel], Searcher]
 RECOVERED_FRAMES = 30
-"""The lengths are fitted again if a limb is found elsewhere within this many frames after a fit."""
+"""The lengths are fitted again if a limb is found elsewhere during a fit, or within this many
+frames after it."""
 MOST_RECOVERED = 6
-"""Largest number of fits of the lengths that are restarted for that reason."""
+"""Largest number of fits of the lengths that are made again for that reason."""
 
 
 class BodyEstimate:
@@ -43,7 +44,8 @@ class BodyEstimate:
     given start, sections are revised when a tracked pose differs from those fitted to. A body that
     was not measured is fitted again when poses have become more varied. Only frames whose
     silhouettes agree with the body are used (f_s of at least `LEAST_FIT`). If a limb was in a wrong
-    place during a fit of the lengths, they are fitted again after it has been found.
+    place during a fit of the lengths, or shortly after it, they are fitted again. A fit in progress
+    is completed first: while the generic body fits badly, limbs are found elsewhere often.
 
     Args:
         body: with generic sections, and lengths that were measured or follow from a stature.
@@ -93,6 +95,7 @@ class BodyEstimate:
         self._lengths: BodyFitting | None = None
         self._later: LaterFits | None = None
         self._since_fit = self._recovered = 0
+        self._wrong_limb = False
         if self._person is not None and self._fits_sections and self._config.fit_lengths:
             self._begin_lengths(self._person)
 
@@ -163,7 +166,7 @@ class BodyEstimate:
             return self.restart_lengths()
         self._since_fit += 1
         if recovered:
-            self._refit_lengths()
+            self._limb_was_wrong()
         agrees = _agrees(search)
         if agrees and self._later is not None:
             self._later.keep(search)
@@ -178,12 +181,14 @@ class BodyEstimate:
             self.body = fit_shape(self.body, [(search.contours, search.pose)])
             self.sections_fitted = True
             return np.zeros(self.body.size)
-        assert self._lengths is not None
+        assert self._lengths is not None and self._person is not None
         fitted = self._lengths.add(self.body, search.contours, search.pose)
         if fitted is None:
             return None
         self._lengths, self._since_fit = None, 0
         self.body = fitted.body
+        if self._wrong_limb:
+            self._fit_again(self._person)
         return fitted.moved
 
     def restart_lengths(self) -> FloatArray | None:
@@ -200,20 +205,28 @@ class BodyEstimate:
             self._begin_lengths(self._person)
         return np.zeros(self.body.size)
 
-    def _refit_lengths(self) -> None:
-        """Restart the fit of the lengths, if it is in progress or ended a short time ago."""
-        if self._person is None or not (self._fits_sections and self._config.fit_lengths):
+    def _limb_was_wrong(self) -> None:
+        """Fit the lengths again, if they are being fitted or were a short time ago."""
+        person = self._person
+        if person is None or not (self._fits_sections and self._config.fit_lengths):
             return
-        recent = self._lengths is not None or self._since_fit <= RECOVERED_FRAMES
-        if recent and self._recovered < MOST_RECOVERED:
-            self._recovered += 1
-            self._begin_lengths(self._person)
-        elif self._later is not None:
-            self._later, self._revision = LaterFits(self._person), None
+        if self._lengths is not None:
+            self._wrong_limb = True
+        elif self._since_fit > RECOVERED_FRAMES or not self._fit_again(person):
+            self._later, self._revision = LaterFits(person), None
+
+    def _fit_again(self, person: Unmeasured) -> bool:
+        """Begin a further fit of the lengths; returns False after too many of them."""
+        if self._recovered == MOST_RECOVERED:
+            return False
+        self._recovered += 1
+        self._begin_lengths(person)
+        return True
 
     def _begin_lengths(self, person: Unmeasured) -> None:
         self._lengths = BodyFitting(person, self.limits, floor_precision(self._config))
         self._later, self._revision = LaterFits(person), None
+        self._wrong_limb = False
 
     def _revise(self, search: FrameSearch) -> None:
         """Start a revision of the body, if this frame's pose differs from those fitted to."""

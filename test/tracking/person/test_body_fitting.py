@@ -10,7 +10,6 @@ from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 from markerless_tracker.tracking.person.body_fitting import EVERY, FRAMES
 from markerless_tracker.tracking.person.estimate import (
-    MOST_RECOVERED,
     RECOVERED_FRAMES,
     BodyEstimate,
 )
@@ -27,10 +26,10 @@ LAST = SETTLING_FRAMES + TAKEN - 1
 
 @pytest.fixture(scope="module")
 def walk():
-    """Observations of a walking person, as many as a fit needs and some more."""
+    """Observations of a walking person, as many as three fits need."""
     scene = SyntheticScene(body="person31", motion="walk", size_px=(164, 123), seed=2)
     taken = []
-    for index in range(LAST + MOST_RECOVERED):
+    for index in range(LAST + 2 * TAKEN + 1):
         _, masks, _ = scene.frame(index)
         seen = {
             name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
@@ -59,7 +58,7 @@ def test_lengths_change_once_and_are_kept(walk) -> None:
     scene, taken = walk
     config = TrackerConfig(threads=1, search_again=False)
     tracker = build_tracker(scene.rig, config, stature=1.65).tracker
-    lengths = tracked(tracker, taken)
+    lengths = tracked(tracker, taken[: LAST + 6])
     assert changes(lengths) == [LAST]
     true = SIZES.of(scene.body)
     before, after = np.abs(np.log(lengths[[0, -1]] / true)).mean(axis=1)
@@ -77,19 +76,21 @@ def test_lengths_change_once_and_are_kept(walk) -> None:
 def test_lengths_can_be_left_alone(walk, settings, subject) -> None:
     scene, taken = walk
     tracker = build_tracker(scene.rig, TrackerConfig(threads=1, **settings), **subject).tracker
-    assert changes(tracked(tracker, taken)) == []
+    assert changes(tracked(tracker, taken[: LAST + 6])) == []
 
 
 @pytest.mark.parametrize(
-    ("recovered", "last"),
+    ("recovered", "most", "fits"),
     [
-        pytest.param(range(SETTLING_FRAMES + 1, SETTLING_FRAMES + 2), LAST + 1, id="once"),
-        pytest.param(range(LAST + MOST_RECOVERED), LAST + MOST_RECOVERED - 1, id="always"),
+        pytest.param(range(SETTLING_FRAMES + 1, SETTLING_FRAMES + 2), 6, 2, id="once"),
+        pytest.param(range(LAST + 2 * TAKEN + 1), 6, 3, id="always"),
+        pytest.param(range(LAST + 2 * TAKEN + 1), 1, 2, id="at most one more"),
     ],
 )
-def test_the_fit_begins_anew_when_a_limb_was_found_elsewhere(
-    walk, monkeypatch, recovered: range, last: int
+def test_lengths_are_fitted_again_when_a_limb_was_found_elsewhere(
+    walk, monkeypatch, recovered: range, most: int, fits: int
 ) -> None:
+    """A fit in progress is completed before the next one begins."""
     scene, taken = walk
     config = TrackerConfig(threads=1, search_again=False)
     tracker = build_tracker(scene.rig, config, stature=1.65).tracker
@@ -100,11 +101,13 @@ def test_the_fit_begins_anew_when_a_limb_was_found_elsewhere(
         return fit(self, search, rotated=rotated, recovered=now in stamps)
 
     monkeypatch.setattr(BodyEstimate, "fit_tracked_frame", with_recovery)
+    monkeypatch.setattr("markerless_tracker.tracking.person.estimate.MOST_RECOVERED", most)
     lengths = []
     for now, seen in taken:
         tracker.step(seen, now)
         lengths.append(SIZES.of(tracker.body))
-    assert changes(np.array(lengths)) == [last]
+    steps = [step for step in changes(np.array(lengths)) if step in LAST + TAKEN * np.arange(3)]
+    assert steps == [LAST + TAKEN * k for k in range(fits)]
 
 
 @pytest.mark.parametrize(
@@ -116,8 +119,8 @@ def test_a_fit_is_doubtful_for_a_while_when_a_limb_is_found_elsewhere(
     scene, taken = walk
     config = TrackerConfig(threads=1, search_again=False)
     tracker = build_tracker(scene.rig, config, stature=1.65).tracker
-    lengths = tracked(tracker, taken)
-    stamp, seen = taken[-1]
+    lengths = tracked(tracker, taken[: LAST + 6])
+    stamp, seen = taken[LAST + 5]
     search = Searcher(
         scene.rig, tracker.body, tracker.config, limits=tracker.body.limits, threads=1
     ).frame(seen, stamp, tracker.step(seen, stamp + 1).pose)

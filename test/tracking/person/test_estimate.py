@@ -69,7 +69,7 @@ def test_a_start_beside_the_person_is_fitted_where_the_person_is(
     start = scene.pose(0)
     start[scene.body.index("pelvis_tx")] += 0.25
     tracker = make_tracker(refined_settings, start_pose=start, search_again=False)
-    assert errors_mm(tracker, frames, 0)[-1] < 30.0
+    assert errors_mm(tracker, frames, 0)[-1] < 40.0
 
 
 def test_a_start_that_never_agrees_is_reported_once_and_given_up(
