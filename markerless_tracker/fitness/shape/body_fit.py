@@ -34,7 +34,7 @@ ALONG = 9.0
 """Number of pieces of outline that count as one, since errors of sections extend along a limb."""
 AMONG = 3.0
 """Number of frames that count as one independent frame."""
-LIMB_OFFSET_SD_RATIO = 0.12
+LIMB_OFFSET_SD_RATIO = 0.08
 """Standard deviation of limbs' offsets among people, relative to the generic radius, if poses are
 fitted, too. With a larger one the sections of thighs, calves and feet would be fitted beside the
 line of the joints, and bent knees would be too straight."""
