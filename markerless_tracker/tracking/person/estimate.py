@@ -206,14 +206,18 @@ class BodyEstimate:
         return np.zeros(self.body.size)
 
     def _limb_was_wrong(self) -> None:
-        """Fit the lengths again, if they are being fitted or were a short time ago."""
+        """Fit the lengths again, if they are being fitted or were a short time ago.
+
+        The frames that were kept for later fits are forgotten.
+        """
         person = self._person
         if person is None or not (self._fits_sections and self._config.fit_lengths):
             return
         if self._lengths is not None:
             self._wrong_limb = True
-        elif self._since_fit > RECOVERED_FRAMES or not self._fit_again(person):
-            self._later, self._revision = LaterFits(person), None
+        elif self._since_fit <= RECOVERED_FRAMES and self._fit_again(person):
+            return
+        self._later, self._revision = LaterFits(person), None
 
     def _fit_again(self, person: Unmeasured) -> bool:
         """Begin a further fit of the lengths; returns False after too many of them."""
