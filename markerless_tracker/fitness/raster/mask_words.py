@@ -141,7 +141,7 @@ def grow_rows(words, half_widths, width, out):  # type: ignore[no-untyped-def]
         most = max(most, half)
     for half in range(most + 1):
         if half > 0:
-            grow_across(words, 1, width)
+            grow_across(words, np.int64(1), width)
         for i in range(half_widths.size):
             if half_widths[i] != half:
                 continue
