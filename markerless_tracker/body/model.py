@@ -165,6 +165,11 @@ class BodyModel:
         return np.unique(self.node_parameter[is_translation(self.node_kind)])
 
     @property
+    def root_position(self) -> IntArray:
+        """(3,) indices of the parameters that are the root's position x, y, z, m, world frame."""
+        return np.array([self.index(f"pelvis_t{axis}") for axis in "xyz"])
+
+    @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints (all parameters but the root's), in order."""
         return tuple(self.parameter_names[i] for i in self.joints)

@@ -55,7 +55,7 @@ def projected(x, y, z, to_camera, matrix, distortion):  # type: ignore[no-untype
     """
     t = to_camera
     depth = t[2, 0] * x + t[2, 1] * y + t[2, 2] * z + t[2, 3]
-    # Not for NaN either.
+    # NaN fails the comparison and is left out, too.
     if not depth > _NEAREST_M:
         return np.nan, np.nan
     a = (t[0, 0] * x + t[0, 1] * y + t[0, 2] * z + t[0, 3]) / depth

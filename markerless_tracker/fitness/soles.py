@@ -1,4 +1,4 @@
-"""How the feet of a body stand on the floor: the height of its ankles, and what its soles count."""
+"""How the feet of a body stand on the floor: height of its ankles, and weight of its soles."""
 
 from typing import NamedTuple
 

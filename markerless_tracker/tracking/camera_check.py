@@ -1,8 +1,9 @@
 """Detects a camera that disagrees with the others: its silhouettes are shifted from the body.
 
-At intervals the pose is refined without one camera. Then the shift of that camera's image is
-estimated with which the body's outline fits its silhouette. A shift that persists over a run is due
-neither to motion nor to segmentation: the calibration of the camera is wrong.
+At intervals, for each camera in turn, the pose is refined on the other cameras' silhouettes. Then
+the image shift is estimated that fits the body's outline best to this camera's silhouette. A shift
+that persists over a run is due neither to motion nor to segmentation: the calibration of the camera
+is wrong.
 """
 
 from collections.abc import Mapping
@@ -33,7 +34,7 @@ _FIRST_NS = 300_000_000
 _LEAST_CHECKS = 3
 _ITERATIONS, _TRUNCATION_M = 4, (0.10, 0.035)
 """Refinement without a camera: its iterations, and the first and last truncation."""
-_SHIFTS, _WIDE_M = 3, 0.10
+_SHIFT_STEPS, _SHIFT_TRUNCATION_M = 3, 0.10
 """Estimate of a shift: its steps and their truncation."""
 
 
@@ -115,7 +116,7 @@ class CameraCheck:
         return out
 
     def _suspect(self) -> None:
-        """Exclude the camera that disagrees most from the checks of the others."""
+        """Exclude the camera that disagrees most from the others' checks, which begin anew."""
         worst = max(self.shifts().items(), key=lambda item: item[1].length_m, default=None)
         if worst is None or worst[0] in self._suspects or not worst[1].disagrees:
             return
@@ -182,9 +183,9 @@ def _shift(
     # The silhouette is fixed; the principal point is moved.
     centre = views.arrays.intrinsics[0, [2, 4]]
     shift = np.zeros(2)
-    for _ in range(_SHIFTS):
+    for _ in range(_SHIFT_STEPS):
         views.arrays.intrinsics[0, [2, 4]] = centre + shift
-        contours.collect(pose, _WIDE_M)
+        contours.collect(pose, _SHIFT_TRUNCATION_M)
         rows = slice(int(contours.residuals.count[0]))
         value, weight = contours.residuals.value[0, rows], contours.residuals.weight[0, rows]
         slopes = contours.residuals.gradient[0, rows] @ to_camera[:2, :3].T * (depth / focal)

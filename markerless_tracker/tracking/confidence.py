@@ -2,8 +2,9 @@
 
 The inverse normal equations of the contour refinement, scaled by the variance of this frame's
 residuals, are the Gauss-Newton approximation of the posterior covariance. It accounts for noise
-only. Two errors are added: the disagreement between the views, and what images do not show, which
-is the joint's centre inside the limb and, if the lengths were not measured, the lengths.
+only. Two errors are added to it. One is the disagreement between the views. The other is what
+images do not show: where the joint's centre lies inside the limb, and the lengths, if they were not
+measured.
 
 A limb at a wrong optimum has a well-determined pose, so its covariance does not show the error. Its
 residuals do: they are larger than those of a limb that fits. An error proportional to their excess
@@ -34,7 +35,7 @@ MEASURED_M = 0.0025
 """Error, per axis, of a joint's centre in a body whose lengths were measured."""
 UNMEASURED_M = 0.013
 """The same with lengths that were fitted, or derived from a stature."""
-DISAGREEMENT = 2.0
+DISAGREEMENT_FACTOR = 2.0
 """Error of a pose relative to the disagreement of the views that remains after the fit."""
 CORRELATED = 9.0
 """Factor of the residuals' correlation length. The error of a generic section extends along a whole
@@ -42,11 +43,11 @@ limb, about half a metre, which is longer than the pieces of outline that the re
 independent."""
 FITTING_M = 0.007
 """Root mean square of the residuals of a limb or trunk that fits, with generic sections."""
-LIMB_ERROR = 15.0
+LIMB_ERROR_FACTOR = 15.0
 """Error of a limb's end relative to the excess of its residuals over those of a limb that fits."""
 MOST_LIMB_M = 0.30
 """Largest error that is inferred from the excess: about the length of a segment."""
-TRUNK_ERROR = 2.0
+TRUNK_ERROR_FACTOR = 2.0
 """Error of all markers relative to the excess of the trunk's residuals."""
 _LEVER_M = 0.25
 """Length of a limb, which converts an error of a joint's centre into an error of its angle."""
@@ -86,21 +87,21 @@ def confidence_of(
         return None
     unseen = MEASURED_M if measured else UNMEASURED_M
     by_limb, of_trunk = excesses_m(body, rows)
-    between = DISAGREEMENT * disagreement_m(contours, rows)
-    floor = float(np.linalg.norm([unseen, between, TRUNK_ERROR * of_trunk]))
+    between = DISAGREEMENT_FACTOR * disagreement_m(contours, rows)
+    common_sd = float(np.linalg.norm([unseen, between, TRUNK_ERROR_FACTOR * of_trunk]))
     by_marker, by_root = slopes(body, pose)
     of_markers = np.einsum("ij,jk,ik->i", by_marker, covariance, by_marker)
-    limbs_m = {name: min(LIMB_ERROR * value, MOST_LIMB_M) for name, value in by_limb.items()}
+    limbs_m = {name: min(LIMB_ERROR_FACTOR * value, MOST_LIMB_M) for name, value in by_limb.items()}
     of_limbs, of_pose = _spread(body, by_marker, limbs_m)
     of_root = by_root @ covariance @ by_root.T
-    of_root[np.diag_indices(6)] += np.repeat([floor**2, (floor / _LEVER_M) ** 2], 3)
-    floors = np.full(body.size, floor / _LEVER_M)
-    floors[body.translations] = floor
-    of_model = np.diag(floors**2 + of_pose)
+    of_root[np.diag_indices(6)] += np.repeat([common_sd**2, (common_sd / _LEVER_M) ** 2], 3)
+    common_sds = np.full(body.size, common_sd / _LEVER_M)
+    common_sds[body.translations] = common_sd
+    of_model = np.diag(common_sds**2 + of_pose)
     return Confidence(
-        pose_sd=np.sqrt(np.diag(covariance) + floors**2 + of_pose),
+        pose_sd=np.sqrt(np.diag(covariance) + common_sds**2 + of_pose),
         pose_covariance=covariance + of_model,
-        markers_sd_m=np.sqrt((of_markers + floor**2).reshape(-1, 3) + of_limbs[:, None]),
+        markers_sd_m=np.sqrt((of_markers + common_sd**2).reshape(-1, 3) + of_limbs[:, None]),
         root_covariance=0.5 * (of_root + of_root.T),
     )
 

@@ -48,7 +48,11 @@ class RefineSettings(SettingsGroup):
         most=10.0,
     )
     truncation_end_m: float = setting(
-        0.035, "the same, in the last iteration", least=0.001, most=10.0
+        0.035,
+        "outline points farther than this from a silhouette's contour are outliers, in the last "
+        "iteration",
+        least=0.001,
+        most=10.0,
     )
     sigma_m: float = setting(
         0.01, "standard deviation of a silhouette's contour, for refinement", least=1e-4, most=1.0

@@ -25,7 +25,7 @@ class MotionModel:
         start: (p,) as given.
         pose: (p,) of the last frame.
         velocity_per_ns: (p,) change per nanosecond.
-        stamp_ns: time of the last frame; None before the first.
+        stamp_ns: time of the last frame with a pose; None before the first.
     """
 
     def __init__(self, start: FloatArray, config: TrackerConfig) -> None:
@@ -115,7 +115,7 @@ class MotionModel:
         self.pose = np.clip(self.pose + change, *limits)
 
     def since_s(self, stamp_ns: int) -> float:
-        """Time since the last frame, s; 0 before the first, and if time does not advance."""
+        """Time since the last frame with a pose, s; 0 before it, and if time does not advance."""
         return self._elapsed_ns(stamp_ns) * 1e-9
 
     def _elapsed_ns(self, stamp_ns: int) -> int:

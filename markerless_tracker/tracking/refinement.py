@@ -24,7 +24,8 @@ value: a forearm held in the wrong plane would straighten the elbow."""
 HANGING_RAD = float(np.deg2rad(12.0))
 """Least flexion of an elbow that partly shows the arm's rotation; usual in hanging arms."""
 HEAD_ROTATION_SD_RAD = 0.04
-"""The same for the head's rotation, whose outline is nearly round."""
+"""Standard deviation, in the refinement, of the head's rotation about its own axis from the usual
+value: its outline is nearly round."""
 ELBOW_PRECISION = 9.0
 """Factor of the precision of an elbow's prior. In front of the trunk and behind it the outline
 shows little of a forearm, and the error of generic sections along a whole limb would determine
@@ -48,7 +49,8 @@ def pose_prior(body: BodyModel, weight: float = 1.0, at: FloatArray | None = Non
         weight: the factor.
         at: (p,) a pose near the solution. Limbs that are straight in it, and the head, are held
             near the usual rotation about their own axes; nearly straight arms near their rotation
-            in it. This is a convention, not knowledge: the reported deviations do not use it.
+            in it. Elbows count `ELBOW_PRECISION` times. This is a convention, not knowledge: the
+            reported deviations do not use it.
     """
     mean, precision = body.prior_mean, weight / body.prior_sd**2
     joints = swing_joints(body)

@@ -309,7 +309,7 @@ def _same_terms(one: Comparison, other: Comparison) -> bool:
 
 def root_m(body: BodyModel, pose: FloatArray) -> FloatArray:
     """Position (3,) of the root of a body at a pose (p,), m, world frame."""
-    return pose[[body.index(f"pelvis_t{axis}") for axis in "xyz"]]
+    return pose[body.root_position]
 
 
 def pixels_per_m(camera: CameraModel, point_m: FloatArray) -> float:

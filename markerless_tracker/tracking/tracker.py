@@ -40,7 +40,7 @@ class Tracker:
     """Tracks one person frame by frame, from a start pose or from an automatic start.
 
     Uses no clock, no ROS and no files: results depend on the arguments only. The same arguments
-    give the same bytes with any number of threads. Calls must come from one thread at a time.
+    give the same bytes with any number of threads. `prepare` alone may be called beside a step.
 
     Args:
         rig: the cameras; views are named after them.
@@ -85,14 +85,14 @@ class Tracker:
             body, config, shape_known=shape_known, start_markers=start_markers, person=person
         )
         check_pose(body, start, self._body.limits if self._given else None)
-        # Refuses a budget that cannot be spent before the first frame comes.
+        # Raises now, not at the first frame, if the budget cannot be spent.
         frame_stages(body, config, start, body.sigma)
         threads = config.threads or usable_cores()
         # One thread is reserved for the evidence of the next set.
-        beside = max(1, threads - 1)
-        mapper = ThreadPoolExecutor(min(beside, len(rig))).map if beside > 1 else map
+        own = max(1, threads - 1)
+        mapper = ThreadPoolExecutor(min(own, len(rig))).map if own > 1 else map
         searcher_for = partial(make_searcher, rig=rig, config=config, mapper=mapper)
-        self._searcher_for = partial(searcher_for, threads=beside)
+        self._searcher_for = partial(searcher_for, threads=own)
         self._starter_for = partial(searcher_for, threads=threads)
         self._searcher = self._searcher_for(body)
         self.evidence = EvidenceMaker(rig, config, backgrounds or {}, mapper)
@@ -171,7 +171,7 @@ class Tracker:
         """Region of each camera's image that `step` would use at a time; None = whole image.
 
         It follows from the pose of the set before the last one, so that it is known while the last
-        set is fitted. If the region cuts the person off, the whole image is used, too.
+        set is fitted. If the region cuts the person off, a wider one is used, or the whole image.
         """
         return self.evidence.regions(self._lookahead.current, stamp_ns)
 
@@ -216,7 +216,7 @@ class Tracker:
             views: camera name to its image, (h, w, 3) uint8 BGR or (h, w) grey, not rectified, or
                 to a ready-made observation; cameras may be missing. Or the result of `prepare`.
             stamp_ns: time of the images; the search widens with the time since the last step.
-            effort: fraction, 0 to 1, of the frames explained as usual that more searches may take.
+            effort: fraction, 0 to 1, of the frames explained as usual that are searched further.
 
         Raises:
             ConfigError: the effort is not between 0 and 1.
@@ -319,8 +319,8 @@ class Tracker:
         recovered, limbs = Recovered(search.pose), self._assessor.limbs
         again = self.config.refinement != "none" and self.config.search_again
         if again and self._effort.for_limbs:
-            one, contours = self._effort.reduced, search.contours
-            recovered = limbs.recover(self._searcher, contours, seen, search.pose, one=one)
+            single, contours = self._effort.reduced, search.contours
+            recovered = limbs.recover(self._searcher, contours, seen, search.pose, single=single)
         notes = seen.notes + self._body.take_warnings() + recovered.notes + seen.left_out
         jumped = recovered.jumped(self.body)
         corrected = self._motion.reachable(stamp_ns, limits, np.full_like(speeds, LIMB_RAD_S))

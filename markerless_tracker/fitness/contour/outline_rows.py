@@ -25,7 +25,7 @@ class OutlineRows:
     Attributes:
         view: (n,) index of the residual's view, ascending; -1 for the floor.
         cone: (n,) index of the cone of the residual's outline point.
-        place: (n, 5) the point on the cone, as in `Samples.shape`.
+        place: (n, 5) the point on the cone, as in `Samples.place`.
         gradient: (n, 3) of the residual with respect to that point, world frame.
         value: (n,) residual, m.
         weight: (n,) represented length of outline, m, times the robust weight.
@@ -47,7 +47,7 @@ def outline_rows(frame: ContourFrame) -> OutlineRows:
     return OutlineRows(
         view=np.repeat(np.arange(len(r.count)), r.count),
         cone=np.concatenate([samples.cone[v, s] for v, s in enumerate(sample)]),
-        place=np.concatenate([samples.shape[v, s] for v, s in enumerate(sample)]),
+        place=np.concatenate([samples.place[v, s] for v, s in enumerate(sample)]),
         gradient=np.concatenate([r.gradient[v, rows] for v, rows in enumerate(used)]),
         value=np.concatenate([r.value[v, rows] for v, rows in enumerate(used)]),
         weight=np.concatenate([r.weight[v, rows] for v, rows in enumerate(used)]),

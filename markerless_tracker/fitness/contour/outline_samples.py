@@ -36,7 +36,7 @@ class Samples(NamedTuple):
         depth: (v, s) its depth, m.
         length: (v, s) represented length of outline, m.
         cone: (v, s) index of the cone.
-        shape: (v, s, 5) cos and sin on end 0, cos and sin on end 1, fraction t of end 1: the point
+        place: (v, s, 5) cos and sin on end 0, cos and sin on end 1, fraction t of end 1: the point
             is (1 - t) (centre_0 + cos a_0 + sin b_0) + t (centre_1 + cos a_1 + sin b_1).
         count: (v,).
     """
@@ -47,7 +47,7 @@ class Samples(NamedTuple):
     depth: FloatArray
     length: FloatArray
     cone: NDArray[np.int64]
-    shape: FloatArray
+    place: FloatArray
     count: NDArray[np.int64]  # type: ignore[assignment]
 
 
@@ -84,7 +84,7 @@ def _shows(pu, pv, nu, nv, step_px, width, height, bits):  # type: ignore[no-unt
 @kernel
 def _sample_arc(  # type: ignore[no-untyped-def]
     kept, c, e, sweep, spacing_px, step_px, k, distortion, distorted, width, height, arcs, flat,
-    ends, world, bits, pixel, normal, point, depth, length, cone, shape,
+    ends, world, bits, pixel, normal, point, depth, length, cone, place,
 ):  # fmt: skip
     """Sample an end's arc into one view's arrays of `Samples`; returns their new number."""
     at = 6 * e * LANES + c
@@ -125,9 +125,9 @@ def _sample_arc(  # type: ignore[no-untyped-def]
                 depth[kept] = z
                 length[kept] = norm * abs(step) * z / k[0]
                 cone[kept] = c
-                shape[kept, 0], shape[kept, 1] = cos, sin
-                shape[kept, 2], shape[kept, 3] = cos, sin
-                shape[kept, 4] = e
+                place[kept, 0], place[kept, 1] = cos, sin
+                place[kept, 2], place[kept, 3] = cos, sin
+                place[kept, 4] = e
                 kept += 1
         cos, sin = cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin
     return kept
@@ -136,7 +136,7 @@ def _sample_arc(  # type: ignore[no-untyped-def]
 @kernel
 def _sample_side(  # type: ignore[no-untyped-def]
     kept, c, side, spacing_px, step_px, k, distortion, distorted, width, height, arcs, ends, world,
-    bits, pixel, normal, point, depth, length, cone, shape,
+    bits, pixel, normal, point, depth, length, cone, place,
 ):  # fmt: skip
     """Sample a side, as `_sample_arc`."""
     # Side 0 goes from the end of end 0's arc to the start of end 1's arc, side 1 back.
@@ -175,8 +175,8 @@ def _sample_side(  # type: ignore[no-untyped-def]
             depth[kept] = z
             length[kept] = whole / n * z / k[0]
             cone[kept] = c
-            shape[kept, 0], shape[kept, 1], shape[kept, 2], shape[kept, 3] = c0, s0, c1, s1
-            shape[kept, 4] = t
+            place[kept, 0], place[kept, 1], place[kept, 2], place[kept, 3] = c0, s0, c1, s1
+            place[kept, 4] = t
             kept += 1
     return kept
 
@@ -197,7 +197,7 @@ def sample_outline(view, views, cones, spacing_px, step_px, scratch, outlines, s
             fill_outline(c, count, out, width, height, bits, used)
     pixel, normal, point = samples.pixel[view], samples.normal[view], samples.world[view]
     depth, length = samples.depth[view], samples.length[view]
-    cone, shape = samples.cone[view], samples.shape[view]
+    cone, place = samples.cone[view], samples.place[view]
     # A literal would make numba compile the functions once more.
     kept = np.int64(0)
     for c in range(cones):
@@ -209,13 +209,13 @@ def sample_outline(view, views, cones, spacing_px, step_px, scratch, outlines, s
                 kept = _sample_arc(
                     kept, c, e, sweep, spacing_px, step_px, k, distortion, distorted, width,
                     height, arcs, flat, ends, world, bits, pixel, normal, point, depth, length,
-                    cone, shape,
+                    cone, place,
                 )  # fmt: skip
         if forms[c] == TAPERED:
             for side in range(2):
                 kept = _sample_side(
                     kept, c, side, spacing_px, step_px, k, distortion, distorted, width, height,
-                    arcs, ends, world, bits, pixel, normal, point, depth, length, cone, shape,
+                    arcs, ends, world, bits, pixel, normal, point, depth, length, cone, place,
                 )  # fmt: skip
     samples.count[view] = kept
     wipe(words, height, bits, used)

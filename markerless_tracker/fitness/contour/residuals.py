@@ -1,8 +1,9 @@
 """Distances between the outlines of the model and of the silhouettes, in both directions.
 
-Residuals are the signed distances of the model's outline points from the silhouette's edge, and the
-distances of points of the edge from the nearest outline point of the model, in metres at the body's
-depth. Each has a gradient with respect to a point of a cone's surface (docs/normal-equations.md).
+Residuals are the signed distances of the model's outline points from the silhouette's edge, and for
+points of the edge their distances, along the edge's normal, from the nearest outline point of the
+model, in metres at the body's depth. Each has a gradient with respect to a point of a cone's
+surface (docs/normal-equations.md).
 """
 
 from typing import NamedTuple
@@ -73,8 +74,8 @@ def _world_gradient(r, t, k, d, point, s, du, dv, out, n):  # type: ignore[no-un
     px, py, pz = point[s, 0], point[s, 1], point[s, 2]
     x = r[0, 0] * px + r[0, 1] * py + r[0, 2] * pz + t[0]
     y = r[1, 0] * px + r[1, 1] * py + r[1, 2] * pz + t[1]
-    z = 1.0 / (r[2, 0] * px + r[2, 1] * py + r[2, 2] * pz + t[2])
-    a, b = x * z, y * z
+    inverse_depth = 1.0 / (r[2, 0] * px + r[2, 1] * py + r[2, 2] * pz + t[2])
+    a, b = x * inverse_depth, y * inverse_depth
     r2 = a * a + b * b
     radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]))
     rate = 2.0 * (d[0] + r2 * (2.0 * d[1] + 3.0 * r2 * d[4]))
@@ -84,8 +85,8 @@ def _world_gradient(r, t, k, d, point, s, du, dv, out, n):  # type: ignore[no-un
     # d(u, v)/d(a, b), then d(a, b)/d(camera point), then in the world's axes.
     ga = du * (k[0] * aa + k[1] * ab) + dv * k[3] * ab
     gb = du * (k[0] * ab + k[1] * bb) + dv * k[3] * bb
-    gx, gy = ga * z, gb * z
-    gz = -(ga * a + gb * b) * z
+    gx, gy = ga * inverse_depth, gb * inverse_depth
+    gz = -(ga * a + gb * b) * inverse_depth
     for i in range(3):
         out[n, i] = gx * r[0, i] + gy * r[1, i] + gz * r[2, i]
 
@@ -108,18 +109,18 @@ def collect_residuals(view, views, contours, truncation_m, samples, start, order
     width, height = contours.window[view, 2], contours.window[view, 3]
     n = np.int64(0)
     cost = 0.0
-    limit = truncation_m * truncation_m / 6.0
-    focal = 1.0 / k[0]
+    outlier_cost = truncation_m * truncation_m / 6.0
+    inverse_focal = 1.0 / k[0]
     least_depth = np.inf
     for s in range(count):
-        metres = depth[s] * focal
+        m_per_px = depth[s] * inverse_focal
         least_depth = min(least_depth, depth[s])
         length = lengths[s]
-        cost += length * limit
+        cost += length * outlier_cost
         inside, value, along_u, along_v = _distance_at(
             distance, distance_start, left, top, width, height, pixel[s, 0], pixel[s, 1]
         )
-        value *= metres
+        value *= m_per_px
         if not inside or abs(value) >= truncation_m:
             continue
         steep = np.sqrt(along_u * along_u + along_v * along_v)
@@ -127,40 +128,40 @@ def collect_residuals(view, views, contours, truncation_m, samples, start, order
         if steep < 0.3 or facing < 0.5 * steep:
             continue
         share = 1.0 - (value / truncation_m) ** 2
-        cost -= length * limit * share**3
+        cost -= length * outlier_cost * share**3
         values[n] = value
         weights[n] = length * share * share
         sample[n] = s
-        _world_gradient(r, t, k, d, world, s, metres * along_u, metres * along_v, gradient, n)
+        _world_gradient(r, t, k, d, world, s, m_per_px * along_u, m_per_px * along_v, gradient, n)
         n += 1
     # No point farther off than this radius lies within the truncation.
-    radius_px = truncation_m / (least_depth * focal)
+    radius_px = truncation_m / (least_depth * inverse_focal)
     bands = sort_into_bands(count, views.size[view, 1], pixel, start, order)
     points, normals, spacing = contours.points, contours.normals, contours.spacing
-    first_m = depth[0] * focal if count > 0 else 0.0
+    first_m = depth[0] * inverse_focal if count > 0 else 0.0
     for m in range(contours.point_start[view], contours.point_start[view + 1]):
         u, v = points[m, 0], points[m, 1]
         nu, nv = normals[m, 0], normals[m, 1]
         nearest = nearest_facing(
             u, v, nu, nv, radius_px * radius_px, bands, pixel, normal, start, order
         )
-        metres, gap = 0.0, np.inf
+        m_per_px, gap = 0.0, np.inf
         if nearest >= 0:
-            metres = depth[nearest] * focal
+            m_per_px = depth[nearest] * inverse_focal
             du, dv = pixel[nearest, 0] - u, pixel[nearest, 1] - v
-            gap = (du * du + dv * dv) * metres * metres
+            gap = (du * du + dv * dv) * m_per_px * m_per_px
         if gap >= truncation_m * truncation_m:
             # The length of an outlier is taken at the depth of the body's first point.
-            cost += spacing[m] * first_m * limit
+            cost += spacing[m] * first_m * outlier_cost
             continue
-        length = spacing[m] * metres
-        cost += length * limit
+        length = spacing[m] * m_per_px
+        cost += length * outlier_cost
         share = 1.0 - gap / (truncation_m * truncation_m)
-        cost -= length * limit * share**3
-        values[n] = (du * nu + dv * nv) * metres
+        cost -= length * outlier_cost * share**3
+        values[n] = (du * nu + dv * nv) * m_per_px
         weights[n] = length * share * share
         sample[n] = nearest
-        _world_gradient(r, t, k, d, world, nearest, metres * nu, metres * nv, gradient, n)
+        _world_gradient(r, t, k, d, world, nearest, m_per_px * nu, m_per_px * nv, gradient, n)
         n += 1
     residuals.count[view] = n
     residuals.cost[view] = cost

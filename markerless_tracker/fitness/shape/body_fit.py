@@ -109,8 +109,8 @@ class BodyFit:
     def pieces(self, truncation_m: float) -> Iterator[None]:
         """One damped Gauss-Newton step of lengths, sections and all poses, in pieces.
 
-        Each piece makes one frame's equations; the last also solves them. Frames that are added
-        meanwhile take part.
+        Each piece makes one frame's equations. They are solved when the iterator is resumed after
+        the last piece. Frames that are added meanwhile take part.
 
         The poses are eliminated first (Schur complement), since only the body couples them
         (docs/normal-equations.md). Equations that cannot be solved change nothing.

@@ -85,7 +85,7 @@ class Learning:
                 return
 
     def saw(self, state: TrackState) -> None:
-        """Take the tracker's state after the last set; refuses if a person is tracked."""
+        """Take the tracker's state after a set; refuses if a person is tracked."""
         if state is TrackState.TRACKING:
             self.refuse("a person is tracked; the scene must be empty")
 

@@ -312,7 +312,7 @@ class TrackerNode(GivenNode):
             offsets_ns=self._sets.offsets_ns() if set_age_s is None or set_age_s > QUIET_S else {},
             tolerance_s=self._settings.sync_tolerance,
             repeating=self._repeated[0] > 0 and now_s - self._repeated[1] < QUIET_S,
-            last_error=self._status.set_error(),
+            last_error=self._status.last_set_error(),
             clock_missing=simulated
             and now_s - self._started_s > QUIET_S
             and self.get_clock().now().nanoseconds == 0,

@@ -94,7 +94,7 @@ class RunReport:
         if abs(stamp_ns - self._looked_ns) < LOOK_NS:
             return
         self._looked_ns = stamp_ns
-        # Why nobody may have been found is said at the end: it takes the hull of the silhouettes.
+        # Why nobody was found is said at the end only: it needs the visual hull.
         if self._record is not None and self._record.tracked:
             verdict = self._verdict(())
             self._doubts = () if verdict is None else verdict.doubts

@@ -53,7 +53,7 @@ class TrackerStatus:
         self._finished_s: deque[float] = deque(maxlen=WINDOW)
         self._result: TrackResult | None = None
         self._last_error = ""
-        self._set_error = ""
+        self._last_set_error = ""
         self._dealt_ns: int | None = None
         self._first_arrived_s: float | None = None
         self._first_pose_s: float | None = None
@@ -105,7 +105,7 @@ class TrackerStatus:
         with self._lock:
             self._tracked += 1
             self._result = result
-            self._set_error = ""
+            self._last_set_error = ""
             self._latencies_s.append(finished_s - arrived_s)
             self._finished_s.append(finished_s)
             if self._first_arrived_s is None:
@@ -138,16 +138,16 @@ class TrackerStatus:
         with self._lock:
             self._last_error = message
 
-    def set_failed(self, message: str) -> None:
+    def record_failed_set(self, message: str) -> None:
         """Record a set that could not be tracked."""
         with self._lock:
             self._dropped["error"] += 1
-            self._last_error = self._set_error = message
+            self._last_error = self._last_set_error = message
 
-    def set_error(self) -> str:
+    def last_set_error(self) -> str:
         """Reason why the last set could not be tracked; empty if it was tracked."""
         with self._lock:
-            return self._set_error
+            return self._last_set_error
 
     def finished_s(self) -> float | None:
         """Time of the last result; None before the first."""

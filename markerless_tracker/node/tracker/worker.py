@@ -164,7 +164,10 @@ class TrackWorker:
             self._request.open(learning)
 
     def stop(self, timeout_s: float) -> bool:
-        """End after the present set, or at once while compiling; returns whether it has ended."""
+        """End after the present set; returns whether it has ended.
+
+        Compilation cannot be interrupted, so while compiling it returns soon, with False.
+        """
         self._stop.set()
         self._sets.wake()
         if self._thread.ident is not None:
@@ -282,7 +285,7 @@ class TrackWorker:
             # The next set may be usable.
             if learning is not None:
                 learning.refuse(one_line(error))
-            self._status.set_failed(one_line(error))
+            self._status.record_failed_set(one_line(error))
             self._trouble(matched.stamp_ns, error)
             return None
         self._keep_for(result, handle.kept)

@@ -74,7 +74,7 @@ class StaticSilhouette:
         self._comparisons += 1
         seen = [self._cameras[name] for name in result.observations]
         covered = body_masks(body, result.pose, seen)
-        at = result.pose[[body.index(f"pelvis_t{axis}") for axis in "xyz"]]
+        at = result.pose[body.root_position]
         for camera in seen:
             self._compare(camera, result.observations[camera.name], covered[camera.name])
             view = self._views[camera.name]

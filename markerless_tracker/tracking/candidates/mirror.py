@@ -53,7 +53,7 @@ class OppositeHeading:
 
     def __init__(self, body: BodyModel) -> None:
         self._body = body
-        root = [body.index("pelvis_rz"), *(body.index(f"pelvis_t{axis}") for axis in "xyz")]
+        root = [body.index("pelvis_rz"), *body.root_position]
         alone = [
             (i, i)
             for i, name in enumerate(body.parameter_names)
@@ -77,7 +77,7 @@ def rotated_by(
     out = pose.copy()
     out[body.index("pelvis_rz")] += angle_rad
     moved_m = markers(body, out) - markers(body, about)
-    out[[body.index(f"pelvis_t{axis}") for axis in "xyz"]] -= moved_m[TRUNK].mean(axis=0)
+    out[body.root_position] -= moved_m[TRUNK].mean(axis=0)
     return out
 
 

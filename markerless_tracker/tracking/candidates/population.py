@@ -288,7 +288,7 @@ class FramePopulation:
 def scaled_to(body: BodyModel, other: BodyModel, poses: FloatArray) -> FloatArray:
     """Poses (n, p) of one body for a body of another size; the markers' mean stays in place."""
     out = poses.copy()
-    at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
+    at = body.root_position
     out[:, at] += (markers_of_many(body, poses) - markers_of_many(other, poses)).mean(axis=1)
     return out
 

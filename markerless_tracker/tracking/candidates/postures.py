@@ -97,7 +97,7 @@ def _made(joints: _Joints) -> FloatArray:
 
 
 def joint_sd(body: BodyModel) -> FloatArray:
-    """(p,) standard deviation of people's joints about neutral, rad; 0 for the root."""
+    """(p,) standard deviations of the pose prior, rad; 0 for the root."""
     return np.where(np.isfinite(body.prior_sd), body.prior_sd, 0.0)
 
 
@@ -109,7 +109,8 @@ def first_guesses(
     Args:
         body: the body.
         limits: (2, p) of the poses.
-        hull: the body's trunk is placed at its trunk.
+        hull: the trunk is placed at the hull's trunk. Its height is that of the hull's trunk, or
+            puts the lower ankle at one of `ankle_heights_m`.
         rng: draws the variations.
     """
     known = postures(body)
@@ -125,7 +126,7 @@ def first_guesses(
         out[k] = np.concatenate([*[known] * places, varied])
         out[k, :, body.index("pelvis_rz")] += 2.0 * np.pi * k / HEADINGS
     np.clip(out, limits[0], limits[1], out=out)
-    at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
+    at = body.root_position
     flat = out.reshape(-1, body.size)
     middles = _trunk_middles(body, flat).reshape(HEADINGS, -1, 3)
     ankles = markers_of_many(body, flat)[:, _ANKLES, 2].min(axis=1).reshape(HEADINGS, -1)
@@ -151,7 +152,7 @@ def ankle_heights_m(hull: Hull) -> tuple[float, ...]:
 def put_at(body: BodyModel, hull: Hull, pose: FloatArray) -> FloatArray:
     """A pose (p,) with its trunk moved to the hull's trunk."""
     moved = pose.copy()
-    at = [body.index(f"pelvis_t{axis}") for axis in "xyz"]
+    at = body.root_position
     moved[at] += hull.trunk_m.mean(axis=0) - _trunk_middles(body, pose[None])[0]
     return moved
 

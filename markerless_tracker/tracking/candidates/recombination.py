@@ -14,9 +14,9 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.mirror import Mirror, mirror_of
 from markerless_tracker.tracking.candidates.postures import joint_sd, postures
 
-_ONE_LIMB, _KNOWN = 0.35, 0.3
-"""Fractions of two kinds of children: one limb drawn at random; and one limb, or both arms or legs,
-taken from a known posture or mirrored. The others mix limbs."""
+_ONE_PART, _KNOWN = 0.35, 0.3
+"""Fractions of two kinds of children: one part (a limb, or torso and head) drawn at random; and one
+part, or both arms or legs, taken from a known posture or mirrored. The others mix parts."""
 _MIRRORED = 0.25
 """Fraction of the second kind that are mirrored."""
 _NOISE = 0.3
@@ -51,12 +51,13 @@ class Recombiner:
         self.body = body
         self._limits = limits
         self._sd = joint_sd(body)
-        self._limbs = [body.subspaces[step[0]] for step in body.steps("six")[1:]]
+        # Torso and head, and each limb.
+        self._parts = [body.subspaces[step[0]] for step in body.steps("six")[1:]]
         radius = np.where(self._sd < _FEW, _FEW, _FREE_RAD)
         self._low = np.maximum(limits[0], body.neutral - radius)
         self._high = np.minimum(limits[1], body.neutral + radius)
         pairs = [body.subspaces[name] for name in ("arms", "legs") if name in body.subspaces]
-        self._groups = [*self._limbs, *pairs]
+        self._groups = [*self._parts, *pairs]
         self._yaw = body.index("pelvis_rz")
         self._tilt = [body.index("pelvis_rx"), body.index("pelvis_ry")]
 
@@ -75,9 +76,9 @@ class Recombiner:
         for child in out:
             child[:] = parents[min(int(rng.geometric(_RANK)) - 1, len(parents) - 1)]
             kind = rng.random()
-            if kind < _ONE_LIMB:
-                self._draw(child, self._limbs[rng.integers(len(self._limbs))], rng)
-            elif kind < _ONE_LIMB + _KNOWN:
+            if kind < _ONE_PART:
+                self._draw(child, self._parts[rng.integers(len(self._parts))], rng)
+            elif kind < _ONE_PART + _KNOWN:
                 self._take_known(child, self._groups[rng.integers(len(self._groups))], rng)
             else:
                 self._mix(child, parents, rng)
@@ -95,7 +96,7 @@ class Recombiner:
     def with_prior_limb(
         self, pose: FloatArray, limb: IntArray, count: int, rng: np.random.Generator
     ) -> FloatArray:
-        """Poses (count, p): a pose with a limb drawn about its prior mean."""
+        """Poses (count, p): a pose with a limb drawn about neutral, with the prior's deviations."""
         poses = np.tile(pose, (count, 1))
         poses[:, limb] = self.body.neutral[limb]
         return self.with_limb_near(poses, limb, 1.0, rng)
@@ -119,7 +120,7 @@ class Recombiner:
         child[limbs] = known[limbs] + noise
 
     def _mix(self, child: FloatArray, parents: FloatArray, rng: np.random.Generator) -> None:
-        for limb in self._limbs:
+        for limb in self._parts:
             if rng.random() > _MIXED:
                 continue
             how = rng.integers(4)

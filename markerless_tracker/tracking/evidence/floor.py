@@ -89,7 +89,7 @@ def _look(  # type: ignore[no-untyped-def]
     for i in range(points.shape[0]):
         u, v = pixel(points[i, 0], points[i, 1], points[i, 2], to_camera, matrix, distortion)
         u, v = u - offset[0], v - offset[1]
-        # Not for NaN either.
+        # NaN fails the comparison and is left out, too.
         if not (u >= 0.0 and v >= 0.0 and u < width and v < height):
             continue
         column, row = np.int64(u), np.int64(v)

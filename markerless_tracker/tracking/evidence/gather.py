@@ -246,10 +246,11 @@ class EvidenceMaker:
         body: BodyModel,
         predicted: FloatArray,
     ) -> tuple[dict[str, Observation], tuple[str, ...]]:
-        """The result of `whole` and `select`, in less time while the body is tracked.
+        """As `select` of `whole`, but cut to a region around the body, which takes less time.
 
-        If a region cuts the person off, a wider region is segmented. If that cuts the person off,
-        too, the whole frame is segmented.
+        A component that is connected to the body outside of the region only is left out. If a
+        region cuts the person off, a wider region is segmented. If that cuts the person off, too,
+        the whole frame is segmented.
 
         Args:
             seen: returned by `segment`.

@@ -26,7 +26,7 @@ FINE_M = 0.03
 """Spacing of the grid around a person."""
 LEAST_VIEWS = 2
 """Cameras that must have a point in view for it to count."""
-LEAST_HEIGHT_M = 0.45
+LEAST_EXTENT_M = 0.45
 """A component with a smaller extent in every direction is no person."""
 LEAST_VOLUME_M3 = 0.015
 MOST_VOLUME_M3 = 1.5
@@ -61,16 +61,13 @@ class Hull:
 
     Attributes:
         points_m: (n, 3) points of a grid with spacing `FINE_M` that lie in it, world frame.
-        depth_m: (n,) distance of each point from the component's surface.
-        views: number of cameras that see it.
-        trunk_m: (m, 3) the thick part: points with at least half of the largest depth.
+        trunk_m: (m, 3) the thick part: points with at least half of the largest depth, among those
+            that two cameras see as person above `HIGH_M`.
         sure_m: (k, 3) points that are no shadow: high enough, or person in two views and not at the
             floor.
     """
 
     points_m: FloatArray
-    depth_m: FloatArray
-    views: int
     trunk_m: FloatArray
     sure_m: FloatArray
 
@@ -91,14 +88,13 @@ class Hull:
 
     @classmethod
     def without_shadows(
-        cls, points_m: FloatArray, depth_m: FloatArray, views: int, person: NDArray[np.bool_]
+        cls, points_m: FloatArray, depth_m: FloatArray, person: NDArray[np.bool_]
     ) -> "Hull":
         """The component without its points on the floor beside the person.
 
         Args:
             points_m: (n, 3) points of the component.
             depth_m: (n,) distance of each point from the component's surface.
-            views: number of cameras that see it.
             person: (n,) whether two cameras see a point as person.
         """
         high = (points_m[:, 2] > HIGH_M) & person
@@ -110,13 +106,15 @@ class Hull:
         low = (points_m[:, 2] < FLOOR_M) | ((points_m[:, 2] < HIGH_M) & ~person)
         kept = (~(aside & low) | thick) & ~_isolated_floor(points_m, ~(aside & low))
         sure = kept & (person | (points_m[:, 2] > HIGH_M)) & (points_m[:, 2] > SHIN_M)
-        return cls(points_m[kept], depth_m[kept], views, trunk, points_m[sure])
+        return cls(points_m[kept], trunk, points_m[sure])
 
 
 def find_hulls(
     cameras: Mapping[str, CameraModel], observations: Mapping[str, Observation]
 ) -> Iterator[Hull]:
     """Components of the visual hull that may be a person, the largest first.
+
+    A component's size is the sum, over its points, of the cameras that have the point in view.
 
     Args:
         cameras: cameras by name.
@@ -161,7 +159,7 @@ def _fine(
     near = ndimage.binary_dilation(
         np.pad(labels[box] == number, 1), structure=np.ones((3, 3, 3), dtype=np.bool_)
     )
-    inside, view_count, person = _occupied(first, size, FINE_M, views, near)
+    inside, _, person = _occupied(first, size, FINE_M, views, near)
     inside &= _dilated(np.asarray(person.any(axis=2)))[:, :, None]
     parts, count = ndimage.label(inside)
     if count == 0:
@@ -176,13 +174,11 @@ def _fine(
     depth = np.zeros(part.shape)
     depth[bounds] = ndimage.distance_transform_edt(np.pad(part[bounds], 1))[1:-1, 1:-1, 1:-1]
     points = first + FINE_M * (np.argwhere(part) + 0.5)
-    if float(np.ptp(points, axis=0).max()) < LEAST_HEIGHT_M:
+    if float(np.ptp(points, axis=0).max()) < LEAST_EXTENT_M:
         return None
     if float(person[part].mean()) < LEAST_PERSON:
         return None
-    return Hull.without_shadows(
-        points, FINE_M * depth[part], int(np.median(view_count[part])), person[part]
-    )
+    return Hull.without_shadows(points, FINE_M * depth[part], person[part])
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +227,8 @@ def _occupied(
 
     Returns:
         Per point: whether it belongs to the hull, how many views have it in their frame, and
-        whether at least two views see it as person.
+        whether at least two views see it as person. The last two are valid inside the hull only,
+        since a point is not looked at again once a view shows background there.
     """
     axes = [low[i] + spacing * (np.arange(size[i]) + 0.5) for i in range(3)]
     if cells is None:

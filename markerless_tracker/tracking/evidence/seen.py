@@ -13,7 +13,8 @@ class Seen:
     Attributes:
         stamp_ns: its time.
         observed: the observations of all cameras.
-        used: those of the usable cameras; undecided pixels near the predicted body are decided.
+        used: those of the usable cameras; undecided pixels near the predicted body are decided,
+            unless the body is lost or an automatic start searches it.
         imaged: those of the usable cameras, with the undecided pixels that imaging left.
         notes: a line for each camera that is left out from now on, or used again.
         left_out: a line for each camera with silhouette parts that are left out.

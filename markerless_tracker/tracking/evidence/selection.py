@@ -14,6 +14,8 @@ from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation
 
 _POINTS_PER_CONE = 6
+_THICKEST_PX = 32767
+"""OpenCV draws no thicker lines."""
 _FAR_PX = 1e4
 """A line with a point farther than this from the region's corner is not drawn."""
 HAND_M = 0.07
@@ -39,14 +41,14 @@ class BodyLines(NamedTuple):
         pixels: (c, n, 2) px, NaN behind the camera.
         depths_m: (c,) least depth of each line.
         radii_px: (c,) largest radius of each cone, at that depth.
-        px_m: the camera's focal length, px: size of a metre at a metre's distance.
+        focal_px: the camera's focal length.
         size_px: (width, height) of the frame.
     """
 
     pixels: FloatArray
     depths_m: FloatArray
     radii_px: FloatArray
-    px_m: float
+    focal_px: float
     size_px: tuple[int, int]
 
 
@@ -113,7 +115,7 @@ def explained_in_region(
     if not mask.any():
         return None
     if _leaves_region(mask, observation, clear_px):
-        hand_px = lines.px_m * HAND_M / float(np.median(lines.depths_m))
+        hand_px = lines.focal_px * HAND_M / float(np.median(lines.depths_m))
         if _leaves_region(_larger(mask, hand_px**2), observation, clear_px):
             return None
     return part, left_out
@@ -162,7 +164,7 @@ def body_region(lines: BodyLines, margin_m: float, least_px: int) -> Region | No
     radii_px = lines.radii_px[:, None]
     low = (pixels.min(axis=1) - radii_px).min(axis=0)
     high = (pixels.max(axis=1) + radii_px).max(axis=0)
-    margin = max(lines.px_m * margin_m / float(depths_m.min()), float(least_px))
+    margin = max(lines.focal_px * margin_m / float(depths_m.min()), float(least_px))
     left, top = np.floor(np.maximum(low - margin, 0.0))
     right, bottom = np.ceil(np.minimum(high + margin, np.asarray(lines.size_px, dtype=float)))
     if right <= left or bottom <= top:
@@ -206,7 +208,7 @@ def _meet(pixels, offset, labels, kept):  # type: ignore[no-untyped-def]
         drawn = True
         for n in range(pixels.shape[1]):
             u, v = pixels[c, n, 0] - offset[0], pixels[c, n, 1] - offset[1]
-            # Not for NaN either.
+            # NaN fails the comparison and is left out, too.
             drawn = drawn and abs(u) <= _FAR_PX and abs(v) <= _FAR_PX
         if not drawn:
             continue
@@ -234,7 +236,7 @@ def _thick_body(observation: Observation, lines: BodyLines, margin_px: int) -> N
     out = np.zeros((observation.height, observation.width), dtype=np.uint8)
     which, points = _drawn(observation, lines)
     for line, radius_px in zip(points, lines.radii_px[which], strict=True):
-        thickness = max(1, min(2 * (round(float(radius_px)) + margin_px), 255))
+        thickness = max(1, min(2 * (round(float(radius_px)) + margin_px), _THICKEST_PX))
         cv2.polylines(out, [line.reshape(-1, 1, 2)], False, 1, thickness)
     return out.view(np.bool_)
 
@@ -244,6 +246,6 @@ def _drawn(
 ) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
     """Which lines (c,) can be drawn, and their points (k, n, 2) in whole pixels of the region."""
     pixels = lines.pixels - observation.offset_px
-    # Not for NaN either.
+    # NaN fails the comparison and is left out, too.
     which = np.asarray((np.abs(pixels) <= _FAR_PX).all(axis=(1, 2)))
     return which, np.round(pixels[which]).astype(np.int32)

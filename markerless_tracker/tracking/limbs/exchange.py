@@ -24,7 +24,7 @@ within half a step."""
 LEAST_M = 0.1
 """An exchange that moves no marker farther than this is not tried."""
 LEAST_GAIN = 0.004
-"""Least rise of f_s for an exchange. While the legs pass each other, both poses fit alike."""
+"""Least gain of an exchange. While the legs pass each other, both poses fit alike."""
 CLOSE = 0.018
 """Argument of `LimbSearch.compared`. Exchanging limbs that are right costs more than this."""
 
@@ -35,7 +35,7 @@ class Exchange(NamedTuple):
     Attributes:
         name: of the pair.
         pose: (p,) with the pair exchanged.
-        least_gain: least rise of f_s for which it is taken; 0 if it uncrosses the pair.
+        least_gain: least gain for which it is taken; 0 if it uncrosses the pair.
     """
 
     name: str

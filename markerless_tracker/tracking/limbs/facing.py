@@ -19,7 +19,7 @@ EVERY_NS, FIRST_EVERY_NS, DOUBTED_EVERY_NS = 600_000_000, 250_000_000, 80_000_00
 while some sum of gains is positive."""
 FIRST_NS = 2_000_000_000
 LEAST_GAIN = 0.02
-"""Least sum of the rises of f_s, over comparisons, for which another heading is taken."""
+"""Least sum of the gains, over comparisons, for which another heading is taken."""
 LEAST_COMPARISONS = 3
 """Least number of comparisons in this sum."""
 CLOSE = 0.03
@@ -46,7 +46,7 @@ _ROTATIONS: tuple[Callable[[BodyModel, FloatArray], FloatArray], ...] = (
 
 
 class FacingWatch:
-    """Sums the gains of f_s of three other headings: the opposite one, and a quarter to each side.
+    """Sums the gains of three other headings: the opposite one, and a quarter to each side.
 
     A comparison in which a heading fits worse lowers its sum, so that a few frames do not decide.
     Each comparison tests one heading, in rotation; the heading with the best mean is taken.

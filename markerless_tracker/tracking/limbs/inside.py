@@ -70,7 +70,7 @@ def _find(  # type: ignore[no-untyped-def]
 ):
     for i in range(points.shape[0]):
         u, v = projected(points[i, 0], points[i, 1], points[i, 2], to_camera, matrix, distortion)
-        # Not for NaN either.
+        # NaN fails the comparison and is left out, too.
         if not (u >= 0.0 and v >= 0.0 and u <= size[0] - 1.0 and v <= size[1] - 1.0):
             continue
         framed[i] = True

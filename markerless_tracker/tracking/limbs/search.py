@@ -14,7 +14,7 @@ from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.search import LIMB_M
 
 DRAWS = 120
-"""First draws of a limb: half from the pose prior, half uniform."""
+"""First draws of a limb: half about the neutral posture, half uniform."""
 AIMED, AIMED_OF = 60, 1000
 """If silhouette is unexplained: further draws of the limb in its regions, the best of how many."""
 LAYERS = (0.4, 0.2)
@@ -24,7 +24,7 @@ HOPELESS = 0.03
 NEAR_M = 0.10
 """A drawn limb with every marker nearer than this to its place would return there when refined."""
 LEAST_GAIN = 0.003
-"""Least rise of f_s between two poses in their own evidence, which differs a little by chance."""
+"""Least gain between two poses in their own evidence, which differs a little by chance."""
 LEAST_M = 0.05
 """A limb with every marker nearer than this to its place was not found elsewhere."""
 CLOSE = 0.01
@@ -45,15 +45,17 @@ class LimbSearch:
 
     After a search of a limb the whole body is refined. The result is taken if it explains the frame
     better than the estimate, and better than the estimate after the same refinement: a gain of the
-    rest of the body is not due to the limb. Poses are compared by f_s less `prior_costs`; a rise of
-    f_s means that, also where other modules name one.
+    rest of the body is not due to the limb. Poses are compared by `costs_with_prior`; the gain of a
+    pose is how far its cost lies below the estimate's.
 
     Args:
         recombiner: draws limbs of the body.
         frame: the evidence, decided near the predicted body.
         own: the evidence for poses that decide it themselves.
         pose: (p,) the estimate.
-        least_gain: least rise of f_s for which another pose is taken.
+        least_gain: least gain for which a limb is taken, in evidence decided with the predicted
+            pose. If pixels were undecided, a limb with that gain must not cost more in its own
+            evidence either, and one without it must gain `LEAST_GAIN` there.
 
     Attributes:
         pose: (p,) the estimate so far.
@@ -94,7 +96,7 @@ class LimbSearch:
         return better
 
     def takes(self, other: FloatArray, least_gain: float, close: float) -> bool:
-        """Take another pose (p,) if f_s rises by `least_gain`; return whether it was taken.
+        """Take another pose (p,) if it gains `least_gain`; return whether it was taken.
 
         Other arguments as for `compared`.
         """
@@ -146,7 +148,9 @@ def other_limb(
     annealed particle filter. They are the best by f_s, and the best if the prior counts, too: where
     the limb explains few pixels, f_s tells little; where people have it seldom, the prior misleads.
     A contour refinement of the whole body refines the best pose of either kind, and the better one
-    is returned. If both limbs are near the former place, it is the given pose with `most_cost`.
+    is returned. If no draw comes within `HOPELESS` of `most_cost`, the given pose is returned with
+    the least cost of the draws, 1 - f_s; if the best draws of both kinds lie near the former place,
+    with `most_cost`.
 
     Args:
         frame: the evidence.

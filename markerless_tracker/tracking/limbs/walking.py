@@ -23,8 +23,8 @@ LEAST_SPEED_M_S = 0.3
 LEAST_ANGLE_RAD = 0.7
 """A heading nearer than this to the walking direction is kept, since that lags in a curve."""
 LEAST_GAIN = 0.004
-"""Least rise of f_s for which the body is rotated. People seldom walk backwards or sideways, so a
-rise beyond chance is enough."""
+"""Least gain for which the body is rotated. People seldom walk backwards or sideways, so a gain
+beyond chance is enough."""
 CLOSE = 0.03
 """Argument of `LimbSearch.compared`."""
 

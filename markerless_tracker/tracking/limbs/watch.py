@@ -1,7 +1,7 @@
 """Detects lost limbs, and schedules the searches for limbs and headings.
 
 A limb outside the silhouettes is detected. A wrong limb inside the silhouettes goes undetected, so
-all limbs are searched elsewhere in rotation, and exchanges of both legs or both arms are tried.
+all limbs are searched elsewhere in turn, and exchanges of both legs or both arms are tried.
 """
 
 from collections.abc import Mapping
@@ -33,18 +33,18 @@ from markerless_tracker.tracking.limbs.walking import WalkingWatch
 from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
 
-ROTATION_NS, LONGEST_NS = 100_000_000, 200_000_000
-"""Interval at which the next limb in rotation is searched: six frames at 60 frames/s; and longest
+TURN_NS, LONGEST_TURN_NS = 100_000_000, 200_000_000
+"""Interval at which the limbs are searched in turn: six frames at 60 frames/s; and longest
 interval, while frames have other searches."""
 DENSE_NS = 40_000_000
-"""Searches that can wait are spread over frames nearer in time than this: late sets are lost."""
-WAIT_NS = 16_000_000
-"""Half the time before a limb near unexplained silhouette is searched again, after one search
-without gain."""
+"""If frames follow each other faster than this, searches that can wait are put off to other frames,
+since sets that come too late are lost."""
+FIRST_WAIT_NS = 32_000_000
+"""Time before a limb near unexplained silhouette is searched again, after one search without gain.
+It doubles with each further search without gain, at most `_DOUBLINGS` times."""
 RECOVERED_M = 0.10
 """A limb that is found farther than this from its last place was wrong there."""
 _DOUBLINGS = 4
-"""That time doubles with each further search without gain, at most this often."""
 _GROWN = 2.0
 """Earlier searches do not count once the unexplained area has grown by this factor."""
 
@@ -57,7 +57,7 @@ class Recovered:
         pose: (p,) the estimate.
         names: of the limbs that were found elsewhere; `legs` or `arms` for an exchanged pair.
         rotated: whether another heading was found; no parameter continues its last value then.
-        moved_m: largest distance by which the searches moved a marker.
+        moved_m: largest distance by which the searches moved a marker; 0 if `rotated`.
     """
 
     pose: FloatArray
@@ -111,11 +111,13 @@ class _Wait:
         """Whether the limb may be searched again at a time, with that unexplained area."""
         since_ns = stamp_ns - self.searched_ns
         grown = area_m2 > _GROWN * self.area_m2
-        return grown or not 0 <= since_ns < WAIT_NS * 2**self.failures
+        return grown or not 0 <= since_ns < FIRST_WAIT_NS * 2 ** (self.failures - 1)
 
 
 class LimbWatch:
-    """Detects lost limbs, and searches for them; all other limbs are searched in rotation.
+    """Detects lost limbs and searches for them; other limbs are searched in turn.
+
+    It also schedules the exchanges of legs or arms and the comparisons of headings.
 
     Args:
         rig: the cameras.
@@ -132,7 +134,7 @@ class LimbWatch:
         self._calls = 0
         self._unexplained = 0
         self._last_ns: int | None = None
-        self._rotated_ns: int | None = None
+        self._turn_ns: int | None = None
         self._waits: dict[str, _Wait] = {}
         self._exchange = PairExchange()
         self._facing = FacingWatch()
@@ -175,20 +177,21 @@ class LimbWatch:
         seen: Seen,
         pose: FloatArray,
         *,
-        one: bool = False,
+        single: bool = False,
     ) -> Recovered:
-        """Search the limbs that `assess` found lost, and the next one in rotation.
+        """Run the searches that are due: other headings, exchanges of legs or arms, and limbs.
 
-        A limb is taken from elsewhere if f_s rises by at least `min_improvement`, like a swarm's
-        result. Each pose is compared in its own evidence.
+        Limbs that are due are the lost ones, those near unexplained silhouette, and one in turn. A
+        result is taken by the rules of `LimbSearch`; headings and exchanges have least gains of
+        their own (`facing`, `walking`, `exchange`).
 
         Args:
             searcher: of the frame.
             contours: the frame's contours.
             seen: the frame's evidence.
             pose: (p,) the estimate.
-            one: whether there is time for a single search: a comparison of whole poses and a search
-                of one limb alternate then.
+            single: whether there is time for a single search: a comparison of whole poses and a
+                search of one limb alternate then.
         """
         body, stamp_ns, observations = searcher.body, seen.stamp_ns, seen.used
         if not body.limbs:
@@ -200,7 +203,7 @@ class LimbWatch:
         self._calls += 1
         dense = self._last_ns is not None and 0 <= stamp_ns - self._last_ns < DENSE_NS
         self._last_ns = stamp_ns
-        if not one or self._calls % 2:
+        if not single or self._calls % 2:
             pair = self._exchange.due(body, pose, searcher.limits, stamp_ns)
             if not (dense and pair):
                 facing = self._facing.due(stamp_ns)
@@ -208,7 +211,7 @@ class LimbWatch:
                 walking = self._walking.due(body, pose, searcher.limits, stamp_ns)
         whole = facing or pair is not None or bool(walking)
         due = self._due(body, stamp_ns, unexplained.areas_m2, dense=dense, busy=whole)
-        if one and due:
+        if single and due:
             due = [] if whole else [due[self._calls // 2 % len(due)]]
         if not due and not whole:
             return Recovered(pose)
@@ -261,19 +264,19 @@ class LimbWatch:
         dense: bool,
         busy: bool,
     ) -> list[str]:
-        """Limbs to search: the lost ones, those near unexplained silhouette, one in rotation."""
+        """Limbs to search: the lost ones, those near unexplained silhouette, one in turn."""
         lost = self.lost
         due = [*lost, *(n for n in self._suspects(stamp_ns, areas_m2) if n not in lost)]
-        waits_ns = LONGEST_NS if dense and (busy or due) else ROTATION_NS
-        if self._rotated_ns is not None and 0 <= stamp_ns - self._rotated_ns < waits_ns:
+        waits_ns = LONGEST_TURN_NS if dense and (busy or due) else TURN_NS
+        if self._turn_ns is not None and 0 <= stamp_ns - self._turn_ns < waits_ns:
             return due
-        self._rotated_ns = stamp_ns
+        self._turn_ns = stamp_ns
         name = body.limbs[self._next % len(body.limbs)]
         self._next += 1
         return due if name in due else [*due, name]
 
     def _suspects(self, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
-        """The limb likeliest to lie in unexplained silhouette, and one of the others in rotation.
+        """The limb likeliest to lie in unexplained silhouette, and one of the others in turn.
 
         Limbs whose last search failed a short time ago are left out.
         """

@@ -281,7 +281,7 @@ class BodyEstimate:
         self.body, pose = shape_of_first_frame(
             self.generic, pose, self._start_markers, contours, self._config, self.limits
         )
-        # A body of other lengths has a generic prior of poses, not that of this person.
+        # A body made with other lengths has the pose prior of all people, not this person's.
         known = self.generic
         self.body = replace(self.body, prior_mean=known.prior_mean, prior_sd=known.prior_sd)
         # The generic sections with the lengths from the first frame.

@@ -4,7 +4,7 @@ The positions of shoulders, neck and top of the head relative to the trunk depen
 on the measuring system's definition of joint centres. At rest the angles of clavicles, thorax and
 head differ more between people, and between systems, than they change in motion. A measured start
 pose shows the resting posture and the posture of that moment together. Differences between left
-and right, and deviations larger than those among people, are attributed to the latter.
+and right, and deviations larger than those among people, are attributed to that moment.
 """
 
 from dataclasses import replace

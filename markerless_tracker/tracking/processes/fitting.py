@@ -180,7 +180,7 @@ class FittingProcess:
         return result
 
     def close(self) -> None:
-        """End the process; calls that wait for it return then."""
+        """End the process; a step that waits for it then raises a TrackerError."""
         self._closed = True
         self._child.close(_END_S)
         for stream in (self._sets, self._made):
@@ -209,6 +209,7 @@ class FittingProcess:
     def _call(self, method: str, *arguments: Any) -> None:
         if not self._ended:
             self._ask(Call(method, arguments))
+        # `configure` has changed the local tracker already.
         if self._ended and method != "configure":
             getattr(self._local, method)(*arguments)
 
@@ -225,14 +226,14 @@ class FittingProcess:
                 compiled_elsewhere(*answer)
                 answer = self._child.receive()
         except (EOFError, OSError, ValueError):
-            self._end()
+            self._fall_back()
             return None
         answer, self._cpu_s = answer
         if isinstance(answer, Exception):
             raise answer
         return answer
 
-    def _end(self) -> None:
+    def _fall_back(self) -> None:
         """Restart tracking in this process, unless the tracker was closed."""
         self._ended = True
         if self._closed:

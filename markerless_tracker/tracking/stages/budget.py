@@ -1,4 +1,8 @@
-"""Divides a budget of evaluations: particles scale with it, iterations do not change."""
+"""Divides a budget of evaluations: particles scale with it.
+
+If a refinement takes a part of the budget, the swarms have fewer particles (`scaled_particles`) or
+fewer iterations (`shared_out`).
+"""
 
 import math
 from collections.abc import Sequence

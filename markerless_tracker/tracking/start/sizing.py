@@ -124,7 +124,7 @@ class SizeSearch:
     def coarse(
         self, found: Sized, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> Sized:
-        """Try statures near the hull's height, then girths, then statures near the best.
+        """Try statures near the hull's height; then girths, and statures near the best, if set.
 
         Args:
             found: the population.

@@ -47,13 +47,13 @@ GAP_NS = 150_000_000
 _GAP_GENERATIONS = 2
 """Generations after such a gap."""
 _FITS = 0.85
-"""At this f_s or more, a generation that gains less than `_GAIN` is the last one."""
+"""If 1 - cost is at least this, a generation that gains less than `_GAIN` is the last one."""
 _GAIN = 0.002
 _DOUBTFUL = 0.12
 """If the first search's best pose costs more, it is repeated with a cost of unusual postures."""
 _SURE_FIT, _SURE_GAP = 0.91, 0.025
-"""There is no second search if the first frame has at least this f_s, and the opposite heading's is
-lower by at least this gap."""
+"""There is no second search if 1 - cost is at least this in the first frame, and that of the
+opposite heading is lower by at least this gap."""
 _TRUNK_MARKERS = [0, 1]
 
 Select = Callable[
@@ -168,7 +168,7 @@ class Starter:
         settled = self._headings.over
         pose = self._best(population).poses[0]
         if settled:
-            pose = self._settle(frame, pose)
+            self._settle(frame, pose)
         return StartEstimate(self._searcher, pose, observations, settled, notes)
 
     def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
@@ -286,7 +286,7 @@ class Starter:
         for body, cost in bodies:
             searcher = self._searcher_for(body)
             near = body.neutral.copy()
-            near[[body.index(f"pelvis_t{axis}") for axis in "xyz"]] = hull.trunk_m.mean(axis=0)
+            near[body.root_position] = hull.trunk_m.mean(axis=0)
             frame = FramePopulation(searcher, observations, stamp_ns, near, usual=self._usual)
             hints = None
             if self._last_pose is not None:
@@ -314,16 +314,15 @@ class Starter:
         facing = population.facing(self._headings.leading_rad)
         return facing if len(facing) else population
 
-    def _settle(self, frame: FramePopulation, pose: FloatArray) -> FloatArray:
+    def _settle(self, frame: FramePopulation, pose: FloatArray) -> None:
         assert self._searcher is not None
         if not self._fit_shape:
-            return pose
+            return
         fits = self._headings.leading_fits
         good = min((fit.cost for fit in fits), default=0.0) + _SHAPE_SLACK
         used = [(fit.contours, fit.pose) for fit in fits if fit.cost <= good][-_SHAPE_FRAMES:]
         body = fit_shape(self._searcher.body, used or [(frame.contours, pose)])
         self._searcher = self._searcher_for(body)
-        return pose
 
     def _trunk(self, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None

@@ -127,7 +127,7 @@ def test_the_place_on_the_cone_gives_the_world_point(posed) -> None:
     for v in range(len(posed.rig)):
         for s in range(0, samples.count[v], 3):
             c = samples.cone[v, s]
-            *turns, t = samples.shape[v, s]
+            *turns, t = samples.place[v, s]
             ends = []
             for e in range(2):
                 rx, ry, ox, oy = posed.body.cone_shape[c, e]
@@ -164,8 +164,8 @@ def test_samples_along_a_side_are_evenly_spaced_in_the_image(make_pose, make_sce
         n = samples.count[v]
         for c in range(len(made.body.cone_names)):
             (mine,) = np.nonzero(samples.cone[v, :n] == c)
-            for side in np.unique(samples.shape[v, mine, :4], axis=0):
-                on = mine[(samples.shape[v, mine, :4] == side).all(axis=1)]
+            for side in np.unique(samples.place[v, mine, :4], axis=0):
+                on = mine[(samples.place[v, mine, :4] == side).all(axis=1)]
                 if on.size < 4:
                     continue
                 gap = np.linalg.norm(np.diff(samples.pixel[v, on], axis=0), axis=1)
@@ -173,7 +173,7 @@ def test_samples_along_a_side_are_evenly_spaced_in_the_image(make_pose, make_sce
                 steps = gap / gap.min()
                 np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
                 compared += on.size
-                along = np.diff(samples.shape[v, on, 4]) / np.rint(steps)
+                along = np.diff(samples.place[v, on, 4]) / np.rint(steps)
                 uneven = max(uneven, np.ptp(along) / along.mean())
     assert compared > 500 and uneven > 0.02
 

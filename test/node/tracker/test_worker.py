@@ -178,7 +178,7 @@ def test_an_error_costs_its_set_and_is_reported(bench: Bench, error: Exception) 
     bench.offer(3)
     bench.until(lambda: bench.published)
     assert bench.reports == [f"stamp {stamp}: {one_line(error)}" for stamp in (1, 2)]
-    assert "\n" not in bench.reports[0] and bench.status.set_error() == ""
+    assert "\n" not in bench.reports[0] and bench.status.last_set_error() == ""
     assert bench.values()["last_error"] == one_line(error) and bench.worker.fatal is None
 
 

@@ -30,7 +30,7 @@ def body():
 
 def hull_from(low_m, trunk_m):
     points = np.array([[0.0, 0.0, low_m + 0.5 * FINE_M], [0.0, 0.0, 1.7]])
-    return Hull(points, np.full(2, FINE_M), 4, np.array([trunk_m]), points)
+    return Hull(points, np.array([trunk_m]), points)
 
 
 def guesses(body, hull):

@@ -113,7 +113,7 @@ def test_a_speck_at_a_side_of_the_region_is_no_limb_that_goes_on(
     camera, body, pose, person, larger, goes_on
 ) -> None:
     placed = lines(camera, body, pose)
-    side = round(larger * HAND_M * placed.px_m / float(np.median(placed.depths_m)))
+    side = round(larger * HAND_M * placed.focal_px / float(np.median(placed.depths_m)))
     columns = np.flatnonzero(person.any(axis=0))
     left = columns[0] - 8 - side
     window = np.s_[:, left : columns[-1] + 20]

@@ -12,9 +12,9 @@ from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import (
+    FIRST_WAIT_NS,
     RECOVERED_M,
-    ROTATION_NS,
-    WAIT_NS,
+    TURN_NS,
     LimbWatch,
     Recovered,
 )
@@ -42,9 +42,9 @@ def contours_of(searcher, seen, pose):
     return searcher.frame(seen, 0, pose).contours
 
 
-def recover(watch, searcher, contours, seen, stamp_ns, pose, *, one=False):
+def recover(watch, searcher, contours, seen, stamp_ns, pose, *, single=False):
     """What `recover` finds: the pose and the names."""
-    found = watch.recover(searcher, contours, Seen(stamp_ns, seen, seen, seen), pose, one=one)
+    found = watch.recover(searcher, contours, Seen(stamp_ns, seen, seen, seen), pose, single=single)
     return found.pose, found.names
 
 
@@ -106,7 +106,7 @@ def test_a_wrong_arm_inside_the_silhouettes_is_found_in_rotation(balancing) -> N
     states = watch.assess(body, hidden, seen, np.full(body.size, np.nan))
     assert states["l_arm"].state is TRACKING
     at, taken = hidden, []
-    for stamp_ns in range(0, 8 * ROTATION_NS, ROTATION_NS):
+    for stamp_ns in range(0, 8 * TURN_NS, TURN_NS):
         at, names = recover(watch, searcher, contours_of(searcher, seen, at), seen, stamp_ns, at)
         taken += names
     assert taken[0] == "l_arm"
@@ -117,7 +117,7 @@ def test_limbs_in_their_place_are_left_alone(balancing) -> None:
     scene, seen, pose, _ = balancing
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
-    for stamp_ns in range(0, 4 * ROTATION_NS, ROTATION_NS):
+    for stamp_ns in range(0, 4 * TURN_NS, TURN_NS):
         contours = contours_of(searcher, seen, pose)
         assert recover(watch, searcher, contours, seen, stamp_ns, pose) == (pose, ())
 
@@ -158,8 +158,8 @@ def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch)
         return [recover(watch, searcher, contours, seen, stamp, hidden)[1] for stamp in stamps]
 
     # The arm is the first in rotation, and no limb comes again so soon.
-    assert found([0, 1, ROTATION_NS - 1]) == [("l_arm",), (), ()]
-    assert found([0, ROTATION_NS], threads=2) == found([0, ROTATION_NS])
+    assert found([0, 1, TURN_NS - 1]) == [("l_arm",), (), ()]
+    assert found([0, TURN_NS], threads=2) == found([0, TURN_NS])
     assert scene.body.limbs[0] == "l_arm"
 
 
@@ -168,7 +168,7 @@ def test_a_limb_near_unexplained_silhouette_is_searched_in_every_frame(balancing
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, hidden)
-    for stamp_ns in (0, 1, ROTATION_NS - 1):
+    for stamp_ns in (0, 1, TURN_NS - 1):
         names = recover(watch, searcher, contours, seen, stamp_ns, hidden)[1]
         assert "l_arm" in names
 
@@ -185,7 +185,7 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
         ),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
-    monkeypatch.setattr("markerless_tracker.tracking.limbs.watch.WAIT_NS", 0)
+    monkeypatch.setattr("markerless_tracker.tracking.limbs.watch.FIRST_WAIT_NS", 0)
     searcher, watch, searched = searcher_of(scene), LimbWatch(scene.rig), []
     contours = contours_of(searcher, seen, pose)
     recover(watch, searcher, contours, seen, 0, pose)
@@ -216,14 +216,14 @@ def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_turns(
         f"{package}.watch.find_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})
     )
     monkeypatch.setattr(f"{package}.search.other_limb", elsewhere)
-    monkeypatch.setattr(f"{package}.watch.WAIT_NS", 0)
+    monkeypatch.setattr(f"{package}.watch.FIRST_WAIT_NS", 0)
     monkeypatch.setattr(f"{package}.facing.FacingWatch.compare", faces)
     monkeypatch.setattr(f"{package}.exchange.LEAST_M", 9.0)
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, pose)
     for number in range(24):
         before = len(done)
-        recover(watch, searcher, contours, seen, number * ROTATION_NS, pose, one=True)
+        recover(watch, searcher, contours, seen, number * TURN_NS, pose, single=True)
         assert len(done) == before + 1
     assert set(done) == {*limbs, "facing"}
 
@@ -234,17 +234,17 @@ def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monk
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})),
         ("search.other_limb", lambda _f, _r, at, limb, *_: searched.append(now) or (at, 9.0)),
-        ("watch.ROTATION_NS", 10**12),
-        ("watch.LONGEST_NS", 10**12),
+        ("watch.TURN_NS", 10**12),
+        ("watch.LONGEST_TURN_NS", 10**12),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, pose)
-    for now in range(0, 40 * WAIT_NS, WAIT_NS):
+    for now in range(0, 20 * FIRST_WAIT_NS, FIRST_WAIT_NS // 2):
         recover(watch, searcher, contours, seen, now, pose)
     # Once more at first: the next limb in rotation.
-    frames = sorted({at // WAIT_NS for at in searched})
-    assert frames == [0, 2, 6, 14, 30]
+    frames = sorted({at // FIRST_WAIT_NS for at in searched})
+    assert frames == [0, 1, 3, 7, 15]
 
 
 def test_a_limb_does_not_wait_where_more_silhouette_is_unexplained_than_before(
@@ -265,7 +265,7 @@ def test_a_limb_does_not_wait_where_more_silhouette_is_unexplained_than_before(
     arm = scene.body.subspaces["l_arm"].tobytes()
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, pose)
-    for now in range(0, 20 * ROTATION_NS, ROTATION_NS):
+    for now in range(0, 20 * TURN_NS, TURN_NS):
         recover(watch, searcher, contours, seen, now, pose)
     assert scene.body.limbs[0] == "l_arm"
     last = max(at for at, limb in searched if limb.tobytes() == arm)

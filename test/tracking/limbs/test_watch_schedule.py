@@ -7,7 +7,7 @@ from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
-from markerless_tracker.tracking.limbs.watch import LONGEST_NS, LimbWatch
+from markerless_tracker.tracking.limbs.watch import LONGEST_TURN_NS, LimbWatch
 from markerless_tracker.tracking.search import Searcher
 
 
@@ -23,7 +23,7 @@ def searches_of(monkeypatch, every_ns, count, areas_m2=None):
     now: list[str] = []
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained(dict(areas_m2 or {}), {})),
-        ("watch.WAIT_NS", 0),
+        ("watch.FIRST_WAIT_NS", 0),
         ("facing.FacingWatch.compare", lambda *_: now.append("facing")),
         ("exchange.LEAST_M", 0.0),
         ("search.LimbSearch.takes", lambda *_: now.append("exchange")),
@@ -62,5 +62,5 @@ def test_the_rotation_goes_on_while_every_dense_frame_is_searched(monkeypatch) -
     frames = searches_of(monkeypatch, 16_666_667, 61, {"r_leg": 0.01})
     # The leg near unexplained silhouette, and the limb in rotation; once that is the leg itself.
     both = [number for number, frame in enumerate(frames) if frame.count("limb") == 2]
-    every = LONGEST_NS // 16_666_667 + 1
+    every = LONGEST_TURN_NS // 16_666_667 + 1
     assert np.diff(both).tolist() == [every, every, 2 * every, every]

@@ -28,7 +28,7 @@ FRAMES = 60
 def block(middle, cells=(10, 10, 50)) -> Hull:
     points = FINE_M * (np.argwhere(np.ones(cells, dtype=np.bool_)) + 0.5)
     points = points - points.mean(axis=0) + middle
-    return Hull(points, np.full(len(points), FINE_M), 4, points, points)
+    return Hull(points, points, points)
 
 
 def searched(rejections, hull, frames, first=0, frame_ns=FRAME_NS):

@@ -23,7 +23,7 @@ from markerless_tracker.tracking.start.sizing import (
 
 def hull_of(height_m: float) -> Hull:
     points = np.array([[0.0, 0.0, 0.015], [0.0, 0.0, height_m + 0.015]])
-    return Hull(points, np.ones(2), 4, points, points)
+    return Hull(points, points, points)
 
 
 @pytest.mark.parametrize(

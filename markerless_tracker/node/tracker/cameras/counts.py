@@ -14,7 +14,7 @@ class SyncCounts:
     """Counts of sets and views.
 
     Attributes:
-        complete: sets with a view of every camera, in order of time.
+        complete: sets with a view of every camera that is not left out, in order of time.
         skipped: complete sets that were replaced by a newer set before they were taken.
         incomplete: sets dropped because a view never came.
         late: complete sets dropped because a newer set was complete before.
@@ -36,7 +36,7 @@ class CameraCounts:
 
     Attributes:
         received: usable views, including repeated stamps.
-        matched: views of complete sets.
+        matched: views of complete sets that were not late.
         late: views of sets that were complete after a newer set.
         dropped: views whose set never became complete, and repeated stamps.
         offset_ms: median difference of its stamps from the median stamp of their sets; None before

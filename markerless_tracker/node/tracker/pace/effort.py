@@ -46,9 +46,9 @@ class Lateness:
 class EffortRule:
     """The effort for the next set, in (0, 1].
 
-    It falls to `LEAST` when the worker is late, since longer times between the sets make each of
-    them costlier. It rises again while there is time to spare. In between it does not change, so
-    that it does not oscillate.
+    It falls to `LEAST` when `LATE_SETS` of the last `WINDOW` sets were late, since longer times
+    between the sets make each of them costlier. It rises again while there is time to spare. In
+    between it does not change, so that it does not oscillate.
     """
 
     def __init__(self) -> None:
