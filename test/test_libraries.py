@@ -16,7 +16,7 @@ PROGRAMS = {
 }
 
 PROCESSES = (
-    "from markerless_tracker.tracking.processes.fitting_main import main; main(0, 0, 0)",
+    "from markerless_tracker.tracking.processes.tracker_process_main import main; main(0, 0, 0)",
     "from markerless_tracker.tracking.evidence.segmenting_main import main; main(0)",
 )
 """The tracker's own processes."""

@@ -24,7 +24,7 @@ from markerless_tracker.tracking.refinement import pose_prior, refined_on_contou
 from markerless_tracker.tracking.swarms import SWARMS, SwarmSearch
 
 _NEAREST_M = 0.5
-LIMB_M = 0.12
+LIMB_TRUNCATION_M = 0.12
 """Truncation in the first step of the refinement of a limb that is searched elsewhere."""
 RADIUS_FACTOR = 1.3
 """Outlines of a tracked body are compared up to this multiple of the largest truncation, since
@@ -78,7 +78,7 @@ class Searcher:
         self.cameras: Mapping[str, CameraModel] = {camera.name: camera for camera in rig}
         self.feasible = Feasibility(body, limits, config.collision)
         self.fitness = make_fitness(body, rig, config, threads=threads)
-        self.tracked_radius_m = RADIUS_FACTOR * max(config.refine.truncation_m, LIMB_M)
+        self.tracked_radius_m = RADIUS_FACTOR * max(config.refine.truncation_m, LIMB_TRUNCATION_M)
         self.particle_sets: dict[str, ParticleSet] = {}
         """By stage, the particles of the last frame, if its algorithm continues from them."""
 
@@ -220,7 +220,7 @@ class FrameSearch:
         searcher, plan = self.searcher, stage.plan
         rng = keyed_generator(searcher.config.seed, self.stamp_ns, stage.name)
         if plan.algorithm not in SWARMS or is_replaced(plan.algorithm):
-            return self._filter(stage, rng), None
+            return self._uncompiled(stage, rng), None
         active, centre = stage.comparison.active, stage.comparison.centre
         search = SwarmSearch(
             centre=centre[active],
@@ -241,7 +241,7 @@ class FrameSearch:
         same = np.array_equal(pose[active], particles.found)
         return pose, cost if same and np.isfinite(cost) else None
 
-    def _filter(self, stage: Stage, rng: np.random.Generator) -> FloatArray:
+    def _uncompiled(self, stage: Stage, rng: np.random.Generator) -> FloatArray:
         """The pose (p,) found by an algorithm that is not compiled as a whole."""
         searcher, plan = self.searcher, stage.plan
         active, centre = stage.comparison.active, stage.comparison.centre

@@ -93,7 +93,7 @@ class Tracker:
         mapper = ThreadPoolExecutor(min(own, len(rig))).map if own > 1 else map
         searcher_for = partial(make_searcher, rig=rig, config=config, mapper=mapper)
         self._searcher_for = partial(searcher_for, threads=own)
-        self._starter_for = partial(searcher_for, threads=threads)
+        self._start_searcher_for = partial(searcher_for, threads=threads)
         self._searcher = self._searcher_for(body)
         self.evidence = EvidenceMaker(rig, config, backgrounds or {}, mapper)
         self._views = ViewWatch(rig)
@@ -135,7 +135,7 @@ class Tracker:
         for part in (self._motion, self._body, self._assessor, self._effort):
             part.configure(config)
         self._searcher_for = partial(self._searcher_for, config=config)
-        self._starter_for = partial(self._starter_for, config=config)
+        self._start_searcher_for = partial(self._start_searcher_for, config=config)
         self._searcher = self._searcher_for(self.body)
 
     def warm_up(self) -> None:
@@ -345,6 +345,6 @@ class Tracker:
 
     def _new_starter(self, last_pose: FloatArray | None = None) -> Starter:
         return Starter(
-            self.rig, self.body, self._starter_for, self.evidence.select,
+            self.rig, self.body, self._start_searcher_for, self.evidence.select,
             sized=self._body.sized, fit_shape=not self._body.sections_fitted, last_pose=last_pose,
         )  # fmt: skip

@@ -13,7 +13,7 @@ from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.records import TrackResult
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.config import live_settings
-from markerless_tracker.tracking.processes.fitting import FittingProcess
+from markerless_tracker.tracking.processes.tracker_process import TrackerProcess
 from markerless_tracker.tracking.stages.frame import frame_stages
 
 LIVE = live_settings()
@@ -31,7 +31,7 @@ class SettableTracker:
 
     def __init__(
         self,
-        tracker: Tracker | FittingProcess,
+        tracker: Tracker | TrackerProcess,
         changed: Callable[[int, TrackerConfig], None] = lambda *_: None,
     ) -> None:
         self._tracker = tracker
@@ -116,7 +116,7 @@ class LiveSettings:
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
 
-    def settable(self, tracker: Tracker | FittingProcess) -> SettableTracker:
+    def settable(self, tracker: Tracker | TrackerProcess) -> SettableTracker:
         """A tracker whose settings the parameters change from now on."""
         self._tracker = SettableTracker(tracker, self._changed)
         return self._tracker

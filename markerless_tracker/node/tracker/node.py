@@ -36,8 +36,8 @@ from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, TrackWorker
 from markerless_tracker.records import TrackState
 from markerless_tracker.tracking import Tracker
-from markerless_tracker.tracking.processes.fitting import FittingProcess
 from markerless_tracker.tracking.processes.images import set_bytes
+from markerless_tracker.tracking.processes.tracker_process import TrackerProcess
 
 STATE_PERIOD_S = 0.5
 
@@ -79,7 +79,7 @@ class TrackerNode(GivenNode):
         self._sets: Synchronizer[Any] = Synchronizer(
             self._source.names, tolerance_ns=round(self._settings.sync_tolerance * 1e9)
         )
-        self._tracker: Tracker | FittingProcess | None = None
+        self._tracker: Tracker | TrackerProcess | None = None
         self._end_process: Callable[[], None] = lambda: None
         self._time_offsets: TimeOffsetEstimate | None = None
         self._found = False
@@ -209,9 +209,9 @@ class TrackerNode(GivenNode):
         self._status.doing("reading the backgrounds and the start")
         scaled = rig.scaled(self._settings.scale)
         setup = build(self._settings, rig, scaled)
-        tracker: Tracker | FittingProcess = setup.tracker
+        tracker: Tracker | TrackerProcess = setup.tracker
         if (self._settings.config.threads or usable_cores()) > 1:
-            process = tracker = FittingProcess(setup, self._warn)
+            process = tracker = TrackerProcess(setup, self._warn)
             self._end_process = process.close
             self._status.add_cpu_of(lambda: process.cpu_s)
         self._pictures = Pictures(self, scaled)

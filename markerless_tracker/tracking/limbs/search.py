@@ -11,7 +11,7 @@ from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
 from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.candidates.prior_costs import prior_costs
 from markerless_tracker.tracking.candidates.recombination import Recombiner
-from markerless_tracker.tracking.search import LIMB_M
+from markerless_tracker.tracking.search import LIMB_TRUNCATION_M
 
 DRAWS = 120
 """First draws of a limb: half about the neutral posture, half uniform."""
@@ -32,7 +32,7 @@ CLOSE = 0.01
 _PARENTS, _CHILDREN = 3, 10
 """Draws that are varied in each layer: the best by f_s, and as many with the prior, too (many are
 the same); and variations of each."""
-_REFINE = (3, (LIMB_M, 0.035))
+_REFINE = (3, (LIMB_TRUNCATION_M, 0.035))
 """Iterations of the refinement of the best draw; truncation (m) in the first and the last one."""
 _REFINE_FAR = (8, (0.15, 0.035))
 """The same for a given pose, which may be far from the optimum."""

@@ -1,8 +1,9 @@
 """Main program of a tracker's process: sets of images in, results out, until its input ends.
 
-Started as ``python -m markerless_tracker.tracking.processes.fitting_main SETS MADE FD`` with three
-descriptors: SETS gives the sets to prepare, MADE takes the answers to these, FD is the shared
-memory. Standard input gives the parent's other requests; standard output takes only the answers.
+Started as ``python -m markerless_tracker.tracking.processes.tracker_process_main SETS MADE FD``
+with three descriptors: SETS gives the sets to prepare, MADE takes the answers to these, FD is the
+shared memory. Standard input gives the other requests of the parent; standard output takes only the
+answers.
 """
 
 import mmap
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from markerless_tracker.imaging import Image
     from markerless_tracker.records import Observation
     from markerless_tracker.tracking.processes.child import SharedMemory
-    from markerless_tracker.tracking.processes.fitting import SetOfViews, Step, Tracked
+    from markerless_tracker.tracking.processes.tracker_process import SetOfViews, Step, Tracked
     from markerless_tracker.tracking.tracker import Tracker
 
 
@@ -72,7 +73,7 @@ class Service:
             EOFError, BrokenPipeError: the parent has ended.
         """
         from markerless_tracker.compiled import compilation
-        from markerless_tracker.tracking.processes.fitting import Call, Compiled, Step
+        from markerless_tracker.tracking.processes.tracker_process import Call, Compiled, Step
         from markerless_tracker.tracking.processes.wire import receive, send
 
         def progress(name: str, done: int, most: int) -> None:
@@ -108,12 +109,12 @@ class Service:
         from markerless_tracker.tracking.processes.wire import receive, send
 
         while True:
-            of: SetOfViews = receive(sets)
+            asked: SetOfViews = receive(sets)
             error: Exception | None = None
             try:
-                prepared = self.tracker.prepare(self._views(of), of.stamp_ns)
+                prepared = self.tracker.prepare(self._views(asked), asked.stamp_ns)
                 with self._lock:
-                    self._prepared[of.number] = prepared
+                    self._prepared[asked.number] = prepared
             except Exception as raised:
                 error = _portable(raised)
             send(made, error)
@@ -126,26 +127,26 @@ class Service:
         return self._tracker
 
     def _step(self, step: "Step") -> "Tracked":
-        from markerless_tracker.tracking.processes.fitting import Tracked
+        from markerless_tracker.tracking.processes.tracker_process import Tracked
 
-        of = step.views
+        asked = step.views
         with self._lock:
-            prepared = self._prepared.pop(of.number, None)
+            prepared = self._prepared.pop(asked.number, None)
             # Sets that were prepared and then skipped.
-            for number in [n for n in self._prepared if n < of.number]:
+            for number in [n for n in self._prepared if n < asked.number]:
                 del self._prepared[number]
-        views = self._views(of) if prepared is None else prepared
-        result = self.tracker.step(views, of.stamp_ns, step.effort)
+        views = self._views(asked) if prepared is None else prepared
+        result = self.tracker.step(views, asked.stamp_ns, step.effort)
         body = self.tracker.body
         reported, self._reported = self._reported, body
         return Tracked(result, None if body is reported else body)
 
-    def _views(self, of: "SetOfViews") -> "dict[str, Image | Observation]":
+    def _views(self, asked: "SetOfViews") -> "dict[str, Image | Observation]":
         from markerless_tracker.tracking.processes.images import Place, get
 
         return {
             name: get(self._shared.memory, view) if isinstance(view, Place) else view
-            for name, view in of.views.items()
+            for name, view in asked.views.items()
         }
 
 

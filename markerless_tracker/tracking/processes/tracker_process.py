@@ -18,7 +18,7 @@ from markerless_tracker.tracking.processes.images import Place, put, set_bytes
 from markerless_tracker.tracking.processes.wire import receive, send
 from markerless_tracker.tracking.setup import TrackerSetup
 
-_MAIN = "markerless_tracker.tracking.processes.fitting_main"
+_MAIN = "markerless_tracker.tracking.processes.tracker_process_main"
 _END_S = 1.0
 """Time that the step in progress has to end; a compilation takes longer and is aborted."""
 _SETS = 3
@@ -77,7 +77,7 @@ class Handed:
     sent: SetOfViews
 
 
-class FittingProcess:
+class TrackerProcess:
     """A tracker in a process of its own, with the calls and the results, byte by byte, of
     `Tracker`.
 

@@ -16,7 +16,7 @@ from markerless_tracker.errors import CalibrationError, ConfigError, ImageError,
 from markerless_tracker.imaging import learn_background
 from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.tracking import Tracker, TrackerConfig, TrackerSetup
-from markerless_tracker.tracking.processes.fitting import FittingProcess
+from markerless_tracker.tracking.processes.tracker_process import TrackerProcess
 
 
 def said(result: TrackResult) -> tuple[object, ...]:
@@ -54,8 +54,8 @@ def reports() -> list[str]:
 
 
 @pytest.fixture
-def process(setup, reports) -> Iterator[FittingProcess]:
-    started = FittingProcess(setup, reports.append)
+def process(setup, reports) -> Iterator[TrackerProcess]:
+    started = TrackerProcess(setup, reports.append)
     started.warm_up()
     yield started
     started.close()
@@ -173,7 +173,7 @@ def test_a_closed_tracker_does_not_go_on_here(process, frames, reports) -> None:
 
 
 def test_closing_ends_it_and_what_it_started(setup) -> None:
-    process = FittingProcess(setup)
+    process = TrackerProcess(setup)
     pid = process.pid
     children = _children(pid)
     process.close()
