@@ -30,6 +30,7 @@ from markerless_tracker.cli.terminal.notices import Bars
 from markerless_tracker.datasets.uncalibrated import open_uncalibrated
 from markerless_tracker.datasets.writer import write_image
 from markerless_tracker.errors import ConfigError, DatasetError
+from markerless_tracker.results.appended import make_folder_of
 
 HELP = (
     "Calibrate cameras with a board: intrinsics, lenses and poses of all cameras from one "
@@ -101,6 +102,7 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"sets is {args.sets}, expected {LEAST_VIEWS} or more")
     if not 0.0 <= args.thickness <= 1.0:
         raise ConfigError(f"thickness is {args.thickness:g} m, expected 0 to 1")
+    make_folder_of(args.out)
     recording = open_uncalibrated(args.recording)
     board = board_of(args, recording.path)
     with Bars(console) as bars:
@@ -115,7 +117,6 @@ def run(args: argparse.Namespace) -> int:
             progress=bars.step,
             adjusting=lambda: bars.begin(f"calibrating {len(recording.rig)} cameras"),
         )
-    args.out.parent.mkdir(parents=True, exist_ok=True)
     write_calibration(args.out, found.rig)
     pictures = args.pictures or args.out.with_name(f"{args.out.stem}_pictures")
     _draw(found, board, pictures)

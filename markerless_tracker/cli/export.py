@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from markerless_tracker.cli.terminal.bars import progress_bars, warn
+from markerless_tracker.cli.track_arguments import result_name
 from markerless_tracker.datasets.markers.sets import MARKER_SETS, names_in
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.export.formats import EXPORTS, MORE_FILES
@@ -29,7 +30,9 @@ BAG = "bag"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("name", metavar="NAME", type=Path, help="NAME of NAME.trc and NAME.json")
+    parser.add_argument(
+        "name", metavar="NAME", type=result_name, help="NAME of NAME.trc and NAME.json"
+    )
     parser.add_argument(
         "--to",
         metavar="FORMAT",
@@ -39,7 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"one or more of {', '.join((*EXPORTS, BAG))}, separated by commas or blanks",
     )
     parser.add_argument(
-        "-o", dest="out", type=Path, metavar="OUT", help="write OUT.FORMAT (default: NAME.FORMAT)"
+        "-o",
+        dest="out",
+        type=result_name,
+        metavar="OUT",
+        help="write OUT.FORMAT (default: NAME.FORMAT)",
     )
     parser.add_argument(
         "--names",

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--topics",
         metavar="A,B,...",
-        help="topics to record (default: all but /rosout and /parameter_events)",
+        help="topics to record (default: all but debug/..., /rosout and /parameter_events)",
     )
     parser.add_argument("--seconds", type=float, metavar="S", help="end after S seconds")
     parser.add_argument(

@@ -9,6 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from markerless_tracker.cli.terminal.bars import progress_bars, warn
+from markerless_tracker.cli.track_arguments import result_name
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.datasets.markers.c3d import read_markers
 from markerless_tracker.datasets.markers.sets import MARKER_SETS, read_marker_map, renamed
@@ -39,7 +40,7 @@ PAPERS = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "names", metavar="NAME", type=Path, nargs="+", help="NAME of NAME.trc and NAME.json"
+        "names", metavar="NAME", type=result_name, nargs="+", help="NAME of NAME.trc and NAME.json"
     )
     parser.add_argument(
         "-o", dest="out", metavar="PAGE.html", type=Path, required=True, help="the page"

@@ -27,6 +27,7 @@ from markerless_tracker.datasets import Recording, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
 from markerless_tracker.datasets.silhouettes import SilhouetteRecording
 from markerless_tracker.errors import CalibrationError, ConfigError
+from markerless_tracker.results.appended import make_folder_of
 from markerless_tracker.results.result import ResultWriter, check_target
 from markerless_tracker.results.run import frames_to_track, track_recording
 from markerless_tracker.results.smooth import Smoothing, smooth_result
@@ -127,6 +128,8 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     """
     config = read_config(args.config, given_settings(args))
     check_target(args.name, overwrite=args.force, allow="--force")
+    if args.refine_calibration is not None:
+        make_folder_of(args.refine_calibration)
     smoothing = None
     if args.smooth is not None or args.fill_gaps is not None:
         smoothing = Smoothing(args.smooth, args.fill_gaps or 0.0)
@@ -246,31 +249,38 @@ def _track(
         overwrite=args.force,
         keep_lost=args.keep_lost,
     ) as writer:
-        for tracked in track_recording(recording, setup, fps=args.fps):
-            result, body = tracked.result, tracker.body
-            writer.add(result)
-            writer.body = body
-            check.add(result, body)
-            if choice is not None:
-                choice.add(result)
-            for kind in record.add(result, body, tracked.images.index):
-                notices.warn(f"frame {kind.first_frame}: {kind.text}")
-            if debug:
-                debug.write(tracked.images, result, tracker.rig, body, tracker.segmenter)
-            notices.pose(result.state, result.iou.values())
-            notices.step(record.frames)
+        interrupted: tuple[str, ...] = ()
+        try:
+            for tracked in track_recording(recording, setup, fps=args.fps):
+                result, body = tracked.result, tracker.body
+                writer.add(result)
+                writer.body = body
+                check.add(result, body)
+                if choice is not None:
+                    choice.add(result)
+                for kind in record.add(result, body, tracked.images.index):
+                    notices.warn(f"frame {kind.first_frame}: {kind.text}")
+                if debug:
+                    debug.write(tracked.images, result, tracker.rig, body, tracker.segmenter)
+                notices.pose(result.state, result.iou.values())
+                notices.step(record.frames)
+        except KeyboardInterrupt:
+            interrupted = (f"interrupted after frame {record.frames}: the rest is missing",)
+            notices.warn(interrupted[0])
         seconds = time.perf_counter() - started
         shifts = check.shifts()
         verdict = verdict_of(
             record,
             load_description(config.body),
-            known=(*doubts, *describe(shifts)),
+            known=(*interrupted, *doubts, *describe(shifts)),
             start_given=args.start is not None,
         )
         writer.note({"cameras": _cameras(shifts), "verdict": verdict.as_mapping()})
         writer.note({"scale": args.scale})
         if args.time_offsets is not None:
             writer.note({"time_offsets_s": read_time_offsets(args.time_offsets)})
+    if interrupted:
+        raise KeyboardInterrupt
     return Outcome(writer.trc_path, seconds, shifts, record, verdict)
 
 

@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o",
         dest="name",
-        type=Path,
+        type=result_name,
         required=True,
         metavar="NAME",
         help="path of the result files, without suffix",
@@ -216,3 +216,17 @@ def _files(group: argparse._ArgumentGroup) -> None:
         help="write the calibration with pose and focal length of disagreeing cameras corrected by "
         "the contours of the whole run; refused if the person hardly moves",
     )
+
+
+def result_name(text: str) -> Path:
+    """The NAME of NAME.trc and NAME.json, type of an argument: a path that names no folder.
+
+    Raises:
+        argparse.ArgumentTypeError: it names a folder, or nothing.
+    """
+    path = Path(text)
+    if path.name in ("", "..") or text.endswith("/"):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} names no file, expected a name such as {path / 'walk'}"
+        )
+    return path

@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 
 from markerless_tracker.cli.terminal.bars import progress_bars
+from markerless_tracker.cli.track_arguments import result_name
 from markerless_tracker.cli.view_node import run_node
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.results.read import read_result
@@ -38,7 +39,7 @@ MOST_RRD_PICTURES = 300
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "name", metavar="NAME", nargs="?", type=Path, help="NAME of NAME.trc and NAME.json"
+        "name", metavar="NAME", nargs="?", type=result_name, help="NAME of NAME.trc and NAME.json"
     )
     parser.add_argument(
         "--node",

@@ -24,6 +24,7 @@ from markerless_tracker.datasets.pose2sim import (
 from markerless_tracker.datasets.recording import Recording
 from markerless_tracker.datasets.upright.axes import upright
 from markerless_tracker.datasets.upright.standing import PERSON, standing
+from markerless_tracker.datasets.video.images import VIDEO_SUFFIXES
 from markerless_tracker.errors import DatasetError, TrackerError
 
 _READERS: Mapping[str, Callable[..., Recording]] = MappingProxyType(
@@ -108,6 +109,12 @@ def open_recording(
     elif format is not None:
         raise DatasetError(f"format {format!r}: expected one of {', '.join(FORMATS)}")
     else:
+        entries = path.iterdir() if path.is_dir() else ()
+        videos = [entry for entry in entries if entry.suffix.lower() in VIDEO_SUFFIXES]
+        if len(videos) > 1:
+            raise DatasetError(
+                f"{path}: {len(videos)} videos, but no {CALIBRATION}, which `calibrate` makes"
+            )
         raise DatasetError(
             f"{path}: no recording; expected a folder with {CALIBRATION} and videos, a bag (folder "
             f"or .mcap), or one of the formats {', '.join(_READERS)}"

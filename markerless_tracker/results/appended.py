@@ -88,3 +88,16 @@ def check_writable(path: Path) -> None:
             os.unlink(path)
     except OSError as error:
         raise not_written(path, error) from error
+
+
+def make_folder_of(path: Path) -> None:
+    """Make the folder of a file, and check that the file can be written there.
+
+    Raises:
+        DatasetError: it cannot.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise not_written(path, error) from error
+    check_writable(path)

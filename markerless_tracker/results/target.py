@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from markerless_tracker.errors import DatasetError
-from markerless_tracker.results.appended import check_writable, not_written
+from markerless_tracker.results.appended import make_folder_of
 
 _SUFFIXES = (".trc", ".json", ".jsonl")
 
@@ -28,12 +28,8 @@ def check_target(name: Path, *, overwrite: bool, allow: str = "`overwrite`") -> 
     earlier = earlier_files(name)
     if earlier and not overwrite:
         raise DatasetError(f"{earlier[0]}: exists already, expected a new name or {allow}")
-    try:
-        name.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise not_written(path_of(name, ".json"), error) from error
     for suffix in _SUFFIXES:
-        check_writable(path_of(name, suffix))
+        make_folder_of(path_of(name, suffix))
 
 
 def path_of(name: Path, suffix: str) -> Path:

@@ -32,6 +32,8 @@ from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.person.first_frame import StartMarkers, start_noise_m
 from markerless_tracker.tracking.tracker import Tracker
 
+_START_SUFFIXES = (".trc", ".yaml", ".yml")
+
 
 @dataclass(frozen=True)
 class TrackerSetup:
@@ -97,6 +99,10 @@ def build_tracker(
         if start_file is not None and start_file.suffix.lower() == ".trc"
         else None
     )
+    if start_file is not None and start_file.suffix.lower() not in _START_SUFFIXES:
+        raise ConfigError(
+            f"{start_file}: no start pose, expected the markers (.trc) or a pose (.yaml)"
+        )
     if start_file is not None and start is None and not named:
         raise ConfigError(
             f"{start_file} gives a pose but no subject: name one "

@@ -222,3 +222,16 @@ def test_each_verb_has_help_with_an_example(name: str, capsys: pytest.CaptureFix
 )
 def test_help_names_defaults(name: str, expected: str) -> None:
     assert expected in " ".join(cli.parser_of(name).format_help().split())
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "out/"])
+@pytest.mark.parametrize(
+    "words", [["track", "walk", "-o"], ["view"], ["report", "-o", "page.html"], ["export"]]
+)
+def test_a_folder_is_no_name_of_a_result(
+    words: list[str], name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main([*words, name])
+    assert ended.value.code == 2
+    assert f"{name!r} names no file, expected a name such as" in capsys.readouterr().err

@@ -154,6 +154,16 @@ class TestRefusals:
             track("--start", walk / "start.yaml")
         )
 
+    def test_a_start_that_is_no_pose(self, track, walk):
+        line = refusal(track("--start", walk / "calibration.toml", "--stature", "1.7"))
+        assert "calibration.toml: no start pose, expected the markers (.trc) or a pose" in line
+
+    def test_a_calibration_that_could_not_be_written_afterwards(self, track, walk, tmp_path):
+        (tmp_path / "file").write_text("")
+        path = tmp_path / "file" / "refined.toml"
+        line = refusal(track("--start", walk / "start.yaml", "--refine-calibration", path))
+        assert "refined.toml: cannot be written" in line
+
     def test_an_unknown_setting(self, track, walk, tmp_path):
         path = tmp_path / "typo.yaml"
         path.write_text("edge_wieght: 1.0\n", encoding="utf-8")

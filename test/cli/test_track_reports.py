@@ -79,6 +79,24 @@ def test_the_verdict_follows_the_counts(run: Run, warned, walk, tmp_path) -> Non
     assert verdict["tracked"] == 6 and verdict["frames_with_warnings"] == 4
 
 
+def test_an_interrupted_run_keeps_its_frames_and_says_so(
+    run: Run, walk, tmp_path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def frames(*args, **kwargs) -> Iterator[TrackedFrame]:
+        for tracked in track_recording(*args, **kwargs):
+            if tracked.images.index == 3:
+                raise KeyboardInterrupt
+            yield tracked
+
+    monkeypatch.setattr(track, "track_recording", frames)
+    status, out, err = run(walk, "--start", walk / "ground_truth.trc")
+    said = "interrupted after frame 3: the rest is missing"
+    assert (status, out) == (130, "") and f"warning: {said}" in err.splitlines()
+    stored = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
+    assert len(stored["frames"]) == 3 and stored["verdict"]["doubts"][0] == said
+    assert len(read_trc(tmp_path / "out.trc").stamps_ns) == 3
+
+
 @pytest.fixture
 def empty_room(tmp_path: Path) -> Path:
     """Five frames of the synthetic room without a person."""

@@ -14,6 +14,10 @@ def test_unknown_formats_are_refused(tmp_path: Path) -> None:
         open_recording(tmp_path / "none")
     with pytest.raises(DatasetError, match="no recording; expected.*calibration.toml.*mcap"):
         open_recording(tmp_path)
+    for number in (1, 2):
+        (tmp_path / f"cam{number}.mp4").write_bytes(b"")
+    with pytest.raises(DatasetError, match="2 videos, but no calibration.toml, which `calibrate`"):
+        open_recording(tmp_path)
     (tmp_path / "file.txt").write_text("hello")
     with pytest.raises(DatasetError, match="no recording"):
         open_recording(tmp_path / "file.txt")

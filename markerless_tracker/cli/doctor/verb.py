@@ -132,6 +132,8 @@ def _cameras(
                 names, seconds=args.seconds, image_topic=args.image_topic, stop=stop,
                 progress=lambda seconds: bars.update(task, completed=seconds),
             )  # fmt: skip
+            if stop.received:
+                raise KeyboardInterrupt
     except RosMissingError:
         return []  # `check_machine` reports it.
     streams = {name: CameraStream(*received) for name, received in heard.items()}

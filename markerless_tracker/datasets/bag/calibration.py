@@ -34,8 +34,8 @@ def rig_from_messages(
             frame = info.header.frame_id
             if frame not in frames:
                 raise CalibrationError(
-                    f"{name}: its frame {frame!r} is in no static transform, expected a "
-                    "calibration.toml or /tf_static"
+                    f"{name}: its frame {frame!r} is in no static transform, expected it in "
+                    "/tf_static, or a calibration.toml beside the bag (`record --calibration`)"
                 )
             roots[name], T_root_cam = frames.up(frame)
             matrix, distortion = lens_of(info, name)

@@ -15,6 +15,8 @@ _FLUSH_S = 1.0
 """Interval of flushes: a kill loses at most the messages of this time."""
 _DEPTH = 50
 _OF_ROS = ("/rosout", "/parameter_events")
+_DEBUG = "/debug/"
+"""Part of the names of images that the tracker draws only while somebody subscribes to them."""
 
 
 class Bag(Protocol):
@@ -41,7 +43,7 @@ class RecorderNode(GivenNode):
 
     Args:
         writer: of the bag.
-        topics: names of the topics; None = all except those of ROS itself.
+        topics: names of the topics; None = all but those of ROS itself and images for debugging.
         node_arguments: passed on to ``rclpy.node.Node`` (context, ...).
     """
 
@@ -63,7 +65,7 @@ class RecorderNode(GivenNode):
         for name, kinds in self.get_topic_names_and_types():
             if name in self._seen or name in _OF_ROS:
                 continue
-            if self._wanted is not None and name not in self._wanted:
+            if name not in self._wanted if self._wanted is not None else _DEBUG in name:
                 continue
             offers = self.get_publishers_info_by_topic(name)
             if offers:

@@ -96,6 +96,18 @@ def test_without_a_calibration_it_finds_the_cameras_that_send(
     assert lines[-1].startswith("doctor: ")
 
 
+def test_ctrl_c_ends_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(names: Any, *, stop: Any, **_: Any) -> dict[str, Any]:
+        stop.received = True
+        return {}
+
+    monkeypatch.setattr("markerless_tracker.node.doctor.listen.listen", interrupted)
+    assert main(["doctor", "--cameras", "cam01"]) == 130
+    assert capsys.readouterr().out == ""
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

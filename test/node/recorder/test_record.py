@@ -38,6 +38,7 @@ class Graph:
         self._peer, self.sets = peer, 0
         self._images = {n: create(Image, f"{n}/image_raw", image_qos()) for n in RIG.names}
         self._poses = create(PoseArray, "marker_poses", output_qos())
+        self._debug = create(Image, "debug/cam01/overlay", image_qos())
         self._text = create(String, "robot_description", latched_qos())
         self._text.publish(String(data="<robot/>"))
 
@@ -108,6 +109,8 @@ def test_what_arrives_is_in_the_bag(peer: Any, recorder, tmp_path: Path) -> None
     out, _ = process.communicate(timeout=120)
     summary = json.loads(out)
     assert process.returncode == 0
+    # The tracker draws images for debugging as soon as somebody subscribes to them.
+    assert "/debug/cam01/overlay" not in summary["topics"]
     # The middleware may lose images under load, but not the latched text.
     assert summary["topics"]["/robot_description"] == 1
     assert set(summary["topics"]) == {
