@@ -1,7 +1,6 @@
 """A ROS 2 node that listens to the tracker's topic `marker_poses`.
 
-    tracker --ros-args --params-file config/tracker.yaml      # and in another terminal:
-    python examples/listen.py
+    python examples/listen.py       # beside a tracker in another terminal (README, "Live")
 
 Each message has the 15 markers in the order of `MARKER_NAMES`, in metres, in the frame `map`, with
 the stamp of the images. `--count N` ends the node after N messages.

@@ -160,7 +160,7 @@ def _fine(
         np.pad(labels[box] == number, 1), structure=np.ones((3, 3, 3), dtype=np.bool_)
     )
     inside, _, person = _occupied(first, size, FINE_M, views, near)
-    inside &= _dilated(np.asarray(person.any(axis=2)))[:, :, None]
+    inside &= _dilated(np.asarray((person & inside).any(axis=2)))[:, :, None]
     parts, count = ndimage.label(inside)
     if count == 0:
         return None

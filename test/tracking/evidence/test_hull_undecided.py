@@ -1,5 +1,7 @@
 """The visual hull where pixels are undecided: legs like the floor, and shadows on it."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 
@@ -161,3 +163,36 @@ def test_the_floor_far_from_the_legs_is_no_foot(person) -> None:
     assert gaps[hull.points_m[far, 2] < SHIN_M].max() < FOOT_M + 2 * FINE_M
     # The feet stay.
     assert hull.low_m < plain.low_m + 0.04
+
+
+def box_pixels(camera, low_m, high_m, shape):
+    """(h, w): pixels of a grid of points in a box."""
+    axes = [np.linspace(low, high, 24) for low, high in zip(low_m, high_m, strict=True)]
+    points = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 3)
+    columns, rows = np.round(project_camera(points, camera)).astype(int).T
+    seen = (columns >= 0) & (rows >= 0) & (columns < shape[1]) & (rows < shape[0])
+    mask = np.zeros(shape, dtype=np.bool_)
+    mask[rows[seen], columns[seen]] = True
+    return mask
+
+
+def test_the_order_of_the_cameras_does_not_matter(person) -> None:
+    """Two cameras see a thing beside the person that the other two see as background."""
+    scene, masks = person
+    middle = scene.markers(0).mean(axis=0)
+    seen = {}
+    for camera in scene.rig:
+        shape = masks[camera.name].shape
+        shadow = box_pixels(camera, middle - (0.66, 0.58, 0.25), middle + (0.86, 0.27, 0.20), shape)
+        mask = masks[camera.name]
+        if camera.name in (scene.rig.names[1], scene.rig.names[3]):
+            mask = mask | box_pixels(
+                camera, middle + (-0.27, 0.45, 0.30), middle + (0.29, 0.98, 0.56), shape
+            )
+        seen[camera.name] = observe(camera.name, mask, shadow & ~mask)
+    found = set()
+    for names in permutations(seen):
+        hulls = find_hulls(cameras(scene), {name: seen[name] for name in names})
+        # The grid's place differs by rounding.
+        found.add(tuple(np.round(hull.points_m, 6).tobytes() for hull in hulls))
+    assert len(found) == 1
