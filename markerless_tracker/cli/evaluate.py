@@ -36,6 +36,8 @@ HELP = (
 EXAMPLE = "markerless_tracker evaluate out/walk.trc walk/ground_truth.trc --skip 30"
 
 _WIDTH = 160
+_FAR_MM = 300.0
+"""No tracked person is this far from the reference on average."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="RESULT",
         type=Path,
         nargs="+",
-        help="marker files to evaluate (TRC, C3D)",
+        help="marker files to evaluate (TRC, C3D), or NAME of NAME.trc",
     )
     parser.add_argument(
         "reference",
@@ -96,6 +98,7 @@ def run(args: argparse.Namespace) -> int:
     reference = read_markers(args.reference)
     if names is not None:
         reference = _renamed(args.reference, reference, names)
+    args.results = [_marker_file(path) for path in args.results]
     figures = [_figures(path, reference, names, args) for path in args.results]
     if args.json:
         single = figures[0].as_dict() if len(figures) == 1 else None
@@ -121,6 +124,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _marker_file(path: Path) -> Path:
+    """NAME.trc of a result that is given as NAME, as for other verbs."""
+    file = path.with_name(f"{path.name}.trc") if path.name else path
+    return file if file.is_file() and not path.is_file() else path
+
+
 def _lines(found: _Figures) -> list[str]:
     """The figures of one result, in lines that a terminal of 80 columns does not wrap."""
     figures, more = found.score, found.measures
@@ -143,6 +152,10 @@ def _remarks(found: _Figures) -> list[str]:
         lines.append(f"not compared: {', '.join(more.only_reference)} of the reference")
     if more.only_result:
         lines.append(f"not compared: {', '.join(more.only_result)} of the result")
+    if found.alignment is None and found.score.mean_mm > _FAR_MM:
+        lines.append(
+            "large errors: is the reference of this recording, and in the same world? (--align)"
+        )
     if found.alignment is not None:
         moved = found.alignment
         x, y, z = (1000.0 * value for value in moved.translation_m.tolist())

@@ -43,6 +43,23 @@ def test_a_table(files, capsys) -> None:
     assert [line for line in out.splitlines() if line[80:]] == []
 
 
+def test_a_result_may_be_given_by_its_name(files, capsys) -> None:
+    assert main(["evaluate", *files]) == 0
+    expected = capsys.readouterr().out
+    assert main(["evaluate", files[0].removesuffix(".trc"), files[1]]) == 0
+    assert capsys.readouterr().out == expected and "is the reference" not in expected
+
+
+def test_the_reference_of_another_recording_raises_a_question(
+    files, tmp_path: Path, capsys
+) -> None:
+    stamps = np.array([0, 50_000_000, 100_000_000])
+    other = np.repeat(POSE[None], 3, 0) + [2.0, 0.0, 0.0]
+    write_trc(tmp_path / "other.trc", MarkerTrack(NAMES, stamps, other), 20.0)
+    assert main(["evaluate", files[0], str(tmp_path / "other.trc")]) == 0
+    assert "is the reference of this recording, and in the same world?" in capsys.readouterr().out
+
+
 def test_what_cannot_be_compared_fails_in_one_line(files, tmp_path: Path, capsys) -> None:
     other = str(tmp_path / "other.trc")
     write_trc(other, MarkerTrack(("Nose",), np.array([0]), np.zeros((1, 1, 3))), 20.0)
