@@ -41,7 +41,7 @@ def compiled(**options: Any) -> Decorator:
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        # A wrapper for callers in C, which has none, would take a twelfth of the compile time.
+        # Nothing calls kernels from C; their wrappers for it would take a seventh of the time.
         dispatcher = njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
         dispatcher._cache = _Cache(function)
         _dispatchers.add(dispatcher)

@@ -265,7 +265,7 @@ def _track(
                 notices.pose(result.state, result.iou.values())
                 notices.step(record.frames)
         except KeyboardInterrupt:
-            interrupted = (f"interrupted after frame {record.frames}: the rest is missing",)
+            interrupted = (f"interrupted after {record.frames} frames: the rest is missing",)
             notices.warn(interrupted[0])
         seconds = time.perf_counter() - started
         shifts = check.shifts()

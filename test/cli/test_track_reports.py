@@ -90,7 +90,7 @@ def test_an_interrupted_run_keeps_its_frames_and_says_so(
 
     monkeypatch.setattr(track, "track_recording", frames)
     status, out, err = run(walk, "--start", walk / "ground_truth.trc")
-    said = "interrupted after frame 3: the rest is missing"
+    said = "interrupted after 3 frames: the rest is missing"
     assert (status, out) == (130, "") and f"warning: {said}" in err.splitlines()
     stored = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
     assert len(stored["frames"]) == 3 and stored["verdict"]["doubts"][0] == said
