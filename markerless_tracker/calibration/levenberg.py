@@ -43,7 +43,7 @@ def minimised(model: Model, start: FloatArray, *, loss_px: float | None) -> Floa
             try:
                 factor = cho_factor(normal + np.diag(damping * diagonal))
                 candidate = value - np.asarray(cho_solve(factor, gradient))
-                tried, slopes = model(candidate)
+                tried, tried_jacobian = model(candidate)
                 new_cost, new_weights = _loss(tried, loss_px)
             except LinAlgError:
                 new_cost = np.inf
@@ -53,7 +53,7 @@ def minimised(model: Model, start: FloatArray, *, loss_px: float | None) -> Floa
         else:
             return value
         gained = cost - new_cost
-        value, residuals, jacobian = candidate, tried, slopes
+        value, residuals, jacobian = candidate, tried, tried_jacobian
         cost, weights = new_cost, new_weights
         damping = max(0.1 * damping, _LEAST_DAMPING)
         if gained <= _PROGRESS * cost:

@@ -59,20 +59,20 @@ def make_step_scratch(parameters: int) -> StepScratch:
 
 
 def damped_step(
-    hessian: FloatArray, slope: FloatArray, x: FloatArray, bounds: FloatArray, damping: float
+    hessian: FloatArray, gradient: FloatArray, x: FloatArray, bounds: FloatArray, damping: float
 ) -> FloatArray:
-    """The step (p,) of (H + damping diag H) step = -slope that keeps x + step within bounds (2, p).
+    """The step (p,) of (H + damping diag H) step = -gradient, with x + step within bounds (2, p).
 
     Parameters that a solution would take out of bounds are held on them, and the others are solved
-    again. Held parameters that the slope pulls back inside are released (primal-dual active sets,
-    Hintermüller, Ito and Kunisch 2002).
+    again. Held parameters that the gradient pulls back inside are released (primal-dual active
+    sets, Hintermüller, Ito and Kunisch 2002).
 
     Raises:
         SearchError: the equations are singular or not finite.
     """
     scratch = make_step_scratch(x.size)
     state = solve_step(
-        np.array(hessian, dtype=np.float64), np.ascontiguousarray(slope, dtype=np.float64), x,
+        np.array(hessian, dtype=np.float64), np.ascontiguousarray(gradient, dtype=np.float64), x,
         np.ascontiguousarray(bounds, dtype=np.float64), damping, scratch,
     )  # fmt: skip
     if state != SOLVED:
@@ -81,7 +81,7 @@ def damped_step(
 
 
 @kernel
-def solve_step(hessian, slope, x, bounds, damping, scratch):  # type: ignore[no-untyped-def]
+def solve_step(hessian, gradient, x, bounds, damping, scratch):  # type: ignore[no-untyped-def]
     """Fill scratch.step with the step of `damped_step`; the hessian's diagonal is damped in place.
 
     Returns:
@@ -93,19 +93,19 @@ def solve_step(hessian, slope, x, bounds, damping, scratch):  # type: ignore[no-
     for i in range(size):
         hessian[i, i] += damping * hessian[i, i] + 1e-12
         side[i] = 0
-        finite = finite and np.isfinite(slope[i])
+        finite = finite and np.isfinite(gradient[i])
         for j in range(size):
             finite = finite and np.isfinite(hessian[i, j])
     if not finite:
         return NOT_FINITE
     for _ in range(_ACTIVE_SETS + 1):
-        if not _solve_free(hessian, slope, x, bounds, scratch):
+        if not _solve_free(hessian, gradient, x, bounds, scratch):
             return SINGULAR
         same, held = True, False
         for i in range(size):
             pull = 0.0
             if side[i] != 0:
-                pull = -slope[i]
+                pull = -gradient[i]
                 for j in range(size):
                     pull -= hessian[i, j] * step[j]
             now = 0
@@ -126,7 +126,7 @@ def solve_step(hessian, slope, x, bounds, damping, scratch):  # type: ignore[no-
 
 
 @kernel
-def _solve_free(hessian, slope, x, bounds, scratch):  # type: ignore[no-untyped-def]
+def _solve_free(hessian, gradient, x, bounds, scratch):  # type: ignore[no-untyped-def]
     """Solve for the free parameters, the others on their bounds; False if they are singular.
 
     By a Cholesky factor whose inner loops run along rows, so that they are vectorised.
@@ -142,7 +142,7 @@ def _solve_free(hessian, slope, x, bounds, scratch):  # type: ignore[no-untyped-
             step[i] = (bounds[0, i] if side[i] < 0 else bounds[1, i]) - x[i]
     for r in range(n):
         i = free[r]
-        total = -slope[i]
+        total = -gradient[i]
         if n < x.size:
             for j in range(x.size):
                 if side[j] != 0:
@@ -201,13 +201,13 @@ def refine(
     """
     x = np.clip(start, bounds[0], bounds[1])
     for bound in truncations(*truncation, iterations):
-        hessian, slope = equations(x, float(bound))
-        hessian, slope = hessian.copy(), slope.copy()
+        hessian, gradient = equations(x, float(bound))
+        hessian, gradient = hessian.copy(), gradient.copy()
         for prior in priors:
             hessian[np.diag_indices_from(hessian)] += prior.precision
-            slope += prior.precision * (x - prior.mean)
+            gradient += prior.precision * (x - prior.mean)
         try:
-            step = damped_step(hessian, slope, x, bounds, DAMPING)
+            step = damped_step(hessian, gradient, x, bounds, DAMPING)
         except SearchError:
             return x
         # Rounding may put the sum beyond a bound.

@@ -11,7 +11,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.fitness.contour import outline_rows
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, TrackResult, TrackState
-from markerless_tracker.tracking.confidence import confidence_of, disagreement_m, slopes
+from markerless_tracker.tracking.confidence import confidence_of, disagreement_m, jacobians
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.watch import LimbWatch
@@ -106,7 +106,7 @@ class Assessor:
         """Compile what `found` needs; same arguments."""
         self.found(found, body, limits)
         # `found` skips these if the pose does not match the evidence at all.
-        slopes(body, found.search.pose)
+        jacobians(body, found.search.pose)
         disagreement_m(found.search.contours, outline_rows(found.search.contours))
 
     def found(self, found: Found, body: BodyModel, limits: FloatArray) -> TrackResult:

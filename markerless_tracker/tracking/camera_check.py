@@ -188,9 +188,9 @@ def _shift(
         contours.collect(pose, _SHIFT_TRUNCATION_M)
         rows = slice(int(contours.residuals.count[0]))
         value, weight = contours.residuals.value[0, rows], contours.residuals.weight[0, rows]
-        slopes = contours.residuals.gradient[0, rows] @ to_camera[:2, :3].T * (depth / focal)
-        normal = slopes.T @ (weight[:, None] * slopes)
+        jacobian = contours.residuals.gradient[0, rows] @ to_camera[:2, :3].T * (depth / focal)
+        normal = jacobian.T @ (weight[:, None] * jacobian)
         if np.linalg.matrix_rank(normal) < 2:
             return None
-        shift = shift - np.linalg.solve(normal, slopes.T @ (weight * value))
+        shift = shift - np.linalg.solve(normal, jacobian.T @ (weight * value))
     return float(shift[0]), float(shift[1]), float(focal.mean()) / depth

@@ -89,7 +89,7 @@ def confidence_of(
     by_limb, of_trunk = excesses_m(body, rows)
     between = DISAGREEMENT_FACTOR * disagreement_m(contours, rows)
     common_sd = float(np.linalg.norm([unseen, between, TRUNK_ERROR_FACTOR * of_trunk]))
-    by_marker, by_root = slopes(body, pose)
+    by_marker, by_root = jacobians(body, pose)
     of_markers = np.einsum("ij,jk,ik->i", by_marker, covariance, by_marker)
     limbs_m = {name: min(LIMB_ERROR_FACTOR * value, MOST_LIMB_M) for name, value in by_limb.items()}
     of_limbs, of_pose = _spread(body, by_marker, limbs_m)
@@ -189,7 +189,7 @@ def _spread(
     return of_markers, of_pose
 
 
-def slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+def jacobians(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Jacobians at a pose (p,): of the markers (45, p) and of the root's pose (6, p).
 
     The root's rotation is expressed as a rotation vector about the world's axes.
@@ -199,7 +199,7 @@ def slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     points = np.concatenate([markers(body, pose), nodes[root, None, :, 3]])
     moved = np.flatnonzero(body.node_kind >= 0)
     out = np.zeros((len(points) + 1, 3, body.size))
-    _fill_slopes(
+    _fill_jacobian(
         points, move_axes(body, nodes, moved), np.ascontiguousarray(nodes[moved, :, 3]),
         is_translation(body.node_kind[moved]), body.node_parameter[moved],
         carried(body, moved)[[*body.marker_node, root]], out,
@@ -208,7 +208,7 @@ def slopes(body: BodyModel, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 @kernel
-def _fill_slopes(points, axes, origins, slides, parameter, hang, out):  # type: ignore[no-untyped-def]
+def _fill_jacobian(points, axes, origins, slides, parameter, hang, out):  # type: ignore[no-untyped-def]
     """Add the derivatives of k points, and of the last point's rotation, to out (k + 1, 3, p).
 
     Args:

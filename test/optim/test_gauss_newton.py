@@ -34,9 +34,9 @@ def test_a_step_without_damping_reaches_the_minimum(seed) -> None:
 
 
 def test_damping_shortens_the_step() -> None:
-    """(1 + λ) H_ii step_i = -slope_i when H is diagonal."""
-    h, slope, x = np.diag([4.0, 1.0, 2.0, 10.0]), np.array([8.0, -1.0, 0.0, 5.0]), np.zeros(4)
-    step = damped_step(h, slope, x, FREE, 0.25)
+    """(1 + λ) H_ii step_i = -gradient_i when H is diagonal."""
+    h, gradient, x = np.diag([4.0, 1.0, 2.0, 10.0]), np.array([8.0, -1.0, 0.0, 5.0]), np.zeros(4)
+    step = damped_step(h, gradient, x, FREE, 0.25)
     np.testing.assert_allclose(step, [-1.6, 0.8, 0.0, -0.4], rtol=1e-9)
 
 
@@ -81,13 +81,13 @@ def test_every_parameter_out_of_bounds() -> None:
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("where", ["hessian", "slope"])
+@pytest.mark.parametrize("where", ["hessian", "gradient"])
 def test_equations_that_are_not_finite(bad, where) -> None:
-    h, slope = np.eye(4), np.ones(4)
-    (h if where == "hessian" else slope)[1] = bad
+    h, gradient = np.eye(4), np.ones(4)
+    (h if where == "hessian" else gradient)[1] = bad
     for bounds in (FREE, np.clip(FREE, -1.0, 1.0)):
         with pytest.raises(SearchError, match="contour refinement: .* not finite") as error:
-            damped_step(h, slope, np.zeros(4), bounds, 1e-3)
+            damped_step(h, gradient, np.zeros(4), bounds, 1e-3)
         assert "\n" not in str(error.value)
 
 
@@ -100,8 +100,8 @@ def test_singular_equations() -> None:
 
 
 def test_a_parameter_without_evidence_stays() -> None:
-    h, slope = np.diag([2.0, 0.0, 1.0, 1.0]), np.array([2.0, 0.0, 0.0, 0.0])
-    step = damped_step(h, slope, np.zeros(4), FREE, 1e-3)
+    h, gradient = np.diag([2.0, 0.0, 1.0, 1.0]), np.array([2.0, 0.0, 0.0, 0.0])
+    step = damped_step(h, gradient, np.zeros(4), FREE, 1e-3)
     assert step[0] == pytest.approx(-1.0 / 1.001) and not step[1:].any()
 
 
@@ -202,14 +202,14 @@ def test_equations_that_cannot_be_solved_end_it_at_the_last_point(bad, after) ->
     good = Recorded(np.eye(4), np.zeros(4))
 
     def equations(x, truncation_m):
-        h, slope = good(x, truncation_m)
+        h, gradient = good(x, truncation_m)
         if len(good.points) <= after:
-            return h, slope
+            return h, gradient
         if bad == "singular":
             whole = np.full((4, 4), 1.0 + (1e-3 + 1e-12))
             whole[np.diag_indices(4)] = 1.0
-            return whole, slope
-        return h, slope * (np.nan if bad == "nan" else np.inf)
+            return whole, gradient
+        return h, gradient * (np.nan if bad == "nan" else np.inf)
 
     start = np.full(4, 3.0)
     found = run(equations, start)
@@ -231,11 +231,11 @@ def test_the_same_again_gives_the_same_bytes() -> None:
 # --- against NumPy -----------------------------------------------------------------------------
 
 
-def numpy_step(hessian, slope, x, bounds, damping):
+def numpy_step(hessian, gradient, x, bounds, damping):
     """`damped_step` with NumPy's solution of the equations."""
     a = hessian + np.diag(damping * np.diag(hessian) + 1e-12)
     low, high = bounds[0] - x, bounds[1] - x
-    step = np.linalg.solve(a, -slope)
+    step = np.linalg.solve(a, -gradient)
     below, above = step < low, step > high
     for _ in range(10):
         held = below | above
@@ -243,9 +243,9 @@ def numpy_step(hessian, slope, x, bounds, damping):
             break
         free = ~held
         step[held] = np.where(below, low, high)[held]
-        right = -slope[free] - a[np.ix_(free, held)] @ step[held]
+        right = -gradient[free] - a[np.ix_(free, held)] @ step[held]
         step[free] = np.linalg.solve(a[np.ix_(free, free)], right)
-        pull = -(a @ step + slope)
+        pull = -(a @ step + gradient)
         now_below, now_above = (
             (step < low) | (below & (pull < 0)),
             (step > high) | (above & (pull > 0)),
@@ -263,7 +263,9 @@ def test_a_step_against_numpy(seed, size, most) -> None:
     h, minimum = quadratic(rng, size)
     x = rng.uniform(-min(most, 1.0), min(most, 1.0), size)
     bounds = np.array([np.full(size, -most), np.full(size, most)])
-    slope = h @ (x - minimum)
+    gradient = h @ (x - minimum)
     np.testing.assert_allclose(
-        damped_step(h, slope, x, bounds, 1e-3), numpy_step(h, slope, x, bounds, 1e-3), atol=1e-9
+        damped_step(h, gradient, x, bounds, 1e-3),
+        numpy_step(h, gradient, x, bounds, 1e-3),
+        atol=1e-9,
     )

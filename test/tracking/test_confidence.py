@@ -17,7 +17,7 @@ from markerless_tracker.tracking.confidence import (
     UNMEASURED_M,
     confidence_of,
     disagreement_m,
-    slopes,
+    jacobians,
 )
 from markerless_tracker.tracking.search import Searcher
 
@@ -161,9 +161,9 @@ def test_no_silhouette_no_confidence(scene) -> None:
     assert confidence_of(body, pose, contours, measured=True) is None
 
 
-def test_slopes_against_finite_differences(scene) -> None:
+def test_jacobians_against_finite_differences(scene) -> None:
     body, pose = scene.body, scene.pose(0)
-    by_marker, by_root = slopes(body, pose)
+    by_marker, by_root = jacobians(body, pose)
     rng = np.random.default_rng(0)
     change = 1e-3 * rng.standard_normal(body.size)
     after, before = markers(body, pose + change), markers(body, pose - change)

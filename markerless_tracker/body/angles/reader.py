@@ -119,28 +119,28 @@ class AngleReader:
         shown = np.concatenate([shown, pose[self._others]])
         sd = None
         if covariance is not None:
-            slopes = self._slopes(values, nodes)
-            variance = ((slopes @ covariance) * slopes).sum(axis=1)
+            jacobian = self._jacobian(values, nodes)
+            variance = ((jacobian @ covariance) * jacobian).sum(axis=1)
             sd = np.minimum(np.sqrt(np.maximum(variance, 0.0)), MOST_SD_RAD)
         return Angles(self.names, shown, sd)
 
-    def slopes(self, pose: FloatArray) -> FloatArray:
+    def jacobian(self, pose: FloatArray) -> FloatArray:
         """Derivatives (n, p) of the angles by the parameters of a pose (p,)."""
         nodes = transforms(self._body, pose)
         values = self._sequences.angles(self._frames.relative(nodes))
         if self._split is not None:
             values = _nearest(values, self._split.shown)
-        return self._slopes(values, nodes)
+        return self._jacobian(values, nodes)
 
-    def _slopes(self, values: FloatArray, nodes: FloatArray) -> FloatArray:
+    def _jacobian(self, values: FloatArray, nodes: FloatArray) -> FloatArray:
         own = np.zeros((len(self._others), self._body.size))
         own[np.arange(len(self._others)), self._others] = 1.0
-        return np.concatenate([self._all_slopes(values, nodes)[self._shown], own])
+        return np.concatenate([self._full_jacobian(values, nodes)[self._shown], own])
 
-    def _all_slopes(self, values: FloatArray, nodes: FloatArray) -> FloatArray:
+    def _full_jacobian(self, values: FloatArray, nodes: FloatArray) -> FloatArray:
         velocities = self._frames.velocities(self._body, nodes)
-        slopes = self._sequences.signs[:, :, None] * self._sequences.rates(values, velocities)
-        return slopes.reshape(-1, self._body.size)
+        jacobian = self._sequences.signs[:, :, None] * self._sequences.rates(values, velocities)
+        return jacobian.reshape(-1, self._body.size)
 
     def _step_s(self, stamp_ns: int | None) -> float:
         if stamp_ns is None or self._stamp_ns is None:
@@ -156,7 +156,7 @@ class AngleReader:
             pose = self._body.neutral + rng.uniform(-0.3, 0.3, self._body.size)
             nodes = transforms(self._body, pose)
             values = self._sequences.angles(self._frames.relative(nodes))
-            changes |= np.abs(self._all_slopes(values, nodes)).max(axis=1, initial=0.0) > 1e-6
+            changes |= np.abs(self._full_jacobian(values, nodes)).max(axis=1, initial=0.0) > 1e-6
         return [int(k) for k in np.flatnonzero(named & changes)]
 
 

@@ -16,10 +16,10 @@ from markerless_tracker.calibration.contours.body_unknowns import BodyUnknowns
 from markerless_tracker.calibration.contours.cameras import (
     CHANGES,
     change_between,
-    change_slopes,
+    change_jacobian,
     moved,
     put,
-    shift_slopes,
+    shift_jacobian,
 )
 from markerless_tracker.calibration.contours.frames import SeenFrame, contours_of, independence
 from markerless_tracker.camera import CameraRig
@@ -31,7 +31,7 @@ from markerless_tracker.fitness.contour import (
     eliminated,
     normal_equations,
     outline_rows,
-    pose_slopes,
+    pose_jacobian,
     solved,
     surface,
 )
@@ -59,13 +59,13 @@ class Evaluation:
     Attributes:
         cost: -log p of all contours and priors.
         information: (7 c, 7 c) of the contours alone.
-        slope: (7 c,) of the contours alone.
+        gradient: (7 c,) of the contours alone.
         residual_m: root mean square residual, by represented length of outline.
     """
 
     cost: float
     information: FloatArray
-    slope: FloatArray
+    gradient: FloatArray
     residual_m: float
 
 
@@ -80,7 +80,7 @@ class _Sums:
     """Equations of cameras and body, summed over frames."""
 
     def __init__(self, size: int) -> None:
-        self.hessian, self.slope = np.zeros((size, size)), np.zeros(size)
+        self.hessian, self.gradient = np.zeros((size, size)), np.zeros(size)
         self.parts: list[FloatArray] = []
         self.cost = self.squares = self.weight = 0.0
 
@@ -172,32 +172,32 @@ class ContourAdjustment:
         sums = self._summed(LAST_TRUNCATION_M)
         count = CHANGES * len(self.cameras)
         cross = sums.hessian[:count, count:]
-        both = np.column_stack([cross.T, sums.slope[count:]])
+        both = np.column_stack([cross.T, sums.gradient[count:]])
         rest = np.linalg.solve(sums.hessian[count:, count:], both)
         strain = float(np.sum((self.changes / PRIOR_SD) ** 2))
         return Evaluation(
             sums.cost + self._body.strain + 0.5 * strain,
             sums.hessian[:count, :count] - cross @ rest[:, :-1],
-            sums.slope[:count] - cross @ rest[:, -1],
+            sums.gradient[:count] - cross @ rest[:, -1],
             float(np.sqrt(sums.squares / sums.weight)),
         )
 
     def shifts_px(self) -> FloatArray:
         """How far (c, 2) px the silhouettes of each camera lie beside the body; NaN if unknown."""
         count = len(self.cameras)
-        normal, slope = np.zeros((count, 2, 2)), np.zeros((count, 2))
+        normal, gradient = np.zeros((count, 2, 2)), np.zeros((count, 2))
         for frame in self._frames:
             rows = self._collect(frame, LAST_TRUNCATION_M)
             points = surface(self.body, frame.pose, rows)
             for number, part in self._parts(frame):
-                along = shift_slopes(self.cameras[number], points[part], rows.gradient[part])
+                along = shift_jacobian(self.cameras[number], points[part], rows.gradient[part])
                 weighted = along * (frame.weight * rows.weight[part])[:, None]
                 normal[number] += weighted.T @ along
-                slope[number] += weighted.T @ rows.value[part]
+                gradient[number] += weighted.T @ rows.value[part]
         out = np.full((count, 2), np.nan)
         for number in range(count):
             if np.linalg.matrix_rank(normal[number]) == 2:
-                out[number] = -np.linalg.solve(normal[number], slope[number])
+                out[number] = -np.linalg.solve(normal[number], gradient[number])
         return out
 
     def moved_px(self) -> FloatArray:
@@ -229,10 +229,10 @@ class ContourAdjustment:
         first, free = np.arange(count), self.free.ravel()
         precision = np.tile(1.0 / PRIOR_SD**2, len(self.cameras))
         sums.hessian[first, first] += np.where(free, precision, _HELD)
-        sums.slope[:count] += precision * self.changes.ravel()
-        sums.slope[:count] *= free
+        sums.gradient[:count] += precision * self.changes.ravel()
+        sums.gradient[:count] *= free
         sums.hessian[np.diag_indices_from(sums.hessian)] *= 1.0 + _DAMPING
-        step = solved(sums.hessian, sums.slope)
+        step = solved(sums.hessian, sums.gradient)
         if not np.isfinite(step).all():
             return
         step[:count] *= free
@@ -245,7 +245,7 @@ class ContourAdjustment:
     def _summed(self, truncation_m: float) -> _Sums:
         """Equations of cameras and body, poses eliminated; the cameras' priors are not in them."""
         sums = _Sums(CHANGES * len(self.cameras) + self._body.size)
-        self._body.add_priors(sums.hessian, sums.slope)
+        self._body.add_priors(sums.hessian, sums.gradient)
         longer, body = self._body.longer(), self.body
         for frame in self._frames:
             rows = self._collect(frame, truncation_m)
@@ -253,21 +253,21 @@ class ContourAdjustment:
             by_camera = np.zeros((len(points), CHANGES * len(self.cameras)))
             for number, part in self._parts(frame):
                 columns = slice(CHANGES * number, CHANGES * (number + 1))
-                by_camera[part, columns] = change_slopes(
+                by_camera[part, columns] = change_jacobian(
                     self.cameras[number], points[part], rows.gradient[part]
                 )
-            slopes = np.column_stack(
+            jacobian = np.column_stack(
                 [
-                    pose_slopes(body, frame.pose, rows),
+                    pose_jacobian(body, frame.pose, rows),
                     by_camera,
-                    self._body.slopes(longer, frame.pose, rows, points),
+                    self._body.jacobian(longer, frame.pose, rows, points),
                 ]
             )
-            own, pull = normal_equations(slopes, frame.weight * _SCALE * rows.weight, rows.value)
+            own, pull = normal_equations(jacobian, frame.weight * _SCALE * rows.weight, rows.value)
             precision = frame.weight / body.prior_sd**2
             off = frame.pose - body.prior_mean
             add_pose_prior(own, pull, precision, off, damping=_DAMPING)
-            sums.parts.append(eliminated(own, pull, body.size, sums.hessian, sums.slope))
+            sums.parts.append(eliminated(own, pull, body.size, sums.hessian, sums.gradient))
             residuals = float(frame.contours.residuals.cost.sum())
             sums.cost += frame.weight * _SCALE * residuals + 0.5 * float(precision @ off**2)
             sums.squares += frame.weight * float(rows.weight @ rows.value**2)

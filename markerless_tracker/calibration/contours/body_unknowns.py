@@ -4,7 +4,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.sizes import PROPORTION_SD, Sizes
-from markerless_tracker.fitness.contour import OutlineRows, length_slopes
+from markerless_tracker.fitness.contour import OutlineRows, length_jacobian
 from markerless_tracker.fitness.shape import Sections
 from markerless_tracker.geometry import FloatArray
 
@@ -47,21 +47,21 @@ class BodyUnknowns:
         other = (self._numbers - self._sections.generic) / self._sections.prior_sd
         return 0.5 * float(longer @ self._precision @ longer + other @ other)
 
-    def add_priors(self, hessian: FloatArray, slope: FloatArray) -> None:
+    def add_priors(self, hessian: FloatArray, gradient: FloatArray) -> None:
         """Add those of the priors to equations whose last unknowns these are."""
-        first = slope.size - self.size
+        first = gradient.size - self.size
         split = first + self._lengths.size
         hessian[first:split, first:split] += self._precision
-        slope[first:split] += self._precision @ (self._lengths - self._mean)
-        rest = np.arange(split, slope.size)
+        gradient[first:split] += self._precision @ (self._lengths - self._mean)
+        rest = np.arange(split, gradient.size)
         hessian[rest, rest] += 1.0 / self._sections.prior_sd**2
-        slope[rest] += (self._numbers - self._sections.generic) / self._sections.prior_sd**2
+        gradient[rest] += (self._numbers - self._sections.generic) / self._sections.prior_sd**2
 
     def longer(self) -> list[BodyModel]:
-        """The body with each length changed a little, for `slopes`."""
+        """The body with each length changed a little, for `jacobian`."""
         return [self._made(self._lengths + step) for step in _STEP * np.eye(self._lengths.size)]
 
-    def slopes(
+    def jacobian(
         self, longer: list[BodyModel], pose: FloatArray, rows: OutlineRows, points: FloatArray
     ) -> FloatArray:
         """Derivatives (n, size) of residuals.
@@ -72,8 +72,8 @@ class BodyUnknowns:
             rows: the residuals.
             points: (n, 3) their places on the body, world.
         """
-        by_length = length_slopes(longer, pose, rows, points, _STEP)
-        by_section = self._sections.slopes(self.body, pose, rows)
+        by_length = length_jacobian(longer, pose, rows, points, _STEP)
+        by_section = self._sections.jacobian(self.body, pose, rows)
         return np.concatenate([by_length, by_section], axis=1)
 
     def take(self, step: FloatArray) -> FloatArray:

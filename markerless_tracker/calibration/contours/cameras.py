@@ -53,7 +53,7 @@ def put(arrays: ViewArrays, view: int, camera: CameraModel) -> None:
     arrays.intrinsics[view] = k[0, 0], k[0, 1], k[0, 2], k[1, 1], k[1, 2]
 
 
-def change_slopes(camera: CameraModel, points_m: FloatArray, gradient: FloatArray) -> FloatArray:
+def change_jacobian(camera: CameraModel, points_m: FloatArray, gradient: FloatArray) -> FloatArray:
     """Derivatives (n, 7) of residuals of one view by its camera's change.
 
     Args:
@@ -67,10 +67,10 @@ def change_slopes(camera: CameraModel, points_m: FloatArray, gradient: FloatArra
     return np.column_stack([np.cross(seen, by_seen), -by_seen, by_focal])
 
 
-def shift_slopes(camera: CameraModel, points_m: FloatArray, gradient: FloatArray) -> FloatArray:
+def shift_jacobian(camera: CameraModel, points_m: FloatArray, gradient: FloatArray) -> FloatArray:
     """Derivatives (n, 2) of residuals of one view by a shift (u, v) px of the projected points.
 
-    Arguments as of `change_slopes`.
+    Arguments as of `change_jacobian`.
     """
     by_bent, _ = _by_bent(camera, *_in_camera(camera, points_m, gradient))
     (fx, skew), (_, fy) = camera.matrix[:2, :2]
@@ -102,7 +102,7 @@ def _by_bent(
 def _lens(
     flat: FloatArray, distortion: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Distorted positions (n, 2) of points at focal length 1, and the slopes (n,) aa, ab = ba, bb.
+    """Distorted positions (n, 2) of points at focal length 1; derivatives (n,) aa, ab = ba and bb.
 
     The first letter names the distorted coordinate, the second the undistorted one.
     """

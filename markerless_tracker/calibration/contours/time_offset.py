@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
-from markerless_tracker.calibration.contours.cameras import shift_slopes
+from markerless_tracker.calibration.contours.cameras import shift_jacobian
 from markerless_tracker.calibration.contours.frames import contours_of
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.fitness.contour import (
@@ -26,7 +26,7 @@ from markerless_tracker.fitness.contour import (
     eliminated,
     normal_equations,
     outline_rows,
-    pose_slopes,
+    pose_jacobian,
     solved,
     surface,
 )
@@ -154,14 +154,14 @@ class TimeOffsetEstimate:
 
     def _estimate(self) -> None:
         """Estimate the offsets; if they are far from where outlines were compared, begin again."""
-        hessian, slope = (np.sum(part, axis=0) for part in zip(*self._blocks, strict=True))
-        offsets_s = self._solved(hessian, slope)
+        hessian, gradient = (np.sum(part, axis=0) for part in zip(*self._blocks, strict=True))
+        offsets_s = self._solved(hessian, gradient)
         if np.abs(offsets_s - self._near_s).max() > _SETTLED_S:
             self._near_s, self.by_camera = offsets_s, {}
             self._blocks.clear()
             return
         # Jackknife: frames that follow each other share their errors, blocks of them less.
-        without = np.array([self._solved(hessian - h, slope - s) for h, s in self._blocks])
+        without = np.array([self._solved(hessian - h, gradient - s) for h, s in self._blocks])
         count = len(without)
         sd_s = np.sqrt((count - 1) / count * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
         self.by_camera = {
@@ -169,17 +169,17 @@ class TimeOffsetEstimate:
             for camera, offset_s, sd in zip(self._cameras, offsets_s, sd_s, strict=True)
         }
 
-    def _solved(self, hessian: FloatArray, slope: FloatArray) -> FloatArray:
+    def _solved(self, hessian: FloatArray, gradient: FloatArray) -> FloatArray:
         """The offsets (c,) relative to their median, s."""
         sd = np.tile([_OFFSET_SD_S, _SHIFT_SD_PX, _SHIFT_SD_PX], len(self._cameras))
-        offsets_s = solved(hessian + np.diag(1.0 / sd**2), slope)[::_NUMBERS]
+        offsets_s = solved(hessian + np.diag(1.0 / sd**2), gradient)[::_NUMBERS]
         return np.asarray(offsets_s - np.median(offsets_s))
 
     def _take(self, result: TrackResult, body: BodyModel, velocity: FloatArray) -> None:
         """Add the equations of one frame: pose, then offset and shift (u, v) of each camera."""
         assert result.pose is not None
         size = body.size + _NUMBERS * len(self._cameras)
-        hessian, slope, views = np.zeros((size, size)), np.zeros(size), 0
+        hessian, gradient, views = np.zeros((size, size)), np.zeros(size), 0
         for number, camera in enumerate(self._cameras):
             observation = result.observations.get(camera.name)
             if observation is None or not observation.mask_words.any():
@@ -188,13 +188,13 @@ class TimeOffsetEstimate:
             own, pull = self._view(camera, observation, result.pose, body, velocity, number)
             at = np.r_[: body.size, body.size + _NUMBERS * number + np.arange(_NUMBERS)]
             hessian[np.ix_(at, at)] += own
-            slope[at] += pull
+            gradient[at] += pull
         if views < 2:
             return
         # The prior's mean is the tracked pose.
         precision = 1.0 / body.prior_sd**2
-        add_pose_prior(hessian, slope, precision, np.zeros(body.size), damping=0.0)
-        eliminated(hessian, slope, body.size, *self._block)
+        add_pose_prior(hessian, gradient, precision, np.zeros(body.size), damping=0.0)
+        eliminated(hessian, gradient, body.size, *self._block)
         self._frames += 1
 
     def _view(
@@ -215,11 +215,11 @@ class TimeOffsetEstimate:
         )  # fmt: skip
         frame.collect(shown, _TRUNCATION_M)
         rows = outline_rows(frame)
-        by_pose = pose_slopes(body, shown, rows)
+        by_pose = pose_jacobian(body, shown, rows)
         by_time = -(by_pose @ velocity)
-        by_shift = shift_slopes(camera, surface(body, shown, rows), rows.gradient)
-        slopes = np.column_stack([by_pose, by_time, by_shift])
-        return normal_equations(slopes, _SCALE * rows.weight, rows.value - near_s * by_time)
+        by_shift = shift_jacobian(camera, surface(body, shown, rows), rows.gradient)
+        jacobian = np.column_stack([by_pose, by_time, by_shift])
+        return normal_equations(jacobian, _SCALE * rows.weight, rows.value - near_s * by_time)
 
     def _new_block(self) -> None:
         size = _NUMBERS * len(self._cameras)

@@ -8,9 +8,9 @@ from markerless_tracker.fitness.contour.outline_rows import (
     OutlineRows,
     floor_rows,
     joined_rows,
-    length_slopes,
+    length_jacobian,
     outline_rows,
-    pose_slopes,
+    pose_jacobian,
     surface,
 )
 from markerless_tracker.fitness.contour.row_kernels import (
@@ -29,10 +29,10 @@ __all__ = [
     "eliminated",
     "floor_rows",
     "joined_rows",
-    "length_slopes",
+    "length_jacobian",
     "normal_equations",
     "outline_rows",
-    "pose_slopes",
+    "pose_jacobian",
     "solved",
     "surface",
 ]

@@ -47,14 +47,14 @@ def fill_twist(node, body, nodes, twist):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def sum_chain(body, nodes, sums, twists, hessian, slope):  # type: ignore[no-untyped-def]
-    """Fill hessian (p, p) and slope (p,) from the parts' sums (m, SUMS).
+def sum_chain(body, nodes, sums, twists, hessian, gradient):  # type: ignore[no-untyped-def]
+    """Fill hessian (p, p) and gradient (p,) from the parts' sums (m, SUMS).
 
     The sums become those of the subtrees, and twists (m + 1, 6) those of the joints; its last row
     is scratch. Parents must come before their children.
     """
     hessian[:] = 0.0
-    slope[:] = 0.0
+    gradient[:] = 0.0
     count = body.parent.size
     for node in range(count):
         if body.kind[node] >= 0:
@@ -79,7 +79,7 @@ def sum_chain(body, nodes, sums, twists, hessian, slope):  # type: ignore[no-unt
                 k += 1
         p = body.parameter[node]
         for i in range(6):
-            slope[p] += twist[i] * sums[node, 21 + i]
+            gradient[p] += twist[i] * sums[node, 21 + i]
             hessian[p, p] += twist[i] * force[i]
         while above >= 0:
             if body.kind[above] >= 0:

@@ -35,7 +35,7 @@ class ContourScratch(NamedTuple):
     sums: FloatArray  # (v, m, SUMS)
     twists: FloatArray  # (m + 1, 6)
     hessian: FloatArray  # (p, p)
-    slope: FloatArray  # (p,)
+    gradient: FloatArray  # (p,)
     step: StepScratch
 
 
@@ -124,7 +124,7 @@ def descend(  # type: ignore[no-untyped-def]
         samples, residuals: `Samples`, `Residuals`; filled with those of the last truncation.
         scratch, outlines: working memory.
     """
-    hessian, slope, count = scratch.hessian, scratch.slope, views.size.shape[0]
+    hessian, gradient, count = scratch.hessian, scratch.gradient, views.size.shape[0]
     for i in range(truncations.size):
         cone_ends(pose, body, scratch.nodes, scratch.world)
         for view in range(count):
@@ -145,17 +145,17 @@ def descend(  # type: ignore[no-untyped-def]
                     scratch.sums[0, m, k] += scratch.sums[view, m, k]
         if floor_precision > 0.0 and i < steps:
             add_floor(body, scratch.world, floor_precision / precision, standing, scratch.sums[0])
-        sum_chain(body, scratch.nodes, scratch.sums[0], scratch.twists, hessian, slope)
+        sum_chain(body, scratch.nodes, scratch.sums[0], scratch.twists, hessian, gradient)
         if i >= steps:
             continue
         for a in range(pose.size):
-            slope[a] *= precision
+            gradient[a] *= precision
             for b in range(pose.size):
                 hessian[a, b] *= precision
             for k in range(prior_mean.shape[0]):
                 hessian[a, a] += prior_precision[k, a]
-                slope[a] += prior_precision[k, a] * (pose[a] - prior_mean[k, a])
-        if solve_step(hessian, slope, pose, bounds, DAMPING, scratch.step) != SOLVED:
+                gradient[a] += prior_precision[k, a] * (pose[a] - prior_mean[k, a])
+        if solve_step(hessian, gradient, pose, bounds, DAMPING, scratch.step) != SOLVED:
             return
         for a in range(pose.size):
             # Rounding may put the sum beyond a bound.

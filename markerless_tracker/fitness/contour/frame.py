@@ -36,12 +36,12 @@ class NormalEquations:
 
     Attributes:
         hessian: (p, p) JᵀWJ.
-        slope: (p,) JᵀWr.
+        gradient: (p,) JᵀWr.
         cost: sum of length times the robust cost of r, m³.
     """
 
     hessian: FloatArray
-    slope: FloatArray
+    gradient: FloatArray
     cost: float
 
 
@@ -115,7 +115,9 @@ class ContourFrame:
         """Normal equations at a pose (p,); residuals beyond `truncation_m` are outliers."""
         self.collect(pose, truncation_m)
         s = self._scratch
-        return NormalEquations(s.hessian.copy(), s.slope.copy(), float(self.residuals.cost.sum()))
+        return NormalEquations(
+            s.hessian.copy(), s.gradient.copy(), float(self.residuals.cost.sum())
+        )
 
     def collect(self, pose: FloatArray, truncation_m: float, body: BodyModel | None = None) -> None:
         """Fill `samples` and `residuals` at a pose (p,), with another body's shape if given."""

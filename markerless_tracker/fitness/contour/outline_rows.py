@@ -120,13 +120,13 @@ def surface(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
     return out
 
 
-def pose_slopes(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
+def pose_jacobian(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
     """Derivatives (n, p) of the residuals by the parameters of a pose (p,)."""
     placed = transforms(body, pose)
     moved = np.flatnonzero(body.node_kind >= 0)
     axes = move_axes(body, placed, moved)
     out = np.zeros((len(rows.cone), body.size))
-    _pose_slopes(
+    _pose_jacobian(
         surface(body, pose, rows), rows.gradient, axes,
         np.ascontiguousarray(placed[moved, :, 3]), is_translation(body.node_kind[moved]),
         body.node_parameter[moved],
@@ -135,7 +135,7 @@ def pose_slopes(body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatAr
     return out
 
 
-def length_slopes(
+def length_jacobian(
     longer: Sequence[BodyModel],
     pose: FloatArray,
     rows: OutlineRows,
@@ -154,7 +154,7 @@ def length_slopes(
     placed = np.stack([cone_transforms(body, pose) for body in longer])
     lengths = np.stack([body.cone_length for body in longer])
     out = np.empty((len(rows.cone), len(longer)))
-    _length_slopes(
+    _length_jacobian(
         placed, longer[0].cone_shape, lengths, rows.cone, rows.place, rows.gradient, points,
         1.0 / step, out,
     )  # fmt: skip
@@ -173,20 +173,20 @@ def _on_cone(c, place, shape, length):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _length_slopes(  # type: ignore[no-untyped-def]
+def _length_jacobian(  # type: ignore[no-untyped-def]
     placed, shape, lengths, cone, place, gradient, points, per_step, out
 ):
-    """Fill out (n, k) as `length_slopes`; placed (k, c, 3, 4), lengths (k, c)."""
+    """Fill out (n, k) as `length_jacobian`; placed (k, c, 3, 4), lengths (k, c)."""
     for n in range(cone.size):
         c = cone[n]
         for k in range(placed.shape[0]):
             x, y, z = _on_cone(c, place[n], shape, lengths[k])
-            slope = 0.0
+            rate = 0.0
             for i in range(3):
                 t = placed[k, c, i]
                 moved = t[0] * x + t[1] * y + t[2] * z + t[3] - points[n, i]
-                slope += gradient[n, i] * moved
-            out[n, k] = per_step * slope
+                rate += gradient[n, i] * moved
+            out[n, k] = per_step * rate
 
 
 @kernel
@@ -201,7 +201,7 @@ def _surface(placed, shape, length, cone, place, out):  # type: ignore[no-untype
 
 
 @kernel
-def _pose_slopes(  # type: ignore[no-untyped-def]
+def _pose_jacobian(  # type: ignore[no-untyped-def]
     points, gradient, axes, origins, slides, parameter, hang, cone, out
 ):
     """Add the derivatives of n residuals by p parameters to out (n, p).

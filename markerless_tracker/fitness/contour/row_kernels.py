@@ -13,18 +13,19 @@ _LEAST_PRECISION = 1e-9
 
 
 def normal_equations(
-    slopes: FloatArray, weight: FloatArray, value: FloatArray
+    jacobian: FloatArray, weight: FloatArray, value: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """JᵀWJ (k, k) and JᵀWr (k,) of rows (n, k), their weights (n,) and residuals (n,)."""
-    hessian, slope = np.zeros((slopes.shape[1], slopes.shape[1])), np.zeros(slopes.shape[1])
-    used = np.empty(slopes.shape[1], dtype=np.int64)
-    _accumulate(np.ascontiguousarray(slopes), weight, value, used, hessian, slope)
-    return hessian, slope
+    k = jacobian.shape[1]
+    hessian, gradient = np.zeros((k, k)), np.zeros(k)
+    used = np.empty(k, dtype=np.int64)
+    _accumulate(np.ascontiguousarray(jacobian), weight, value, used, hessian, gradient)
+    return hessian, gradient
 
 
 def add_pose_prior(
     hessian: FloatArray,
-    slope: FloatArray,
+    gradient: FloatArray,
     precision: FloatArray,
     off: FloatArray,
     *,
@@ -33,65 +34,65 @@ def add_pose_prior(
     """Add a Gaussian prior of a pose, the first p unknowns, and damp their equations.
 
     Args:
-        hessian, slope: (p + k, p + k) and (p + k,), changed.
+        hessian, gradient: (p + k, p + k) and (p + k,), changed.
         precision: (p,) 1 / variance.
         off: (p,) the pose minus the prior's mean.
         damping: fraction of the diagonal that is added to it.
     """
     pose = np.arange(precision.size)
     hessian[pose, pose] = (hessian[pose, pose] + precision + _LEAST_PRECISION) * (1.0 + damping)
-    slope[pose] += precision * off
+    gradient[pose] += precision * off
 
 
 def eliminated(
     hessian: FloatArray,
-    slope: FloatArray,
+    gradient: FloatArray,
     first: int,
     out_hessian: FloatArray,
-    out_slope: FloatArray,
+    out_gradient: FloatArray,
 ) -> FloatArray:
     """Eliminate the first unknowns; add the reduced equations of the others (Schur complement).
 
     Args:
         hessian: (f + k, f + k), positive definite in its first f rows and columns.
-        slope: (f + k,).
+        gradient: (f + k,).
         first: f.
-        out_hessian, out_slope: (k, k) and (k,), added to.
+        out_hessian, out_gradient: (k, k) and (k,), added to.
 
     Returns:
         (f, k + 1): matrix M; the step of the first unknowns is -M @ [step of the others, 1].
     """
-    inner = np.concatenate([hessian[:first, first:], slope[:first, None]], axis=1)
+    inner = np.concatenate([hessian[:first, first:], gradient[:first, None]], axis=1)
     _eliminate(hessian[:first, :first].copy(), inner)
     out_hessian += hessian[first:, first:]
-    out_slope += slope[first:]
-    _reduce(np.ascontiguousarray(hessian[:first, first:]), inner, out_hessian, out_slope)
+    out_gradient += gradient[first:]
+    _reduce(np.ascontiguousarray(hessian[:first, first:]), inner, out_hessian, out_gradient)
     return inner
 
 
-def solved(hessian: FloatArray, slope: FloatArray) -> FloatArray:
+def solved(hessian: FloatArray, gradient: FloatArray) -> FloatArray:
     """The step (k,) that solves positive definite equations (k, k) and (k,)."""
-    step = -slope[:, None]
+    step = -gradient[:, None]
     _eliminate(hessian.copy(), step)
     return step[:, 0]
 
 
 @kernel
-def _accumulate(slopes, weight, value, used, hessian, slope):  # type: ignore[no-untyped-def]
-    """Add rows to hessian (k, k) and slope (k,), as `normal_equations`; used (k,) is scratch."""
-    n, k = slopes.shape
+def _accumulate(jacobian, weight, value, used, hessian, gradient):  # type: ignore[no-untyped-def]
+    """Add rows to hessian (k, k) and gradient (k,), as `normal_equations`; used (k,) is scratch."""
+    n, k = jacobian.shape
     for i in range(n):
         count = 0
         for a in range(k):
-            if slopes[i, a] != 0.0:
+            if jacobian[i, a] != 0.0:
                 used[count] = a
                 count += 1
         for p in range(count):
             a = used[p]
-            scaled = weight[i] * slopes[i, a]
-            slope[a] += scaled * value[i]
+            scaled = weight[i] * jacobian[i, a]
+            gradient[a] += scaled * value[i]
             for q in range(p + 1):
-                hessian[a, used[q]] += scaled * slopes[i, used[q]]
+                hessian[a, used[q]] += scaled * jacobian[i, used[q]]
     for a in range(k):
         for b in range(a):
             hessian[b, a] = hessian[a, b]
@@ -122,11 +123,11 @@ def _eliminate(a, right):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _reduce(cross, solved, hessian, slope):  # type: ignore[no-untyped-def]
-    """Subtract crossᵀ solved (k, k + 1) from hessian and slope."""
+def _reduce(cross, solved, hessian, gradient):  # type: ignore[no-untyped-def]
+    """Subtract crossᵀ solved (k, k + 1) from hessian and gradient."""
     f, k = cross.shape
     for i in range(f):
         for a in range(k):
             for b in range(k):
                 hessian[a, b] -= cross[i, a] * solved[i, b]
-            slope[a] -= cross[i, a] * solved[i, k]
+            gradient[a] -= cross[i, a] * solved[i, k]

@@ -19,10 +19,10 @@ from markerless_tracker.fitness.contour import (
     eliminated,
     floor_rows,
     joined_rows,
-    length_slopes,
+    length_jacobian,
     normal_equations,
     outline_rows,
-    pose_slopes,
+    pose_jacobian,
     solved,
     surface,
 )
@@ -120,16 +120,16 @@ class BodyFit:
         """
         body = self.body
         longer = [self._made(self._lengths + step) for step in _STEP * np.eye(len(self._lengths))]
-        hessian, slope = self._prior()
+        hessian, gradient = self._prior()
         parts = []
         spreads: dict[str, list[float]] = {}
         for frame in self._frames:
             own, pull = self._equations(frame, body, longer, truncation_m, spreads)
-            parts.append(eliminated(own, pull, body.size, hessian, slope))
+            parts.append(eliminated(own, pull, body.size, hessian, gradient))
             yield
         self._view_sd_m = {name: float(np.mean(values)) for name, values in spreads.items()}
         hessian[np.diag_indices_from(hessian)] *= 1.0 + _DAMPING
-        step = solved(hessian, slope)
+        step = solved(hessian, gradient)
         if not np.isfinite(step).all():
             return
         split = len(self._lengths)
@@ -149,13 +149,13 @@ class BodyFit:
         """Normal equations of the priors of lengths and sections."""
         sections, split = self._sections, len(self._lengths)
         size = split + sections.size
-        hessian, slope = np.zeros((size, size)), np.zeros(size)
+        hessian, gradient = np.zeros((size, size)), np.zeros(size)
         hessian[:split, :split] = self._belief.precision
-        slope[:split] = self._belief.precision @ (self._lengths - self._belief.mean)
+        gradient[:split] = self._belief.precision @ (self._lengths - self._belief.mean)
         rest = np.arange(split, size)
         hessian[rest, rest] = 1.0 / sections.prior_sd**2
-        slope[split:] = (self._numbers - sections.generic) / sections.prior_sd**2
-        return hessian, slope
+        gradient[split:] = (self._numbers - sections.generic) / sections.prior_sd**2
+        return hessian, gradient
 
     def _equations(
         self,
@@ -176,15 +176,15 @@ class BodyFit:
         floor = floor_rows(body, frame.pose, self._floor_precision / AMONG)
         rows = joined_rows(replace(outline, weight=weight), floor)
         points = surface(body, frame.pose, rows)
-        by_length = length_slopes(longer, frame.pose, rows, points, _STEP)
-        by_pose = pose_slopes(body, frame.pose, rows)
-        by_section = self._sections.slopes(body, frame.pose, rows)
-        slopes = np.concatenate([by_pose, by_length, by_section], axis=1)
-        hessian, slope = normal_equations(slopes, rows.weight, rows.value)
+        by_length = length_jacobian(longer, frame.pose, rows, points, _STEP)
+        by_pose = pose_jacobian(body, frame.pose, rows)
+        by_section = self._sections.jacobian(body, frame.pose, rows)
+        jacobian = np.concatenate([by_pose, by_length, by_section], axis=1)
+        hessian, gradient = normal_equations(jacobian, rows.weight, rows.value)
         precision = 1.0 / (AMONG * body.prior_sd**2)
         off = frame.pose - body.prior_mean
-        add_pose_prior(hessian, slope, precision, off, damping=_DAMPING)
-        return hessian, slope
+        add_pose_prior(hessian, gradient, precision, off, damping=_DAMPING)
+        return hessian, gradient
 
     def _trust(
         self, rows: OutlineRows, names: Sequence[str], spreads: dict[str, list[float]]

@@ -74,22 +74,22 @@ def shape_fitting(
     shape = sections.of(start)
     for bound_m in truncations(*truncation_m, iterations):
         shaped = sections.put(body, shape)
-        hessian, slope = np.zeros((sections.size, sections.size)), np.zeros(sections.size)
+        hessian, gradient = np.zeros((sections.size, sections.size)), np.zeros(sections.size)
         for frame, pose, weight in frames:
             frame.collect(pose, float(bound_m), shaped)
             rows = outline_rows(frame)
-            slopes = sections.slopes(shaped, pose, rows)
-            one = normal_equations(slopes, rows.weight, rows.value)
+            jacobian = sections.jacobian(shaped, pose, rows)
+            one = normal_equations(jacobian, rows.weight, rows.value)
             hessian += weight * scale * one[0]
-            slope += weight * scale * one[1]
+            gradient += weight * scale * one[1]
             yield
         shape = refine(
-            _sums(hessian, slope), shape, priors=(prior,), bounds=sections.bounds, iterations=1,
+            _sums(hessian, gradient), shape, priors=(prior,), bounds=sections.bounds, iterations=1,
             truncation=(float(bound_m), float(bound_m)),
         )  # fmt: skip
     return sections.put(body, shape)
 
 
-def _sums(hessian: FloatArray, slope: FloatArray) -> Equations:
+def _sums(hessian: FloatArray, gradient: FloatArray) -> Equations:
     """Constant equations, for a refinement of one iteration."""
-    return lambda _, __: (hessian, slope)
+    return lambda _, __: (hessian, gradient)

@@ -78,10 +78,10 @@ class Sections:
         shape[used] = self._sign[used] * numbers[self._index[used]]
         return replace(body, cone_shape=shape)
 
-    def slopes(self, body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
+    def jacobian(self, body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
         """Derivatives (n, k) of residuals by the parameters, for a body at a pose (p,)."""
         out = np.zeros((len(rows.cone), self._size))
-        _fill_slopes(
+        _fill_jacobian(
             cone_transforms(body, pose), rows.cone, rows.place, rows.gradient, self._index,
             self._sign, out,
         )  # fmt: skip
@@ -89,7 +89,7 @@ class Sections:
 
 
 @kernel
-def _fill_slopes(placed, cone, place, gradient, index, sign, out):  # type: ignore[no-untyped-def]
+def _fill_jacobian(placed, cone, place, gradient, index, sign, out):  # type: ignore[no-untyped-def]
     """Fill out (n, k), zeros, with the derivatives of n residuals by k parameters.
 
     Args:

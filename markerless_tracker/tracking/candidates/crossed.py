@@ -12,7 +12,7 @@ from markerless_tracker.body.model import MARKER_NAMES
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 from markerless_tracker.tracking.candidates.mirror import mirror_of
-from markerless_tracker.tracking.confidence import slopes
+from markerless_tracker.tracking.confidence import jacobians
 
 PAIRS = ("legs", "arms")
 _JOINTS = {"legs": ("Hip", "Knee", "Ankle"), "arms": ("Shoulder", "Elbow", "Wrist")}
@@ -72,9 +72,9 @@ def in_each_others_place(
     def equations(values: FloatArray, _: float) -> tuple[FloatArray, FloatArray]:
         other[parameters] = values
         off_m = (markers(body, other)[moved] - goal_m).ravel()
-        by_marker = slopes(body, other)[0].reshape(-1, 3, body.size)
-        slope = by_marker[moved][:, :, parameters].reshape(off_m.size, -1)
-        return slope.T @ slope / _PLACE_M**2, slope.T @ off_m / _PLACE_M**2
+        by_marker = jacobians(body, other)[0].reshape(-1, 3, body.size)
+        jacobian = by_marker[moved][:, :, parameters].reshape(off_m.size, -1)
+        return jacobian.T @ jacobian / _PLACE_M**2, jacobian.T @ off_m / _PLACE_M**2
 
     usual = Prior(body.prior_mean[parameters], 1.0 / body.prior_sd[parameters] ** 2)
     other[parameters] = refine(

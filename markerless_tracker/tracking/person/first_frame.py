@@ -107,19 +107,19 @@ def _settled(
         contours.collect(z[:p], truncation_m, model)
         rows = outline_rows(contours)
         points, joints = surface(model, z[:p], rows), markers(model, z[:p])[seen]
-        slopes = np.empty((rows.value.size, z.size))
+        jacobian = np.empty((rows.value.size, z.size))
         marks = np.empty((joints.size, z.size))
         for i in range(z.size):
             moved = z.copy()
             moved[i] += _STEP
             changed = model if i < p else start.sizes.body(moved[p:], body)
             gap = surface(changed, moved[:p], rows) - points
-            slopes[:, i] = np.einsum("ni,ni->n", rows.gradient, gap) / _STEP
+            jacobian[:, i] = np.einsum("ni,ni->n", rows.gradient, gap) / _STEP
             marks[:, i] = (markers(changed, moved[:p])[seen] - joints).ravel() / _STEP
         gap = (joints - start.positions_m[seen]).ravel()
         trust = 1.0 / start.noise_m**2
-        hessian, slope = normal_equations(slopes, scale * rows.weight, rows.value)
-        return hessian + trust * marks.T @ marks, slope + trust * marks.T @ gap
+        hessian, gradient = normal_equations(jacobian, scale * rows.weight, rows.value)
+        return hessian + trust * marks.T @ marks, gradient + trust * marks.T @ gap
 
     z = refine(
         equations,

@@ -124,12 +124,12 @@ def test_angles_give_back_the_rotations(name, seed) -> None:
 @pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=5, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_slopes_are_finite_differences(name, seed) -> None:
+def test_jacobian_is_finite_differences(name, seed) -> None:
     body = BODIES[name]
     pose = body.neutral + np.random.default_rng(seed).uniform(-0.5, 0.5, body.size)
     reader, step = AngleReader(body), 1e-6
     reader.read(pose)
-    slopes = reader.slopes(pose)
+    jacobian = reader.jacobian(pose)
     for k in range(body.size):
         shift = np.zeros(body.size)
         shift[k] = step
@@ -137,7 +137,7 @@ def test_slopes_are_finite_differences(name, seed) -> None:
         for s in (-1.0, 1.0):
             reader.reset()
             ends.append(reader.read(pose + s * shift).values_rad)
-        np.testing.assert_allclose((ends[1] - ends[0]) / (2.0 * step), slopes[:, k], atol=1e-6)
+        np.testing.assert_allclose((ends[1] - ends[0]) / (2.0 * step), jacobian[:, k], atol=1e-6)
 
 
 def test_deviations_follow_from_the_covariance() -> None:
@@ -146,8 +146,8 @@ def test_deviations_follow_from_the_covariance() -> None:
     root = rng.standard_normal((BODY.size, BODY.size)) * 0.01
     covariance = root @ root.T
     angles = AngleReader(BODY).read(pose, 0, covariance)
-    slopes = AngleReader(BODY).slopes(pose)
-    expected = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+    jacobian = AngleReader(BODY).jacobian(pose)
+    expected = np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))
     np.testing.assert_allclose(angles.sd_rad, expected, rtol=1e-9)
     assert AngleReader(BODY).read(pose).sd_rad is None
     # Nothing known of the rotation of an arm: its deviation says so, and stays bounded.

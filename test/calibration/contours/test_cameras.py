@@ -8,10 +8,10 @@ import pytest
 from markerless_tracker.calibration.contours.cameras import (
     CHANGES,
     change_between,
-    change_slopes,
+    change_jacobian,
     moved,
     put,
-    shift_slopes,
+    shift_jacobian,
 )
 from markerless_tracker.camera import CameraModel, project_camera
 from markerless_tracker.fitness.arrays import camera_arrays
@@ -39,7 +39,7 @@ def normals() -> FloatArray:
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def slope(of: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
+def gradient(of: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
     """Central differences (n, k) of values (n,) by k numbers."""
     steps = STEP * np.eye(at.size)
     return np.stack([(of(at + step) - of(at - step)) / (2.0 * STEP) for step in steps], axis=1)
@@ -62,18 +62,18 @@ def test_derivatives_by_a_change(camera, points, normals) -> None:
 
     by_point = np.stack(
         [
-            slope(
+            gradient(
                 lambda at, n=n: project_camera(at[None], camera)[0] @ normals[n : n + 1].T,
                 points[n],
             )[0]
             for n in range(len(points))
         ]
     )
-    expected = slope(value, np.zeros(CHANGES))
+    expected = gradient(value, np.zeros(CHANGES))
     np.testing.assert_allclose(
-        change_slopes(camera, points, by_point), expected, rtol=1e-4, atol=1e-3
+        change_jacobian(camera, points, by_point), expected, rtol=1e-4, atol=1e-3
     )
-    np.testing.assert_allclose(shift_slopes(camera, points, by_point), normals, atol=1e-5)
+    np.testing.assert_allclose(shift_jacobian(camera, points, by_point), normals, atol=1e-5)
 
 
 def test_kernels_get_the_changed_camera(camera) -> None:

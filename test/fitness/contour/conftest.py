@@ -125,14 +125,14 @@ def residuals_one_by_one(made: Scene, view: int, truncation: float) -> SlowResid
         found = bilinear(edge, pixel[s])
         kept = found is not None
         if kept:
-            value, slope = found[0] * depth[s] / focal, found[1]
-            steep = np.linalg.norm(slope)
+            value, gradient = found[0] * depth[s] / focal, found[1]
+            steep = np.linalg.norm(gradient)
             # Neither on ridges of the distance nor where the edge has another direction.
-            kept = steep >= 0.3 and slope @ normal[s] >= 0.5 * steep and abs(value) < truncation
+            kept = steep >= 0.3 and gradient @ normal[s] >= 0.5 * steep and abs(value) < truncation
         cost += length[s] * (tukey(value, truncation) if kept else truncation**2 / 6.0)
         if kept:
             weight = length[s] * (1.0 - (value / truncation) ** 2) ** 2
-            rows.append((value, weight, s, slope * depth[s] / focal))
+            rows.append((value, weight, s, gradient * depth[s] / focal))
     for at, out, px in zip(edge.points, edge.normals, edge.spacing, strict=True):
         facing = np.flatnonzero(normal @ out > 0.5)
         away = np.linalg.norm(pixel[facing] - at, axis=1)

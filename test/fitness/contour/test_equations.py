@@ -32,7 +32,7 @@ def numeric_jacobian(function, pose, h=1e-5):
     return np.stack(columns, axis=-1)
 
 
-def test_slopes_along_the_chain(posed, disturbed) -> None:
+def test_equations_along_the_chain(posed, disturbed) -> None:
     """The chain's derivatives of gradient . point, for points on every cone."""
     body, rng = posed.body, np.random.default_rng(2)
     pose = disturbed(posed)
@@ -61,7 +61,7 @@ def test_normal_equations(posed, slow_residuals, disturbed) -> None:
     """JᵀWJ and JᵀWr of the slow residuals, J by finite differences through the lens."""
     pose, truncation = disturbed(posed, seed=1), 0.08
     found = posed.frame.equations(pose, truncation)
-    hessian, slope, cost = np.zeros((31, 31)), np.zeros(31), 0.0
+    hessian, gradient, cost = np.zeros((31, 31)), np.zeros(31), 0.0
     for v, camera in enumerate(posed.rig):
         slow = slow_residuals(posed, v, truncation)
         samples = posed.frame.samples
@@ -71,24 +71,26 @@ def test_normal_equations(posed, slow_residuals, disturbed) -> None:
         pixels = numeric_jacobian(lambda x, f=points, c=camera: project_camera(f(x), c), pose)
         rows = np.einsum("nip,ni->np", pixels, slow.along)
         hessian += rows.T @ (slow.weight[:, None] * rows)
-        slope += rows.T @ (slow.weight * slow.value)
+        gradient += rows.T @ (slow.weight * slow.value)
         cost += slow.cost
     scale = np.sqrt(np.outer(np.diag(hessian), np.diag(hessian)))
     assert np.diag(hessian).min() > 0
     assert np.abs(found.hessian - hessian).max() < 1e-5 * np.abs(hessian).max()
     assert (np.abs(found.hessian - hessian) / scale).max() < 1e-5
-    np.testing.assert_allclose(found.slope, slope, rtol=1e-5, atol=1e-5 * np.abs(slope).max())
+    np.testing.assert_allclose(
+        found.gradient, gradient, rtol=1e-5, atol=1e-5 * np.abs(gradient).max()
+    )
     assert found.cost == pytest.approx(cost, rel=1e-7)
     np.testing.assert_allclose(found.hessian, found.hessian.T, rtol=1e-12)
 
 
-def test_the_slope_points_downhill(posed, disturbed) -> None:
+def test_the_negative_gradient_points_downhill(posed, disturbed) -> None:
     """Along the damped step the robust cost falls: residuals and derivatives fit together."""
     pose = disturbed(posed, seed=2, size=0.02)
     found = posed.frame.equations(pose, 0.1)
     a = found.hessian + np.diag(0.1 * np.diag(found.hessian) + 1e-9)
-    step = np.linalg.solve(a, -found.slope)
-    assert found.slope @ step < 0
+    step = np.linalg.solve(a, -found.gradient)
+    assert found.gradient @ step < 0
     costs = [posed.frame.equations(pose + t * step, 0.1).cost for t in (0.0, 0.25, 0.5, 1.0)]
     assert costs[1] < costs[0] and costs[2] < costs[1] and costs[3] < 0.5 * costs[0]
 
@@ -101,5 +103,5 @@ def test_earlier_calls_change_nothing(make_pose, make_scene, disturbed) -> None:
     one.frame.equations(one.pose, 0.02)
     for other in (one.frame.equations(pose, 0.1), two.frame.equations(pose, 0.1)):
         assert other.hessian.tobytes() == first.hessian.tobytes()
-        assert other.slope.tobytes() == first.slope.tobytes()
+        assert other.gradient.tobytes() == first.gradient.tobytes()
         assert other.cost == first.cost

@@ -7,7 +7,7 @@ from markerless_tracker.body import cone_transforms, load_body, load_description
 from markerless_tracker.body.sizes import Sizes
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.arrays import body_arrays
-from markerless_tracker.fitness.contour import ContourFrame, floor_rows, pose_slopes, surface
+from markerless_tracker.fitness.contour import ContourFrame, floor_rows, pose_jacobian, surface
 from markerless_tracker.fitness.contour.chain_kernels import SUMS, sum_chain
 from markerless_tracker.fitness.contour.floor import BELIEVED_M, SLACK_M, STANDING, add_floor
 from markerless_tracker.fitness.raster.kernels import cone_ends
@@ -106,15 +106,15 @@ def test_the_kernel_sums_the_same_rows(sunk, lift_m: float) -> None:
     cone_ends(pose, arrays, nodes, world)
     sums = np.zeros((body.node_parent.size, SUMS))
     add_floor(arrays, world, 7.0, True, sums)
-    hessian, slope = np.empty((body.size, body.size)), np.empty(body.size)
-    sum_chain(arrays, nodes, sums, np.empty((len(nodes) + 1, 6)), hessian, slope)
+    hessian, gradient = np.empty((body.size, body.size)), np.empty(body.size)
+    sum_chain(arrays, nodes, sums, np.empty((len(nodes) + 1, 6)), hessian, gradient)
     # The kernel takes the points below the axes instead of the lowest ones, which a translation of
     # the body does not tell apart.
-    slopes = pose_slopes(body, pose, rows)
+    jacobian = pose_jacobian(body, pose, rows)
     up = body.index("pelvis_tz")
     assert hessian[up, up] == pytest.approx(rows.weight.sum())
-    assert slope[up] == pytest.approx(rows.weight @ rows.value)
-    np.testing.assert_allclose(slopes[:, up], 1.0)
+    assert gradient[up] == pytest.approx(rows.weight @ rows.value)
+    np.testing.assert_allclose(jacobian[:, up], 1.0)
 
 
 def test_without_the_ankles_heights_toes_count_more(sunk) -> None:

@@ -96,7 +96,7 @@ def refined_slowly(
 
     def equations(pose, truncation_m):
         sums = frame.equations(pose, truncation_m)
-        return sums.hessian * PRECISION, sums.slope * PRECISION
+        return sums.hessian * PRECISION, sums.gradient * PRECISION
 
     return refine(
         equations, start, priors=priors, bounds=shown.body.limits, iterations=5,

@@ -90,6 +90,6 @@ def test_no_evidence_costs_the_most_and_has_no_gradient(make_pose, make_scene) -
         .lay_out(blank), pixels_per_m=dict.fromkeys(made.rig.names, 150.0),
     )  # fmt: skip
     found = frame.equations(made.pose, 0.1)
-    assert not found.hessian.any() and not found.slope.any()
+    assert not found.hessian.any() and not found.gradient.any()
     total = sum(frame.samples.length[v, : frame.samples.count[v]].sum() for v in range(4))
     assert found.cost == pytest.approx(total * 0.1**2 / 6.0)
