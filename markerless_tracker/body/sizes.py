@@ -122,8 +122,8 @@ class Sizes:
     @cached_property
     def _with_stature(self) -> Mapping[str, FloatArray]:
         """Changes of the arrays when the stature doubles; all depend on it linearly."""
-        double = subject_from_stature(self._description, 1.5 * MEAN_STATURE_M)
-        taller = build_body(self._description, double)
+        subject = subject_from_stature(self._description, 1.5 * MEAN_STATURE_M)
+        taller = build_body(self._description, subject)
         return {
             name: (getattr(taller, name) - getattr(self._generic, name)) / 0.5
             for name in (*_LINEAR, "cone_shape")

@@ -33,7 +33,7 @@ def draw_evidence(
     background: Image | None = None,
     labels: Image | None = None,
 ) -> Image:
-    """A picture (h, 4 w, 3) BGR: the input, the mask, the edges, the body over the input.
+    """A picture (h, 4 w to 6 w, 3) BGR: the input, the mask, the edges, the body over the input.
 
     The background and the labels (h, w) from `Segmenter.labels` are the second and third panel if
     given. Undecided pixels of the mask are yellow. Pixels outside the observation's region are dark

@@ -16,7 +16,7 @@ def draw_steps(
     pose: FloatArray | None,
     segmenter: Segmenter | None,
 ) -> Image:
-    """The steps side by side (h, 6 w, 3) BGR, see `draw_evidence`.
+    """The steps side by side (h, 6 w, 3) BGR, (h, 4 w, 3) without a segmenter; see `draw_evidence`.
 
     Args:
         image: the input image.

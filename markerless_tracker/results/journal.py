@@ -6,7 +6,7 @@ summary, which replace earlier entries.
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -102,12 +102,13 @@ def open_summary(name: Path) -> tuple[dict[str, Any], Iterator[dict[str, Any]]]:
         name: path of the result without suffix.
 
     Raises:
-        DatasetError: there is neither NAME.json nor NAME.jsonl, or it is no result.
+        DatasetError: there is neither NAME.json nor NAME.jsonl, or it is no result; or, raised by
+            the iterator, a frame has no stamp.
     """
     path = name.with_name(name.name + ".json")
     journal = name.with_name(name.name + ".jsonl")
     if journal.exists() and not path.exists():
-        with _no_result(path):
+        with _no_result(journal):
             return _head(journal), _parsed(journal, _lines(journal), _FRAME)
     with _no_result(path):
         head = _composed_head(path)
@@ -116,7 +117,7 @@ def open_summary(name: Path) -> tuple[dict[str, Any], Iterator[dict[str, Any]]]:
         content = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(content, dict) or not isinstance(content.get("frames"), list):
         raise DatasetError(f"{path}: no result of a tracker (it has no `frames`)")
-    return content, iter(content.pop("frames"))
+    return content, _checked(path, content.pop("frames"))
 
 
 @contextmanager
@@ -129,9 +130,17 @@ def _no_result(path: Path) -> Iterator[None]:
 
 def _parsed(path: Path, lines: Iterator[str], start: str) -> Iterator[dict[str, Any]]:
     with _no_result(path):
-        for line in lines:
-            if line.startswith(start):
-                yield json.loads(line.rstrip(","))
+        frames = (json.loads(line.rstrip(",")) for line in lines if line.startswith(start))
+        yield from _checked(path, frames)
+
+
+def _checked(path: Path, frames: Iterable[Any]) -> Iterator[dict[str, Any]]:
+    for number, frame in enumerate(frames):
+        if not isinstance(frame, dict) or not isinstance(frame.get(FRAME_KEY), int):
+            raise DatasetError(
+                f"{path}: frame {number}: no `{FRAME_KEY}`, expected whole nanoseconds"
+            )
+        yield frame
 
 
 def _composed_head(path: Path) -> dict[str, Any] | None:
@@ -160,7 +169,10 @@ def _head(path: Path) -> dict[str, Any]:
     head: dict[str, Any] = {}
     for line in _lines(path):
         if not line.startswith(_FRAME):
-            head.update(json.loads(line))
+            entries = json.loads(line)
+            if not isinstance(entries, dict):
+                raise ValueError(f"a line is {line[:40]!r}, expected a JSON object")
+            head.update(entries)
     return head
 
 

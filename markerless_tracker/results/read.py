@@ -1,5 +1,6 @@
 """Reads results: NAME.trc and NAME.json together, a chunk at a time."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -63,13 +64,21 @@ class ResultReader:
         self.summary, frames = open_summary(self._summary_name)
         with TrcRows(path) as rows:
             self.marker_names, self.fps = rows.names, rows.fps
+        if not 0.0 < self.fps < math.inf:
+            raise DatasetError(f"{path}: DataRate is {self.fps}, expected a number above 0")
         body = self.summary.get("body")
         names = body.get("parameters", []) if isinstance(body, dict) else []
         self.parameter_names = tuple(str(parameter) for parameter in names)
         # All frames with a pose have the same angles, or none.
         posed = (frame for frame in frames if frame.get("parameters") is not None)
         first = next(posed, {})
-        self.angle_names = tuple(first.get("angles") or ())
+        angles = first.get("angles") or {}
+        if not isinstance(angles, dict):
+            raise DatasetError(
+                f"{self._summary_name}.json: `angles` of the frame at {first['stamp_ns']} ns is no "
+                "table of angles"
+            )
+        self.angle_names = tuple(angles)
         # A camera may be missing in that frame; the verdict at the end of a run has all of them.
         verdict = self.summary.get("verdict")
         overlap = verdict.get("overlap") if isinstance(verdict, dict) else None
@@ -87,12 +96,7 @@ class ResultReader:
             positions = _Positions(rows)
             part: list[tuple[dict[str, Any], FloatArray]] = []
             empty = True
-            for number, frame in enumerate(frames):
-                if not isinstance(frame, dict) or not isinstance(frame.get("stamp_ns"), int):
-                    raise DatasetError(
-                        f"{self._summary_name}.json: frame {number}: no `stamp_ns`, expected "
-                        "whole nanoseconds"
-                    )
+            for frame in frames:
                 if frame.get("segment", 1) != self._segment:
                     continue
                 part.append((frame, positions.at(frame["stamp_ns"])))
@@ -116,8 +120,9 @@ class ResultReader:
         angles = np.full((n, len(self.angle_names)), np.nan)
         overlap = np.full((n, len(self.camera_names)), np.nan)
         parameters, parameters_sd = np.full((2, n, len(self.parameter_names)), np.nan)
-        try:
-            for row, frame in enumerate(frames):
+        fitness = np.full(n, np.nan)
+        for row, frame in enumerate(frames):
+            try:
                 deviations = frame.get("markers_sd_mm") or {}
                 for column, marker in enumerate(self.marker_names):
                     if marker in deviations:
@@ -127,15 +132,14 @@ class ResultReader:
                     angles[row] = [_number(found.get(name)) for name in self.angle_names]
                 agreement = frame.get("iou") or {}
                 overlap[row] = [_number(agreement.get(name)) for name in self.camera_names]
-                if frame.get("parameters") is not None:
-                    parameters[row] = frame["parameters"]
-                if frame.get("parameters_sd") is not None:
-                    parameters_sd[row] = frame["parameters_sd"]
-            fitness = np.array([_number(frame.get("fitness")) for frame in frames], dtype=float)
-        except (TypeError, ValueError, AttributeError) as error:
-            raise DatasetError(
-                f"{self._summary_name}.json: a frame is malformed: {error}"
-            ) from error
+                self._take_parameters(frame, "parameters", parameters[row])
+                self._take_parameters(frame, "parameters_sd", parameters_sd[row])
+                fitness[row] = _number(frame.get("fitness"))
+            except (TypeError, ValueError, AttributeError) as error:
+                raise DatasetError(
+                    f"{self._summary_name}.json: the frame at {frame['stamp_ns']} ns is malformed: "
+                    f"{error}"
+                ) from error
         for values in (positions, sd, angles, overlap, parameters, parameters_sd):
             values[blank] = np.nan
         return StoredResult(
@@ -157,6 +161,15 @@ class ResultReader:
             angles_deg=angles,
             overlap=overlap,
         )
+
+    def _take_parameters(self, frame: dict[str, Any], key: str, out: FloatArray) -> None:
+        """Fill out (p,) with a frame's values, if it has any."""
+        values = frame.get(key)
+        if values is None:
+            return
+        if len(values) != out.size:
+            raise ValueError(f"`{key}` has {len(values)} values, expected {out.size}")
+        out[:] = values
 
 
 class _Positions:

@@ -87,7 +87,7 @@ class ResultWriter:
         check_target(name, overwrite=overwrite)
         self.body = body
         self.frames, self.not_written = 0, 0
-        self._tracked = False
+        self._tracked = self._closed = False
         self._config = config
         self._fps = fps
         self._source = source
@@ -132,11 +132,14 @@ class ResultWriter:
     def close(self) -> None:
         """Complete the files; without any frame an earlier result is kept.
 
+        A second call does nothing.
+
         Raises:
             DatasetError: a file cannot be completed; the rows and the journal stay as they are.
         """
-        if self._journal is None and self._earlier:
+        if self._closed or (self._journal is None and self._earlier):
             return
+        self._closed = True
         journal, trc = self._begun()
         steps: tuple[Callable[[], None], ...] = (
             partial(trc.finish, self._rate()),

@@ -7,17 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.body import LIMB_MARKERS
 from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.marker_angles import angle_errors
 
 MM_PER_M = 1000.0
-LIMBS = tuple(
-    side + joint
-    for joint in ("Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle")
-    for side in ("L", "R")
-)
 SHARES_WITHIN_SD = (1, 2, 3)
 # Shorter than that on the floor's plane, hips and shoulders have no direction.
 _LEAST_ACROSS_M = 0.01
@@ -146,7 +142,7 @@ def score(
     reference_rows = reference_rows[compared]
     frame_mm = _mean(joint_mm, axis=1)
     joints = dict(zip(names, _mean(joint_mm, axis=0).tolist(), strict=True))
-    limbs = np.array([name in LIMBS for name in names])
+    limbs = np.array([name in LIMB_MARKERS for name in names])
     headings = heading_frames(reference)[reference_rows]
     in_heading_mm = np.einsum("nij,nmj->nmi", headings, offset_m) * MM_PER_M
     biases = _mean(in_heading_mm, axis=0)

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.errors import DatasetError
@@ -13,21 +12,21 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import TrackState
 from markerless_tracker.results.journal import read_summary
 
+_WITHOUT_PERSON = (TrackState.LOST.value, TrackState.SEARCHING.value)
+
 
 @dataclass(frozen=True, eq=False)
 class StoredFrames:
     """Rows of a result's marker file, with their entries of its JSON file.
 
     Attributes:
-        track: the markers; rows of frames in the state LOST are blank.
+        track: the markers; rows of frames in the states LOST and SEARCHING are blank.
         markers_sd_mm: (n, m, 3) standard deviations of the markers along x, y, z of the world, mm;
             NaN = unknown.
-        lost: (n,) whether the frame's state is LOST.
     """
 
     track: MarkerTrack
     markers_sd_mm: FloatArray
-    lost: NDArray[np.bool_]
 
 
 def stored_frames(path: Path, track: MarkerTrack) -> StoredFrames | None:
@@ -53,26 +52,27 @@ def stored_frames(path: Path, track: MarkerTrack) -> StoredFrames | None:
     row_of = {stamp: row for row, stamp in enumerate(track.stamps_ns.tolist())}
     column_of = {marker: column for column, marker in enumerate(track.names)}
     sd_mm = np.full(track.positions_m.shape, np.nan)
-    lost = np.zeros(len(track), dtype=np.bool_)
+    blank = np.zeros(len(track), dtype=np.bool_)
     for number, frame in enumerate(read_summary(name)["frames"]):
         where = f"{name}.json: frame {number}"
-        if not isinstance(frame, dict) or not isinstance(frame.get("stamp_ns"), int):
-            raise DatasetError(f"{where}: no `stamp_ns`, expected whole nanoseconds")
         row = row_of.get(frame["stamp_ns"])
         if row is None or frame.get("segment", 1) != segment:
             continue
-        lost[row] = frame.get("state") == TrackState.LOST.value
+        blank[row] = frame.get("state") in _WITHOUT_PERSON
         deviations = frame.get("markers_sd_mm") or {}
         if not isinstance(deviations, dict):
             raise DatasetError(f"{where}: `markers_sd_mm` is no table of markers")
         for marker in deviations.keys() & column_of.keys():
             sd_mm[row, column_of[marker]] = _deviation(deviations[marker], where, marker)
-    positions = np.where(lost[:, None, None], np.nan, track.positions_m)
-    return StoredFrames(MarkerTrack(track.names, track.stamps_ns, positions), sd_mm, lost)
+    positions = np.where(blank[:, None, None], np.nan, track.positions_m)
+    return StoredFrames(MarkerTrack(track.names, track.stamps_ns, positions), sd_mm)
 
 
 def summary_of(path: Path) -> tuple[Path, int] | None:
-    """The result's path without suffix, and the number of this marker file."""
+    """The result's path without suffix, and the number of this marker file.
+
+    None if there is neither NAME.json nor NAME.jsonl.
+    """
     name = path.with_suffix("") if path.suffix.lower() == ".trc" else path
     candidates = [(name, 1)]
     number = name.suffix[1:]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel, Subject, load_description
 from markerless_tracker.body.build import build_body
 from markerless_tracker.datasets.markers.track import MarkerTrack
-from markerless_tracker.errors import DatasetError
+from markerless_tracker.errors import BodyModelError, DatasetError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import TrackState, locked
 
@@ -192,16 +192,26 @@ def stored_body(summary: Mapping[str, Any]) -> BodyModel:
 
     Raises:
         BodyModelError: the body of its settings cannot be loaded or does not fit.
-        DatasetError: there is no description.
+        DatasetError: there is no description, or it is malformed.
     """
     entry = summary.get("body")
     if not isinstance(entry, Mapping) or "lengths_m" not in entry:
         raise DatasetError("the result does not describe its body, expected `body` in its JSON")
+    lengths_m, cones_m = entry["lengths_m"], entry.get("cones_m", {})
+    if not isinstance(lengths_m, Mapping) or not isinstance(cones_m, Mapping):
+        raise DatasetError("`lengths_m` or `cones_m` of the result's `body` is no table of numbers")
     settings = summary.get("settings") or {}
-    name = settings.get("body") or entry["name"]
-    cones = {cone: np.array(shape) for cone, shape in entry.get("cones_m", {}).items()}
-    subject = Subject(str(summary.get("source") or "tracked"), entry["lengths_m"], cones)
-    return build_body(load_description(name), subject)
+    name = settings.get("body") or entry.get("name")
+    cones = {cone: np.array(shape) for cone, shape in cones_m.items()}
+    subject = Subject(str(summary.get("source") or "tracked"), lengths_m, cones)
+    body = build_body(load_description(str(name)), subject)
+    stored = entry.get("parameters", ())
+    if tuple(stored) != body.parameter_names:
+        raise BodyModelError(
+            f"the result's `body.parameters` has {len(stored)} names, expected the {body.size} of "
+            f"the body {name}: was the body's file changed?"
+        )
+    return body
 
 
 def velocities(stamps_ns: NDArray[np.int64], values: FloatArray, fps: float) -> FloatArray:

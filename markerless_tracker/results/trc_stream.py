@@ -39,6 +39,7 @@ class TrcStream:
         self.path = path
         self.rows = 0
         self.last_ns: int | None = None
+        self._finished = False
         self._names = names
         self._file = AppendedFile(path)
         self._file.append(self._fixed_header(fps))
@@ -60,7 +61,7 @@ class TrcStream:
         self._file.rewrite(0, self._fixed_header(fps))
 
     def finish(self, fps: float, title: str | None = None) -> None:
-        """Write the header in its final form and close the file.
+        """Write the header in its final form and close the file; a second call does nothing.
 
         Args:
             fps: rate, 1/s.
@@ -69,6 +70,8 @@ class TrcStream:
         Raises:
             DatasetError: there is no room for the new file; the old one stays, it has every row.
         """
+        if self._finished:
+            return
         self._file.close()
         final = self.path.with_name(self.path.name + ".tmp")
         try:
@@ -79,6 +82,7 @@ class TrcStream:
                 rows.seek(self._header_size)
                 shutil.copyfileobj(rows, sink)
             os.replace(final, self.path)
+            self._finished = True
         except OSError as error:
             final.unlink(missing_ok=True)
             raise not_written(self.path, error) from error

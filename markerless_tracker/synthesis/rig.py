@@ -3,12 +3,39 @@
 import numpy as np
 
 from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray, inverse, transform
 
 MOST_CAMERAS = 99
 """Names have two digits."""
 MILD_LENS = (-0.08, 0.03, 0.0008, -0.0006, 0.0)
 """Distortion k1 k2 p1 p2 k3 of an ordinary wide lens: some px at the corners."""
+
+
+def check_range(name: str, value: float, least: float, most: float) -> None:
+    """Check that an argument of a scene lies in a range.
+
+    Raises:
+        ConfigError: it does not; names it.
+    """
+    if not least <= value <= most:
+        raise ConfigError(f"{name} is {value:g}, expected {least:g} to {most:g}")
+
+
+def check_cameras(
+    cameras: int, size_px: tuple[int, int], fps: float, seed: int, noise: float
+) -> None:
+    """Check the arguments that all scenes have.
+
+    Raises:
+        ConfigError: one of them is impossible; names it.
+    """
+    check_range("cameras", cameras, 1, MOST_CAMERAS)
+    check_range("image width", size_px[0], 16, 8192)
+    check_range("image height", size_px[1], 16, 8192)
+    check_range("fps", fps, 0.1, 1000.0)
+    check_range("noise", noise, 0.0, 100.0)
+    check_range("seed", seed, 0, 2**63)
 
 
 def look_at(eye_m: FloatArray, target_m: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.synthesis.mesh import body_mesh
 from markerless_tracker.synthesis.motion import Motion
 from markerless_tracker.synthesis.render import Image, Look, Mask, Renderer, clothes, dull_clothes
-from markerless_tracker.synthesis.rig import MILD_LENS, MOST_CAMERAS, ring_rig
+from markerless_tracker.synthesis.rig import MILD_LENS, check_cameras, check_range, ring_rig
 from markerless_tracker.synthesis.room import room_picture
 from markerless_tracker.synthesis.threads import side_by_side
 
@@ -74,14 +74,9 @@ class SyntheticScene:
         grey: bool = False,
         dull: bool = False,
     ) -> None:
-        _check("cameras", cameras, 1, MOST_CAMERAS)
-        _check("image width", size_px[0], 16, 8192)
-        _check("image height", size_px[1], 16, 8192)
-        _check("fps", fps, 0.1, 1000.0)
-        _check("noise", noise, 0.0, 100.0)
-        _check("shadow", shadow, 0.0, 1.0)
-        _check("samples", samples, 1, 8)
-        _check("seed", seed, 0, 2**63)
+        check_cameras(cameras, size_px, fps, seed, noise)
+        check_range("shadow", shadow, 0.0, 1.0)
+        check_range("samples", samples, 1, 8)
         if len(distortion) not in (4, 5) or not np.isfinite(distortion).all():
             raise ConfigError(
                 f"distortion has {len(distortion)} coefficients, expected finite k1 k2 p1 p2 (k3)"
@@ -153,8 +148,3 @@ class SyntheticScene:
             ]
             for number, (name, renderer) in enumerate(self._renderers.items())
         }
-
-
-def _check(name: str, value: float, least: float, most: float) -> None:
-    if not least <= value <= most:
-        raise ConfigError(f"{name} is {value:g}, expected {least:g} to {most:g}")

@@ -63,6 +63,7 @@ def write_film(
         raise ConfigError(f"film {container!r}, expected one of {', '.join(FORMATS)}")
     codec, options, muxer = _CODECS[container]
     count = 0
+    where = str(target) if isinstance(target, Path) else "the film"
     try:
         sink = str(target) if isinstance(target, Path) else target
         with av.open(sink, "w", format=container, options=muxer) as film:
@@ -82,7 +83,7 @@ def write_film(
             if count:
                 film.mux(stream.encode())
     except (OSError, av.FFmpegError) as error:
-        raise DatasetError(f"{target}: the film cannot be written: {error}") from error
+        raise DatasetError(f"{where}: cannot be written: {error}") from error
     if not count:
-        raise DatasetError(f"{target}: no image of the result, expected some of its source")
+        raise DatasetError(f"{where}: no image of the result, expected some of its source")
     return count

@@ -41,12 +41,10 @@ class ResultImages:
         width_px: int = 640,
         whole: bool = True,
     ) -> None:
-        path = source or Path(result.source)
-        if not path.exists():
-            raise DatasetError(
-                f"{result.source or 'unknown source'}: the images of the result are not there, "
-                "expected the recording's folder with --source"
-            )
+        path = source or (Path(result.source) if result.source else None)
+        if path is None or not path.exists():
+            found = "the result names no source" if path is None else f"{path}: no such recording"
+            raise DatasetError(f"{found}, expected the recording's folder with --source")
         rig = open_recording(path).rig
         self.windows: Mapping[str, Window] = (
             dict.fromkeys(rig.names, Window()) if whole else windows(result, rig)

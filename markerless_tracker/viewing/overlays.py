@@ -79,7 +79,7 @@ class Overlays:
     def caption(self, row: int) -> str:
         """Time and state of a row."""
         filled = ", filled" if self._result.filled[row] else ""
-        return f"{self._result.times_s[row]:.2f} s  {self._result.states[row]}{filled}"
+        return f"{self._result.times_s[row]:.3f} s  {self._result.states[row]}{filled}"
 
     def _drawn(self, row: int, images: FrameSet) -> dict[str, Image]:
         pose = self._result.parameters[row]

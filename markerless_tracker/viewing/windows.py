@@ -41,8 +41,9 @@ class Window:
 
 
 def windows(result: StoredResult, rig: CameraRig) -> Mapping[str, Window]:
-    """Camera -> the smallest window that holds the markers of all frames, with a margin.
+    """Camera -> the smallest window that holds the markers, with a margin.
 
+    The markers are those of at least 500 evenly spaced frames, or of all in a shorter result.
     The whole image of a camera that never has the markers in view.
     """
     step = max(1, len(result) // _MOST_ROWS)

@@ -101,6 +101,8 @@ def test_videos_are_lossless_only_on_request(tmp_path: Path, capsys) -> None:
         (["--fps", "-1"], "4 s at -1 fps"),
         (["--cameras", "0"], "--cameras is 0, expected 2 to 99"),
         (["--cameras", "1"], "--cameras is 1, expected 2 to 99: one camera does not see how far"),
+        (["--size", "8x8", "--checkerboard"], "image width is 8, expected 16 to 8192"),
+        (["--seed", "-1", "--checkerboard"], "seed is -1"),
         (["--cameras", "-1", "--checkerboard"], "--cameras is -1, expected 2 to 99"),
         (["--cameras", "100"], "--cameras is 100, expected 2 to 99"),
         (["--noise", "-3"], "noise is -3"),

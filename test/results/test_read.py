@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, load_body, markers
-from markerless_tracker.errors import DatasetError
+from markerless_tracker.errors import BodyModelError, DatasetError
 from markerless_tracker.records import Confidence, TrackResult, TrackState
 from markerless_tracker.results.journal import open_summary
 from markerless_tracker.results.read import ResultReader, read_result
 from markerless_tracker.results.result import ResultWriter
-from markerless_tracker.results.stored_result import velocities
+from markerless_tracker.results.stored_result import stored_body, velocities
 from markerless_tracker.tracking import TrackerConfig
 
 BODY = load_body("person31", 1.81)
@@ -136,3 +136,72 @@ def test_missing_files_are_named(tmp_path: Path) -> None:
     name.with_suffix(".json").write_text(broken, encoding="utf-8")
     with pytest.raises(DatasetError, match="no `stamp_ns`"):
         read_result(name)
+
+
+def changed(name: Path, change) -> Path:
+    """The result with a changed summary."""
+    path = name.with_suffix(".json")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    change(content)
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return name
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda c: c["frames"].insert(0, 1), "json: frame 0: no `stamp_ns`"),
+        (
+            lambda c: c["frames"][2].update(parameters=[1.0, 2.0]),
+            "frame at 40000000 ns is malformed: `parameters` has 2 values, expected 31",
+        ),
+        (lambda c: c["frames"][0].update(angles=3), "`angles` of the frame at 0 ns is no table"),
+    ],
+)
+def test_a_malformed_frame_is_named(tmp_path: Path, change, expected: str) -> None:
+    with pytest.raises(DatasetError, match=expected):
+        read_result(changed(write(tmp_path / "out"), change))
+
+
+def test_a_malformed_journal_is_named(tmp_path: Path) -> None:
+    config = TrackerConfig.from_mapping({"body": "person31"})
+    writer = ResultWriter(tmp_path / "out", BODY, config, fps=50.0)
+    writer.add(frame(0))
+    with (tmp_path / "out.jsonl").open("a", encoding="utf-8") as journal:
+        journal.write("[1]\n")
+    with pytest.raises(DatasetError, match=r"out\.jsonl: no result .*expected a JSON object"):
+        read_result(tmp_path / "out")
+
+
+def test_a_marker_file_without_a_rate(tmp_path: Path) -> None:
+    path = write(tmp_path / "out").with_suffix(".trc")
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("50\t50", "0\t50", 1), encoding="utf-8"
+    )
+    with pytest.raises(DatasetError, match=r"out\.trc: DataRate is 0.*, expected .* above 0"):
+        read_result(tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda b: b["parameters"].pop(), "has 30 names, expected the 31 of the body person31"),
+        (lambda b: b.update(lengths_m=[1.0]), "`lengths_m` or `cones_m` of the result's `body`"),
+    ],
+)
+def test_a_body_that_is_not_the_results(tmp_path: Path, change, expected: str) -> None:
+    name = changed(write(tmp_path / "out"), lambda c: change(c["body"]))
+    summary, _ = open_summary(name)
+    with pytest.raises((BodyModelError, DatasetError), match=expected):
+        stored_body(summary)
+
+
+def test_closing_twice_leaves_the_files_as_they_are(tmp_path: Path) -> None:
+    config = TrackerConfig.from_mapping({"body": "person31"})
+    with ResultWriter(tmp_path / "out", BODY, config, fps=50.0) as writer:
+        for index in range(3):
+            writer.add(frame(index))
+        writer.close()
+        once = (tmp_path / "out.trc").read_bytes(), (tmp_path / "out.json").read_bytes()
+    assert once == ((tmp_path / "out.trc").read_bytes(), (tmp_path / "out.json").read_bytes())
+    assert len(read_result(tmp_path / "out")) == 3

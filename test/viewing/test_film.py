@@ -39,7 +39,7 @@ def test_a_film_in_memory() -> None:
 
 
 def test_what_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(DatasetError, match="no image of the result"):
+    with pytest.raises(DatasetError, match="^the film: no image of the result"):
         write_film(io.BytesIO(), [], fps=10.0)
     with pytest.raises(ConfigError, match="film 'avi', expected one of webm, mp4"):
         write_film(io.BytesIO(), pictures(1), fps=10.0, container="avi")

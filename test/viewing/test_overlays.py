@@ -32,7 +32,7 @@ def test_the_body_lies_over_the_person(overlays: Overlays, seen) -> None:
 
 
 def test_sheets_name_time_and_state(overlays: Overlays) -> None:
-    assert overlays.caption(2) == "0.07 s  TRACKING" and overlays.caption(3) == "0.10 s  LOST"
+    assert overlays.caption(2) == "0.067 s  TRACKING" and overlays.caption(3) == "0.100 s  LOST"
     (row, sheet), (_, other) = overlays.sheets([2, 3], width_px=300)
     assert row == 2 and sheet.shape == other.shape and sheet.shape[1] <= 300
     whole = overlays.contact_sheet([0, 2, 5], width_px=640)

@@ -54,19 +54,14 @@ class Alignment:
         }
 
     def apply(self, result: MarkerTrack, reference: MarkerTrack) -> tuple[MarkerTrack, MarkerTrack]:
-        """The result in the reference's world, and the reference at the result's times.
+        """The result, and the reference in the result's world, at the result's times.
 
-        The reference is interpolated linearly between neighbouring rows.
+        The result's world has a vertical z axis, which headings and angles of the trunk need. The
+        reference is interpolated linearly between neighbouring rows.
         """
-        moved = result.positions_m @ self.rotation.T + self.translation_m
-        return (
-            MarkerTrack(result.names, result.stamps_ns, moved),
-            MarkerTrack(
-                reference.names,
-                result.stamps_ns,
-                interpolated(reference, result.stamps_ns / 1e9 + self.offset_s),
-            ),
-        )
+        at = interpolated(reference, result.stamps_ns / 1e9 + self.offset_s)
+        moved = (at - self.translation_m) @ self.rotation
+        return result, MarkerTrack(reference.names, result.stamps_ns, moved)
 
 
 def align(result: MarkerTrack, reference: MarkerTrack) -> Alignment:

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.export.axes import ROTATION_FILE_WORLD, to_file
 from markerless_tracker.results.export.grid import Grid
@@ -57,7 +58,7 @@ def write_bvh(path: Path, reader: ResultReader, names: tuple[str, ...]) -> tuple
     body = stored_body(reader.summary)
     bones = skeleton(body)
     grid = Grid(reader)
-    first = _first_pose(reader, body)
+    first = _first_pose(reader)
     frames = grid.frames()
     repeated = 0
     with new_file(path) as sink:
@@ -76,13 +77,13 @@ def write_bvh(path: Path, reader: ResultReader, names: tuple[str, ...]) -> tuple
     return grid, repeated
 
 
-def _first_pose(reader: ResultReader, body: BodyModel) -> FloatArray:
+def _first_pose(reader: ResultReader) -> FloatArray:
     for part in reader.chunks():
         known = np.flatnonzero(np.isfinite(part.parameters).all(axis=1))
         if known.size:
             pose: FloatArray = part.parameters[known[0]]
             return pose
-    return body.neutral
+    raise DatasetError(f"{reader.name}: no frame has a pose, expected one: BVH has no empty frames")
 
 
 def _channels(body: BodyModel, bones: Skeleton, parameters: FloatArray) -> FloatArray:

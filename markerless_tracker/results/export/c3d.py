@@ -7,6 +7,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.export.axes import to_file
 from markerless_tracker.results.export.grid import Grid
 from markerless_tracker.results.export.new_file import new_file
@@ -35,10 +36,12 @@ def write_c3d(path: Path, reader: ResultReader, names: tuple[str, ...]) -> Grid:
         The constant rate, with what it left out.
 
     Raises:
-        DatasetError: the file cannot be written or the result states no rate.
+        DatasetError: the file cannot be written, or the result has no frame.
     """
     grid = Grid(reader)
     frames = grid.frames()
+    if not frames:
+        raise DatasetError(f"{reader.name}: no frame, expected at least one")
     with new_file(path, binary=True) as sink:
         parameters = _parameters(grid, frames, names)
         sink.write(_header(grid, frames, len(names), len(parameters) // _BLOCK))
@@ -61,7 +64,7 @@ def _write_points(sink: IO[Any], positions_m: Any, empty: Any) -> int:
 
 
 def _header(grid: Grid, frames: int, points: int, parameter_blocks: int) -> bytes:
-    last = min(max(frames, 1), _LARGEST)
+    last = min(frames, _LARGEST)
     head = struct.pack(
         "<BBHHHHHfHHf", 2, 0x50, points, 0, 1, last, 0, _SCALE, 2 + parameter_blocks, 0, grid.fps
     )
@@ -70,8 +73,8 @@ def _header(grid: Grid, frames: int, points: int, parameter_blocks: int) -> byte
 
 def _parameters(grid: Grid, frames: int, names: Sequence[str]) -> bytes:
     """The parameter section, in whole blocks."""
-    end = max(frames, 1)
-    count = min(end, _LARGEST)
+    count = min(frames, _LARGEST)
+    last_words = [frames % 65536, frames // 65536]
     width = max(len(name.encode()) for name in names)
 
     def section(data_start: int) -> bytes:
@@ -84,7 +87,7 @@ def _parameters(grid: Grid, frames: int, names: Sequence[str]) -> bytes:
                     _reals(1, "RATE", [grid.fps]),
                     _integers(1, "DATA_START", [data_start]),
                     _integers(1, "FRAMES", [count]),
-                    _reals(1, "LONG_FRAMES", [float(end)]),
+                    _reals(1, "LONG_FRAMES", [float(frames)]),
                     _texts(1, "LABELS", names, width),
                     _texts(1, "DESCRIPTIONS", names, width),
                     _text(1, "UNITS", "mm"),
@@ -97,7 +100,7 @@ def _parameters(grid: Grid, frames: int, names: Sequence[str]) -> bytes:
                 "TRIAL",
                 [
                     _integers(3, "ACTUAL_START_FIELD", [1, 0], dimensions=(2,)),
-                    _integers(3, "ACTUAL_END_FIELD", [end % 65536, end // 65536], dimensions=(2,)),
+                    _integers(3, "ACTUAL_END_FIELD", last_words, dimensions=(2,)),
                     _reals(3, "CAMERA_RATE", [grid.fps]),
                 ],
             ),

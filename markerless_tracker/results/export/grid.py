@@ -41,14 +41,9 @@ class Grid:
         left_out: rows without a frame of their own, known after `parts`.
         most_off_s: largest difference of a row's time from its frame's, known after `parts`.
         first_ns: stamp of the first row, 0 without any; known after `parts` began.
-
-    Raises:
-        DatasetError: the result states no rate.
     """
 
     def __init__(self, reader: ResultReader) -> None:
-        if not reader.fps > 0.0:
-            raise DatasetError(f"{reader.name}.trc: DataRate is {reader.fps}, expected above 0")
         self._reader = reader
         self.fps = reader.fps
         self.left_out, self.most_off_s, self.first_ns = 0, 0.0, 0

@@ -175,7 +175,7 @@ def _fit(cameras: Mapping[str, CameraModel], views: Views) -> float:
 
 
 def _image(hull: Hull, camera: CameraModel, view: Observation) -> NDArray[np.bool_]:
-    """Pixels (h, w) of a view that a hull covers, grown by half its points' spacing."""
+    """Pixels (h, w) of a view that a hull covers, grown by 3/4 of its points' spacing."""
     pixels = project_camera(hull.points_m, camera) - view.offset_px
     with np.errstate(invalid="ignore"):
         u, v = np.round(pixels).T

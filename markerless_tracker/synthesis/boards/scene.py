@@ -11,7 +11,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.synthesis.boards.motion import BoardMotion
 from markerless_tracker.synthesis.boards.picture import BoardView
-from markerless_tracker.synthesis.rig import MILD_LENS, MOST_CAMERAS, ring_rig
+from markerless_tracker.synthesis.rig import MILD_LENS, check_cameras, ring_rig
 from markerless_tracker.synthesis.room import room_picture
 from markerless_tracker.synthesis.threads import side_by_side
 
@@ -53,12 +53,9 @@ class BoardScene:
         noise: float = 3.0,
         distortion: Sequence[float] = MILD_LENS,
     ) -> None:
-        if not 1 <= cameras <= MOST_CAMERAS:
-            raise ConfigError(f"cameras is {cameras}, expected 1 to {MOST_CAMERAS}")
+        check_cameras(cameras, size_px, fps, seed, noise)
         if not seconds * fps >= 1.0:
             raise ConfigError(f"{seconds:g} s at {fps:g} fps, expected one frame or more")
-        if not 0.0 <= noise <= 100.0:
-            raise ConfigError(f"noise is {noise:g}, expected 0 to 100")
         self.board, self.fps, self.seed = board, float(fps), seed
         self.rig: CameraRig = ring_rig(cameras, size_px, distortion=tuple(distortion))
         self.motion = BoardMotion(board, self.rig, seconds, seed)

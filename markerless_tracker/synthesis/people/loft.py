@@ -15,8 +15,8 @@ AROUND = 20
 SPACING_M = 0.028
 """Distance of the rings along a line."""
 
-_HANG = 0.8
 # Share of the ease by which cloth hangs below the middle of what it covers: on top it lies closer.
+_HANG = 0.8
 
 Binding = Callable[[FloatArray], FloatArray]
 """Points (n, 3) in the rest pose to weights (n, f) of the frames."""

@@ -26,11 +26,11 @@ from markerless_tracker.synthesis.rooms.view import Image, Mask, View, camera_mo
 from markerless_tracker.synthesis.scenes.colours import part_colours, part_light, vertex_colours
 from markerless_tracker.synthesis.scenes.spec import SceneSpec, sample_scene
 
-_PERSON, _EMPTY = 8, 9
 # Apart from each other: noise of frames with the person and of empty frames.
+_PERSON, _EMPTY = 8, 9
 _START_TOLERANCE_M = 0.03
-_MATCHED_S = (0.0, 1.0, 2.0)
 # Times at which clothes that look like the room are compared with it.
+_MATCHED_S = (0.0, 1.0, 2.0)
 _CHAIR = (70.0, 90.0, 120.0)
 
 
@@ -170,7 +170,7 @@ class GeneratedScene:
         return 1.0 + sensor.drift * float(np.sin(2.0 * np.pi * time_s / sensor.drift_s + 0.5))
 
     def _chair(self) -> Triangles:
-        """A chair under the person who sits in the middle of a frame's motion."""
+        """A chair under the hips of the person in frame 0."""
         pose = self.pose(0)
         surface = self.person.posed(pose)
         hips = markers(self.body, pose)[MARKER_NAMES.index("Pelvis")]

@@ -9,6 +9,7 @@ import numpy as np
 
 from markerless_tracker import __version__
 from markerless_tracker.errors import DatasetError
+from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.gait import METHOD
 from markerless_tracker.viewing.page.charts import Curve, Level, Mark, line_chart
 from markerless_tracker.viewing.page.report import Report
@@ -141,8 +142,7 @@ def _errors(reports: Sequence[Report], levels: Sequence[Level]) -> str:
         Curve(
             f"{report.name}: {report.score.mean_mm:.1f} mm" if report.score else "",
             f"s{number % _STYLES}",
-            report.score.stamps_ns / 1e9,
-            report.score.frame_mm,
+            *_with_breaks(report.score.stamps_ns / 1e9, report.score.frame_mm),
         )
         for number, report in enumerate(reports)
         if report.score is not None
@@ -159,6 +159,15 @@ def _errors(reports: Sequence[Report], levels: Sequence[Level]) -> str:
         + line_chart("Mean error over the joints", "mm", curves, levels=levels, low=0.0)
         + f'<p class="dim">Distance to the reference, mean over the joints of a frame. {told}</p>'
     )
+
+
+def _with_breaks(times_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Times and values (n,) with a NaN where frames are missing, so that no line crosses a gap."""
+    if len(times_s) < 2:
+        return times_s, values
+    steps = np.diff(times_s)
+    gaps = np.flatnonzero(steps > 1.5 * np.median(steps)) + 1
+    return np.insert(times_s, gaps, times_s[gaps]), np.insert(values, gaps, np.nan)
 
 
 def _angles(report: Report) -> str:

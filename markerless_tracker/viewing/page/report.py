@@ -137,7 +137,9 @@ def make_report(
     """
     figures = more = None
     if reference is not None:
-        track = result.markers()
-        figures = score(track, reference, markers_sd_mm=1000.0 * result.positions_sd_m)
+        # As `evaluate`: interpolated frames and those without a person are not compared.
+        known = result.rows(result.tracked)
+        track = known.markers()
+        figures = score(track, reference, markers_sd_mm=1000.0 * known.positions_sd_m)
         more = measures(track, reference)
     return Report(name, result, figures, more, gait(result), film, why_no_film)

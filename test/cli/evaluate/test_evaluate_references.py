@@ -152,3 +152,26 @@ def test_a_reference_in_c3d(tmp_path: Path, found, capsys) -> None:
     (tmp_path / "broken.c3d").write_bytes(b"no c3d")
     assert main(["evaluate", found, str(tmp_path / "broken.c3d")]) == 1
     assert "broken.c3d: cannot be read as C3D" in capsys.readouterr().err
+
+
+def test_headings_and_deviations_are_in_the_results_world(tmp_path: Path, capsys) -> None:
+    """A reference whose world lies on its side gives the same offsets in the heading frame."""
+    stamps = np.round(np.arange(60) * 1e9 / 60).astype(np.int64)
+    names = ("LShoulder", "RShoulder", "LHip", "RHip", "Head", "LWrist")
+    stand = np.array([
+        [0.0, 0.2, 1.4], [0.0, -0.2, 1.4], [0.0, 0.1, 0.9], [0.0, -0.1, 0.9], [0.0, 0.0, 1.7],
+        [0.1, 0.3, 0.8],
+    ])  # fmt: skip
+    moved = stand + 0.3 * np.sin(4.0 * stamps / 1e9)[:, None, None] * [1.0, 0.5, 0.1]
+    moved[:, 5, 2] += 0.1 * np.sin(9.0 * stamps / 1e9)
+    off = moved.copy()
+    off[:, 4, 0] += 0.02
+    own = write(tmp_path / "own.trc", names, stamps, off)
+    lying = write(tmp_path / "lying.trc", names, stamps, moved[:, :, [1, 2, 0]])
+    upright = write(tmp_path / "upright.trc", names, stamps, moved)
+    expected = figures(capsys, own, upright, "--align")
+    found = figures(capsys, own, lying, "--align")
+    assert found["mean_mm"] == pytest.approx(expected["mean_mm"], abs=0.01)
+    for joint, bias in expected["bias"].items():
+        assert found["bias"][joint] == pytest.approx(bias, abs=0.05), joint
+    assert expected["bias"]["Head"][0] > 5.0

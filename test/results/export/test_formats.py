@@ -195,3 +195,19 @@ def test_what_cannot_be_exported_fails_in_one_line(tmp_path, make_result, capsys
     with pytest.raises(SystemExit):
         main(["export", str(name), "--to", "docx"])
     assert "format 'docx', expected some of bvh, c3d" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("form", "lost", "left_out", "expected"),
+    [
+        ("bvh", range(12), (), "walk: no frame has a pose"),
+        ("c3d", (), range(12), "walk: no frame, expected at least one"),
+    ],
+)
+def test_a_result_that_a_format_cannot_hold(
+    make_result, capsys, form: str, lost, left_out, expected: str
+) -> None:
+    name = make_result(lost=lost, left_out=left_out)
+    assert main(["export", str(name), "--to", form]) == 1
+    assert expected in capsys.readouterr().err
+    assert not name.with_suffix(f".{form}").exists()
