@@ -1,10 +1,11 @@
 """Pausing, resuming and stepping a player by service."""
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 from std_srvs.srv import Trigger
+
+from markerless_tracker.node.player.spin import Spin
 
 _CHECK_S = 0.05
 """Time between two checks whether a paused player may continue."""
@@ -28,11 +29,11 @@ class Control:
         ):
             node.create_service(Trigger, f"~/{name}", callback)
 
-    def hold(self, spin: Callable[[float], bool]) -> float | None:
+    def hold(self, spin: Spin) -> float | None:
         """Wait while the player is paused and no step is requested.
 
         Args:
-            spin: lets callbacks run for a number of seconds; returns False when it is time to end.
+            spin: lets the node's callbacks run.
 
         Returns:
             Duration of the wait in s; None when it is time to end.
@@ -41,9 +42,10 @@ class Control:
             return 0.0
         began_s = time.monotonic()
         while self._paused and not self._steps:
-            if not spin(_CHECK_S):
+            if not spin(_CHECK_S, lambda: not self._paused or self._steps > 0):
                 return None
-        self._steps -= self._paused
+        if self._paused:
+            self._steps -= 1
         return time.monotonic() - began_s
 
     def _on_pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

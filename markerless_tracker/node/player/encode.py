@@ -34,18 +34,19 @@ def played_sets(
     recording: BagRecording,
     start: int,
     cameras: Collection[str],
-    others: Callable[[int], list[RawMessage]],
+    others: Callable[[int, int], list[RawMessage]],
 ) -> Iterator[PlayedSet]:
     """The sets of a bag from one on, serialised.
+
+    A stored image message is used unchanged if it is a raw image in its camera's frame; others are
+    decoded and encoded again.
 
     Args:
         recording: the bag.
         start: number of the first set.
         cameras: names of the cameras whose images are played.
-        others: gives the messages of other topics up to a time in ns.
-
-    A stored image message is used unchanged if it is a raw image in its camera's frame; others are
-    decoded and encoded again.
+        others: gives the messages of other topics up to a set, from the times in ns at which its
+            first and last image were recorded.
 
     Raises:
         DatasetError, ImageError: the bag ends before, or cannot be read.
@@ -59,21 +60,23 @@ def played_sets(
         for found in recording.stored_sets(start):
             wanted = {name: raw for name, raw in found.messages.items() if name in cameras}
             names, stored = list(wanted), list(wanted.values())
-            images = [_as_stored(recording, n, raw) for n, raw in zip(names, stored, strict=True)]
-            if None in images:
-                decoded = pool.map(recording.image, stored)
-                images = [
-                    image_bytes(image, found.stamp_ns, optical_frame(name))
-                    for name, image in zip(names, decoded, strict=True)
-                ]
+            kept = [_as_stored(recording, n, raw) for n, raw in zip(names, stored, strict=True)]
+            encoded = [raw for raw, data in zip(stored, kept, strict=True) if data is None]
+            decoded = pool.map(recording.image, encoded)
+            images = [
+                image_bytes(next(decoded), found.stamp_ns, optical_frame(name))
+                if data is None
+                else data
+                for name, data in zip(names, kept, strict=True)
+            ]
+            logged_ns = [raw.log_ns for raw in found.messages.values()]
             yield PlayedSet(
                 found.stamp_ns,
                 {
                     name: (with_stamp(infos[name], found.stamp_ns), image)
                     for name, image in zip(names, images, strict=True)
-                    if image is not None
                 },
-                others(found.stamp_ns),
+                others(min(logged_ns), max(logged_ns)),
             )
 
 

@@ -2,8 +2,9 @@
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
+from markerless_tracker.node.player.spin import never
 from markerless_tracker.node.ros.process import (
     NOTICE_S,
     StopSignals,
@@ -35,10 +36,10 @@ def _run(argv: list[str], stop: StopSignals) -> int:
 
     with running(PlayerNode, argv) as (node, executor):
 
-        def spin(seconds: float) -> bool:
-            until_s = time.monotonic() + seconds
-            while not stop.received:
-                left_s = until_s - time.monotonic()
+        def spin(seconds: float, until: Callable[[], bool] = never) -> bool:
+            end_s = time.monotonic() + seconds
+            while not (stop.received or until()):
+                left_s = end_s - time.monotonic()
                 executor.spin_once(timeout_sec=min(max(0.0, left_s), NOTICE_S))
                 if left_s <= 0.0:
                     break

@@ -1,7 +1,7 @@
 """The node `player`: publishes the images of a bag, with their stamps, at the recorded rate."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -24,6 +24,7 @@ from markerless_tracker.node.player.parameters import (
     read_player_settings,
 )
 from markerless_tracker.node.player.prefetch import prefetch
+from markerless_tracker.node.player.spin import Spin
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
 from markerless_tracker.node.ros.qos import image_qos, latched_qos
 
@@ -87,12 +88,11 @@ class PlayerNode(GivenNode):
             missing.append("`state` to say ready")
         return missing
 
-    def play(self, spin: Callable[[float], bool]) -> None:
+    def play(self, spin: Spin) -> None:
         """Play the bag once, or repeatedly if it loops.
 
         Args:
-            spin: lets the node's callbacks run for about a number of seconds (0: only those due);
-                returns False when it is time to end.
+            spin: lets the node's callbacks run.
 
         Raises:
             TrackerError: the bag cannot be read.
@@ -119,7 +119,7 @@ class PlayerNode(GivenNode):
         for warning in self._recording.warnings:
             self.get_logger().warning(warning)
 
-    def finish(self, spin: Callable[[float], bool]) -> None:
+    def finish(self, spin: Spin) -> None:
         """Wait up to `_ACKNOWLEDGE_S` per topic until subscribers have received the last set."""
         for publisher in (*self._images.values(), *self._infos.values()):
             if publisher.get_subscription_count():
@@ -130,7 +130,7 @@ class PlayerNode(GivenNode):
     def _in_step(self) -> bool:
         return self.settings.lockstep and not self._lockstep.alone
 
-    def _discover(self, spin: Callable[[float], bool]) -> bool:
+    def _discover(self, spin: Spin) -> bool:
         """Wait for subscribers, or in lockstep for a tracker, since earlier images are lost."""
         lockstep = self.settings.lockstep
         until_s = time.monotonic() + (_PATIENCE_S if lockstep else _DISCOVERY_S)
@@ -142,7 +142,7 @@ class PlayerNode(GivenNode):
                 return False
         return True
 
-    def _wait(self, spin: Callable[[float], bool]) -> bool:
+    def _wait(self, spin: Spin) -> bool:
         logged, logged_s = "", 0.0
         while missing := self.waiting_for():
             now_s, text = time.monotonic(), f"waiting for {', '.join(missing)}"
@@ -153,7 +153,7 @@ class PlayerNode(GivenNode):
                 return False
         return True
 
-    def _pass(self, spin: Callable[[float], bool]) -> bool:
+    def _pass(self, spin: Spin) -> bool:
         """Play once; returns whether to continue."""
         pace = Pace(self.settings.rate, clock=time.monotonic)
         try:
@@ -166,7 +166,7 @@ class PlayerNode(GivenNode):
                     f"{self.settings.rate:g}"
                 )
 
-    def _send_all(self, pace: Pace, spin: Callable[[float], bool]) -> bool:
+    def _send_all(self, pace: Pace, spin: Spin) -> bool:
         """Send the sets at their times; returns whether to continue."""
         with prefetch(self._sets, _PREFETCH_SETS) as sets:
             for played in sets:
@@ -183,7 +183,8 @@ class PlayerNode(GivenNode):
 
     def _sets(self) -> Iterator[PlayedSet]:
         wanted = {*self._images, *self._infos}
-        return played_sets(self._recording, self._start, wanted, self._others.up_to())
+        others = self._others.up_to(later=self._start > 0)
+        return played_sets(self._recording, self._start, wanted, others)
 
     def _publish(self, played: PlayedSet) -> None:
         self._clock.publish(played.stamp_ns)
@@ -195,13 +196,13 @@ class PlayerNode(GivenNode):
                 self._images[name].publish(image)
         self.sets_played += 1
 
-    def _until_dealt_with(self, stamp_ns: int, spin: Callable[[float], bool]) -> bool:
+    def _until_dealt_with(self, stamp_ns: int, spin: Spin) -> bool:
         """In lockstep, wait until trackers have processed a set; returns whether to continue."""
         if not self._in_step:
             return True
         self._lockstep.sent(stamp_ns)
         while self._lockstep.waiting_for():
-            if not spin(_SERVE_S):
+            if not spin(_SERVE_S, lambda: not self._lockstep.waiting_for()):
                 return False
             if late := self._lockstep.overdue():
                 self.get_logger().warning(
@@ -211,7 +212,7 @@ class PlayerNode(GivenNode):
                 )
         return True
 
-    def _sleep(self, seconds: float, next_ns: int, spin: Callable[[float], bool]) -> bool:
+    def _sleep(self, seconds: float, next_ns: int, spin: Spin) -> bool:
         """Sleep until a set is due, serving callbacks at intervals; False when it is time to end.
 
         Args:

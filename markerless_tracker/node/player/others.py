@@ -35,27 +35,39 @@ class OtherTopics:
                 raise ConfigError(
                     f"topics: {name} is not in the bag, expected some of {', '.join(sorted(types))}"
                 )
-            qos = latched_qos() if name.rsplit("/", 1)[-1] in LATCHED else output_qos()
+            qos = latched_qos() if _is_latched(name) else output_qos()
             self._publishers[name] = node.create_publisher(_type(name, types[name]), name, qos)
 
-    def up_to(self) -> Callable[[int], list[RawMessage]]:
-        """A function that gives the messages recorded up to a time in ns, each once, in order."""
+    def up_to(self, *, later: bool) -> Callable[[int, int], list[RawMessage]]:
+        """A function that gives the messages up to a set of images, each once, in order.
+
+        Its arguments are the times in ns at which the set's first and last image were recorded.
+
+        Args:
+            later: whether the first set is not the bag's first: of the messages before it, only
+                latched ones are given then.
+        """
         if not self._publishers:
-            return lambda stamp_ns: []
+            return lambda first_ns, last_ns: []
         stored: Iterator[RawMessage] = self._recording.messages(tuple(self._publishers))
         following: list[RawMessage] = []
+        left_out = later
 
-        def take(stamp_ns: int) -> list[RawMessage]:
+        def take(first_ns: int, last_ns: int) -> list[RawMessage]:
+            nonlocal left_out
             due = following[:]
             following.clear()
-            if due and due[0].log_ns > stamp_ns:
+            if due and due[0].log_ns > last_ns:
                 following.extend(due)
                 return []
             for message in stored:
-                if message.log_ns > stamp_ns:
+                if message.log_ns > last_ns:
                     following.append(message)
                     break
                 due.append(message)
+            if left_out:
+                due = [m for m in due if m.log_ns >= first_ns or _is_latched(m.topic)]
+                left_out = False
             return due
 
         return take
@@ -64,6 +76,10 @@ class OtherTopics:
         """Publish stored messages unchanged."""
         for message in messages:
             self._publishers[message.topic].publish(bytes(message.data))
+
+
+def _is_latched(topic: str) -> bool:
+    return topic.rsplit("/", 1)[-1] in LATCHED
 
 
 def _type(topic: str, kind: str) -> Any:

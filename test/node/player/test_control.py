@@ -21,6 +21,7 @@ from std_srvs.srv import Trigger
 from markerless_tracker.bags import write_bag
 from markerless_tracker.datasets import open_recording, read_trc
 from markerless_tracker.node.player.node import PlayerNode
+from markerless_tracker.node.player.spin import never
 from markerless_tracker.node.ros.qos import image_qos, output_qos
 from markerless_tracker.node.ros.stamps import stamp_of
 
@@ -79,12 +80,36 @@ def test_a_player_that_falls_behind_says_by_how_much(
         time.sleep(0.1)
 
     monkeypatch.setattr(node, "_publish", slowly)
-    node.play(lambda seconds: len(sent) < sets)
+    node.play(lambda seconds, until=never: len(sent) < sets)
     node.destroy_node()
     # The sets are 1/150 s apart, each takes 0.1 s, the last one is not counted.
     (warning,) = warnings
     late_s = float(re.search(r"was sent (.*) s late at rate 5$", warning).group(1))
     assert 0.8 * (sets - 2) * 0.1 < late_s < (sets + 1) * 0.1 + 1.0
+
+
+def test_in_lockstep_no_wait_goes_on_after_the_answer(
+    bag: Path, ros_context: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = [Parameter("bag", value=str(bag)), Parameter("lockstep", value=True)]
+    node = PlayerNode(context=ros_context, parameter_overrides=given)
+    sent: list[Any] = []
+    answered: list[bool] = []
+
+    def spin(seconds: float, until: Callable[[], bool] = never) -> bool:
+        """A tracker answers during the first wait for each set."""
+        if sent and not until():
+            stamp_ns = str(sent[-1].stamp_ns)
+            node._lockstep.update("tracker", {"ready": "true", "dealt_with_ns": stamp_ns})
+            answered.append(until())
+        return True
+
+    node._lockstep.update("tracker", {"ready": "true", "dealt_with_ns": ""})
+    monkeypatch.setattr(node, "_discover", lambda spin: True)
+    monkeypatch.setattr(node, "_publish", sent.append)
+    node.play(spin)
+    node.destroy_node()
+    assert len(sent) == SETS and answered == [True] * SETS
 
 
 def test_a_step_needs_a_pause(bag: Path, peer: Any, start: Callable[..., Any]) -> None:

@@ -1,0 +1,52 @@
+"""Messages of other topics among the sets of images, by the time at which both were recorded."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+from markerless_tracker.datasets.bag.stream import Place, RawMessage
+from markerless_tracker.node.player.others import OtherTopics
+
+LOGGED_NS = 1_700_000_000_000_000_000
+PERIOD_NS = 20_000_000
+
+
+def message(topic: str, log_ns: int) -> RawMessage:
+    return RawMessage(topic, "geometry_msgs/msg/PoseArray", b"", Place(0, 0), log_ns)
+
+
+@pytest.fixture
+def up_to() -> Callable[..., Callable[[int, int], list[RawMessage]]]:
+    """`up_to(stored, later=)`: that of `OtherTopics`."""
+
+    def make(stored: list[RawMessage], *, later: bool = False):
+        types = {each.topic: each.type for each in stored}
+        recording = SimpleNamespace(types=types, messages=lambda topics: iter(stored))
+        node = SimpleNamespace(create_publisher=lambda *_: None)
+        return OtherTopics(node, recording, list(types)).up_to(later=later)
+
+    return make
+
+
+def test_each_set_has_the_messages_recorded_until_then(up_to) -> None:
+    """Whatever the stamps are: the recorder's clock decides."""
+    stored = [message("/marker_poses", LOGGED_NS + i * PERIOD_NS) for i in range(5)]
+    take = up_to(stored)
+    # The images of a set are recorded one after the other.
+    taken = [
+        take(LOGGED_NS + i * PERIOD_NS - 2_000_000, LOGGED_NS + i * PERIOD_NS) for i in range(5)
+    ]
+    assert taken == [[each] for each in stored]
+
+
+def test_a_later_first_set_comes_without_what_was_before(up_to) -> None:
+    latched = message("/robot_description", LOGGED_NS - 1)
+    stored = [latched, *(message("/marker_poses", LOGGED_NS + i * PERIOD_NS) for i in range(5))]
+    take = up_to(stored, later=True)
+    third = LOGGED_NS + 2 * PERIOD_NS
+    assert take(third, third + 1_000_000) == [latched, stored[3]]
+    assert take(third + PERIOD_NS, third + PERIOD_NS) == [stored[4]]
+    assert take(third + PERIOD_NS, third + PERIOD_NS) == []
