@@ -14,12 +14,13 @@ from markerless_tracker.bags.messages import (
     message_type,
 )
 from markerless_tracker.body import BodyModel, root_transform
+from markerless_tracker.body.angles import ROOT_ANGLES
 from markerless_tracker.body.urdf import urdf
 from markerless_tracker.datasets.target import new_folder
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.read import ResultReader
-from markerless_tracker.results.stored_result import stored_body
+from markerless_tracker.results.stored_result import StoredResult, stored_body
 
 _NODE = "tracker"
 
@@ -54,8 +55,8 @@ def write_result_bag(out: Path, reader: ResultReader, *, replace: bool = False) 
                             f"{reader.name}: stamp {stamp} ns cannot be written to a ROS message"
                         )
                     topics.state(stamp, str(part.states[row]), float(part.fitness[row]))
-                    topics.pose(stamp, part.parameters[row], part.parameters_sd[row])
-                    topics.angles(stamp, part.parameters[row], part.angles_deg[row])
+                    topics.pose(stamp, part.parameters[row])
+                    topics.joints(stamp, part, row)
                     topics.markers(stamp, part.positions_m[row])
             if not writer.messages:
                 raise DatasetError(f"{reader.name}: has no frame, expected at least one")
@@ -68,8 +69,7 @@ class _Topics:
     def __init__(self, writer: BagWriter, body: BodyModel, angles: tuple[str, ...]) -> None:
         self._writer, self._body = writer, body
         # The joints of the URDF: the reported angles, if there are any, except the root's.
-        root = body.root_frame
-        self._columns = [k for k, name in enumerate(angles) if not name.startswith(f"{root}_")]
+        self._columns = [k for k, name in enumerate(angles) if name not in ROOT_ANGLES]
         self._angles = [angles[column] for column in self._columns]
         kinds = {
             "/robot_description": "std_msgs/msg/String",
@@ -102,14 +102,10 @@ class _Topics:
         array = message_type("diagnostic_msgs/msg/DiagnosticArray")
         self._put("/state", stamp, array(header=header(stamp, ""), status=[status]))
 
-    def pose(self, stamp: int, parameters: FloatArray, deviations: FloatArray) -> None:
-        """Write a pose (p,) and its standard deviations, if they are known."""
+    def pose(self, stamp: int, parameters: FloatArray) -> None:
+        """Write a pose (p,), if it is known."""
         if not np.isfinite(parameters).all():
             return
-        joints, names = self._body.joints, list(self._body.joint_names)
-        if np.isfinite(deviations[joints]).all():
-            message = self._joints(stamp, names, deviations[joints])
-            self._put("/joint_deviations", stamp, message)
         T = root_transform(self._body, parameters)
         x, y, z = (float(value) for value in T[:3, 3])
         quaternion = message_type("geometry_msgs/msg/Quaternion")(
@@ -142,13 +138,19 @@ class _Topics:
             return
         self._put("/marker_poses", stamp, marker_poses_message(positions_m, stamp))
 
-    def angles(self, stamp: int, parameters: FloatArray, angles_deg: FloatArray) -> None:
-        """Write the joints: the result's angles (k,), or the parameters (p,) if it has none."""
-        names, values = list(self._body.joint_names), parameters[self._body.joints]
+    def joints(self, stamp: int, part: StoredResult, row: int) -> None:
+        """Write the joints and their standard deviations, as far as they are known.
+
+        They are the result's angles, or the body's parameters if it has none.
+        """
+        at, names = self._body.joints, list(self._body.joint_names)
+        both = part.parameters[row, at], part.parameters_sd[row, at]
         if self._angles:
-            names, values = self._angles, np.deg2rad(angles_deg[self._columns])
-        if np.isfinite(values).all():
-            self._put("/joint_states", stamp, self._joints(stamp, names, values))
+            names, at = self._angles, np.array(self._columns)
+            both = np.deg2rad(part.angles_deg[row, at]), np.deg2rad(part.angles_sd_deg[row, at])
+        for topic, values in zip(("/joint_states", "/joint_deviations"), both, strict=True):
+            if np.isfinite(values).all():
+                self._put(topic, stamp, self._joints(stamp, names, values))
 
     def _joints(self, stamp: int, names: list[str], values: FloatArray) -> Any:
         return message_type("sensor_msgs/msg/JointState")(

@@ -79,14 +79,15 @@ class Health:
     Attributes:
         level: the level.
         message: one line.
-        trouble: the reason for missing results; empty if there are results.
-        without: the cameras that results come without, and why; empty if there is none.
+        trouble: the reason for missing results; empty if there are results, None while unknown.
+        without: the cameras that results come without, and why; empty if there is none, None
+            without recent results.
     """
 
     level: Level
     message: str
-    trouble: str = ""
-    without: str = ""
+    trouble: str | None = None
+    without: str | None = None
 
 
 def assess(facts: Facts) -> Health:
@@ -129,8 +130,8 @@ def _working(facts: Facts) -> Health:
     if without:
         return Health(Level.WARN, f"{facts.state.value}: {without}", "", without)
     if facts.doubts:
-        return Health(Level.WARN, f"{facts.state.value}: doubt: {facts.doubts[0]}")
-    return Health(Level.OK, facts.state.value)
+        return Health(Level.WARN, f"{facts.state.value}: doubt: {facts.doubts[0]}", "", without)
+    return Health(Level.OK, facts.state.value, "", without)
 
 
 def _trouble(facts: Facts) -> str:

@@ -117,7 +117,7 @@ class ResultReader:
         blank &= ~filled
         positions = np.array([row for _, row in part], dtype=np.float64).reshape(n, m, 3)
         sd = np.full((n, m, 3), np.nan)
-        angles = np.full((n, len(self.angle_names)), np.nan)
+        angles, angles_sd = np.full((2, n, len(self.angle_names)), np.nan)
         overlap = np.full((n, len(self.camera_names)), np.nan)
         parameters, parameters_sd = np.full((2, n, len(self.parameter_names)), np.nan)
         fitness = np.full(n, np.nan)
@@ -130,6 +130,8 @@ class ResultReader:
                 found = frame.get("angles") or {}
                 if found:
                     angles[row] = [_number(found.get(name)) for name in self.angle_names]
+                    known = frame.get("angles_sd") or {}
+                    angles_sd[row] = [_number(known.get(name)) for name in self.angle_names]
                 agreement = frame.get("iou") or {}
                 overlap[row] = [_number(agreement.get(name)) for name in self.camera_names]
                 self._take_parameters(frame, "parameters", parameters[row])
@@ -140,7 +142,7 @@ class ResultReader:
                     f"{self._summary_name}.json: the frame at {frame['stamp_ns']} ns is malformed: "
                     f"{error}"
                 ) from error
-        for values in (positions, sd, angles, overlap, parameters, parameters_sd):
+        for values in (positions, sd, angles, angles_sd, overlap, parameters, parameters_sd):
             values[blank] = np.nan
         return StoredResult(
             source=str(self.summary.get("source", "")),
@@ -159,6 +161,7 @@ class ResultReader:
             parameters=parameters,
             parameters_sd=parameters_sd,
             angles_deg=angles,
+            angles_sd_deg=angles_sd,
             overlap=overlap,
         )
 

@@ -17,7 +17,7 @@ from markerless_tracker.records import TrackState, locked
 
 _PER_FRAME = (
     "stamps_ns", "states", "filled", "fitness", "positions_m", "positions_sd_m", "parameters",
-    "parameters_sd", "angles_deg", "overlap",
+    "parameters_sd", "angles_deg", "angles_sd_deg", "overlap",
 )  # fmt: skip
 
 
@@ -42,6 +42,7 @@ class StoredResult:
         parameters: (n, p) the body's parameters in m and rad.
         parameters_sd: (n, p) their standard deviations.
         angles_deg: (n, k) joint angles in degrees.
+        angles_sd_deg: (n, k) their standard deviations.
         overlap: (n, c) overlap (IoU) of each camera's silhouette and the body, 0 to 1.
     """
 
@@ -61,6 +62,7 @@ class StoredResult:
     parameters: FloatArray
     parameters_sd: FloatArray
     angles_deg: FloatArray
+    angles_sd_deg: FloatArray
     overlap: FloatArray
 
     def __post_init__(self) -> None:

@@ -109,6 +109,6 @@ def facts(**changes: Any) -> Facts:
 def test_level_and_reason(changes: dict[str, Any], level: Level, message: str) -> None:
     health = assess(facts(**changes))
     assert (health.level, health.message) == (level, message)
-    assert health.trouble in message
+    assert (health.trouble or "") in message
     waits = changes.get("activity") is not None
     assert bool(health.trouble) == ("result_age_s" in changes and not waits)

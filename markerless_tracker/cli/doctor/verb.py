@@ -119,7 +119,9 @@ def _cameras(
     bars = seconds_bar()
     try:
         with StopSignals() as stop, bars:
-            names = names or image_topics()
+            names = names or image_topics(stop)
+            if stop.received:
+                raise KeyboardInterrupt
             if not names:
                 return [
                     Finding(

@@ -75,8 +75,11 @@ class _Sink:
         self.trouble = message
 
 
-def image_topics() -> tuple[str, ...]:
+def image_topics(stop: StopSignals) -> tuple[str, ...]:
     """Names of cameras whose images are offered, raw or compressed, on ``NAME/image_raw``.
+
+    Args:
+        stop: ends the search earlier.
 
     Raises:
         RosMissingError: ROS is not installed.
@@ -84,7 +87,7 @@ def image_topics() -> tuple[str, ...]:
     names: set[str] = set()
     with _own_node() as (node, executor):
         end_s = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end_s:
+        while time.monotonic() < end_s and not stop.received:
             executor.spin_once(timeout_sec=_SPIN_S)
             for topic, _ in node.get_topic_names_and_types():
                 stem = topic.removesuffix("/compressed")
@@ -133,8 +136,8 @@ def listen(
             executor.spin_once(timeout_sec=_SPIN_S)
             now_s = time.monotonic()
             first = [sink.arrivals_s[0] for sink in sinks.values() if sink.arrivals_s]
-            least_s = now_s - min(first) if first else now_s - begun_s - PATIENCE_S
-            if least_s >= seconds:
+            elapsed_s = now_s - min(first) if first else now_s - begun_s - PATIENCE_S
+            if elapsed_s >= seconds:
                 break
             if now_s - ticked_s >= _TICK_S:
                 ticked_s = now_s

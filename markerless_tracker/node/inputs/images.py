@@ -56,9 +56,9 @@ class CameraInput:
     Args:
         name: the camera's name.
         camera: its calibration for full-size images, None while unknown.
-        sets: receives the usable images (as `ImageMessage`).
+        sets: receives the usable images (as `ImageMessage` or `CompressedMessage`).
         status: receives the counts and errors.
-        report: called with one line when a problem begins and when it ends.
+        report: called with one line for each unusable image, and when a problem begins or ends.
         clock: monotonic time in s.
         channels: number of channels of the camera's background; None if there is none to match.
         image_topic, info_topic: topics; ``NAME`` stands for the camera.

@@ -140,10 +140,11 @@ class ImageSubscription:
 
     def follow(self) -> None:
         """Adapt to the publishers; to be called periodically."""
-        if self._auto and not self._subscription.offered():
-            other = self._topic if self._compressed else f"{self._topic}{COMPRESSED_SUFFIX}"
-            if self._node.count_publishers(other):
-                self._compressed = not self._compressed
+        if self._auto:
+            raw = bool(self._node.count_publishers(self._topic))
+            offered = raw or self._node.count_publishers(f"{self._topic}{COMPRESSED_SUFFIX}")
+            if offered and self._compressed == raw:
+                self._compressed = not raw
                 self._subscription.close()
                 self._subscription = self._subscribe()
                 self._node.get_logger().info(

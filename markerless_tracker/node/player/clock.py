@@ -10,7 +10,7 @@ from markerless_tracker.node.ros.stamps import time_message
 
 
 class BagClock:
-    """Publishes the time of a bag that is being played; nothing at a rate of 0.
+    """Publishes the time of a bag that is being played; nothing if `hz` is 0.
 
     Args:
         node: creates the publisher.

@@ -11,8 +11,9 @@ from markerless_tracker.node.ros.declared import GivenNode
 
 _SEARCH_S = 0.5
 """Interval of the search for new topics."""
-_FLUSH_S = 1.0
-"""Interval of flushes: a kill loses at most the messages of this time."""
+_FLUSH_S = 0.5
+"""Least time between two flushes. They come every `_SEARCH_S`: a kill loses at most the messages of
+both times."""
 _DEPTH = 50
 _OF_ROS = ("/rosout", "/parameter_events")
 _DEBUG = "/debug/"

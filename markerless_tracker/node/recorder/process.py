@@ -25,7 +25,7 @@ def record(
     Args:
         writer: of the bag.
         stop: ends the recording.
-        topics: names; None = all except those of ROS itself.
+        topics: names; None = all except those of ROS itself and images for debugging.
         seconds: duration; None = until a signal.
         progress: called with the number of messages.
 

@@ -52,7 +52,7 @@ def check_info(
 ) -> str:
     """Compare a CameraInfo with the calibration in use.
 
-    A size of 0 and a K of zeros (uncalibrated) are not compared.
+    A size of 0 and a K and D of zeros (uncalibrated) are not compared.
 
     Args:
         info: the message.

@@ -8,7 +8,9 @@ from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
+from rclpy.validate_topic_name import validate_topic_name
 
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.settings import Setting, similar
@@ -118,6 +120,22 @@ def check_names(given: Iterable[str], known: Sequence[str], node: str) -> None:
             near = similar(name, known)
             hint = f"did you mean {' or '.join(map(repr, near))}? {listed}" if near else listed
             raise ConfigError(f"parameter {name!r} is unknown, {hint}")
+
+
+def check_topics(parameter: str, topic: str, cameras: Iterable[str]) -> None:
+    """Check the topics of cameras; NAME in `topic` stands for a camera.
+
+    Raises:
+        ConfigError: ROS refuses the name of a topic; names the parameter.
+    """
+    for camera in cameras:
+        try:
+            validate_topic_name(topic.replace("NAME", camera))
+        except InvalidTopicNameException as error:
+            reason = str(error).splitlines()[0].removeprefix("Invalid topic name: ")
+            raise ConfigError(
+                f"{parameter}: {topic!r} of camera {camera!r} cannot be a topic: {reason}"
+            ) from error
 
 
 def present(given: Mapping[str, Any]) -> dict[str, Any]:

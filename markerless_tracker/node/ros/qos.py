@@ -97,10 +97,6 @@ class FollowingSubscription:
         self.close()
         self._subscription = self._subscribe()
 
-    def offered(self) -> bool:
-        """Whether the topic has a publisher."""
-        return bool(self._node.count_publishers(self._topic))
-
     def close(self) -> None:
         """End the subscription."""
         self._node.destroy_subscription(self._subscription)

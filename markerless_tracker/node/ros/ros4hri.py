@@ -61,14 +61,19 @@ class Human:
     """Reads the joints of a body's poses, frame after frame.
 
     Args:
-        body: the body.
+        body: the body; `take` another that differs in sizes only.
         name: the person's id.
     """
 
     def __init__(self, body: BodyModel, name: str) -> None:
-        self._body, self._id = body, name
-        self._nodes, self._axes = segment_nodes(body), segment_axes(body)
+        self._id = name
         self._last: dict[str, FloatArray] = {}
+        self.take(body)
+
+    def take(self, body: BodyModel) -> None:
+        """Read poses of this body from now on; the angles remain continuous."""
+        self._body = body
+        self._nodes, self._axes = segment_nodes(body), segment_axes(body)
 
     def joints(self, pose: FloatArray) -> dict[str, float]:
         """Values of all `JOINTS` at a pose (p,), by full name, rad."""

@@ -158,6 +158,8 @@ class SegmenterNode(GivenNode):
             level, text = DiagnosticStatus.WARN, self._input.refusal
         elif silent:
             level, text = DiagnosticStatus.STALE, f"no image on {self._input.image_topic}"
+        elif self._status.trouble:
+            level, text = DiagnosticStatus.WARN, self._status.trouble
         elif self._images.share > 1:
             level = DiagnosticStatus.WARN
             text = f"images come too fast: one of {self._images.share} is segmented"

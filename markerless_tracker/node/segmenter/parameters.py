@@ -81,7 +81,10 @@ def read_segmenter_settings(given: Mapping[str, Any]) -> SegmenterSettings:
             "image_transport", values["image_transport"], TRANSPORTS
         )
     rest = {name: value for name, value in values.items() if name not in _OWN}
-    return SegmenterSettings(config=TrackerConfig.from_mapping(rest), **own)
+    settings = SegmenterSettings(config=TrackerConfig.from_mapping(rest), **own)
+    declared.check_topics("camera", "NAME/image_raw", [settings.camera])
+    declared.check_topics("image_topic", settings.image_topic, [settings.camera])
+    return settings
 
 
 def segmenter_values(settings: SegmenterSettings) -> dict[str, Any]:

@@ -32,8 +32,8 @@ class Waiting(NamedTuple):
 class ImageQueue:
     """A queue of images in the order of their arrival, thinned out if they come too fast.
 
-    If not all images can be segmented, every 2nd, 4th, 8th... image is kept. The choice depends on
-    the stamps only, so that the segmenters of other cameras keep the same sets.
+    If not all images can be segmented, one of 2, 4, 8... is kept on average, chosen by a hash of
+    the stamp, so that the segmenters of other cameras keep the same sets.
 
     Attributes:
         received, dropped: counts of images.
@@ -96,8 +96,9 @@ class SegmenterStatus:
     def __init__(self) -> None:
         self._lock = Lock()
         self._latencies_s: deque[float] = deque(maxlen=WINDOW)
-        self._counts = {"published": 0, "refused": 0, "lost": 0, "bytes_in": 0, "bytes_out": 0}
-        self._last_error = ""
+        counts = ("published", "failed", "refused", "lost", "bytes_in", "bytes_out")
+        self._counts = dict.fromkeys(counts, 0)
+        self._last_error = self._trouble = ""
 
     def refused(self, camera: str) -> None:
         """Count an unusable image."""
@@ -114,9 +115,22 @@ class SegmenterStatus:
         with self._lock:
             self._last_error = message
 
+    def failed_image(self, message: str) -> None:
+        """Count an image without evidence, and keep the reason until evidence is published."""
+        with self._lock:
+            self._counts["failed"] += 1
+            self._last_error = self._trouble = message
+
+    @property
+    def trouble(self) -> str:
+        """Why the last image has no evidence; empty if it has."""
+        with self._lock:
+            return self._trouble
+
     def published(self, bytes_in: int, bytes_out: int, latency_s: float) -> None:
         """Count an image whose evidence was published."""
         with self._lock:
+            self._trouble = ""
             self._counts["published"] += 1
             self._counts["bytes_in"] += bytes_in
             self._counts["bytes_out"] += bytes_out
@@ -125,8 +139,9 @@ class SegmenterStatus:
     def values(self) -> dict[str, str]:
         """Everything as text, by key.
 
-        `bytes_in`: bytes of the received images' pixels; `bytes_out`: bytes of the evidence;
-        `latency`: from an image's arrival to the publication of its evidence.
+        `bytes_in`: bytes of the segmented images, still compressed if they come so; `bytes_out`:
+        bytes of the evidence; `latency_median_ms`, `latency_p95_ms`: from an image's arrival to the
+        publication of its evidence.
         """
         with self._lock:
             times = np.array(self._latencies_s) * 1e3
@@ -189,7 +204,7 @@ class SegmentWorker:
             except Exception as error:
                 # The next image may be fine.
                 text = f"stamp {waiting.stamp_ns}: {one_line(error)}"
-                self._status.failed(text)
+                self._status.failed_image(text)
                 self._report(text)
                 continue
             size = len(waiting.message.data)

@@ -95,13 +95,13 @@ class Announcer:
 
     def health(self, health: Health) -> None:
         """Log lost and recovered cameras, the reason for missing results, and its end."""
-        if kind_of(health.without) != kind_of(self._without):
+        if health.without is not None and kind_of(health.without) != kind_of(self._without):
             if health.without:
                 self._notices.say(f"{self._state.value}: {health.without}")
             else:
                 self._news.say(f"{self._state.value}: every camera is used again")
             self._without = health.without
-        if kind_of(health.trouble) != kind_of(self._trouble):
+        if health.trouble is not None and kind_of(health.trouble) != kind_of(self._trouble):
             if health.trouble:
                 self._notices.say(health.trouble)
             else:

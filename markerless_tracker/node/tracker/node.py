@@ -83,7 +83,6 @@ class TrackerNode(GivenNode):
         self._end_process: Callable[[], None] = lambda: None
         self._time_offsets: TimeOffsetEstimate | None = None
         self._found = False
-        self._handle: TrackerHandle | None = None
         self._missing: Sequence[str] = ()
         self._repeated = (0, 0.0)
         self._late_ns: int | None = None
@@ -129,11 +128,6 @@ class TrackerNode(GivenNode):
         """The cameras whose images are received."""
         takes_evidence = self._settings.takes_evidence
         return tuple(name for name in self._source.names if not takes_evidence(name))
-
-    @property
-    def status(self) -> TrackerStatus:
-        """Counts and times."""
-        return self._status
 
     def close(self, timeout_s: float = 3.0) -> bool:
         """Stop the worker and complete the result files; returns whether the worker ended.
@@ -195,15 +189,13 @@ class TrackerNode(GivenNode):
     # work, in the worker's thread
 
     def _prepare(self) -> TrackerHandle | None:
-        if self._handle is None:
-            rig = self._source.try_rig({source.name: source.info for source in self._inputs})
-            if rig is None:
-                self._status.doing("waiting for calibration")
-                return None
-            for source in self._inputs:
-                source.camera = rig[source.name]
-            self._handle = self._build(rig)
-        return self._handle
+        rig = self._source.try_rig({source.name: source.info for source in self._inputs})
+        if rig is None:
+            self._status.doing("waiting for calibration")
+            return None
+        for source in self._inputs:
+            source.camera = rig[source.name]
+        return self._build(rig)
 
     def _build(self, rig: CameraRig) -> TrackerHandle:
         self._status.doing("reading the backgrounds and the start")

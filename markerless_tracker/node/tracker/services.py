@@ -33,7 +33,7 @@ class Services:
         rig: the cameras of full-size images; None while they are not known.
         person: the tracked body; None before a person was tracked.
         clock: monotonic time in s.
-        inform: called with a line about each answered request.
+        inform: called with a line about each saved file and each answer to learn_background.
     """
 
     def __init__(

@@ -1,6 +1,6 @@
 """Builds the rig and the tracker from the node's settings."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -11,6 +11,7 @@ from markerless_tracker.camera.calibration import read_calibration
 from markerless_tracker.datasets.background import read_background, read_background_models
 from markerless_tracker.errors import CalibrationError, ConfigError, TrackerError
 from markerless_tracker.imaging import BackgroundModel, learn_background
+from markerless_tracker.node.ros.declared import check_topics
 from markerless_tracker.node.tracker.parameters import NodeSettings
 from markerless_tracker.tracking import TrackerSetup, build_tracker
 from markerless_tracker.tracking.setup import first_row
@@ -38,6 +39,7 @@ class RigSource:
             with _named("cameras"):
                 self.rig = rig.selected(settings.cameras or rig.names)
             self.names = self.rig.names
+            _check_topics(settings, self.names)
             self._take_offsets(settings.stamp_offsets)
             return
         if not settings.cameras:
@@ -46,6 +48,7 @@ class RigSource:
                 "whose extrinsics come from TF"
             )
         self.names = settings.cameras
+        _check_topics(settings, self.names)
         self._take_offsets(settings.stamp_offsets)
         try:
             import tf2_msgs.msg  # noqa: F401
@@ -230,3 +233,10 @@ def _backgrounds(
         if name not in models
     }
     return models | learned
+
+
+def _check_topics(settings: NodeSettings, cameras: Sequence[str]) -> None:
+    """Raise a ConfigError if a camera's name, or a topic, is none that ROS allows."""
+    check_topics("cameras", "NAME/image_raw", cameras)
+    check_topics("image_topic", settings.image_topic, cameras)
+    check_topics("info_topic", settings.info_topic, cameras)

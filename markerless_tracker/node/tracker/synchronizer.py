@@ -218,6 +218,8 @@ class Synchronizer(Generic[View]):
             counts = SyncCounts(**self._counts)
             self._counts.clear()
             self._counter.reset()
+            for name, queue in self._pending.items():
+                self._counter.note("received", name, len(queue))
             self._waiting.clear()
             return counts
 

@@ -195,7 +195,7 @@ class TrackWorker:
         activity = "waiting for learn_background" if handle.waits else "waiting for images"
         self._status.became_ready(activity, now_s=self._clock())
         self._inform(ready_line(activity, kernels.done, self._clock() - begun_s))
-        self._sets.keep(handle.searches * handle.kept)
+        self._keep_for_search(handle)
         gate = StartTimeGate(handle.start_ns)
         ahead = Ahead(
             self._sets, partial(self._evidence, handle), poll_s=_POLL_S, clock=self._clock
@@ -204,20 +204,17 @@ class TrackWorker:
         published: Future[None] = publishing.submit(lambda: None)
         while not self._stop.is_set():
             asked_s = self._clock()
-            taken = ahead.next()
-            if taken is not None:
+            if (taken := ahead.next()) is not None:
                 ahead.fitting()
                 tracked = self._handle(handle, gate, taken, self._clock() - asked_s)
                 ahead.fitted()
                 published.result()
                 published = publishing.submit(self._give, taken.matched, tracked)
-            request = self._request.current
-            if request is not None:
+            if (request := self._request.current) is not None:
                 request.refuse_if_overdue(self._status.activity)
         ahead.close()
         publishing.shutdown()
-        request = self._request.current
-        if request is not None:
+        if (request := self._request.current) is not None:
             request.refuse("the tracker ends")
 
     def _compiling(self, lines: CompilingLines, _: str, done: int, most: int) -> None:
@@ -228,8 +225,7 @@ class TrackWorker:
 
     def _make(self) -> TrackerHandle | None:
         while not self._stop.is_set():
-            handle = self._prepare()
-            if handle is not None:
+            if (handle := self._prepare()) is not None:
                 return handle
             self._stop.wait(_POLL_S)
         return None
@@ -255,7 +251,7 @@ class TrackWorker:
             if self._reset.is_set():
                 self._reset.clear()
                 handle.tracker.reset()
-                self._sets.keep(handle.searches * handle.kept)
+                self._keep_for_search(handle)
                 self._status.restarted()
             if not gate.admits(matched.stamp_ns):
                 self._status.dropped("before_start")
@@ -296,6 +292,10 @@ class TrackWorker:
             self._learn(handle, learning, matched.stamp_ns)
         return tracked
 
+    def _keep_for_search(self, handle: TrackerHandle) -> None:
+        """Keep sets from now on if the tracker begins with a search."""
+        self._sets.keep(handle.kept if handle.searches else 0)
+
     def _keep_for(self, result: TrackResult, kept: int) -> None:
         """Keep the sets that come during the search for a person; without a person, the newest."""
         searching = result.state is TrackState.SEARCHING
@@ -319,23 +319,26 @@ class TrackWorker:
     def _decoded(self, handle: TrackerHandle, matched: MatchedSet[Any]) -> Images:
         """The set's images without those that cannot be decoded; an error if none remains."""
         images: dict[str, NDArray[np.uint8] | Observation] = {}
-        failed: ImageError | None = None
+        failed: list[ImageError] = []
         for name, view in matched.views.items():
             try:
                 images[name] = handle.decode(name, view)
             except ImageError as error:
-                failed = error
                 self._status.refused(name)
-                self._trouble(matched.stamp_ns, error)
-        if failed is not None and not images:
-            raise failed
+                failed.append(error)
+        # The caller reports an error that is raised.
+        raised = failed.pop() if failed and not images else None
+        for one in failed:
+            self._trouble(matched.stamp_ns, one)
+        if raised is not None:
+            raise raised
         return images
 
     def _learn(self, handle: TrackerHandle, learning: Learning, stamp_ns: int) -> None:
         try:
             if learning.finish_if_complete(handle.tracker):
                 self._waits = False
-                self._sets.keep(handle.searches * handle.kept)
+                self._keep_for_search(handle)
                 self._status.restarted()
         except Exception as error:
             learning.refuse(one_line(error))

@@ -65,6 +65,18 @@ def test_what_is_offered_on_a_remapped_topic_is_received(node: Node, peer: Any) 
     peer.until(lambda: topics.tick() or "info" in source.got, "the camera info sent before")
 
 
+def test_raw_images_that_are_discovered_later_are_received(node: Node, peer: Any) -> None:
+    source = Source()
+    topics = CameraTopics(node, [source], transport="auto", clock=lambda: 0.0)
+    small = peer.node.create_publisher(CompressedImage, "/left/image/compressed", output_qos())
+    peer.until(
+        lambda: topics.tick() or small.publish(CompressedImage()) or "compressed" in source.got,
+        "compressed images",
+    )
+    large = peer.node.create_publisher(Image, "/left/image", output_qos())
+    peer.until(lambda: topics.tick() or large.publish(Image()) or "raw" in source.got, "raw images")
+
+
 @pytest.mark.parametrize("transport", ["raw", "compressed"])
 def test_a_chosen_transport_is_kept(node: Node, peer: Any, transport: str) -> None:
     source = Source()

@@ -1,6 +1,7 @@
 """A body's joints under the names of REP-155, read by an independent reader of URDF."""
 
 import io
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -71,6 +72,20 @@ def test_an_angle_goes_on_beyond_half_a_turn() -> None:
     for step in np.linspace(0.2, 2.8, 40):
         found.append(human.joints(posture(BODY, {"l_shoulder_y": float(step)}))["l_p_shoulder_a"])
     assert np.abs(np.diff(found)).max() < 0.2
+
+
+def test_a_revised_body_continues_the_angles() -> None:
+    revised, same = Human(BODY, "a"), Human(BODY, "a")
+    rng, changes = np.random.default_rng(2), []
+    pose = BODY.neutral.copy()
+    arm = [BODY.index(f"l_shoulder_{axis}") for axis in "xyz"]
+    for _ in range(200):
+        pose[arm] = np.clip(pose[arm] + rng.normal(0.0, 0.15, 3), *BODY.limits[:, arm])
+        revised.take(replace(BODY, cone_shape=BODY.cone_shape.copy()))
+        found = revised.joints(pose)
+        assert found == same.joints(pose)
+        changes.append(max(abs(found[n] - v) for n, v in Human(BODY, "a").joints(pose).items()))
+    assert max(changes) > 1.0, "the angles of a new person begin near 0"
 
 
 @pytest.mark.parametrize("value", ["1a", "a-b", "ä", "a b"])

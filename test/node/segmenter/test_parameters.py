@@ -46,6 +46,11 @@ def test_every_parameter_is_described() -> None:
         ({"camera": "cam02"}, "background_dir: not given, expected a folder"),
         ({**GIVEN, "cameras": ["cam01"]}, "parameter 'cameras' is unknown, did you mean 'camera'"),
         ({**GIVEN, "scale": 2.0}, "scale: got 2.0, expected a number from 0.01 to 1"),
+        ({**GIVEN, "camera": "1"}, "camera: 'NAME/image_raw' of camera '1' cannot be a topic"),
+        (
+            {**GIVEN, "image_topic": "NAME/image raw"},
+            "image_topic: .* cannot be a topic",
+        ),
         ({**GIVEN, "image_transport": "evidence"}, "image_transport: got 'evidence'"),
     ],
 )

@@ -1,10 +1,23 @@
 """Images that come faster than they are segmented are thinned out alike in all segmenters."""
 
+import time
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
-from markerless_tracker.node.segmenter.worker import CALM, QUEUE, ImageQueue
+from markerless_tracker.errors import ImageError
+from markerless_tracker.node.segmenter.worker import (
+    CALM,
+    QUEUE,
+    ImageQueue,
+    SegmenterStatus,
+    SegmentWorker,
+    Waiting,
+)
 
 PERIOD_NS = 16_666_667
 FIRST_NS = 1_700_000_000_123_456_789
@@ -67,3 +80,35 @@ def test_more_are_kept_again_once_there_is_time() -> None:
         rest(queue)
         assert number < 100 * CALM
     assert add(queue, number + 1) and add(queue, number + 2)
+
+
+def test_images_without_evidence_are_counted_and_their_reason_is_kept() -> None:
+    status, reports = SegmenterStatus(), []
+    queue = ImageQueue()
+
+    def observe(waiting: Waiting) -> Any:
+        if waiting.stamp_ns < 2:
+            raise ImageError("cam01: 8x8 px came")
+        return waiting
+
+    worker = SegmentWorker(
+        queue, status, observe=observe, publish=lambda _: 7, report=reports.append
+    )
+    worker.start()
+    try:
+        for stamp_ns in range(2):
+            queue.add("cam01", stamp_ns, SimpleNamespace(data=b"abc"), now_s=0.0)
+        until(lambda: status.values()["failed"] == "2")
+        assert status.trouble == reports[-1] == "stamp 1: cam01: 8x8 px came"
+        queue.add("cam01", 2, SimpleNamespace(data=b"abc"), now_s=0.0)
+        until(lambda: status.values()["published"] == "1")
+        assert status.trouble == "" and status.values()["last_error"] == reports[-1]
+    finally:
+        assert worker.stop(60.0)
+
+
+def until(holds: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + 60.0
+    while not holds():
+        assert time.monotonic() < end_s
+        time.sleep(0.01)

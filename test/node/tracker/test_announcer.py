@@ -1,6 +1,7 @@
 """Log lines of a running tracker and its doubts about the run, without the middleware."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from markerless_tracker.body import markers
 from markerless_tracker.calibration.contours.time_offset import TimeOffset
-from markerless_tracker.node.health import Health, Level
+from markerless_tracker.node.health import Facts, Health, Level, assess
 from markerless_tracker.node.ros.notices import Notices
 from markerless_tracker.node.tracker.announcer import Announcer, CompilingLines, ready_line
 from markerless_tracker.node.tracker.cameras.counts import SyncCounts
@@ -21,6 +22,17 @@ from markerless_tracker.tracking import Tracker, TrackerConfig
 
 FRAME_NS = LOOK_NS // 10
 TRACKING, LOST, SEARCHING = TrackState.TRACKING, TrackState.LOST, TrackState.SEARCHING
+
+CAMERAS = ("cam01", "cam02")
+
+
+def facts(**changes: Any) -> Facts:
+    """A tracker that tracks; with changes."""
+    fine = {
+        "ready": True, "activity": "processing images", "state": TRACKING, "cameras": CAMERAS,
+        "ready_age_s": 60.0, "set_age_s": 0.0, "result_age_s": 0.0,
+    }  # fmt: skip
+    return Facts(**{**fine, **changes})
 
 
 class Log:
@@ -70,13 +82,27 @@ def test_each_kind_of_doubt_is_said_once() -> None:
 def test_a_camera_that_is_gone_and_back_is_said_once_each() -> None:
     log = Log()
     log.results(TRACKING)
-    whole = Health(Level.OK, "TRACKING")
+    whole = Health(Level.OK, "TRACKING", "", "")
     words = "tracking without cam02: no image of cam02"
-    gone = Health(Level.WARN, f"TRACKING: {words}", without=words)
+    gone = Health(Level.WARN, f"TRACKING: {words}", "", words)
     for health in (whole, gone, gone, gone, whole, whole):
         log.announcer.health(health)
     assert log.warnings == [gone.message]
     assert log.lines[1:] == ["TRACKING: every camera is used again"]
+
+
+def test_what_is_not_known_is_no_recovery() -> None:
+    """A camera that is left out, then no image at all, then sets that are not tracked yet."""
+    log = Log()
+    log.results(TRACKING)
+    words = "tracking without cam02: no image of cam02"
+    stale = assess(facts(set_age_s=9.0, result_age_s=9.0, silent=CAMERAS))
+    waits = assess(facts(result_age_s=None, activity="waiting for learn_background"))
+    for health in (Health(Level.WARN, f"TRACKING: {words}", "", words), stale, waits):
+        log.announcer.health(health)
+    assert log.lines[1:] == [] and len(log.warnings) == 2
+    log.announcer.health(assess(facts()))
+    assert log.lines[1:] == ["TRACKING: every camera is used again", "images are tracked"]
 
 
 @pytest.mark.parametrize(("terminal", "more"), [(True, 4), (False, 0)])

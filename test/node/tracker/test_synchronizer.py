@@ -229,6 +229,8 @@ def test_counting_anew_forgets_what_waits_but_not_what_is_on_its_way() -> None:
     assert sets.take() is None and sets.counts.complete == 0
     feed(sets, ("b", 3))
     assert sets.take() is not None
+    for counts in sets.camera_counts.values():
+        assert counts.received == counts.matched == 1
 
 
 def test_take_wakes_up_for_a_set_of_another_thread() -> None:
@@ -319,4 +321,5 @@ def test_every_view_is_counted_for_its_camera() -> None:
     assert (counts["a"].dropped, counts["b"].dropped) == (1, 1)
     assert counts["b"].offset_ms == pytest.approx(1e-6)
     sets.start_counting()
-    assert sets.camera_counts["a"].received == 0
+    # One view of camera a waits for its set.
+    assert (sets.camera_counts["a"].received, sets.camera_counts["b"].received) == (1, 0)

@@ -217,6 +217,21 @@ def test_one_image_that_cannot_be_decoded_costs_its_camera_only(bench: Bench) ->
     assert bench.values()["refused/b"] == "1" and bench.reports == ["stamp 5: b: too short"]
 
 
+def test_a_set_without_any_image_reports_each_reason_once(bench: Bench) -> None:
+    assert bench.prepared is not None
+
+    def none(name: str, view: Any) -> Any:
+        raise ImageError(f"{name}: too short")
+
+    bench.prepared = replace(bench.prepared, decode=none)
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    bench.offer(5)
+    bench.until(lambda: bench.values()["dropped_on_error"] == "1")
+    bench.until(lambda: len(bench.reports) == 2)
+    assert bench.reports == ["stamp 5: a: too short", "stamp 5: b: too short"]
+
+
 def test_reset_makes_the_tracker_forget(bench: Bench) -> None:
     bench.worker.start()
     bench.until(lambda: bench.status.ready)

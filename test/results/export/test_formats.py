@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import markers
+from markerless_tracker.body.angles import ROOT_ANGLES
 from markerless_tracker.cli.main import main
 from markerless_tracker.datasets import read_trc
 from markerless_tracker.results.read import read_result
@@ -122,6 +123,7 @@ def test_a_bag_has_the_topics_of_the_node(make_result, export, person, motion) -
     result = read_result(name)
     poses: dict[int, np.ndarray] = {}
     joints: dict[int, dict[str, float]] = {}
+    deviations: dict[int, dict[str, float]] = {}
     states = []
     with AnyReader([path]) as reader:
         for connection, stamp, data in reader.messages():
@@ -132,6 +134,8 @@ def test_a_bag_has_the_topics_of_the_node(make_result, export, person, motion) -
                 poses[stamp] = np.array([[point.x, point.y, point.z] for point in at])
             elif connection.topic == "/joint_states":
                 joints[stamp] = dict(zip(message.name, message.position, strict=True))
+            elif connection.topic == "/joint_deviations":
+                deviations[stamp] = dict(zip(message.name, message.position, strict=True))
             elif connection.topic == "/state":
                 states.append(message.status[0].message)
         topics = set(reader.topics)
@@ -143,6 +147,12 @@ def test_a_bag_has_the_topics_of_the_node(make_result, export, person, motion) -
     last = START_NS + 11 * PERIOD_NS
     np.testing.assert_allclose(poses[last], markers(person, motion[11]), atol=1e-6)
     assert len(joints[last]) >= len(person.joints)
+    assert deviations[last].keys() == joints[last].keys() and not joints[last].keys() & set(
+        ROOT_ANGLES
+    )
+    for joint, value in deviations[last].items():
+        column = result.angle_names.index(joint)
+        assert value == pytest.approx(np.deg2rad(result.angles_sd_deg[11, column])) and value > 0.0
     for joint, value in joints[last].items():
         if joint in result.angle_names:
             assert value == pytest.approx(np.deg2rad(result.angle(joint)[11]))

@@ -68,9 +68,9 @@ class CameraCounter:
             name: deque(maxlen=WINDOW) for name in self._cameras
         }
 
-    def note(self, what: str, camera: str) -> None:
-        """Count a view of a camera as one of the attributes of `CameraCounts`."""
-        self._counts[camera][what] += 1
+    def note(self, what: str, camera: str, views: int = 1) -> None:
+        """Count views of a camera as one of the attributes of `CameraCounts`."""
+        self._counts[camera][what] += views
 
     def complete(self, stamps_ns: Mapping[str, int], *, late: bool) -> None:
         """Count the views of a complete set, by the stamps of its members."""

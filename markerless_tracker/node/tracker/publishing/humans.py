@@ -31,7 +31,9 @@ class HumanPublisher:
     def describe(self, body: BodyModel) -> None:
         """Take a body and publish its URDF."""
         if self._name:
-            self._human = Human(body, self._name)
+            if self._human is None:
+                self._human = Human(body, self._name)
+            self._human.take(body)
             self._urdfs.publish(String(data=self._human.urdf()))
 
     def publish(self, pose: FloatArray, stamp_ns: int) -> None:
