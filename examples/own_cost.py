@@ -2,7 +2,7 @@
 
     python examples/own_cost.py --frames 12
 
-The images' cost of a pose is 2 - f, f being the overlap of body and silhouettes and of edges.
+The images' cost of a pose is 1 - f_s, f_s being the overlap of body and silhouettes.
 `NearPrediction` adds a term that grows with the distance from the predicted pose. It takes the
 place of the algorithm `sppso`. `refine.swarms: always` searches with it in each frame after the
 start (here the first eight); by default frames that the contour refinement explains are not

@@ -1,4 +1,4 @@
-"""Cores, memory, threads of the numerical libraries (none beside the package's own), collections.
+"""Settings of a process: cores, threads of the libraries, memory that is kept, garbage collection.
 
 A pose has some thirty parameters. For matrices of that size a library's threads only wait for each
 other, and take the cores from the threads that work.
@@ -48,7 +48,7 @@ def keep_freed_memory() -> None:
 
 
 def touch_memory(size_bytes: int) -> None:
-    """Let this thread's allocator have memory that the kernel has provided already.
+    """Make the kernel provide memory for this thread's allocator before it is needed.
 
     For programs, after `keep_freed_memory` and in the thread that will need the memory. The kernel
     provides new memory page by page, which takes milliseconds for an image in a virtual machine.

@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -220,10 +220,15 @@ def row(listener: Listener, recording: MadeUp, rate: float, *, split: bool) -> d
         },
         "segmenter_ms": max((float(v["latency_median_ms"]) for v in segmenters), default=None),
         "bandwidth_share": sent / raw if raw else None,
-        "bytes_a_set": sent / max(1, int(values["tracked"])) if split else None,
+        "bytes_a_set": sum(_per_image(v) for v in segmenters) if split else None,
         "tracker_cpu_ms": 1e3 * float(values["cpu_s"]) / max(1, int(values["tracked"])),
         "dropped": sum(int(v["dropped"]) for v in segmenters),
     }
+
+
+def _per_image(values: Mapping[str, str]) -> float:
+    """Bytes of evidence that a segmenter sends for an image."""
+    return int(values["bytes_out"]) / max(1, int(values["published"]))
 
 
 def measure(cameras: int, args: argparse.Namespace, folder: Path, place: Place) -> list[Any]:

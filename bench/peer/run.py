@@ -67,13 +67,19 @@ def compare(source: Path, out: Path, python: Path, options: list[str]) -> list[d
             **scored(out / f"{source.name}_peer.trc", truth),
         }
     ]
-    for name, start in (("automatic", []), ("measured", ["--start", str(truth)])):
-        result = out / f"{source.name}_{name}"
-        done = call(["track", str(source), "-o", str(result), "--force", *start, *options])
+    scale = ["--scale", "0.5"] if source.name == "balance_real" else []
+    runs = {
+        "automatic start": [],
+        "automatic start, two passes": ["--passes", "2"],
+        "measured start": ["--start", str(truth)],
+    }
+    for number, (name, start) in enumerate(runs.items()):
+        result = out / f"{source.name}_{number}"
+        done = call(["track", str(source), "-o", str(result), "--force", *scale, *start, *options])
         rows.append(
             {
                 "recording": source.name,
-                "tracker": f"this, {name} start",
+                "tracker": f"this, {name}",
                 "sets_per_s": done["frames_per_s"],
                 **scored(Path(f"{result}.trc"), truth),
             }

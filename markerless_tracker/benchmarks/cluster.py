@@ -35,12 +35,15 @@ def submitted(
     """
     try:
         from distributed import Client, as_completed
+        from distributed.comm.addressing import parse_address, parse_host_port
     except ImportError as error:
         raise ConfigError(
             f"scheduler {scheduler}: the package distributed is not installed here, "
             "expected markerless_tracker[cluster]"
         ) from error
     try:
+        # A client with a wrong address would leave a thread that waits for an answer.
+        parse_host_port(parse_address(scheduler)[1])
         client = Client(scheduler, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise ConfigError(

@@ -132,7 +132,7 @@ def measure_recovery(
                         "frames_until_back": until,
                         "back": until is not None and until <= WITHIN_FRAMES,
                         "meanwhile_mm": _mean(errors[begins:ends]),
-                        "worst_mm": float(np.nanmax(errors[ends:], initial=0.0)),
+                        "worst_mm": _worst(errors[ends:]),
                     }
                 )
                 report(part, seed * per_seed + 2 + number, seeds * per_seed)
@@ -184,10 +184,15 @@ def _mean(errors_mm: NDArray[np.float64]) -> float | None:
     return float(known.mean()) if known.size else None
 
 
+def _worst(errors_mm: NDArray[np.float64]) -> float | None:
+    known = errors_mm[np.isfinite(errors_mm)]
+    return float(known.max()) if known.size else None
+
+
 def _black(view: Observation) -> Observation:
     """The observation of a black image: every pixel differs from the background."""
     everywhere = pack_mask(np.ones((view.height, view.width), dtype=np.uint8))
-    return replace(view, mask_words=everywhere)
+    return replace(view, mask_words=everywhere, undecided_words=None)
 
 
 def _errors(

@@ -99,9 +99,9 @@ def run(args: argparse.Namespace) -> int:
     if args.out.exists() and not args.force:
         raise DatasetError(f"{args.out}: exists already, expected a new name or --force")
     if args.sets < LEAST_VIEWS:
-        raise ConfigError(f"sets is {args.sets}, expected {LEAST_VIEWS} or more")
+        raise ConfigError(f"--sets is {args.sets}, expected {LEAST_VIEWS} or more")
     if not 0.0 <= args.thickness <= 1.0:
-        raise ConfigError(f"thickness is {args.thickness:g} m, expected 0 to 1")
+        raise ConfigError(f"--thickness is {args.thickness:g} m, expected 0 to 1")
     make_folder_of(args.out)
     recording = open_uncalibrated(args.recording)
     board = board_of(args, recording.path)
@@ -161,6 +161,10 @@ def board_of(args: argparse.Namespace, folder: Path) -> Board:
         columns, rows = (int(value) for value in squares)
         square_m = float(square_m)
         if kind != CHARUCO:
+            if args.marker_size is not None or args.dictionary is not None:
+                raise ConfigError(
+                    "--marker-size and --dictionary need a ChArUco board (--board charuco)"
+                )
             return Board(kind, columns, rows, square_m)
         marker_m = args.marker_size
         if marker_m is None:

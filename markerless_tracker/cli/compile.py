@@ -4,13 +4,14 @@ import argparse
 import json
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 
 from markerless_tracker.calibration.contours.time_offset import TimeOffsetEstimate
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.cli.benchmark.arguments import list_of
+from markerless_tracker.cli.terminal.arguments import list_of
 from markerless_tracker.cli.terminal.bars import progress_bars
 from markerless_tracker.cli.track import read_config
 from markerless_tracker.compiled import compilation
@@ -90,10 +91,11 @@ def warm_up(config: TrackerConfig, channels: int) -> None:
         for name in rig.names
     }
     tracker = build_tracker(rig, config, backgrounds=backgrounds).tracker
-    tracker.evidence.start_process()
-    tracker.warm_up()
-    TimeOffsetEstimate(rig, step_px=config.edges.step_px).warm_up(tracker.body)
-    tracker.evidence.close()
+    # An interruption must not leave the segmenting process behind.
+    with closing(tracker.evidence) as evidence:
+        evidence.start_process()
+        tracker.warm_up()
+        TimeOffsetEstimate(rig, step_px=config.edges.step_px).warm_up(tracker.body)
 
 
 def _optimizer(text: str) -> str:

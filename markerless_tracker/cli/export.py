@@ -14,6 +14,7 @@ from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.export.formats import EXPORTS, MORE_FILES
 from markerless_tracker.results.read import ResultReader
 from markerless_tracker.results.stored_result import result_names
+from markerless_tracker.results.target import path_of
 
 HELP = (
     "Write a result (NAME.trc, NAME.json) as NAME.FORMAT: mot (OpenSim motion, degrees), osim "
@@ -67,10 +68,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Export; returns the exit status."""
     console = Console(stderr=True)
-    name = args.name.with_suffix("") if args.name.suffix.lower() == ".trc" else args.name
+    name = args.name
     formats = list(dict.fromkeys(entry for several in args.to for entry in several))
-    if "trc" in formats and args.names is None and args.out is None:
-        raise DatasetError(f"{name}.trc: this is the result, expected --names or -o")
     parts = result_names(name)
     jobs: list[tuple[Path, Path, str]] = []
     for part in parts:
@@ -78,6 +77,9 @@ def run(args: argparse.Namespace) -> int:
         if args.names is not None:
             base = base.with_name(f"{base.name}.{args.names}")
         jobs += [(part, _path(base, kind), kind) for kind in formats]
+    for part, path, kind in jobs:
+        if kind == "trc" and path.resolve() == path_of(part, ".trc").resolve():
+            raise DatasetError(f"{path}: this is the result, expected --names or another -o")
     if not args.force:
         _refuse_existing(jobs)
     written, notes = [], []
@@ -112,6 +114,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _formats(text: str) -> list[str]:
     found = [entry for entry in text.split(",") if entry]
+    if not found:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} names no format, expected some of {', '.join((*EXPORTS, BAG))}"
+        )
     for entry in found:
         if entry not in (*EXPORTS, BAG):
             raise argparse.ArgumentTypeError(

@@ -65,26 +65,24 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit status: 0 done, 1 failed with one line on standard error, 2 wrong arguments,
-        3 no person found (`track`, `batch`) or a red finding (`check`, `doctor`), 130 interrupted,
-        141 standard output was closed by its reader.
+        3 no person found (`track`, `batch`), a red finding (`check`, `doctor`) or no message
+        (`record`, `view --node`), 130 interrupted, 141 standard output was closed by its reader.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if not words:
         sys.stderr.write(_overview())
         return 2
     verb, rest = words[0], words[1:]
-    if verb in ("-h", "--help"):
-        sys.stdout.write(_overview())
-        return 0
-    if verb == "--version":
-        print(f"{PROGRAM} {__version__}")
-        return 0
-    if verb not in VERBS:
+    if verb not in (*VERBS, *_ANSWERS):
         near = difflib.get_close_matches(verb, VERBS, n=1)
         meant = f"did you mean {near[0]}?" if near else f"expected one of {', '.join(VERBS)}"
         sys.stderr.write(f"{PROGRAM}: error: unknown verb {verb!r}, {meant}\n")
         return 2
     try:
+        if verb in _ANSWERS:
+            sys.stdout.write(_ANSWERS[verb]())
+            sys.stdout.flush()
+            return 0
         return _run(verb, rest)
     except KeyboardInterrupt:
         return 130
@@ -139,3 +137,11 @@ def _line(error: Exception) -> str:
         names = [str(name) for name in (error.filename, error.filename2) if name is not None]
         return ": ".join([*names, error.strerror])
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def _version() -> str:
+    return f"{PROGRAM} {__version__}\n"
+
+
+_ANSWERS = {"-h": _overview, "--help": _overview, "--version": _version}
+"""What stands in the place of a verb, and the text that answers it."""

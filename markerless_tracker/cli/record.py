@@ -11,6 +11,7 @@ from rich.progress import Progress, TextColumn, TimeElapsedColumn
 
 from markerless_tracker.bags.mcap_bag import BagWriter
 from markerless_tracker.camera import read_calibration
+from markerless_tracker.cli.terminal.arguments import positive
 from markerless_tracker.cli.terminal.bars import warn
 from markerless_tracker.errors import DatasetError
 
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="A,B,...",
         help="topics to record (default: all but debug/..., /rosout and /parameter_events)",
     )
-    parser.add_argument("--seconds", type=float, metavar="S", help="end after S seconds")
+    parser.add_argument("--seconds", type=positive, metavar="S", help="end after S seconds")
     parser.add_argument(
         "--calibration",
         type=Path,

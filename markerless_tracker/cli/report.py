@@ -13,7 +13,7 @@ from markerless_tracker.cli.track_arguments import result_name
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.datasets.markers.c3d import read_markers
 from markerless_tracker.datasets.markers.sets import MARKER_SETS, read_marker_map, renamed
-from markerless_tracker.errors import DatasetError, TrackerError
+from markerless_tracker.errors import ConfigError, DatasetError, TrackerError
 from markerless_tracker.results.read import read_result
 from markerless_tracker.results.stored_result import StoredResult
 from markerless_tracker.viewing.images import ResultImages
@@ -76,7 +76,9 @@ def run(args: argparse.Namespace) -> int:
     console = Console(stderr=True)
     if args.out.exists() and not args.force:
         raise DatasetError(f"{args.out}: exists already, expected a new name or --force")
-    names = [_without_suffix(name) for name in args.names]
+    if args.markers is not None and not args.reference:
+        raise ConfigError("--markers is given without --reference, expected both")
+    names = args.names
     sources = _for_each(args.source, len(names), "--source")
     references = _for_each(args.reference, len(names), "--reference")
     started = time.perf_counter()
@@ -145,7 +147,12 @@ def _film(
 
 def _reference(path: Path, markers: str | None) -> MarkerTrack:
     track = read_markers(path)
-    return track if markers is None else renamed(track, read_marker_map(markers))
+    if markers is None:
+        return track
+    try:
+        return renamed(track, read_marker_map(markers))
+    except DatasetError as error:
+        raise DatasetError(f"{path}: {error}") from error
 
 
 def _levels() -> list[Level]:
@@ -160,10 +167,6 @@ def _levels() -> list[Level]:
             if settings.items() <= row.settings.items() and "mean_mm" in figures:
                 found.append(Level(f"{label}: {figures['mean_mm']:g} mm", figures["mean_mm"]))
     return found
-
-
-def _without_suffix(name: Path) -> Path:
-    return name.with_suffix("") if name.suffix.lower() == ".trc" else name
 
 
 def _title(name: Path, names: list[Path]) -> str:

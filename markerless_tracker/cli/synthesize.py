@@ -299,7 +299,7 @@ def synthesize(
 def _size(text: str) -> tuple[int, int]:
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
     if match is None:
-        raise ConfigError(f"size is {text!r}, expected WxH such as 656x490")
+        raise ConfigError(f"--size is {text!r}, expected WxH such as 656x490")
     return int(match[1]), int(match[2])
 
 

@@ -26,7 +26,7 @@ from markerless_tracker.compiled import compilation
 from markerless_tracker.datasets import Recording, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
 from markerless_tracker.datasets.silhouettes import SilhouetteRecording
-from markerless_tracker.errors import CalibrationError, ConfigError
+from markerless_tracker.errors import CalibrationError, ConfigError, DatasetError
 from markerless_tracker.results.appended import make_folder_of
 from markerless_tracker.results.result import ResultWriter, check_target
 from markerless_tracker.results.run import frames_to_track, track_recording
@@ -129,6 +129,10 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     config = read_config(args.config, given_settings(args))
     check_target(args.name, overwrite=args.force, allow="--force")
     if args.refine_calibration is not None:
+        if args.refine_calibration.exists() and not args.force:
+            raise DatasetError(
+                f"{args.refine_calibration}: exists already, expected a new name or --force"
+            )
         make_folder_of(args.refine_calibration)
     smoothing = None
     if args.smooth is not None or args.fill_gaps is not None:
@@ -136,8 +140,9 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
     recording = _opened(args, args.scale)
     if smoothing is not None:
         smoothing.check_rate(args.fps or recording.fps)
-    if args.time_offsets is not None:
-        recording = InStepRecording(recording, read_time_offsets(args.time_offsets))
+    offsets_s = None if args.time_offsets is None else read_time_offsets(args.time_offsets)
+    if offsets_s is not None:
+        recording = InStepRecording(recording, offsets_s)
     if args.masks is not None:
         if args.debug_images is not None:
             raise ConfigError("--debug-images shows the segmentation, which --masks replaces")
@@ -154,7 +159,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
             setup.tracker.warm_up()
         notices.begin(f"tracking {recording.name}", frames_to_track(recording, setup, args.fps))
         choice = None if args.refine_calibration is None else FrameChoice()
-        outcome = _track(args, recording, setup, config, doubts, notices, choice)
+        outcome = _track(args, recording, setup, config, doubts, notices, choice, offsets_s)
     filled = refined = None
     verdict = outcome.verdict
     if smoothing is not None and verdict.tracked:
@@ -233,9 +238,10 @@ def _track(
     doubts: Sequence[str],
     notices: Notices,
     choice: FrameChoice | None,
+    offsets_s: Mapping[str, float] | None,
 ) -> Outcome:
     """Track all frames and write the result and the debug images."""
-    tracker = setup.tracker
+    tracker, description = setup.tracker, load_description(config.body)
     debug = DebugImages(args.debug_images) if args.debug_images else None
     check = CameraCheck(tracker.rig, config)
     record = RunRecord(tracker.rig)
@@ -271,14 +277,14 @@ def _track(
         shifts = check.shifts()
         verdict = verdict_of(
             record,
-            load_description(config.body),
+            description,
             known=(*interrupted, *doubts, *describe(shifts)),
             start_given=args.start is not None,
         )
         writer.note({"cameras": _cameras(shifts), "verdict": verdict.as_mapping()})
         writer.note({"scale": args.scale})
-        if args.time_offsets is not None:
-            writer.note({"time_offsets_s": read_time_offsets(args.time_offsets)})
+        if offsets_s is not None:
+            writer.note({"time_offsets_s": dict(offsets_s)})
     if interrupted:
         raise KeyboardInterrupt
     return Outcome(writer.trc_path, seconds, shifts, record, verdict)
@@ -311,13 +317,17 @@ def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
         try:
             loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            first = str(error).splitlines()[0]
-            raise ConfigError(f"{path}: cannot read the settings: {first}") from error
+            reason = " ".join(str(error).split())
+            raise ConfigError(f"{path}: cannot read the settings: {reason}") from error
         if loaded is not None and not isinstance(loaded, dict):
             raise ConfigError(
                 f"{path}: expected a mapping of settings, got {type(loaded).__name__}"
             )
-        values = TrackerConfig.dotted(loaded or {})
+        try:
+            values = TrackerConfig.dotted(loaded or {})
+            TrackerConfig.from_mapping(values)
+        except ConfigError as error:
+            raise ConfigError(f"{path}: {error}") from error
     return TrackerConfig.from_mapping({**values, **TrackerConfig.dotted(flags)})
 
 

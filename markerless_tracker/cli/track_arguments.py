@@ -221,6 +221,8 @@ def _files(group: argparse._ArgumentGroup) -> None:
 def result_name(text: str) -> Path:
     """The NAME of NAME.trc and NAME.json, type of an argument: a path that names no folder.
 
+    NAME.trc gives NAME.
+
     Raises:
         argparse.ArgumentTypeError: it names a folder, or nothing.
     """
@@ -229,4 +231,4 @@ def result_name(text: str) -> Path:
         raise argparse.ArgumentTypeError(
             f"{text!r} names no file, expected a name such as {path / 'walk'}"
         )
-    return path
+    return path.with_suffix("") if path.suffix.lower() == ".trc" else path

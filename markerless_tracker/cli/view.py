@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -11,9 +10,10 @@ from pathlib import Path
 
 import cv2
 
+from markerless_tracker.cli.terminal.arguments import count, positive
 from markerless_tracker.cli.terminal.bars import progress_bars
 from markerless_tracker.cli.track_arguments import result_name
-from markerless_tracker.cli.view_node import run_node
+from markerless_tracker.cli.view_node import has_display, run_node
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.results.read import read_result
 from markerless_tracker.results.stored_result import StoredResult
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "and --sheet (the last pictures)",
     )
     parser.add_argument(
-        "--seconds", metavar="S", type=float, help="with --node: end after S seconds"
+        "--seconds", metavar="S", type=positive, help="with --node: end after S seconds"
     )
     parser.add_argument(
         "--source",
@@ -74,14 +74,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--frames",
         metavar="N",
-        type=_count,
+        type=count,
         default=4,
         help="frames of the picture, from the first to the last (default 4)",
     )
     parser.add_argument(
         "--width",
         metavar="PX",
-        type=_count,
+        type=count,
         default=1280,
         help="width of film and picture (default 1280)",
     )
@@ -110,11 +110,11 @@ def run(args: argparse.Namespace) -> int:
         require_av()
     if args.rrd is not None or not targets:
         require_rerun()
-    if not targets and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if not targets and not has_display():
         raise ConfigError(
             "there is no display for the Rerun viewer, expected --film, --sheet or --rrd"
         )
-    name = args.name.with_suffix("") if args.name.suffix.lower() == ".trc" else args.name
+    name = args.name
     result = read_result(name)
     images = ResultImages(result, args.source, width_px=args.width // 2, whole=args.whole)
     for path in targets:
@@ -187,9 +187,3 @@ def _file(endings: Sequence[str]) -> Callable[[str], Path]:
         return path
 
     return parse
-
-
-def _count(text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and int(text)):
-        raise argparse.ArgumentTypeError(f"{text!r}, expected a whole number above 0")
-    return int(text)

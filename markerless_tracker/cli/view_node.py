@@ -33,7 +33,7 @@ def run_node(args: argparse.Namespace) -> int:
     shows = args.rrd is not None or args.sheet is None
     if shows:
         require_rerun()
-    if args.sheet is None and args.rrd is None and not _has_display():
+    if args.sheet is None and args.rrd is None and not has_display():
         raise ConfigError("there is no display for the Rerun viewer, expected --sheet or --rrd")
     for path in (args.sheet, args.rrd):
         if path is not None:
@@ -87,7 +87,8 @@ def run_node(args: argparse.Namespace) -> int:
     return NOTHING_RECEIVED
 
 
-def _has_display() -> bool:
+def has_display() -> bool:
+    """Whether there is a display for a window."""
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 

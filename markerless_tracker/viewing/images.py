@@ -43,7 +43,11 @@ class ResultImages:
     ) -> None:
         path = source or (Path(result.source) if result.source else None)
         if path is None or not path.exists():
-            found = "the result names no source" if path is None else f"{path}: no such recording"
+            found = (
+                "the result names no source"
+                if path is None
+                else f"{path}: the images of the result are not there"
+            )
             raise DatasetError(f"{found}, expected the recording's folder with --source")
         rig = open_recording(path).rig
         self.windows: Mapping[str, Window] = (

@@ -37,7 +37,7 @@ def test_unknown_sets_are_refused() -> None:
     [
         ([], "expected recordings or --postures N, and not both"),
         (["somewhere", "--postures", "2"], "expected recordings or --postures N, and not both"),
-        (["somewhere", "--exact"], "--exact and --set are given without --postures"),
+        (["somewhere", "--exact"], "--exact and --set need --postures"),
         (["--postures", "2", "--scale", "0.5"], "expected no --stature and no --scale"),
     ],
 )

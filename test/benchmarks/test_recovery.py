@@ -1,5 +1,7 @@
 """Disturbed frames, and the frame from which a track has recovered."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,9 +12,13 @@ from markerless_tracker.records import Observation
 def frames(count: int):
     mask = np.zeros((8, 70), np.uint8)
     mask[2, 3] = 1
+    undecided = np.zeros((8, 70), np.uint8)
+    undecided[5] = 1
+    views = {
+        name: Observation.from_mask(name, 0, mask, mask, undecided=undecided) for name in "abc"
+    }
     return [
-        (i, {name: Observation.from_mask(name, i, mask, mask) for name in ("a", "b", "c")})
-        for i in range(count)
+        (i, {name: replace(view, stamp_ns=i) for name, view in views.items()}) for i in range(count)
     ]
 
 

@@ -151,7 +151,7 @@ def test_a_floor_frame_that_is_not_there_is_refused_at_once(stills, tmp_path, nu
 def test_fewer_sets_than_a_camera_needs_views_are_refused(tmp_path, capsys) -> None:
     words = ["calibrate", str(tmp_path), "-o", str(tmp_path / "out.toml"), "--sets", "5"]
     assert main(words) == 1
-    assert "sets is 5, expected 6 or more" in capsys.readouterr().err
+    assert "--sets is 5, expected 6 or more" in capsys.readouterr().err
 
 
 def test_a_camera_without_a_board_is_named(stills, tmp_path) -> None:

@@ -263,7 +263,7 @@ def test_fewer_cameras(walk, capsys) -> None:
     out = capsys.readouterr().out
     assert "cam01 cam03" in out and "measured, 2 cameras" in out
     assert main(["benchmark", "cameras", walk, "--start", "guessed"]) == 1
-    assert "--start: guessed, expected some of measured, automatic" in capsys.readouterr().err
+    assert "--start: got guessed, expected some of measured, automatic" in capsys.readouterr().err
 
 
 def test_jitter_of_too_few_frames_is_an_error(walk, capsys) -> None:

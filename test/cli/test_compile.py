@@ -10,7 +10,7 @@ import pytest
 
 import markerless_tracker.cli.compile as compile_verb
 from markerless_tracker.cli.main import main
-from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.config import OPTIMIZERS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -121,3 +121,17 @@ def test_an_unknown_optimizer_is_wrong_usage(capsys: pytest.CaptureFixture[str])
     with pytest.raises(SystemExit) as ended:
         main(["compile", "--optimizer", "sppso,annealing"])
     assert ended.value.code == 2 and "'annealing'" in capsys.readouterr().err
+
+
+def test_an_interruption_ends_the_segmenting_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    pids: list[int] = []
+
+    def interrupted(self: Tracker) -> None:
+        pids.append(self.evidence._process.pid)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Tracker, "warm_up", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        compile_verb.warm_up(TrackerConfig(), 3)
+    (pid,) = pids
+    assert not Path(f"/proc/{pid}").exists()

@@ -154,7 +154,8 @@ def test_help_imports_no_numerical_library() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_a_closed_pipe_is_no_error() -> None:
+@pytest.mark.parametrize("word", ["probe", "--help", "--version"])
+def test_a_closed_pipe_is_no_error(word: str) -> None:
     read_end, write_end = os.pipe()
     os.close(read_end)
     code = (
@@ -165,7 +166,7 @@ def test_a_closed_pipe_is_no_error() -> None:
         "probe = types.SimpleNamespace(HELP='h', EXAMPLE='e', run=run)\n"
         "probe.add_arguments = lambda parser: None\n"
         "sys.modules['markerless_tracker.cli.probe'] = probe; m.VERBS = {'probe': ''}\n"
-        "sys.exit(m.main(['probe']))"
+        f"sys.exit(m.main([{word!r}]))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], stdout=write_end, stderr=subprocess.PIPE, text=True

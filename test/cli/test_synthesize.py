@@ -92,7 +92,7 @@ def test_videos_are_lossless_only_on_request(tmp_path: Path, capsys) -> None:
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--size", "big"], "size is 'big', expected WxH"),
+        (["--size", "big"], "--size is 'big', expected WxH"),
         (["--size", "65x49"], "cam01: .*65x49 .* even numbers"),
         (["--size", "8x8"], "image width is 8, expected 16 to 8192"),
         (["--seconds", "0"], "0 s at 60 fps, expected 1 to"),

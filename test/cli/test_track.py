@@ -164,11 +164,18 @@ class TestRefusals:
         line = refusal(track("--start", walk / "start.yaml", "--refine-calibration", path))
         assert "refined.toml: cannot be written" in line
 
+    def test_a_calibration_that_is_there_is_kept(self, track, walk, tmp_path):
+        path = tmp_path / "mine.toml"
+        path.write_text("# mine", encoding="utf-8")
+        line = refusal(track("--start", walk / "start.yaml", "--refine-calibration", path))
+        assert line == f"{path}: exists already, expected a new name or --force"
+        assert path.read_text(encoding="utf-8") == "# mine"
+
     def test_an_unknown_setting(self, track, walk, tmp_path):
         path = tmp_path / "typo.yaml"
         path.write_text("edge_wieght: 1.0\n", encoding="utf-8")
         line = refusal(track("--start", walk / "ground_truth.trc", config=path))
-        assert line == "unknown setting 'edge_wieght', did you mean 'edge_weight'?"
+        assert line == f"{path}: unknown setting 'edge_wieght', did you mean 'edge_weight'?"
 
     @pytest.mark.parametrize(
         ("text", "message"),
@@ -184,7 +191,8 @@ class TestRefusals:
     def test_malformed_settings_files(self, track, walk, tmp_path, text, message):
         path = tmp_path / "wrong.yaml"
         path.write_text(text + "\n", encoding="utf-8")
-        assert message in refusal(track("--start", walk / "ground_truth.trc", config=path))
+        line = refusal(track("--start", walk / "ground_truth.trc", config=path))
+        assert message in line and line.startswith(f"{path}: ")
 
     def test_a_missing_settings_file(self, track, walk, tmp_path):
         line = refusal(

@@ -27,9 +27,11 @@ def test_rows_come_with_the_images_of_their_time(make_result, walk: Path) -> Non
 
 def test_the_source_may_be_elsewhere(make_result, walk: Path) -> None:
     result = read_result(make_result(source="/nowhere/walk"))
-    with pytest.raises(DatasetError, match="/nowhere/walk: no such recording, .* --source"):
+    with pytest.raises(DatasetError, match="/nowhere/walk: the images .* --source"):
         ResultImages(result)
-    with pytest.raises(DatasetError, match="/nowhere/given: no such recording"):
+    with pytest.raises(
+        DatasetError, match="/nowhere/given: the images of the result are not there"
+    ):
         ResultImages(result, Path("/nowhere/given"))
     with pytest.raises(DatasetError, match="the result names no source, expected .* --source"):
         ResultImages(read_result(make_result("unnamed", source="")))

@@ -49,9 +49,10 @@ def _trial(
     name: str, source: Path, out: Path, options: Mapping[str, Any], settings: Mapping[str, Any]
 ) -> Trial:
     own = {key: _filled(key, value, name, source) for key, value in options.items()}
-    # The key has the settings in place of their options, and the content of files, not their names.
+    # The key has the settings in place of their options, and the content of files that are read,
+    # not their names.
     files = {
-        key: _content(value)
+        key: str(value) if key in _OUTPUTS else _content(key, value)
         for key, value in own.items()
         if key not in settings and key not in ("config", "threads")
     }
@@ -74,7 +75,9 @@ def _filled(option: str, value: Any, name: str, source: Path) -> Any:
     return os.path.abspath(text) if option in _MAYBE_FILES and os.path.isfile(text) else text
 
 
-def _content(value: Any) -> Any:
+def _content(option: str, value: Any) -> Any:
+    if option in _MAYBE_FILES and isinstance(value, str) and os.path.isfile(value):
+        return file_key(Path(value))
     if isinstance(value, Path):
         return recording_key(value) if value.is_dir() else file_key(value)
     return value

@@ -21,9 +21,10 @@ import cv2
 from markerless_tracker.cli.terminal.notices import COMPILING, Notices
 from markerless_tracker.cli.track import Finished, track_source
 from markerless_tracker.datasets import read_trc
-from markerless_tracker.errors import TrackerError
+from markerless_tracker.errors import TrackerError, one_line
 from markerless_tracker.results.score import score
 from markerless_tracker.results.stored import stored_frames
+from markerless_tracker.results.target import earlier_files
 
 RECORDS = ".batch"
 """Folder of the records, in the folder of the results."""
@@ -89,7 +90,7 @@ def do_trial(trial: Trial) -> dict[str, Any]:
     try:
         finished, files = _track(trial, stored, clock)
     except Exception as error:  # a damaged recording may raise any exception: it costs its trial
-        return failed(trial, _line(error), clock.seconds)
+        return failed(trial, one_line(error), clock.seconds)
     seconds, summary = clock.seconds, finished.summary
     mean_mm, problem = _mean_error(trial, finished) if summary["tracked"] else (None, None)
     overlap = list(summary["verdict"]["overlap"].values())
@@ -111,7 +112,7 @@ def do_trial(trial: Trial) -> dict[str, Any]:
     try:
         _write(trial.record, {"key": trial.key, "row": row, "files": files})
     except OSError as error:
-        return failed(trial, _line(error), clock.seconds)
+        return failed(trial, one_line(error), clock.seconds)
     return row
 
 
@@ -154,7 +155,7 @@ def _track(trial: Trial, earlier: Record | None, clock: _Clock) -> tuple[Finishe
     folder = Path(tempfile.mkdtemp(prefix=PARTIAL, dir=trial.out / RECORDS))
     try:
         chosen = argparse.Namespace(
-            **trial.arguments, source=trial.source, name=folder / target.name, force=False
+            **trial.arguments, source=trial.source, name=folder / target.name, force=True
         )
         finished = track_source(chosen, clock)
         files = sorted(file.name for file in folder.iterdir())
@@ -162,6 +163,8 @@ def _track(trial: Trial, earlier: Record | None, clock: _Clock) -> tuple[Finishe
         _write(trial.record, {"key": trial.key, "files": files})
         for name in earlier.files if earlier is not None else ():
             (target.parent / name).unlink(missing_ok=True)
+        for path in earlier_files(target):
+            path.unlink()
         for name in files:
             os.replace(folder / name, target.parent / name)
         return finished, files
@@ -181,7 +184,7 @@ def _mean_error(trial: Trial, finished: Finished) -> tuple[float | None, str | N
         found = score(track if stored is None else stored.track, reference)
     except TrackerError as error:
         # The result itself is complete.
-        return None, _line(error)
+        return None, one_line(error)
     return round(found.mean_mm, 2), None
 
 
@@ -189,10 +192,3 @@ def _write(path: Path, content: Mapping[str, Any]) -> None:
     part = path.with_name(path.name + ".part")
     part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     os.replace(part, path)
-
-
-def _line(error: Exception) -> str:
-    text = " ".join(str(error).split())
-    if isinstance(error, TrackerError):
-        return text
-    return f"{type(error).__name__}: {text}"

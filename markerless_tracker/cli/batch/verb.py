@@ -18,12 +18,13 @@ from markerless_tracker.cli.batch.plan import plan
 from markerless_tracker.cli.batch.processes import on_processes
 from markerless_tracker.cli.batch.table import text_table, totals, write_tables
 from markerless_tracker.cli.batch.trial import PARTIAL, RECORDS, Trial
-from markerless_tracker.cli.benchmark.arguments import count
+from markerless_tracker.cli.terminal.arguments import count
 from markerless_tracker.cli.terminal.bars import progress_bars, tell, warn
 from markerless_tracker.cli.track import NO_PERSON_FOUND
 from markerless_tracker.cli.track_arguments import add_options
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.libraries import usable_cores
+from markerless_tracker.results.target import earlier_files, path_of
 
 HELP = (
     "Track the person in every recording of a folder (at any depth) or of a list (a text file with "
@@ -134,8 +135,10 @@ def _done(
 def _check_targets(missing: Sequence[Trial]) -> None:
     """Check that no result of other settings would be replaced."""
     for trial in missing:
-        path = trial.out / f"{trial.name}.json"
-        if trial.stored() is not None or (path.exists() and not trial.record.exists()):
+        target = trial.out / trial.name
+        there = earlier_files(target)
+        if trial.stored() is not None or (there and not trial.record.exists()):
+            path = there[0] if there else path_of(target, ".json")
             raise DatasetError(
                 f"{path}: exists already and is of other settings, code or images, expected the "
                 "same, another OUT or --force"

@@ -1,7 +1,6 @@
 """`benchmark cameras`: the error with every subset of the cameras."""
 
 import argparse
-import sys
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
@@ -13,8 +12,10 @@ from rich.table import Table
 from markerless_tracker.benchmarks import cameras
 from markerless_tracker.benchmarks.tables.runs import LOST_LIMB_MM
 from markerless_tracker.benchmarks.with_truth import Report, RunStart
-from markerless_tracker.cli.benchmark.arguments import add_kind, count, list_of
+from markerless_tracker.cli.benchmark.arguments import add_kind
 from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
+from markerless_tracker.cli.terminal.arguments import count, list_of
+from markerless_tracker.errors import ConfigError
 
 _STARTS = ("measured", "automatic")
 
@@ -45,11 +46,9 @@ def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status."""
     unknown = sorted(set(args.start) - set(_STARTS))
     if unknown:
-        print(
-            f"--start: {', '.join(unknown)}, expected some of {', '.join(_STARTS)}",
-            file=sys.stderr,
+        raise ConfigError(
+            f"--start: got {', '.join(unknown)}, expected some of {', '.join(_STARTS)}"
         )
-        return 1
     config = settings(args, "seed")
 
     def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:

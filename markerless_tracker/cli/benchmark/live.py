@@ -10,9 +10,10 @@ from rich.console import Console
 from rich.table import Table
 
 from markerless_tracker.benchmarks.machine import machine
-from markerless_tracker.cli.benchmark.arguments import add_kind, list_of, positive
+from markerless_tracker.cli.benchmark.arguments import add_kind
 from markerless_tracker.cli.benchmark.recordings import add_recordings, each, settings
 from markerless_tracker.cli.replay.measure import LivePlan, measure_live
+from markerless_tracker.cli.terminal.arguments import list_of, positive
 from markerless_tracker.cli.terminal.bars import progress_bars
 from markerless_tracker.node.ros.process import require_ros
 from markerless_tracker.results.result import versions

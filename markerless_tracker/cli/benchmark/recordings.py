@@ -11,7 +11,7 @@ from rich.console import Console
 
 from markerless_tracker.benchmarks.machine import machine
 from markerless_tracker.benchmarks.with_truth import Report
-from markerless_tracker.cli.benchmark.arguments import list_of, positive
+from markerless_tracker.cli.terminal.arguments import list_of, positive
 from markerless_tracker.cli.terminal.bars import progress_bars
 from markerless_tracker.cli.track import read_config
 from markerless_tracker.errors import ConfigError

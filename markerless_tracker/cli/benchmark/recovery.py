@@ -9,8 +9,9 @@ from rich.table import Table
 
 from markerless_tracker.benchmarks import recovery
 from markerless_tracker.benchmarks.with_truth import Report
-from markerless_tracker.cli.benchmark.arguments import add_kind, count
+from markerless_tracker.cli.benchmark.arguments import add_kind
 from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
+from markerless_tracker.cli.terminal.arguments import count
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
@@ -69,6 +70,7 @@ def _table(rows: list[Row]) -> Table:
                 continue
             meanwhile = [run["meanwhile_mm"] for run in runs if run["meanwhile_mm"] is not None]
             until = [run["frames_until_back"] for run in runs]
+            worst = [run["worst_mm"] for run in runs if run["worst_mm"] is not None]
             table.add_row(
                 row["recording"],
                 disturbance.name,
@@ -77,6 +79,6 @@ def _table(rows: list[Row]) -> Table:
                 f"{sum(meanwhile) / len(meanwhile):.1f}" if meanwhile else "-",
                 str(sum(run["back"] for run in runs)),
                 ", ".join("never" if n is None else str(n) for n in until),
-                f"{max(run['worst_mm'] for run in runs):.0f}",
+                f"{max(worst):.0f}" if worst else "-",
             )
     return table

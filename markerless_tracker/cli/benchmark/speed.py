@@ -10,7 +10,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from markerless_tracker.cli.benchmark.arguments import add_kind, count
+from markerless_tracker.cli.benchmark.arguments import add_kind
+from markerless_tracker.cli.terminal.arguments import count
 from markerless_tracker.cli.terminal.bars import progress_bars
 
 

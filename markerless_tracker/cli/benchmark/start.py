@@ -10,8 +10,9 @@ from rich.table import Table
 from markerless_tracker.benchmarks import postures, starts
 from markerless_tracker.benchmarks.silhouettes.generated import SETS
 from markerless_tracker.benchmarks.with_truth import Report
-from markerless_tracker.cli.benchmark.arguments import add_kind, count
+from markerless_tracker.cli.benchmark.arguments import add_kind
 from markerless_tracker.cli.benchmark.recordings import Row, add_recordings, run_each, settings
+from markerless_tracker.cli.terminal.arguments import count
 from markerless_tracker.errors import ConfigError
 
 
@@ -57,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     if (args.postures is None) == (not args.sources):
         raise ConfigError("expected recordings or --postures N, and not both")
     if args.postures is None and (args.exact or args.set != "development"):
-        raise ConfigError("--exact and --set are given without --postures, expected both")
+        raise ConfigError("--exact and --set need --postures")
     if args.postures is not None and (args.stature or args.scale != (1.0,)):
         raise ConfigError("--postures makes its own scenes: expected no --stature and no --scale")
     config = settings(args, "preset", "body")

@@ -16,15 +16,10 @@ from markerless_tracker.benchmarks.tables import accuracy
 from markerless_tracker.benchmarks.tables.papers import PaperRow, choose, read_papers
 from markerless_tracker.benchmarks.tables.plots import write_plot
 from markerless_tracker.benchmarks.tables.variants import variants
-from markerless_tracker.cli.benchmark.arguments import (
-    add_kind,
-    count,
-    list_of,
-    not_negative,
-    positive,
-)
+from markerless_tracker.cli.benchmark.arguments import add_kind
 from markerless_tracker.cli.benchmark.choices import Group, every_config, groups, varied
 from markerless_tracker.cli.benchmark.layout import LEGEND, full_table, legend_of, paper_table
+from markerless_tracker.cli.terminal.arguments import count, list_of, not_negative, positive
 from markerless_tracker.cli.terminal.bars import progress_bars, warn
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.libraries import usable_cores

@@ -28,6 +28,7 @@ EXAMPLE = "markerless_tracker doctor --calibration walk/calibration.toml"
 _ADVICE = "correct it, or make it anew with `calibrate`"
 MOST_SECONDS = 3600.0
 """Largest value of `--seconds`."""
+IMAGE_TOPIC = "NAME/image_raw"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="cameras to listen to (those of --calibration, else all that send)",
     )  # fmt: skip
     parser.add_argument(
-        "--image-topic", default="NAME/image_raw", metavar="TOPIC",
+        "--image-topic", default=IMAGE_TOPIC, metavar="TOPIC",
         help="topic of the images, NAME stands for the camera",
     )  # fmt: skip
     parser.add_argument(
@@ -58,9 +59,13 @@ def run(args: argparse.Namespace) -> int:
         ConfigError: arguments are impossible, or contradict each other.
     """
     if not 0.0 <= args.seconds <= MOST_SECONDS:
-        raise ConfigError(f"seconds is {args.seconds:g}, expected 0 to {MOST_SECONDS:g}")
+        raise ConfigError(f"--seconds is {args.seconds:g}, expected 0 to {MOST_SECONDS:g}")
     if args.background is not None and args.calibration is None:
         raise ConfigError("--background needs --calibration, whose cameras it is compared with")
+    if args.image_topic != IMAGE_TOPIC and args.cameras is None and args.calibration is None:
+        raise ConfigError(
+            "--image-topic needs the names of the cameras, expected --cameras or --calibration"
+        )
     # The user's environment is copied first, since listening applies the shipped profile.
     found = check_machine(dict(os.environ), profiles=USERS_OWN, shipped=profile_file())
     rig, calibrated = _calibration(args.calibration)

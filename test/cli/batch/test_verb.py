@@ -67,7 +67,7 @@ def test_results_and_table_of_every_recording(trials, options, walk, tmp_path, c
 
     # Other settings replace nothing by themselves.
     assert call(trials, "-o", out, *options, "--seed", 9) == 1
-    assert "one.json: exists already and is of other settings" in capsys.readouterr().err
+    assert "one.trc: exists already and is of other settings" in capsys.readouterr().err
     assert before == {name: (out / f"{name}.trc").stat().st_mtime_ns for name in GOOD}
     assert not list((out / ".batch").glob(".partial-*"))
 
@@ -162,12 +162,14 @@ def test_mistakes_cost_no_time(trials, options, tmp_path, capsys, extra, message
     assert message in err and err.splitlines()[-1].startswith("markerless_tracker: error: ")
 
 
-def test_a_result_of_somebody_else_is_not_replaced(trials, options, tmp_path, capsys) -> None:
+@pytest.mark.parametrize("ending", ["trc", "json", "jsonl"])
+def test_a_result_of_somebody_else_is_not_replaced(
+    trials, options, tmp_path, capsys, ending: str
+) -> None:
     (tmp_path / "out" / "a").mkdir(parents=True)
-    mine = tmp_path / "out" / "a" / "one.json"
+    mine = tmp_path / "out" / "a" / f"one.{ending}"
     mine.write_text("{}", encoding="utf-8")
     assert call(trials, "-o", tmp_path / "out", *options) == 1
-    assert "one.json: exists already" in capsys.readouterr().err
-    assert mine.read_text(encoding="utf-8") == "{}" and os.listdir(tmp_path / "out" / "a") == [
-        "one.json"
-    ]
+    assert f"one.{ending}: exists already" in capsys.readouterr().err
+    assert mine.read_text(encoding="utf-8") == "{}"
+    assert os.listdir(tmp_path / "out" / "a") == [mine.name]

@@ -78,7 +78,7 @@ def test_what_cannot_be_shown_fails_in_one_line(
         (["--film", "a.avi"], "ends in .webm or .mp4"),
         (["--sheet", "a.gif"], "ends in .png or .jpg"),
         (["--rrd", "a"], "ends in .rrd"),
-        (["--frames", "0"], "whole number above 0"),
+        (["--frames", "0"], "whole number from 1"),
     ):
         with pytest.raises(SystemExit):
             main(["view", result, *words])

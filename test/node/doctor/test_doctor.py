@@ -111,8 +111,9 @@ def test_ctrl_c_ends_it(
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--seconds", "-1"], "seconds is -1, expected 0 to 3600"),
-        (["--seconds", "nan"], "seconds is nan, expected 0 to 3600"),
+        (["--image-topic", "/rig/NAME/image"], "--image-topic needs the names of the cameras"),
+        (["--seconds", "-1"], "--seconds is -1, expected 0 to 3600"),
+        (["--seconds", "nan"], "--seconds is nan, expected 0 to 3600"),
         (["--seconds", "0", "--background", "empty"], "--background needs --calibration"),
     ],
 )

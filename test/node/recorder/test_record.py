@@ -20,6 +20,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
 from markerless_tracker.camera import write_calibration
+from markerless_tracker.cli.main import main
 from markerless_tracker.datasets import open_recording
 from markerless_tracker.datasets.bag.stream import McapFiles
 from markerless_tracker.node.ros.images import fill_image
@@ -147,3 +148,15 @@ def test_mistakes_and_silence(recorder, tmp_path: Path) -> None:
     assert process.returncode == 3 and json.loads(out)["messages"] == 0
     process = recorder()
     assert process.wait(120) == 1
+
+
+@pytest.mark.parametrize("words", [["record", "bag"], ["view", "--node"]])
+@pytest.mark.parametrize("seconds", ["-1", "0", "nan", "some"])
+def test_impossible_durations_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], seconds: str
+) -> None:
+    given = [*words[:1], *(str(tmp_path / "bag") if w == "bag" else w for w in words[1:])]
+    with pytest.raises(SystemExit) as stop:
+        main([*given, f"--seconds={seconds}"])
+    assert stop.value.code == 2 and f"{seconds!r}, expected a number" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

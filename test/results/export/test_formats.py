@@ -221,3 +221,15 @@ def test_a_result_that_a_format_cannot_hold(
     assert main(["export", str(name), "--to", form]) == 1
     assert expected in capsys.readouterr().err
     assert not name.with_suffix(f".{form}").exists()
+
+
+def test_a_result_is_not_exported_onto_itself(make_result, capsys) -> None:
+    name = make_result()
+    before = name.with_suffix(".trc").read_bytes()
+    for more in (["--force"], ["-o", str(name), "--force"], ["-o", f"{name}.trc", "--force"]):
+        assert main(["export", str(name), "--to", "csv,trc", *more]) == 1
+        assert "walk.trc: this is the result" in capsys.readouterr().err
+    assert name.with_suffix(".trc").read_bytes() == before
+    with pytest.raises(SystemExit):
+        main(["export", str(name), "--to", ","])
+    assert "',' names no format, expected some of bvh" in capsys.readouterr().err

@@ -1,0 +1,47 @@
+"""What the key of a trial's result depends on."""
+
+import argparse
+from pathlib import Path
+
+import pytest
+
+from markerless_tracker.cli.batch.plan import plan
+from markerless_tracker.cli.batch.verb import add_arguments
+
+
+@pytest.fixture
+def key(walk, tmp_path: Path):
+    """`key(*words)`: that of the recording's result with these options."""
+
+    def run(*words: object) -> str:
+        parser = argparse.ArgumentParser()
+        add_arguments(parser)
+        given = [str(walk), "-o", str(tmp_path / "out"), *map(str, words)]
+        (trial,) = plan(parser.parse_args(given), {"walk": Path(walk)}, threads=1)
+        return trial.key
+
+    return run
+
+
+def test_not_on_what_the_outputs_hold(key, tmp_path: Path) -> None:
+    words = [
+        "--debug-images",
+        tmp_path / "{name}",
+        "--refine-calibration",
+        tmp_path / "{name}.toml",
+    ]
+    before = key(*words)
+    (tmp_path / "walk").mkdir()
+    (tmp_path / "walk" / "000000.png").write_bytes(b"a picture")
+    (tmp_path / "walk.toml").write_text("refined", encoding="utf-8")
+    assert key(*words) == before != key()
+
+
+def test_on_the_content_of_a_file_of_offsets(key, tmp_path: Path) -> None:
+    path = tmp_path / "offsets.yaml"
+    path.write_text("cam02: 0.05\n", encoding="utf-8")
+    before = key("--time-offsets", path)
+    assert key("--time-offsets", path) == before
+    path.write_text("cam02: 0.5\n", encoding="utf-8")
+    assert key("--time-offsets", path) != before
+    assert key("--time-offsets", "cam02=0.5") != key("--time-offsets", "cam02=0.05")
