@@ -236,14 +236,20 @@ def _deviations(jacobian: csr_matrix, errors: FloatArray, free: NDArray[np.bool_
     freedom = max(errors.size - int(free.sum()), 1)
     variance = float((errors**2).sum()) / freedom
     normal = (jacobian.T @ jacobian).toarray()
+    # A pose whose corners are all outliers is not determined; it must not affect the others.
+    known = np.diag(normal) > 0.0
+    columns = np.flatnonzero(free)
+    normal = normal[np.ix_(known, known)]
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
     scaled = normal / scale[:, None] / scale
     deviations = np.zeros(free.size)
+    deviations[columns] = np.inf
     try:
         spread = np.diag(np.linalg.inv(scaled)) * variance
-        deviations[free] = np.where(spread >= 0.0, np.sqrt(np.abs(spread)), np.inf) / scale
+        found = np.where(spread >= 0.0, np.sqrt(np.abs(spread)), np.inf) / scale
+        deviations[columns[known]] = found
     except np.linalg.LinAlgError:
-        deviations[free] = np.inf
+        pass  # The views determine nothing.
     return deviations
 
 

@@ -1,5 +1,6 @@
 """From a recording of a board to calibrated cameras."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -115,7 +116,11 @@ def calibrate(
 
 
 def _rounded(measures: CameraMeasures | PairMeasures) -> dict[str, Any]:
-    return {
-        key: value if isinstance(value, int) else float(f"{value:.4g}")
-        for key, value in vars(measures).items()
-    }
+    """Four digits of each number; None for one that is not finite, which JSON lacks."""
+
+    def rounded(value: float) -> float | None:
+        if isinstance(value, int):
+            return value
+        return float(f"{value:.4g}") if math.isfinite(value) else None
+
+    return {key: rounded(value) for key, value in vars(measures).items()}

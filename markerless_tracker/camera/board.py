@@ -60,8 +60,8 @@ class Board:
         if self.kind == CHARUCO:
             if not 0.2 * self.square_m <= self.marker_m < self.square_m:
                 raise ConfigError(
-                    f"marker size {self.marker_m:g} m, expected less than that of a square, "
-                    f"{self.square_m:g} m"
+                    f"marker size {self.marker_m:g} m, expected {0.2 * self.square_m:g} m to less "
+                    f"than a square, {self.square_m:g} m"
                 )
             if not hasattr(cv2, "aruco"):
                 raise ConfigError(
@@ -73,6 +73,17 @@ class Board:
                     f"marker dictionary {self.dictionary!r}: unknown, expected a name of OpenCV "
                     "such as 4x4_50, 5x5_100 or 6x6_250"
                 )
+            self._check_markers()
+
+    def _check_markers(self) -> None:
+        name = getattr(cv2.aruco, f"DICT_{self.dictionary.upper()}")
+        held = len(cv2.aruco.getPredefinedDictionary(name).bytesList)
+        needed = self.columns * self.rows // 2
+        if needed > held:
+            raise ConfigError(
+                f"marker dictionary {self.dictionary} has {held} markers, expected the {needed} of "
+                f"{self.columns}x{self.rows} squares or more"
+            )
 
     @property
     def inner(self) -> tuple[int, int]:

@@ -74,7 +74,10 @@ def lens_of(info: CameraInfoFields, where: str) -> tuple[FloatArray, FloatArray]
         raise CalibrationError(
             f"{where}: {distortion.size} distortion coefficients, expected k1 k2 p1 p2 (k3)"
         )
-    if info.binning_x > 1 or info.binning_y > 1 or info.roi.width or info.roi.height:
+    # A region of the whole image is none.
+    region = (info.roi.width, info.roi.height)
+    whole = region in ((0, 0), (info.width, info.height))
+    if info.binning_x > 1 or info.binning_y > 1 or not whole:
         raise CalibrationError(f"{where}: binning or a region of interest, expected full images")
     lens = np.zeros(5)
     if distortion.any():

@@ -3,6 +3,7 @@
 One file per camera, or all in `intri.yml` and `extri.yml` as EasyMocap writes them.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -54,11 +55,11 @@ def read_camera(
     path = Path(path)
     fields = _fields(path)
     width, height = (_number(path, fields, f"image_{side}") for side in ("width", "height"))
-    if width is not None and height is not None and (round(width), round(height)) != size_px:
-        raise CalibrationError(
-            f"{path}: image_width x image_height is {width:g}x{height:g}, expected "
-            f"{size_px[0]}x{size_px[1]} as the images of {name}"
-        )
+    for side, stated, own_px in zip("width height".split(), (width, height), size_px, strict=True):
+        if stated is not None and round(stated) != own_px:
+            raise CalibrationError(
+                f"{path}: image_{side} is {stated:g}, expected {own_px} as the images of {name}"
+            )
     model = fields("distortion_model")
     if isinstance(model, str) and model not in _PLUMB_BOB:
         raise CalibrationError(
@@ -155,7 +156,7 @@ def _fields(path: Path) -> _Fields:
             rows, columns = value.get("rows", -1), value.get("cols", 1)
             try:
                 return np.array(value["data"], dtype=np.float64).reshape(int(rows), int(columns))
-            except (TypeError, ValueError) as error:
+            except (TypeError, ValueError, OverflowError) as error:
                 raise CalibrationError(
                     f"{path}: {name}: data is {value['data']!r}, expected {rows}x{columns} numbers"
                 ) from error
@@ -216,8 +217,8 @@ def _number(path: Path, fields: _Fields, name: str) -> float | None:
     value = fields(name)
     if value is None:
         return None
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise CalibrationError(f"{path}: {name} is {value!r}, expected a number")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise CalibrationError(f"{path}: {name} is {value!r}, expected a finite number")
     return float(value)
 
 
@@ -235,7 +236,9 @@ def _array(
         value = np.empty(0)
     if value.shape not in shapes and 1 in value.shape:
         value = value.ravel()
-    if value.shape not in shapes or not np.isfinite(value).all():
+    if value.shape in shapes and not np.isfinite(value).all():
+        raise CalibrationError(f"{path}: {found[0]} is {value.tolist()}, expected finite numbers")
+    if value.shape not in shapes:
         raise CalibrationError(
             f"{path}: {found[0]} has shape {'x'.join(map(str, value.shape))}, expected {expected} "
             "finite numbers"

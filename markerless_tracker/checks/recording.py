@@ -102,6 +102,8 @@ def _sees_person(camera: CameraModel, foot_m: FloatArray) -> bool:
 
 
 def _steps(signals: Mapping[str, CameraSignals], fps: float) -> list[Finding]:
+    if len(signals) < 2:
+        return []
     offsets = find_offsets({name: signal.motion for name, signal in signals.items()}, fps)
     found = []
     for name in signals:
@@ -122,7 +124,8 @@ def _steps(signals: Mapping[str, CameraSignals], fps: float) -> list[Finding]:
             text = f"in step with the others (correlation {agree:.2f})"
             found.append(Finding("in step", GREEN, name, text))
             continue
-        every = sorted({round(late), *offsets.others[name]}, key=abs)
+        best = round(late)
+        every = [best, *sorted(set(offsets.others[name]) - {0, best}, key=abs)]
         listed = " or ".join(f"{frames:+d}" for frames in every[:3])
         found.append(
             Finding(

@@ -1,6 +1,7 @@
 """The empty scene: `background/NAME.{png,jpg,mp4}`, a folder NAME of images, learned `NAME.npz`."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
 
 from markerless_tracker.camera import CameraRig
@@ -121,7 +122,8 @@ def background_size(folder: str | Path, camera: str) -> tuple[int, int]:
         elif path.suffix.lower() in IMAGE_SUFFIXES and path.stem == camera:
             image = read_image(path)
         elif path.suffix.lower() in VIDEO_SUFFIXES and path.stem == camera:
-            return open_stream(path).size_px
+            with closing(open_stream(path)) as stream:
+                return stream.size_px
         else:
             continue
         if image is not None:
@@ -164,17 +166,19 @@ def _load(path: Path, size_px: tuple[int, int], stored_px: tuple[int, int] | Non
     return images
 
 
-def _images(path: Path) -> list[Image]:
+def _images(path: Path) -> Iterator[Image]:
+    """At most `MAX_FRAMES` images of a file, a folder or a clip, one after the other."""
     if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file():
-        return [read_image(path)]
+        yield read_image(path)
+        return
     if path.is_dir():
         files = numbered_files(path)[:MAX_FRAMES]
         if not files:
             raise DatasetError(f"{path}: holds no image, expected {', '.join(IMAGE_SUFFIXES)}")
-        return [read_image(file) for file in files]
-    stream = open_stream(path)
-    images: list[Image] = []
-    while len(images) < MAX_FRAMES and (image := stream.read()) is not None:
-        images.append(image)
-    stream.close()
-    return images
+        yield from map(read_image, files)
+        return
+    with closing(open_stream(path)) as stream:
+        for _ in range(MAX_FRAMES):
+            if (image := stream.read()) is None:
+                return
+            yield image

@@ -48,7 +48,8 @@ class InStepRecording(Recording):
         offsets_s: seconds by which a camera began late; 0 for cameras left out.
 
     Raises:
-        ConfigError: a camera is unknown, or the offsets differ by more than a minute.
+        ConfigError: a camera is unknown, the offsets differ by more than a minute, or the cameras
+            share no time.
     """
 
     def __init__(self, recording: Recording, offsets_s: Mapping[str, float]) -> None:
@@ -71,6 +72,12 @@ class InStepRecording(Recording):
         self.scale, self.fps = recording.scale, recording.fps
         count = recording.frame_count
         self.frame_count = None if count is None else count + min(self._shifts.values())
+        if self.frame_count is not None and self.frame_count <= self._first:
+            listed = ", ".join(f"{name} {offset:g}" for name, offset in offsets_s.items())
+            raise ConfigError(
+                f"time offsets in s: {listed}; the cameras share no time in {recording.name} of "
+                f"{(count or 0) / recording.fps:g} s"
+            )
         self._warnings = {}
         worst = max(abs(value - self._shifts[name]) for name, value in frames.items())
         if worst > 0.25:
@@ -110,12 +117,12 @@ class InStepRecording(Recording):
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
         begin = max(start, self._first)
-        latest, earliest = min(self._shifts.values()), max(self._shifts.values())
-        held: deque[FrameSet] = deque(maxlen=earliest - latest + 1)
-        for stored in self._inner.frames(start=begin - earliest):
+        least, most = min(self._shifts.values()), max(self._shifts.values())
+        held: deque[FrameSet] = deque(maxlen=most - least + 1)
+        for stored in self._inner.frames(start=begin - most):
             held.append(stored)
             # The newest stored set completes this one.
-            index = stored.index + latest
+            index = stored.index + least
             if index < begin or (index - begin) % every:
                 continue
             images = {
@@ -123,6 +130,6 @@ class InStepRecording(Recording):
                 for name, shift in self._shifts.items()
             }
             # The stored set of that number has the stamp, while it is held.
-            near = held[index - stored.index - 1] if latest <= 0 <= earliest else stored
+            near = held[index - stored.index - 1] if least <= 0 <= most else stored
             stamp_ns = near.stamp_ns + stamp_of(index - near.index, self.fps)
             yield FrameSet(index, stamp_ns, images)

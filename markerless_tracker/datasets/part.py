@@ -108,6 +108,7 @@ class PartRecording(Recording):
         def inside(frame: FrameSet) -> bool:
             return self._until_ns is None or frame.stamp_ns <= self._until_ns
 
-        for frame in takewhile(inside, self._inner.frames(start=start, every=every)):
+        begin = max(start, self._first)
+        for frame in takewhile(inside, self._inner.frames(start=begin, every=every)):
             images = {name: frame.images[name] for name in self.rig.names}
             yield FrameSet(frame.index, frame.stamp_ns, images)

@@ -56,14 +56,28 @@ def new_folder(path: str | Path, *, replace: bool = False) -> Iterator[Path]:
         if earlier:
             if _exchanged(inner, path):
                 return
-            path.rename(holder / f"{path.name}.earlier")
-        elif path.is_dir():
+            _replace(path, inner, holder / f"{path.name}.earlier")
+            return
+        if path.is_dir():
             path.rmdir()
         inner.rename(path)
     except OSError as error:
-        raise DatasetError(f"{path}: cannot be written: {error.strerror or error}") from error
+        # The block may have read or written other files.
+        where, reason = error.filename or path, error.strerror or error
+        raise DatasetError(f"{where}: cannot be read or written: {reason}") from error
     finally:
         shutil.rmtree(holder, ignore_errors=True)
+
+
+def _replace(path: Path, new: Path, kept: Path) -> None:
+    """Move a new folder to a path, and the folder there to `kept`; back if that fails."""
+    try:
+        path.rename(kept)
+        new.rename(path)
+    except BaseException:
+        if kept.is_dir() and not path.exists():
+            kept.rename(path)
+        raise
 
 
 def _prefix(path: Path) -> str:

@@ -1,7 +1,7 @@
 """Writing recording folders: videos, masks, background, calibration, reference markers."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -15,6 +15,7 @@ from markerless_tracker.datasets.markers.trc import write_trc
 from markerless_tracker.datasets.recording import BACKGROUND
 from markerless_tracker.datasets.target import new_folder
 from markerless_tracker.datasets.truth import truth_path
+from markerless_tracker.datasets.video.images import open_stream
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image, check_image
 
@@ -41,6 +42,7 @@ class RecordingWriter:
         self.folder, self.rig, self.fps = folder, rig, fps
         self._count = 0
         self._videos: dict[str, Any] = {}
+        self._paths: dict[str, Path] = {}
         suffix, codec = LOSSLESS if lossless else LOSSY
         for camera in rig:
             if camera.size_px[0] % 2 or camera.size_px[1] % 2:
@@ -48,7 +50,7 @@ class RecordingWriter:
                     f"{camera.name}: a video of {camera.size_px[0]}x{camera.size_px[1]} px cannot "
                     "be written, expected even numbers"
                 )
-            path = folder / f"{camera.name}{suffix}"
+            path = self._paths[camera.name] = folder / f"{camera.name}{suffix}"
             fourcc = int.from_bytes(codec.encode("ascii"), "little")
             self._videos[camera.name] = cv2.VideoWriter(str(path), fourcc, fps, camera.size_px)
             if not self._videos[camera.name].isOpened():
@@ -63,7 +65,8 @@ class RecordingWriter:
         """Append one set; `masks` (0 or 255) are written to `masks/NAME/FFFFFF.png`.
 
         Raises:
-            DatasetError: a camera is missing or a file cannot be written.
+            DatasetError: a camera is missing, or a mask cannot be written; videos are checked when
+                they are finished.
             ImageError: an image's size is not its camera's.
         """
         for camera in self.rig:
@@ -100,6 +103,21 @@ class RecordingWriter:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+        if kind is None:
+            self._check_videos()
+
+    def _check_videos(self) -> None:
+        """Make sure that the videos have all frames: OpenCV says nothing of a full disk."""
+        for path in self._paths.values() if self._count else ():
+            try:
+                with closing(open_stream(path)) as stream:
+                    whole = stream.frame_count == self._count
+            except DatasetError:
+                whole = False
+            if not whole:
+                raise DatasetError(
+                    f"{path}: not all {self._count} frames were written: is the disk full?"
+                )
 
 
 @contextmanager

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
 
 from markerless_tracker.calibration.bundle import (
     BOARD,
     CAMERA,
     _camera_vector,
+    _deviations,
     _observations,
     _pose_vector,
     adjust,
@@ -140,3 +142,19 @@ def test_too_few_views_are_named(views) -> None:
     few = replace(views, sets=tuple(s for s in sets if s))
     with pytest.raises(CalibrationError, match="cam02 saw the board in [0-3] poses, expected 6"):
         adjusted(few)
+
+
+def test_what_no_corner_determines_leaves_the_rest_certain() -> None:
+    """A pose whose corners are all outliers has columns of zeros."""
+    rng = np.random.default_rng(0)
+    jacobian, errors = rng.normal(size=(40, 5)), rng.normal(size=40)
+    jacobian[:, 3] = 0.0
+    free = np.array([True, True, False, True, True, True])
+    found = _deviations(csr_matrix(jacobian), errors, free)
+    known = np.array([0, 1, 4, 5])
+    kept = np.delete(jacobian, 3, axis=1)
+    variance = (errors**2).sum() / 35
+    np.testing.assert_allclose(
+        found[known], np.sqrt(np.diag(np.linalg.inv(kept.T @ kept)) * variance)
+    )
+    assert found[2] == 0.0 and found[3] == np.inf

@@ -54,7 +54,11 @@ def test_a_description_is_read_as_written(tmp_path: Path) -> None:
         (("circles", 5, 4, 0.1), "board 'circles'"),
         (("checkerboard", 2, 4, 0.1), "board of 2x4 squares"),
         (("checkerboard", 5, 4, 100.0), "metres, not millimetres"),
-        (("charuco", 5, 4, 0.1, 0.2, "4x4_50"), "marker size 0.2"),
+        (
+            ("charuco", 5, 4, 0.1, 0.2, "4x4_50"),
+            "marker size 0.2 m, expected 0.02 m to less",
+        ),
+        (("charuco", 12, 9, 0.1, 0.05, "4x4_50"), "4x4_50 has 50 markers, expected the 54 of 12x9"),
         (("charuco", 5, 4, 0.1, 0.05, "9x9"), "dictionary '9x9'"),
     ],
 )

@@ -51,6 +51,12 @@ def test_no_coefficients_mean_no_distortion(camera: CameraModel, changes) -> Non
     assert lens_of(info_of(camera, **changes), "topic")[1].tolist() == [0.0] * 5
 
 
+def test_a_region_of_the_whole_image_is_none(camera: CameraModel) -> None:
+    width, height = camera.size_px
+    info = info_of(camera, roi=SimpleNamespace(width=width, height=height))
+    np.testing.assert_array_equal(lens_of(info, "topic")[0], camera.matrix)
+
+
 @pytest.mark.parametrize(
     ("changes", "reported"),
     [

@@ -7,6 +7,7 @@ import pytest
 
 from markerless_tracker.datasets import open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
+from markerless_tracker.datasets.part import PartRecording
 from markerless_tracker.errors import ConfigError, DatasetError
 
 
@@ -57,6 +58,9 @@ def test_impossible_offsets(make_recording, tmp_path: Path) -> None:
     for wrong in (100.0, float("nan")):
         with pytest.raises(ConfigError, match=f"cam01 {wrong:g}; expected differences of at most"):
             InStepRecording(stored, {"cam01": wrong})
+    for apart in (10.0, -10.0):
+        with pytest.raises(ConfigError, match="share no time in .* of 0.1 s"):
+            InStepRecording(stored, {"cam02": apart})
     assert read_time_offsets("cam01=0.5,cam02=-0.1") == {"cam01": 0.5, "cam02": -0.1}
     path = tmp_path / "offsets.yaml"
     path.write_text("cam01: 0.5\n", encoding="utf-8")
@@ -65,3 +69,10 @@ def test_impossible_offsets(make_recording, tmp_path: Path) -> None:
     for text in ("cam01", "cam01=x", str(path), str(tmp_path / "none.yaml")):
         with pytest.raises(ConfigError, match="time offsets"):
             read_time_offsets(text)
+
+
+def test_a_part_begins_at_its_time(make_recording) -> None:
+    stored = open_recording(make_recording(frames=12))
+    part = PartRecording(stored, from_s=4 / 60, until_s=8 / 60)
+    assert [frame.index for frame in part.frames()] == list(range(4, 9))
+    assert [frame.index for frame in part.frames(start=6, every=2)] == [6, 8]

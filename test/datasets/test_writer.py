@@ -105,3 +105,44 @@ def test_a_grey_cameras_background_has_the_channels_of_its_video(tmp_path: Path,
     (images,) = recording.frames()
     for name, model in recording.background_frames().items():
         assert model[0].shape == images.images[name].shape == (48, 64, 3)
+
+
+def test_a_replacement_that_fails_keeps_the_old_bag(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where folders cannot be exchanged at once, and the second of two moves fails."""
+    bag, rename = tmp_path / "bag", Path.rename
+    bag.mkdir()
+    (bag / "metadata.yaml").write_text("old")
+
+    def full(self: Path, target: Path) -> Path:
+        if Path(target) == bag and self.name == bag.name:
+            raise OSError(28, "No space left on device")
+        return rename(self, target)
+
+    monkeypatch.setattr("markerless_tracker.datasets.target._exchanged", lambda *_: False)
+    monkeypatch.setattr(Path, "rename", full)
+    with pytest.raises(DatasetError, match="No space left"), new_folder(bag, replace=True) as new:
+        (new / "metadata.yaml").write_text("new")
+    assert [path.name for path in tmp_path.iterdir()] == ["bag"]
+    assert (bag / "metadata.yaml").read_text() == "old"
+
+
+def test_another_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="missing: cannot be read or written: No such file"):
+        with new_folder(tmp_path / "out"):
+            (tmp_path / "missing").read_text()
+
+
+@pytest.mark.parametrize("lossless", [True, False])
+def test_videos_that_a_full_disk_cut_are_refused(
+    tmp_path: Path, rig, monkeypatch: pytest.MonkeyPatch, lossless: bool
+) -> None:
+    with pytest.raises(DatasetError, match=r"cam01\..*: not all 3 frames were written"):
+        with new_recording(tmp_path / "made", rig, 30.0, lossless=lossless) as out:
+            for seed in range(3):
+                out.write(images_of(rig, seed))
+            out.close()
+            cut = next(out.folder.glob("cam01.*"))
+            cut.write_bytes(cut.read_bytes()[:1000])
+    assert not (tmp_path / "made").exists()

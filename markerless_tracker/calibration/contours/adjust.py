@@ -58,8 +58,9 @@ class Evaluation:
 
     Attributes:
         cost: -log p of all contours and priors.
-        information: (7 c, 7 c) of the contours alone.
-        gradient: (7 c,) of the contours alone.
+        information: (7 c, 7 c) of the contours and the priors of body and poses, without the
+            cameras' priors.
+        gradient: (7 c,) of the same.
         residual_m: root mean square residual, by represented length of outline.
     """
 
@@ -219,6 +220,9 @@ class ContourAdjustment:
             pixels = project_camera(points, camera) - project_camera(points, first)
             depth = points @ first.T_cam_world[2, :3] + first.T_cam_world[2, 3]
             seen = np.isfinite(pixels).all(axis=1)
+            if not seen.any():  # With the person behind it, its change displaces nothing.
+                out.append((np.zeros((1, 2)), np.zeros(1)))
+                continue
             out.append((pixels[seen], depth[seen] / first.matrix[0, 0]))
         return out
 

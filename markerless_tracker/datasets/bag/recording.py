@@ -203,7 +203,7 @@ class BagRecording(Recording):
             return self._store.deserialize_cdr(message.data, message.type)
         except Exception as error:  # damaged bytes raise any exception
             raise DatasetError(
-                f"{self._files.paths[0]}: {message.topic}: a message cannot be decoded as "
+                f"{self._files.paths[message.place.file]}: {message.topic}: a message cannot be decoded as "
                 f"{message.type}"
             ) from error
 

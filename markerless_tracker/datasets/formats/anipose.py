@@ -65,8 +65,7 @@ def is_anipose(path: Path) -> bool:
         if path.parent.name not in _FOLDERS or path.suffix.lower() not in VIDEO_SUFFIXES:
             return False
         path = path.parent.parent
-    videos = any((path / folder).is_dir() for folder in _FOLDERS[:1])
-    return videos and calibration_file(path).is_file()
+    return (path / _FOLDERS[0]).is_dir() and calibration_file(path).is_file()
 
 
 def trials(path: Path) -> list[Path]:
@@ -95,7 +94,7 @@ def _trials(session: Path, rig: CameraRig) -> dict[str, dict[str, Path]]:
             continue
         if pattern is not None:
             match = pattern.search(video.stem)
-            camera = match[1].strip() if match else None
+            camera = match[1].strip() if match and match[1] else None
             trial = pattern.sub("", video.stem).strip()
         else:
             ends = [name for name in rig.names if video.stem.endswith(name)]
@@ -116,7 +115,10 @@ def _pattern(session: Path) -> re.Pattern[str] | None:
             config: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise DatasetError(f"{path}: cannot be read: {error}") from error
-        text = config.get("triangulation", {}).get("cam_regex")
+        table = config.get("triangulation", {})
+        if not isinstance(table, dict):
+            raise DatasetError(f"{path}: triangulation is {table!r}, expected a table")
+        text = table.get("cam_regex")
         if text is None:
             continue
         try:

@@ -50,7 +50,9 @@ class BodytrackRecording(VideoRecording):
             for name in sources
         ]
         rig = CameraRig(tuple(cameras))
-        super().__init__(path, sources, rig, scale=scale, input_fps=input_fps or FPS)
+        super().__init__(
+            path, sources, rig, scale=scale, input_fps=FPS if input_fps is None else input_fps
+        )
         if input_fps is None:
             self.warn(f"{self.name}: no file states the rate, it is taken as {FPS:g} fps")
 

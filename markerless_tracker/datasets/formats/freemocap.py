@@ -63,7 +63,7 @@ class FreeMoCapRecording(VideoRecording):
             {names[name]: video for name, video in videos.items()},
             upright(CameraRig(tuple(cameras)), units=UNITS),
             scale=scale,
-            input_fps=input_fps or _rate(path / VIDEOS),
+            input_fps=_rate(path / VIDEOS) if input_fps is None else input_fps,
         )
         for note in notes:
             self.warn(note)

@@ -64,7 +64,9 @@ class HumanEvaRecording(VideoRecording):
             read_cal(subject / CALIBRATION / f"{name}.cal", name, sizes[name]) for name in sources
         ]
         rig = CameraRig(tuple(cameras))
-        super().__init__(subject, sources, rig, scale=scale, input_fps=input_fps or FPS)
+        super().__init__(
+            subject, sources, rig, scale=scale, input_fps=FPS if input_fps is None else input_fps
+        )
         self.name = f"{subject.resolve().name}_{trial}"
         self._trial = trial
 

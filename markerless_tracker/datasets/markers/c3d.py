@@ -49,7 +49,10 @@ def read_c3d(path: str | Path) -> MarkerTrack:
         content = ezc3d.c3d(str(path))
         points = np.array(content["data"]["points"][:3], dtype=np.float64)
         parameters = content["parameters"]
-        labels = [str(label).strip() for label in parameters["POINT"]["LABELS"]["value"]]
+        # A field holds 255 labels; further ones are in LABELS2, LABELS3, ...
+        fields = ("LABELS", *(f"LABELS{number}" for number in range(2, 100)))
+        held = [parameters["POINT"].get(field, {}).get("value", []) for field in fields]
+        labels = [str(label).strip() for part in held for label in part][: points.shape[1]]
         rate = float(content["header"]["points"]["frame_rate"])
         first = int(content["header"]["points"]["first_frame"])
     except Exception as error:  # ezc3d raises what the C++ library throws

@@ -56,7 +56,10 @@ def upright(rig: CameraRig, *, up: str = "z", units: str = "m") -> CameraRig:
 
 
 def upright_points(points: FloatArray, *, up: str = "z", units: str = "m") -> FloatArray:
-    """Points (..., 3) of the old world in m in the new one; arguments as in `upright`."""
+    """Points (..., 3) of the old world, in `units`, as points of the new world, in m.
+
+    Other arguments as in `upright`.
+    """
     return np.asarray(points @ rotation_to(up).T * UNITS[units])
 
 

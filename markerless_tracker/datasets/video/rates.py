@@ -11,7 +11,7 @@ def stamp_of(index: int, fps: float) -> int:
 def tidy_fps(fps: float) -> float:
     """The nominal rate (1/s) of a measured or stored one.
 
-    Rates within 1e-4 of a whole number become that number, those within 1e-4 of a whole number
+    Rates within 0.01 % of a whole number become that number, those within 0.01 % of a whole number
     * 1000/1001 (such as 29.97) become that product; others are rounded to 1/1000. A rate measured
     from stamps in ns and the container's own are then the same float.
     """

@@ -62,6 +62,8 @@ def test_a_video_chooses_the_trial(session: Path, write_video, make_rig, check) 
     [
         ("[triangulation", "config.toml: cannot be read: "),
         ("[triangulation]\ncam_regex = '(['", "cam_regex is .*expected a pattern"),
+        ("triangulation = 3", "triangulation is 3, expected a table"),
+        ("[triangulation]\ncam_regex = 'view([A-Z])|-cam([A-Z])'", "trial|video"),
         ("[triangulation]\ncam_regex = 3", "cam_regex is 3, expected a pattern"),
         ("[triangulation]\ncam_regex = 'cam'", "cam_regex is 'cam', expected one group"),
     ],

@@ -131,8 +131,8 @@ def test_a_pair_of_easymocap(folder: Path, make_rig, check) -> None:
         ({"R": 2.0 * np.eye(3)}, "R is not a rotation matrix"),
         ({"T": np.zeros((2, 1))}, "T has shape 2, expected 3"),
         ({"T": None}, "no T, expected 3 numbers"),
-        ({"image_width": 100}, "image_width x image_height is 100x24, expected 32x24"),
-        ({"image_width": "wide"}, "image_width is 'wide', expected a number"),
+        ({"image_width": 100}, "image_width is 100, expected 32 as the images of right"),
+        ({"image_width": "wide"}, "image_width is 'wide', expected a finite number"),
         ({"distortion_model": "equidistant"}, "distortion_model is 'equidistant', expected plumb"),
     ],
 )

@@ -45,3 +45,19 @@ def test_what_is_no_file_of_this_kind(file: Path, tmp_path: Path) -> None:
     file.write_bytes(b"\2" + file.read_bytes())
     with pytest.raises(DatasetError, match="cannot be read as C3D: no header of 512 bytes"):
         read_c3d(file)
+
+
+def test_more_labels_than_points(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    content = ezc3d.c3d(str(file))
+    content["parameters"]["POINT"]["LABELS"]["value"].append("NONE")
+    monkeypatch.setattr(ezc3d, "c3d", lambda path: content)
+    assert read_c3d(file).names == tuple(f"M{number}" for number in range(12))
+
+
+def test_labels_beyond_the_first_field(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    content = ezc3d.c3d(str(file))
+    point = content["parameters"]["POINT"]
+    labels = point["LABELS"]["value"]
+    point["LABELS"]["value"], point["LABELS2"] = labels[:8], {"value": labels[8:]}
+    monkeypatch.setattr(ezc3d, "c3d", lambda path: content)
+    assert read_c3d(file).names == tuple(f"M{number}" for number in range(12))
