@@ -202,10 +202,8 @@ class BagRecording(Recording):
         try:
             return self._store.deserialize_cdr(message.data, message.type)
         except Exception as error:  # damaged bytes raise any exception
-            raise DatasetError(
-                f"{self._files.paths[message.place.file]}: {message.topic}: a message cannot be decoded as "
-                f"{message.type}"
-            ) from error
+            where = f"{self._files.paths[message.place.file]}: {message.topic}"
+            raise DatasetError(f"{where}: a message cannot be decoded as {message.type}") from error
 
     def _image_topic(self, path: Path, name: str) -> str:
         for suffix, kind in (("image_raw", RAW_TYPE), ("image_raw/compressed", COMPRESSED_TYPE)):
