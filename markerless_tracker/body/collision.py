@@ -146,7 +146,7 @@ class Feasibility:
                 images, where an inter-penetration means that the model's sections are too wide.
         """
         constraints = self.constraints(active, centre, forgive=forgive)
-        return lambda points: test_points(points, constraints)
+        return lambda points: satisfied(points, constraints)
 
     def constraints(
         self, active: IntArray, centre: FloatArray, *, forgive: bool = False
@@ -168,7 +168,7 @@ class Feasibility:
             kept = _apart(still, centre[None, :0])
             pairs, moved = pairs[kept], moved[kept]
         others = every._replace(active=rest, moving=_NONE, pairs=pairs[~moved])
-        if not test_points(centre[None, rest], others)[0]:
+        if not satisfied(centre[None, rest], others)[0]:
             return every._replace(limits=np.full(self.limits.shape, np.nan))
         return every._replace(pairs=pairs[moved])
 
@@ -187,7 +187,7 @@ class Feasibility:
         return self._known[key]
 
 
-def test_points(points: FloatArray, constraints: Constraints) -> NDArray[np.bool_]:
+def satisfied(points: FloatArray, constraints: Constraints) -> NDArray[np.bool_]:
     """Mask (n,) of the points (n, d) that satisfy constraints."""
     out = np.empty(len(points), dtype=np.bool_)
     are_feasible(np.array(points, dtype=np.float64), constraints, out)
@@ -197,10 +197,10 @@ def test_points(points: FloatArray, constraints: Constraints) -> NDArray[np.bool
 def _apart(constraints: Constraints, point: FloatArray) -> NDArray[np.bool_]:
     """Mask (k,) of the pairs that satisfy the rule at a point (1, d)."""
     pairs = constraints.pairs
-    if test_points(point, constraints)[0]:
+    if satisfied(point, constraints)[0]:
         return np.ones(len(pairs), dtype=np.bool_)
     ones = (constraints._replace(pairs=pairs[k : k + 1]) for k in range(len(pairs)))
-    return np.array([test_points(point, one)[0] for one in ones])
+    return np.array([satisfied(point, one)[0] for one in ones])
 
 
 @kernel

@@ -66,14 +66,11 @@ def start_lens(views: BoardViews, camera: str, *, k3: bool = False) -> Lens:
     return Lens(found, lens)
 
 
-def board_poses(seen: Seen, board: Board, lens: Lens) -> list[tuple[FloatArray, int, float]]:
+def board_poses(seen: Seen, board: Board, lens: Lens) -> list[FloatArray]:
     """Poses `T_cam_board` (4, 4) that explain a view, best first.
 
     A plane seen from afar has two poses that look alike (infinitesimal plane-based pose
     estimation), and a symmetric board has as many more.
-
-    Returns:
-        Pose, number of the order among `Board.symmetries`, error on the plane at focal length 1.
     """
     flat = cv2.undistortPoints(seen.pixels.reshape(-1, 1, 2), lens.matrix, lens.distortion).reshape(
         -1, 2
@@ -94,9 +91,9 @@ def board_poses(seen: Seen, board: Board, lens: Lens) -> list[tuple[FloatArray, 
         for turn, move, error in zip(turns, moves, np.ravel(errors), strict=True):
             pose = transform(rotation_from_rodrigues(turn), np.ravel(move))
             if pose[2, 3] > 0.0 and np.isfinite(pose).all():
-                found.append((pose, number, float(error)))
-    found.sort(key=lambda entry: entry[2])
-    return [entry for entry in found if entry[2] <= _AMBIGUOUS * found[0][2] + 1e-3]
+                found.append((pose, float(error)))
+    found.sort(key=lambda entry: entry[1])
+    return [pose for pose, error in found if error <= _AMBIGUOUS * found[0][1] + 1e-3]
 
 
 def _different(seen: list[Seen], board: Board, size_px: tuple[int, int]) -> list[int]:

@@ -19,7 +19,8 @@ _LEAST_SUPPORT = 0.34
 _MANY_SHARED = 4
 _BIG = 0.2
 
-Candidates = list[tuple[FloatArray, int, float]]
+Candidates = list[FloatArray]
+"""Poses `T_cam_board` (4, 4) that explain a view."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +87,7 @@ def _link(pairs: list[tuple[Candidates, Candidates]]) -> _Link:
     chosen = pairs[::step]
     relative, view, depth = [], [], []
     for number, (of_a, of_b) in enumerate(chosen):
-        for (T_a_board, _, _), (T_b_board, _, _) in product(of_a, of_b):
+        for T_a_board, T_b_board in product(of_a, of_b):
             relative.append(T_a_board @ inverse(T_b_board))
             view.append(number)
             depth.append(0.5 * (T_a_board[2, 3] + T_b_board[2, 3]))
@@ -146,7 +147,7 @@ def _board(
     best: tuple[float, FloatArray, dict[str, int]] | None = None
     first = next(iter(poses), "")
     for name, candidates in poses.items():
-        for T_cam_board, _, _ in candidates:
+        for T_cam_board in candidates:
             T_root_board = inverse(placed[name]) @ T_cam_board
             total, orders = 0.0, {}
             for other in poses:

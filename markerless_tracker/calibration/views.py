@@ -43,10 +43,6 @@ class BoardViews:
         """The sets in which a camera saw the board: number, corners."""
         return [(i, seen[camera]) for i, seen in enumerate(self.sets) if camera in seen]
 
-    def shared(self, a: str, b: str) -> list[int]:
-        """Numbers of the sets in which both cameras saw the board."""
-        return [i for i, seen in enumerate(self.sets) if a in seen and b in seen]
-
 
 def find_views(
     recording: Recording,

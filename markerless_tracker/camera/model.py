@@ -79,11 +79,6 @@ class CameraModel:
         """(4, 4), takes points of the camera's frame to the world."""
         return inverse(self.T_cam_world)
 
-    @property
-    def is_distorted(self) -> bool:
-        """Whether any distortion coefficient is not zero."""
-        return bool(np.any(self.distortion != 0.0))
-
     def resized(self, size_px: tuple[int, int]) -> "CameraModel":
         """The same camera with its images resized to (width, height), each axis by its own factor.
 

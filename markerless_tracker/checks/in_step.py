@@ -39,14 +39,12 @@ class Offsets:
         correlation: camera -> mean correlation of its pairs at these offsets.
         gained: camera -> increase of this correlation over that without offsets.
         others: camera -> further offsets that fit almost as well, since motion may be periodic.
-        pairs: number of pairs used.
     """
 
     frames: Mapping[str, float]
     correlation: Mapping[str, float]
     gained: Mapping[str, float]
     others: Mapping[str, tuple[int, ...]]
-    pairs: int
 
 
 def find_offsets(motion: Mapping[str, FloatArray], fps: float) -> Offsets:
@@ -88,7 +86,6 @@ def find_offsets(motion: Mapping[str, FloatArray], fps: float) -> Offsets:
         {n: float(np.mean(there[n])) for n in sure},
         {n: float(np.mean(there[n]) - np.mean(still[n])) for n in sure},
         {n: _similar(_totals(n, offsets, pairs, lags), lags - round(middle)) for n in sure},
-        len(pairs) // 2,
     )
 
 

@@ -166,12 +166,12 @@ def _write(
             write_film(film, shown, fps=result.fps, container=film.suffix[1:].lower())
         if sheet is not None:
             begin(sheet)
-            picture = overlays.contact_sheet(spread_rows(result, frames), width_px=width_px)
+            picture = overlays.contact_sheet(spread_rows(len(result), frames), width_px=width_px)
             if not cv2.imwrite(str(sheet), picture):
                 raise DatasetError(f"{sheet}: cannot be written")
         if rrd is not None:
             begin(rrd)
-            rows = chosen_rows(result, MOST_RRD_PICTURES)
+            rows = chosen_rows(len(result), MOST_RRD_PICTURES)
             write_rrd(rrd, result, rig=images.rig, overlays=overlays, rows=rows)
 
 

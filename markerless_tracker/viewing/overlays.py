@@ -15,14 +15,14 @@ _END_POINTS = 32
 """Points on the ellipse of a cone's end: enough for a small picture."""
 
 
-def chosen_rows(result: StoredResult, most: int) -> list[int]:
-    """At most `most` rows, evenly spaced, the first one included."""
-    return list(range(0, len(result), max(1, -(-len(result) // most))))
+def chosen_rows(total: int, most: int) -> list[int]:
+    """At most `most` of the rows of a result, evenly spaced, the first one included."""
+    return list(range(0, total, max(1, -(-total // most))))
 
 
-def spread_rows(result: StoredResult, count: int) -> list[int]:
-    """`count` rows, evenly spaced from the first to the last."""
-    ends = np.linspace(0, len(result) - 1, min(count, len(result)))
+def spread_rows(total: int, count: int) -> list[int]:
+    """`count` of the rows of a result, evenly spaced from the first to the last."""
+    ends = np.linspace(0, total - 1, min(count, total))
     return sorted({int(row) for row in np.rint(ends)})
 
 

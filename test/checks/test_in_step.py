@@ -23,7 +23,7 @@ def test_late_cameras_are_found(late) -> None:
     found = find_offsets(motions(late), FPS)
     expected = np.array(late) - np.median(late)
     np.testing.assert_allclose(list(found.frames.values()), expected, atol=0.6)
-    assert found.pairs == 6 and min(found.correlation.values()) > 0.7
+    assert min(found.correlation.values()) > 0.7
     gained = list(found.gained.values())
     assert max(gained) < 0.02 if not any(late) else gained[int(np.argmax(np.abs(late)))] > 0.3
 
@@ -42,4 +42,4 @@ def test_a_camera_without_the_motion_is_left_out() -> None:
     assert set(find_offsets(signals, FPS).frames) == {"cam00", "cam01"}
     signals["cam02"] = np.zeros(200)
     assert "cam02" not in find_offsets(signals, FPS).frames
-    assert find_offsets({n: s[:10] for n, s in signals.items()}, FPS).pairs == 0
+    assert find_offsets({n: s[:10] for n, s in signals.items()}, FPS).frames == {}

@@ -60,13 +60,11 @@ class Evaluation:
         cost: -log p of all contours and priors.
         information: (7 c, 7 c) of the contours and the priors of body and poses, without the
             cameras' priors.
-        gradient: (7 c,) of the same.
         residual_m: root mean square residual, by represented length of outline.
     """
 
     cost: float
     information: FloatArray
-    gradient: FloatArray
     residual_m: float
 
 
@@ -145,11 +143,6 @@ class ContourAdjustment:
         """The body so far."""
         return self._body.body
 
-    @property
-    def poses(self) -> FloatArray:
-        """(n, p) the frames' poses so far."""
-        return np.array([frame.pose for frame in self._frames])
-
     def hold(self, held: NDArray[np.bool_]) -> None:
         """Hold changes (c, 7) at zero from now on, all others are free."""
         self.free = ~held
@@ -173,13 +166,11 @@ class ContourAdjustment:
         sums = self._summed(LAST_TRUNCATION_M)
         count = CHANGES * len(self.cameras)
         cross = sums.hessian[:count, count:]
-        both = np.column_stack([cross.T, sums.gradient[count:]])
-        rest = np.linalg.solve(sums.hessian[count:, count:], both)
+        rest = np.linalg.solve(sums.hessian[count:, count:], cross.T)
         strain = float(np.sum((self.changes / PRIOR_SD) ** 2))
         return Evaluation(
             sums.cost + self._body.strain + 0.5 * strain,
-            sums.hessian[:count, :count] - cross @ rest[:, :-1],
-            sums.gradient[:count] - cross @ rest[:, -1],
+            sums.hessian[:count, :count] - cross @ rest,
             float(np.sqrt(sums.squares / sums.weight)),
         )
 

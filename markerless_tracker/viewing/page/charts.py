@@ -5,7 +5,7 @@ chart is legible on a phone and on paper. Colours are classes of the page's styl
 they follow its light and dark scheme.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -46,9 +46,8 @@ class Level:
 
 @dataclass(frozen=True)
 class Mark:
-    """A vertical line at an x, in a style, with a label for the legend."""
+    """A vertical line at an x, in a style."""
 
-    label: str
     style: str
     x: float
 
@@ -61,7 +60,6 @@ def line_chart(
     levels: Sequence[Level] = (),
     marks: Sequence[Mark] = (),
     low: float | None = None,
-    x_unit: str = "s",
 ) -> str:
     """A chart as HTML (`<figure>`); without finite values a note in place of the curves.
 
@@ -72,7 +70,6 @@ def line_chart(
         levels: horizontal lines.
         marks: vertical lines.
         low: lower end of y; None = from the values.
-        x_unit: of x.
     """
     heading = f'{escape(title)} <span class="unit">{escape(unit)}</span>'
     known = [curve for curve in curves if np.isfinite(curve.y).any()]
@@ -120,10 +117,10 @@ def line_chart(
         for curve in known
     )
     return (
-        f'<figure class="chart"><figcaption>{heading}{_legend(known, marks)}</figcaption>'
+        f'<figure class="chart"><figcaption>{heading}{_legend(known)}</figcaption>'
         f'<div class="plot"><svg viewBox="0 0 {_SIDE:g} {_SIDE:g}" preserveAspectRatio="none" '
         f'role="img" aria-label="{escape(f"{title}. {says}")}">{"".join(lines)}</svg>'
-        f'{"".join(labels)}<span class="xu">{escape(x_unit)}</span></div>{_levels(levels)}</figure>'
+        f'{"".join(labels)}<span class="xu">s</span></div>{_levels(levels)}</figure>'
     )
 
 
@@ -156,8 +153,11 @@ def _range(low: float, high: float) -> tuple[float, float]:
     return low - 0.5, high + 0.5
 
 
-def _points(points: tuple[FloatArray, FloatArray], across: object, down: object) -> str:
-    assert callable(across) and callable(down)
+def _points(
+    points: tuple[FloatArray, FloatArray],
+    across: Callable[[float], float],
+    down: Callable[[float], float],
+) -> str:
     words, pen_down = [], False
     for x, y in zip(points[0].tolist(), points[1].tolist(), strict=True):
         if not (np.isfinite(x) and np.isfinite(y)):
@@ -180,14 +180,12 @@ def _path(style: str, d: str) -> str:
     return f'<path class="{style}" d="{d}"/>'
 
 
-def _legend(curves: Sequence[Curve], marks: Sequence[Mark]) -> str:
-    entries = {(curve.label, curve.style): "key" for curve in curves if curve.label}
-    entries |= {(mark.label, mark.style): "key dashed" for mark in marks if mark.label}
+def _legend(curves: Sequence[Curve]) -> str:
+    entries = dict.fromkeys((curve.label, curve.style) for curve in curves if curve.label)
     if not entries:
         return ""
     items = "".join(
-        f'<li><span class="{kind} {style}"></span>{escape(label)}</li>'
-        for (label, style), kind in entries.items()
+        f'<li><span class="key {style}"></span>{escape(label)}</li>' for label, style in entries
     )
     return f'<ul class="legend">{items}</ul>'
 

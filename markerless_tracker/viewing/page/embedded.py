@@ -50,7 +50,7 @@ def embedded_film(
     rows = list(range(0, len(result), step))
     fps = result.fps / step
     seconds = max(len(rows) / fps, 0.1)
-    stills = {rows[i] for i in spread_rows(result.rows(slice(0, len(rows))), _STILLS)}
+    stills = {rows[i] for i in spread_rows(len(rows), _STILLS)}
     kept: list[Image] = []
 
     def pictures() -> Iterator[Image]:

@@ -220,7 +220,7 @@ def _cut(values: np.ndarray) -> np.ndarray:
 def _strikes(report: Report) -> list[Mark]:
     if report.gait is None:
         return []
-    return [Mark("", event.side, event.time_s) for event in report.gait.events if event.strike]
+    return [Mark(event.side, event.time_s) for event in report.gait.events if event.strike]
 
 
 def _gait(report: Report) -> str:

@@ -56,7 +56,7 @@ def test_levels_are_listed_for_narrow_screens() -> None:
 
 def test_gaps_interrupt_the_curve_and_marks_stand() -> None:
     y = np.where((X > 1.0) & (X < 2.0), np.nan, X)
-    marks = [Mark("strike", "right", 1.5), Mark("", "right", 9.0)]
+    marks = [Mark("right", 1.5), Mark("right", 9.0)]
     chart = figure("a", "m", [Curve("", "s0", X, y)], marks=marks)
     (line,) = paths(chart, "line s0")
     assert line.count("M") == 2 and len(points(line)) == np.isfinite(y).sum()
