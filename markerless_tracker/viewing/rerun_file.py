@@ -79,9 +79,11 @@ def write_rrd(
 
     Raises:
         ConfigError: rerun-sdk is not installed.
-        DatasetError: the file cannot be written, or the images cannot be read.
+        DatasetError, BodyModelError: the file cannot be written, the images cannot be read, or the
+            result's body is unknown.
     """
     rr = require_rerun()
+    body = result.body()
     stream = rr.RecordingStream(APPLICATION)
     names = rig.names if rig is not None else ()
     try:
@@ -89,22 +91,24 @@ def write_rrd(
         stream.save(path, default_blueprint=blueprint(names, CURVES))
     except (OSError, RuntimeError, ValueError) as error:
         raise DatasetError(f"{path}: cannot be written: {error}") from error
-    log_world(rr, stream)
-    for camera in rig or ():
-        _camera(rr, stream, camera)
-    body = result.body()
-    _cones(rr, stream, body)
-    for row in range(len(result)):
-        stream.set_time(TIMELINE, duration=float(result.times_s[row]))
-        _body(rr, stream, result, row)
-        _move_cones(rr, stream, body, result.parameters[row])
-        _curves(rr, stream, result, row)
-    if overlays is not None:
-        for row, pictures in overlays.pictures(list(range(len(result))) if rows is None else rows):
+    try:
+        log_world(rr, stream)
+        for camera in rig or ():
+            _camera(rr, stream, camera)
+        _cones(rr, stream, body)
+        for row in range(len(result)):
             stream.set_time(TIMELINE, duration=float(result.times_s[row]))
-            log_pictures(rr, stream, pictures)
-    stream.flush()
-    stream.disconnect()
+            _body(rr, stream, result, row)
+            _move_cones(rr, stream, body, result.parameters[row])
+            _curves(rr, stream, result, row)
+        if overlays is not None:
+            shown = list(range(len(result))) if rows is None else rows
+            for row, pictures in overlays.pictures(shown):
+                stream.set_time(TIMELINE, duration=float(result.times_s[row]))
+                log_pictures(rr, stream, pictures)
+        stream.flush()
+    finally:
+        stream.disconnect()
 
 
 def log_world(rr: Any, stream: Any) -> None:

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body import BodyModel, transforms
 from markerless_tracker.body.angles.segments import joint_frames, reported_joints
+from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.export.axes import FROM_WORLD, ROTATION_FILE_WORLD
 from markerless_tracker.results.export.skeleton import Skeleton, skeleton
@@ -217,6 +218,11 @@ class Coordinates:
     def _of_parameters(self, index: int) -> ModelJoint:
         """A joint without reported angles, by the body's own parameters."""
         segment = self.bones.segments[index]
+        if segment.swings:
+            raise BodyModelError(
+                f"body {self._body.name}: {segment.moves[0].name} is part of a swing, whose frame "
+                "must be that of a hip or shoulder"
+            )
         place, parent = segment.T_parent_joint, "ground"
         if segment.parent >= 0:
             parent = self.bones.segments[segment.parent].name

@@ -5,19 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from markerless_tracker.body import BodyModel, transforms
-from markerless_tracker.body.model import FIRST_TRANSLATION, IntArray
+from markerless_tracker.body.model import SWING_X, IntArray, is_translation
 from markerless_tracker.geometry import FloatArray
 
 MOST_ROTATIONS = 3
-FIRST_COUPLED = 6
-"""Nodes of this kind or a higher one rotate together with a neighbour, without an axis of their
-own.
-"""
-ANATOMICAL: FloatArray = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""(3, 3) OpenSim's axes of a segment, x forward, y up, z right, in the world, body neutral."""
-BALL_AXES = (2, 0, 1)
-"""Axes of a ball joint's rotations, each as moved by those before: z flexion, x adduction, y
-rotation (Rajagopal et al. 2016)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +39,7 @@ class Segment:
         moves: translations, then at most three rotations, each about an axis that the earlier ones
             have rotated.
         node: the body's node at the joint, with which the segment rotates.
-        R_segment_node: (3, 3) rotation from that node's axes to the segment's.
-        ball: whether the joint's rotations are those of `BALL_AXES` between the anatomical axes of
-            parent and segment, since no axes belong to the body's parameters.
-        R_parent_anatomical, R_segment_anatomical: (3, 3) anatomical axes in parent and segment.
+        swings: whether moves are parts of a swing, which rotate together and have no axes.
     """
 
     name: str
@@ -59,10 +47,7 @@ class Segment:
     T_parent_joint: FloatArray
     moves: tuple[Move, ...]
     node: int
-    R_segment_node: FloatArray
-    ball: bool
-    R_parent_anatomical: FloatArray
-    R_segment_anatomical: FloatArray
+    swings: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +74,7 @@ class _Open:
         self.rotation = np.eye(3)
         self.node = -1
         self.names: list[str] = []
-        self.ball = False
+        self.swings = False
 
     @property
     def rotations(self) -> int:
@@ -109,7 +94,7 @@ def skeleton(body: BodyModel) -> Skeleton:
         place = _joined(places[parent], fixed) if parent >= 0 else fixed
         kind = int(body.node_kind[node])
         if kind >= 0:
-            rotates = kind < FIRST_TRANSLATION or kind >= FIRST_COUPLED
+            rotates = not is_translation(body.node_kind[[node]])[0]
             if not (own >= 0 and _goes_on(segments[own], parent, fixed, rotates, children)):
                 own, place = len(segments), _with_segment(segments, own, place)
             grown = segments[own]
@@ -118,7 +103,7 @@ def skeleton(body: BodyModel) -> Skeleton:
             parameter = int(body.node_parameter[node])
             grown.moves.append(Move(body.parameter_names[parameter], parameter, rotates, axis))
             grown.node = node
-            grown.ball = grown.ball or kind >= FIRST_COUPLED
+            grown.swings = grown.swings or kind >= SWING_X
         elif own < 0:
             own, place = len(segments), _with_segment(segments, own, place)
             segments[own].node = node
@@ -126,37 +111,17 @@ def skeleton(body: BodyModel) -> Skeleton:
             segments[own].names.append(names[node])
         segment_of.append(own)
         places.append(place)
-    neutral = transforms(body, body.neutral)[:, :, :3]
-    finished: list[Segment] = []
-    for entry in segments:
-        own = places[entry.node][:, :3]
-        above, joint = ANATOMICAL, ANATOMICAL
-        if entry.parent >= 0:
-            parent_segment = finished[entry.parent]
-            R_world_parent = neutral[parent_segment.node] @ parent_segment.R_segment_node.T
-            above = R_world_parent.T @ ANATOMICAL
-        joint = (neutral[entry.node] @ own.T).T @ ANATOMICAL
-        name = entry.names[0] if entry.names else f"{entry.moves[-1].name}_link"
-        moves = tuple(entry.moves)
-        if entry.ball:
-            signs = (1.0, -1.0, -1.0) if name.startswith("l_") else (1.0, 1.0, 1.0)
-            moves = tuple(
-                Move(move.name, move.parameter, True, sign * np.eye(3)[axis])
-                for move, sign, axis in zip(entry.moves, signs, BALL_AXES, strict=True)
-            )
-        finished.append(
-            Segment(
-                name=name,
-                parent=entry.parent,
-                T_parent_joint=entry.place,
-                moves=moves,
-                node=entry.node,
-                R_segment_node=own,
-                ball=entry.ball,
-                R_parent_anatomical=above,
-                R_segment_anatomical=joint,
-            )
+    finished = [
+        Segment(
+            name=entry.names[0] if entry.names else f"{entry.moves[-1].name}_link",
+            parent=entry.parent,
+            T_parent_joint=entry.place,
+            moves=tuple(entry.moves),
+            node=entry.node,
+            swings=entry.swings,
         )
+        for entry in segments
+    ]
     return Skeleton(
         tuple(finished),
         tuple(segment_of),

@@ -1,11 +1,14 @@
 """The exported model's joints and coordinates, by forward kinematics of their description alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from markerless_tracker.body import load_body, markers
 from markerless_tracker.body.angles import AngleReader
+from markerless_tracker.errors import BodyModelError
 from markerless_tracker.results.export.coordinates import Coordinates
 
 
@@ -47,3 +50,10 @@ def test_the_reported_angles_move_the_model_to_the_markers(name) -> None:
             rotation, origin = places[segment]
             at = rotation @ (own[:, :3] @ offset + own[:, 3]) + origin
             np.testing.assert_allclose(at, true, atol=1e-9)
+
+
+def test_a_swing_without_reported_angles_is_refused() -> None:
+    body = load_body("person32", 1.75)
+    frames = {"l_coxa" if name == "l_hip" else name: node for name, node in body.frames.items()}
+    with pytest.raises(BodyModelError, match="l_hip_x is part of a swing, whose frame must be"):
+        Coordinates(replace(body, frames=frames))
