@@ -6,11 +6,9 @@ from pathlib import Path
 
 import yaml
 
-from markerless_tracker.datasets.markers.track import MarkerTrack
-from markerless_tracker.datasets.recording import FrameSet, Recording
+from markerless_tracker.datasets.recording import DerivedRecording, FrameSet, Recording
 from markerless_tracker.datasets.video.rates import stamp_of
 from markerless_tracker.errors import ConfigError
-from markerless_tracker.imaging import BackgroundModel, Image
 
 MOST_OFFSET_S = 60.0
 """Largest difference of two cameras' offsets: sets of that duration are held in memory."""
@@ -36,7 +34,7 @@ def read_time_offsets(text: str) -> dict[str, float]:
         ) from error
 
 
-class InStepRecording(Recording):
+class InStepRecording(DerivedRecording):
     """A recording whose cameras' clocks differ by constant offsets.
 
     Frame k of a camera was taken at k / fps + offset. A set at time t has each camera's frame that
@@ -65,11 +63,9 @@ class InStepRecording(Recording):
             raise ConfigError(
                 f"time offsets in s: {listed}; expected differences of at most {MOST_OFFSET_S:g}"
             )
-        self._inner = recording
+        super().__init__(recording)
         self._shifts = {name: round(value) for name, value in frames.items()}
         self._first = max(0, *self._shifts.values())
-        self.path, self.name, self.rig = recording.path, recording.name, recording.rig
-        self.scale, self.fps = recording.scale, recording.fps
         count = recording.frame_count
         self.frame_count = None if count is None else count + min(self._shifts.values())
         if self.frame_count is not None and self.frame_count <= self._first:
@@ -78,34 +74,12 @@ class InStepRecording(Recording):
                 f"time offsets in s: {listed}; the cameras share no time in {recording.name} of "
                 f"{(count or 0) / recording.fps:g} s"
             )
-        self._warnings = {}
         worst = max(abs(value - self._shifts[name]) for name, value in frames.items())
         if worst > 0.25:
             self.warn(
                 f"{self.name}: time offsets are met to whole frames only: up to "
                 f"{1000.0 * worst / self.fps:.1f} ms remain"
             )
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Problems found, one line each."""
-        return (*self._inner.warnings, *self._warnings.values())
-
-    def background_frames(self, folder: Path | None = None) -> dict[str, list[Image]]:
-        """As of the stored recording."""
-        return self._inner.background_frames(folder)
-
-    def background_models(self, folder: Path | None = None) -> dict[str, BackgroundModel]:
-        """As of the stored recording."""
-        return self._inner.background_models(folder)
-
-    def room_stills(self) -> dict[str, list[Image]]:
-        """As of the stored recording."""
-        return self._inner.room_stills()
-
-    def ground_truth(self) -> MarkerTrack | None:
-        """As of the stored recording."""
-        return self._inner.ground_truth()
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
         index, nearest_ns = self._inner._nearest(stamp_ns)

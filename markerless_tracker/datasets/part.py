@@ -6,15 +6,14 @@ from pathlib import Path
 from typing import TypeVar
 
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.datasets.markers.track import MarkerTrack
-from markerless_tracker.datasets.recording import FrameSet, Recording
+from markerless_tracker.datasets.recording import DerivedRecording, FrameSet, Recording
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.imaging import BackgroundModel, Image
 
 T = TypeVar("T")
 
 
-class PartRecording(Recording):
+class PartRecording(DerivedRecording):
     """Some cameras of a recording between two times; indices and stamps stay those of the source.
 
     Args:
@@ -49,12 +48,8 @@ class PartRecording(Recording):
                 f"{recording.name}: time from {from_s:g} s to "
                 f"{'the end' if until_s is None else f'{until_s:g} s'}, expected 0 <= start <= end"
             )
-        self._inner = recording
-        self.path, self.name = recording.path, recording.name
-        self.scale, self.fps = recording.scale, recording.fps
+        super().__init__(recording)
         self.rig = CameraRig(tuple(camera for camera in recording.rig if camera.name in chosen))
-        self._stored_sizes_px = recording._stored_sizes_px
-        self._warnings = {}
         _, first_ns = recording._nearest(-(2**62))
         half_ns = round(0.5e9 / recording.fps)
         self._until_ns = None if until_s is None else first_ns + round(until_s * 1e9) + half_ns
@@ -67,7 +62,6 @@ class PartRecording(Recording):
                     f"{recording.name}: ends {(nearest_ns - first_ns) / 1e9:.3f} s after its first "
                     f"set, expected to start at {from_s:g} s"
                 )
-        self.frame_count = recording.frame_count
         if self._until_ns is not None and recording.frame_count is not None:
             last, _ = recording._nearest(self._until_ns - half_ns)
             self.frame_count = min(recording.frame_count, last + 1)
@@ -76,11 +70,6 @@ class PartRecording(Recording):
     def first(self) -> int:
         """Index of the first set of the part."""
         return self._first
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Problems found, one line each."""
-        return (*self._inner.warnings, *self._warnings.values())
 
     def background_frames(self, folder: Path | None = None) -> dict[str, list[Image]]:
         """As of the whole, of the part's cameras."""
@@ -94,15 +83,8 @@ class PartRecording(Recording):
         """As of the whole, of the part's cameras."""
         return self._own(self._inner.room_stills())
 
-    def ground_truth(self) -> MarkerTrack | None:
-        """As of the whole."""
-        return self._inner.ground_truth()
-
     def _own(self, found: dict[str, T]) -> dict[str, T]:
         return {name: value for name, value in found.items() if name in self.rig.names}
-
-    def _nearest(self, stamp_ns: int) -> tuple[int, int]:
-        return self._inner._nearest(stamp_ns)
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
         def inside(frame: FrameSet) -> bool:

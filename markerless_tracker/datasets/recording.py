@@ -155,3 +155,43 @@ class Recording(ABC):
     @abstractmethod
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
         """The sets that `frames` yields; its arguments have been checked."""
+
+
+class DerivedRecording(Recording):
+    """Sets made of those of another recording; all that a subclass does not define is the other's.
+
+    Args:
+        recording: the other one.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        self._inner = recording
+        self.path, self.name, self.rig = recording.path, recording.name, recording.rig
+        self.scale, self.fps = recording.scale, recording.fps
+        self.frame_count = recording.frame_count
+        self._stored_sizes_px = recording._stored_sizes_px
+        self._warnings = {}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Problems found, one line each; those of the other recording first."""
+        return (*self._inner.warnings, *self._warnings.values())
+
+    def background_frames(self, folder: Path | None = None) -> dict[str, list[Image]]:
+        """As of the other recording."""
+        return self._inner.background_frames(folder)
+
+    def background_models(self, folder: Path | None = None) -> dict[str, BackgroundModel]:
+        """As of the other recording."""
+        return self._inner.background_models(folder)
+
+    def room_stills(self) -> dict[str, list[Image]]:
+        """As of the other recording."""
+        return self._inner.room_stills()
+
+    def ground_truth(self) -> MarkerTrack | None:
+        """As of the other recording."""
+        return self._inner.ground_truth()
+
+    def _nearest(self, stamp_ns: int) -> tuple[int, int]:
+        return self._inner._nearest(stamp_ns)

@@ -6,8 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from markerless_tracker.datasets.markers.track import MarkerTrack
-from markerless_tracker.datasets.recording import FrameSet, Recording
+from markerless_tracker.datasets.recording import DerivedRecording, FrameSet, Recording
 from markerless_tracker.datasets.video.images import numbered_files, read_image
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image
@@ -17,7 +16,7 @@ from markerless_tracker.observation import Observation
 _PERSON = 128
 
 
-class SilhouetteRecording(Recording):
+class SilhouetteRecording(DerivedRecording):
     """A recording whose sets hold observations, which `Tracker.step` takes in place of images.
 
     A folder per camera has an image per frame: person from 128 on, background below. Files are
@@ -35,12 +34,8 @@ class SilhouetteRecording(Recording):
     """
 
     def __init__(self, recording: Recording, folder: Path) -> None:
-        self._inner, rig = recording, recording.rig
-        self.path, self.name, self.rig = recording.path, recording.name, rig
-        self.scale, self.fps = recording.scale, recording.fps
-        self.frame_count = recording.frame_count
-        self._warnings = {}
-        self._folder = folder
+        super().__init__(recording)
+        self._folder, rig = folder, recording.rig
         missing = [name for name in rig.names if not (folder / name).is_dir()]
         if missing:
             raise DatasetError(
@@ -55,18 +50,6 @@ class SilhouetteRecording(Recording):
                         f"{file}: expected a frame number as its name, such as 000050.png"
                     )
             self._files[name] = {int(file.stem): file for file in files}
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Problems found, one line each."""
-        return (*self._inner.warnings, *self._warnings.values())
-
-    def ground_truth(self) -> MarkerTrack | None:
-        """As of the stored recording."""
-        return self._inner.ground_truth()
-
-    def _nearest(self, stamp_ns: int) -> tuple[int, int]:
-        return self._inner._nearest(stamp_ns)
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
         left_out = read = 0
