@@ -27,11 +27,11 @@ HELP = (
     "Compare marker files with a reference: rows are matched by Time, markers by name, errors are "
     "in mm. A missing Pelvis is replaced by the midpoint of the hips; rows that are blank in "
     "either file are not compared, nor frames that the JSON file beside a result calls LOST or "
-    "SEARCHING. With `offsets off` each joint's mean offset in the heading frame is subtracted from "
-    "its errors. `inside sd` is the share of the errors per axis within 1, 2 and 3 of the standard "
-    "deviations in the JSON file. MPJPE is the mean error after the pelvis is aligned in each frame, PA-MPJPE "
-    "after rotation, translation and scale are, PCK the share of joints within 150 mm after the "
-    "pelvis is aligned."
+    "SEARCHING. With `offsets off` each joint's mean offset in the heading frame is subtracted "
+    "from its errors. `inside sd` is the share of the errors per axis within 1, 2 and 3 of the "
+    "standard deviations in the JSON file. MPJPE is the mean error after the pelvis is aligned in "
+    "each frame, PA-MPJPE after rotation, translation and scale are, PCK the share of joints "
+    "within 150 mm after the pelvis is aligned."
 )
 EXAMPLE = "markerless_tracker evaluate out/walk.trc walk/ground_truth.trc --skip 30"
 
