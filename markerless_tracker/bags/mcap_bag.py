@@ -24,6 +24,16 @@ _DISTRIBUTION = "jazzy"
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
 
+def check_stamp(stamp_ns: int, where: str) -> None:
+    """Check that a stamp fits in a ROS message.
+
+    Raises:
+        DatasetError: it does not; names what it is of.
+    """
+    if not 0 <= stamp_ns < (LAST_SECOND + 1) * 10**9:
+        raise DatasetError(f"{where}: stamp {stamp_ns} ns cannot be written to a ROS message")
+
+
 @dataclass(frozen=True)
 class Topic:
     """A topic of a bag that is being written.
@@ -96,8 +106,7 @@ class BagWriter:
         self._write(topic, stamp_ns, (data,))
 
     def _write(self, topic: Topic, stamp_ns: int, pieces: Sequence[Piece]) -> None:
-        if not 0 <= stamp_ns < LAST_SECOND * 10**9:
-            raise DatasetError(f"{topic.name}: stamp {stamp_ns} ns cannot be written to a bag")
+        check_stamp(stamp_ns, topic.name)
         number = self._counts[topic.number]
         self._mcap.add_message(topic.number, stamp_ns, pieces, stamp_ns, number)
         self._counts[topic.number] += 1

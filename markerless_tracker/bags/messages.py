@@ -12,12 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from markerless_tracker.bags.pieces import Piece
 from markerless_tracker.camera import CameraModel, CameraRig
-from markerless_tracker.camera.ros_fields import camera_info_fields
+from markerless_tracker.camera.ros_fields import WORLD_FRAME, camera_info_fields, optical_frame
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image
 
-WORLD_FRAME = "map"
 JPEG_QUALITY = 90
 # Low PNG compression: higher levels take several times as long and save a few percent.
 _FORMS = {
@@ -58,11 +57,6 @@ def serialized(message: Any, kind: str) -> tuple[Piece, ...]:
     # The data are the last field: their length, then the bytes.
     start = typestore().serialize_cdr(replace(message, data=_NO_DATA), kind)
     return bytes(start[:-4]) + struct.pack("=I", message.data.size), memoryview(message.data)
-
-
-def optical_frame(camera_name: str) -> str:
-    """Frame id of a camera's messages (REP-103: x right, y down, z forward)."""
-    return f"{camera_name}_optical_frame"
 
 
 def stamp_message(stamp_ns: int) -> Any:

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from markerless_tracker.bags.mcap_bag import LAST_SECOND, BagWriter
+from markerless_tracker.bags.mcap_bag import BagWriter, check_stamp
 from markerless_tracker.bags.messages import (
-    WORLD_FRAME,
     header,
     marker_poses_message,
     message_type,
@@ -16,6 +15,7 @@ from markerless_tracker.bags.messages import (
 from markerless_tracker.body import BodyModel, root_transform
 from markerless_tracker.body.angles import ROOT_ANGLES
 from markerless_tracker.body.urdf import urdf
+from markerless_tracker.camera.ros_fields import WORLD_FRAME
 from markerless_tracker.datasets.target import new_folder
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
@@ -50,10 +50,7 @@ def write_result_bag(out: Path, reader: ResultReader, *, replace: bool = False) 
             topics = _Topics(writer, body, reader.angle_names)
             for part in reader.chunks():
                 for row, stamp in enumerate(part.stamps_ns.tolist()):
-                    if not 0 <= stamp < LAST_SECOND * 10**9:
-                        raise DatasetError(
-                            f"{reader.name}: stamp {stamp} ns cannot be written to a ROS message"
-                        )
+                    check_stamp(stamp, str(reader.name))
                     topics.state(stamp, str(part.states[row]), float(part.fitness[row]))
                     topics.pose(stamp, part.parameters[row])
                     topics.joints(stamp, part, row)

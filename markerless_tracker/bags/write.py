@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from markerless_tracker.bags.mcap_bag import LAST_SECOND, BagWriter
+from markerless_tracker.bags.mcap_bag import BagWriter, check_stamp
 from markerless_tracker.bags.messages import (
     camera_info_message,
     encoded_message,
@@ -164,10 +164,7 @@ class _Topics:
     def write(self, frame: FrameSet) -> None:
         """Write one set, before it the reference markers since the last one."""
         stamp = frame.stamp_ns
-        if not 0 <= stamp < LAST_SECOND * 10**9:
-            raise DatasetError(
-                f"frame {frame.index}: its stamp {stamp} ns cannot be written to a ROS message"
-            )
+        check_stamp(stamp, f"frame {frame.index}")
         if not self._writer.messages:
             transforms = static_transforms_message(self._rig, stamp)
             self._writer.write(self._static, stamp, transforms)

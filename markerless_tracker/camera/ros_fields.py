@@ -14,6 +14,13 @@ from markerless_tracker.geometry import FloatArray, rotation_from_quaternion, tr
 
 LENS_MODEL = "plumb_bob"
 """ROS' name of the radial-tangential model with k1 k2 p1 p2 k3."""
+WORLD_FRAME = "map"
+"""Frame of everything in world coordinates (REP-105)."""
+
+
+def optical_frame(camera: str) -> str:
+    """Frame of a camera's images (REP-103: x right, y down, z forward)."""
+    return f"{camera}_optical_frame"
 
 
 class CameraInfoFields(Protocol):

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 from rclpy.serialization import serialize_message
 
+from markerless_tracker.camera.ros_fields import optical_frame
 from markerless_tracker.datasets.bag.recording import RAW_TYPE, BagRecording
 from markerless_tracker.datasets.bag.stream import RawMessage
 from markerless_tracker.errors import DatasetError, ImageError
 from markerless_tracker.node.ros.camera_info import info_of
 from markerless_tracker.node.ros.cdr import image_bytes, read_image, with_stamp
 from markerless_tracker.node.ros.images import check_layout
-from markerless_tracker.node.ros.messages import optical_frame
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,10 @@ import numpy as np
 from sensor_msgs.msg import CameraInfo
 
 from markerless_tracker.camera import CameraModel
-from markerless_tracker.camera.ros_fields import camera_info_fields, lens_of
+from markerless_tracker.camera.ros_fields import camera_info_fields, lens_of, optical_frame
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.node.ros.messages import header, optical_frame
+from markerless_tracker.node.ros.messages import header
 
 TOLERANCE = 0.01
 """K and D of a camera info may differ by this fraction from the calibration file."""

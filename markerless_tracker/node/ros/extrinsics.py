@@ -3,10 +3,9 @@
 from collections.abc import Iterable
 from typing import Any
 
-from markerless_tracker.camera.ros_fields import FrameTree
+from markerless_tracker.camera.ros_fields import WORLD_FRAME, FrameTree, optical_frame
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import FloatArray, inverse
-from markerless_tracker.node.ros.messages import WORLD_FRAME, optical_frame
 
 
 class TransformTree:

@@ -5,22 +5,17 @@ from collections.abc import Mapping
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Pose, PoseArray, PoseWithCovarianceStamped, Quaternion
-from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from markerless_tracker.body import BodyModel, cone_transforms, root_transform
 from markerless_tracker.body.angles import ROOT_ANGLES, Angles
-from markerless_tracker.geometry import quaternion_from_rotation
+from markerless_tracker.camera.ros_fields import WORLD_FRAME
+from markerless_tracker.geometry import FloatArray, quaternion_from_rotation
 from markerless_tracker.node.health import Health, Level
 from markerless_tracker.node.ros.stamps import time_message
 from markerless_tracker.records import Confidence
-
-WORLD_FRAME = "map"
-"""Frame of everything in world coordinates (REP-105)."""
-
-FloatArray = NDArray[np.float64]
 
 _BODY_COLOUR = ColorRGBA(r=0.35, g=0.6, b=0.9, a=0.7)
 _JOINT_COLOUR = ColorRGBA(r=1.0, g=0.45, b=0.1, a=1.0)
@@ -30,11 +25,6 @@ _LEVELS = {
     Level.WARN: DiagnosticStatus.WARN,
     Level.STALE: DiagnosticStatus.STALE,
 }
-
-
-def optical_frame(camera: str) -> str:
-    """Name of a camera's optical frame."""
-    return f"{camera}_optical_frame"
 
 
 def header(stamp_ns: int, frame: str = WORLD_FRAME) -> Header:

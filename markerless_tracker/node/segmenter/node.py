@@ -12,6 +12,7 @@ from sensor_msgs.msg import CompressedImage
 
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.model import nominal_camera
+from markerless_tracker.camera.ros_fields import optical_frame
 from markerless_tracker.datasets.background import (
     background_size,
     read_background,
@@ -32,7 +33,7 @@ from markerless_tracker.node.inputs.wire import (
 )
 from markerless_tracker.node.ros.declared import GivenNode, declare_effective, given_parameters
 from markerless_tracker.node.ros.images import decode_received
-from markerless_tracker.node.ros.messages import header, optical_frame
+from markerless_tracker.node.ros.messages import header
 from markerless_tracker.node.ros.notices import Notices
 from markerless_tracker.node.ros.qos import image_qos
 from markerless_tracker.node.segmenter.parameters import (

@@ -132,7 +132,7 @@ class RigSource:
         """Descriptions of the missing transforms."""
         if self._tree is None or self.rig is not None:
             return []
-        from markerless_tracker.node.ros.messages import WORLD_FRAME, optical_frame
+        from markerless_tracker.camera.ros_fields import WORLD_FRAME, optical_frame
 
         return [
             f"TF {WORLD_FRAME} -> {optical_frame(name)}"

@@ -30,9 +30,10 @@ from markerless_tracker.body import (
     write_subject,
 )
 from markerless_tracker.camera import write_calibration
+from markerless_tracker.camera.ros_fields import optical_frame
 from markerless_tracker.node.ros.camera_info import info_of
 from markerless_tracker.node.ros.images import fill_image
-from markerless_tracker.node.ros.messages import header, optical_frame
+from markerless_tracker.node.ros.messages import header
 from markerless_tracker.node.ros.qos import latched_qos, output_qos
 from markerless_tracker.node.ros.stamps import stamp_of
 from markerless_tracker.synthesis.scene import SyntheticScene

@@ -9,6 +9,7 @@ from sensor_msgs.msg import Image
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.camera.ros_fields import optical_frame
 from markerless_tracker.drawing import draw_overlay
 from markerless_tracker.drawing.evidence import class_picture
 from markerless_tracker.drawing.steps import draw_steps
@@ -16,7 +17,7 @@ from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image as Picture
 from markerless_tracker.imaging import Segmenter
 from markerless_tracker.node.ros.images import fill_image
-from markerless_tracker.node.ros.messages import header, optical_frame
+from markerless_tracker.node.ros.messages import header
 from markerless_tracker.node.ros.qos import output_qos
 from markerless_tracker.node.tracker.worker import TrackedSet
 from markerless_tracker.records import Observation, TrackResult

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.camera.ros_fields import WORLD_FRAME, optical_frame
 from markerless_tracker.geometry import FloatArray, inverse, quaternion_from_rotation
-from markerless_tracker.node.ros.messages import WORLD_FRAME, optical_frame
 from markerless_tracker.node.ros.qos import latched_qos, output_qos
 from markerless_tracker.node.ros.transforms import TransformMessages, installed
 from markerless_tracker.node.ros.urdf_joints import UrdfJoints, read_joints
