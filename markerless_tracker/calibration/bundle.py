@@ -26,6 +26,8 @@ OUTLIER, OUTLIER_PX = 5.0, 1.0
 """An outlier's error exceeds both `OUTLIER` times the median error and `OUTLIER_PX`."""
 _LOSS_PX = 0.5
 _DEPTH_M = 1e-3
+# Added to the diagonal of scaled normal equations, so that what is not determined has an inverse.
+_RIDGE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +247,8 @@ def _deviations(jacobian: csr_matrix, errors: FloatArray, free: NDArray[np.bool_
     deviations = np.zeros(free.size)
     deviations[columns] = np.inf
     try:
-        spread = np.diag(np.linalg.inv(scaled)) * variance
+        # With one or two corners left, a pose is not determined either.
+        spread = np.diag(np.linalg.inv(scaled + _RIDGE * np.eye(len(scaled)))) * variance
         found = np.where(spread >= 0.0, np.sqrt(np.abs(spread)), np.inf) / scale
         deviations[columns[known]] = found
     except np.linalg.LinAlgError:

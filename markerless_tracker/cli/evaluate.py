@@ -199,7 +199,9 @@ def _figures(
     try:
         if args.align:
             alignment = align(result, reference)
-            result, reference = alignment.apply(result, reference)
+            # This tracker's world has a vertical z axis; that of others may lie on its side.
+            ours = deviations is not None
+            result, reference = alignment.apply(result, reference, into_result=ours)
         return _Figures(
             score(result, reference, markers_sd_mm=deviations, skip=args.skip),
             measures(result, reference, skip=args.skip),

@@ -62,8 +62,10 @@ def new_folder(path: str | Path, *, replace: bool = False) -> Iterator[Path]:
             path.rmdir()
         inner.rename(path)
     except OSError as error:
-        # The block may have read or written other files.
-        where, reason = error.filename or path, error.strerror or error
+        # The block may have read or written files elsewhere.
+        other = Path(error.filename or path)
+        where = path if holder in (other, *other.parents) else other
+        reason = error.strerror or error
         raise DatasetError(f"{where}: cannot be read or written: {reason}") from error
     finally:
         shutil.rmtree(holder, ignore_errors=True)

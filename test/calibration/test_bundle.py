@@ -158,3 +158,19 @@ def test_what_no_corner_determines_leaves_the_rest_certain() -> None:
         found[known], np.sqrt(np.diag(np.linalg.inv(kept.T @ kept)) * variance)
     )
     assert found[2] == 0.0 and found[4] == np.inf
+
+
+@pytest.mark.parametrize("rows", [2, 4])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_pose_with_few_corners_left_leaves_the_rest_certain(rows: int, seed: int) -> None:
+    """The last six unknowns, of a pose, have so many rows; the others have many."""
+    rng = np.random.default_rng(seed)
+    jacobian = np.zeros((200 + rows, 21))
+    jacobian[:, :15] = rng.normal(size=(200 + rows, 15))
+    jacobian[200:, 15:] = rng.normal(size=(rows, 6))
+    errors = rng.normal(size=200 + rows)
+    found = _deviations(csr_matrix(jacobian), errors, np.ones(21, dtype=bool))
+    kept = jacobian[:200, :15]
+    variance = (errors**2).sum() / (errors.size - 21)
+    alone = np.sqrt(np.diag(np.linalg.inv(kept.T @ kept)) * variance)
+    np.testing.assert_allclose(found[:15], alone, rtol=0.05)

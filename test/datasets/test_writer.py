@@ -117,13 +117,14 @@ def test_a_replacement_that_fails_keeps_the_old_bag(
 
     def full(self: Path, target: Path) -> Path:
         if Path(target) == bag and self.name == bag.name:
-            raise OSError(28, "No space left on device")
+            raise OSError(28, "No space left on device", str(self))
         return rename(self, target)
 
     monkeypatch.setattr("markerless_tracker.datasets.target._exchanged", lambda *_: False)
     monkeypatch.setattr(Path, "rename", full)
-    with pytest.raises(DatasetError, match="No space left"), new_folder(bag, replace=True) as new:
-        (new / "metadata.yaml").write_text("new")
+    with pytest.raises(DatasetError, match=f"^{bag}: .*No space left"):
+        with new_folder(bag, replace=True) as new:
+            (new / "metadata.yaml").write_text("new")
     assert [path.name for path in tmp_path.iterdir()] == ["bag"]
     assert (bag / "metadata.yaml").read_text() == "old"
 

@@ -133,8 +133,11 @@ def _done(
 
 
 def _check_targets(missing: Sequence[Trial]) -> None:
-    """Check that no result of other settings would be replaced."""
+    """Check that no result of other settings, and no other calibration, would be replaced."""
     for trial in missing:
+        refined = trial.arguments["refine_calibration"]
+        if refined is not None and refined.exists() and not trial.record.exists():
+            raise DatasetError(f"{refined}: exists already, expected a new name or --force")
         target = trial.out / trial.name
         there = earlier_files(target)
         if trial.stored() is not None or (there and not trial.record.exists()):

@@ -53,15 +53,29 @@ class Alignment:
             "rms_mm": self.rms_mm,
         }
 
-    def apply(self, result: MarkerTrack, reference: MarkerTrack) -> tuple[MarkerTrack, MarkerTrack]:
-        """The result, and the reference in the result's world, at the result's times.
+    def apply(
+        self, result: MarkerTrack, reference: MarkerTrack, *, into_result: bool
+    ) -> tuple[MarkerTrack, MarkerTrack]:
+        """Both in one world, at the result's times.
 
-        The result's world has a vertical z axis, which headings and angles of the trunk need. The
-        reference is interpolated linearly between neighbouring rows.
+        The reference is interpolated linearly between neighbouring rows.
+
+        Args:
+            result, reference: as for `align`.
+            into_result: whether the reference is moved to the result's world, else the other way
+                round. The world's z axis must be vertical for headings and angles of the trunk.
         """
         at = interpolated(reference, result.stamps_ns / 1e9 + self.offset_s)
-        moved = (at - self.translation_m) @ self.rotation
-        return result, MarkerTrack(reference.names, result.stamps_ns, moved)
+        positions = result.positions_m
+        if into_result:
+            at = (at - self.translation_m) @ self.rotation
+        else:
+            positions = positions @ self.rotation.T + self.translation_m
+        stamps_ns = result.stamps_ns
+        return (
+            MarkerTrack(result.names, stamps_ns, positions),
+            MarkerTrack(reference.names, stamps_ns, at),
+        )
 
 
 def align(result: MarkerTrack, reference: MarkerTrack) -> Alignment:
@@ -72,7 +86,7 @@ def align(result: MarkerTrack, reference: MarkerTrack) -> Alignment:
     all common markers and rows).
 
     Args:
-        result: the track whose world is to be moved.
+        result: a track.
         reference: the track that it is to be compared with.
 
     Raises:

@@ -173,3 +173,16 @@ def test_a_result_of_somebody_else_is_not_replaced(
     assert f"one.{ending}: exists already" in capsys.readouterr().err
     assert mine.read_text(encoding="utf-8") == "{}"
     assert os.listdir(tmp_path / "out" / "a") == [mine.name]
+
+
+def test_a_calibration_of_somebody_else_is_not_replaced(trials, options, tmp_path, capsys) -> None:
+    mine = tmp_path / "one.toml"
+    mine.write_text("# mine", encoding="utf-8")
+    words = ["-o", tmp_path / "out", *options, "--refine-calibration"]
+    words.append(tmp_path / "{name}.toml")
+    shutil.rmtree(trials / "b")
+    shutil.rmtree(trials / "a" / "two")
+    shutil.move(trials / "a" / "one", trials / "one")
+    assert call(trials, *words) == 1
+    assert "one.toml: exists already, expected a new name or --force" in capsys.readouterr().err
+    assert mine.read_text(encoding="utf-8") == "# mine"

@@ -154,8 +154,8 @@ def test_a_reference_in_c3d(tmp_path: Path, found, capsys) -> None:
     assert "broken.c3d: cannot be read as C3D" in capsys.readouterr().err
 
 
-def test_headings_and_deviations_are_in_the_results_world(tmp_path: Path, capsys) -> None:
-    """A reference whose world lies on its side gives the same offsets in the heading frame."""
+def test_headings_are_those_of_an_upright_world(tmp_path: Path, capsys) -> None:
+    """Where one of both worlds lies on its side, the other's gives the heading frame."""
     stamps = np.round(np.arange(60) * 1e9 / 60).astype(np.int64)
     names = ("LShoulder", "RShoulder", "LHip", "RHip", "Head", "LWrist")
     stand = np.array([
@@ -167,11 +167,15 @@ def test_headings_and_deviations_are_in_the_results_world(tmp_path: Path, capsys
     off = moved.copy()
     off[:, 4, 0] += 0.02
     own = write(tmp_path / "own.trc", names, stamps, off)
+    # As this tracker writes it.
+    (tmp_path / "own.json").write_text(json.dumps({"frames": []}), encoding="utf-8")
+    other = write(tmp_path / "other.trc", names, stamps, off[:, :, [1, 2, 0]])
     lying = write(tmp_path / "lying.trc", names, stamps, moved[:, :, [1, 2, 0]])
     upright = write(tmp_path / "upright.trc", names, stamps, moved)
     expected = figures(capsys, own, upright, "--align")
-    found = figures(capsys, own, lying, "--align")
-    assert found["mean_mm"] == pytest.approx(expected["mean_mm"], abs=0.01)
-    for joint, bias in expected["bias"].items():
-        assert found["bias"][joint] == pytest.approx(bias, abs=0.05), joint
+    for words in ((own, lying), (other, upright)):
+        found = figures(capsys, *words, "--align")
+        assert found["mean_mm"] == pytest.approx(expected["mean_mm"], abs=0.01)
+        for joint, bias in expected["bias"].items():
+            assert found["bias"][joint] == pytest.approx(bias, abs=0.2), joint
     assert expected["bias"]["Head"][0] > 5.0
