@@ -7,6 +7,7 @@ from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image, grey_of
 from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.settings import ImagingSettings
+from markerless_tracker.observation import locked
 
 
 def edge_radius_px(settings: ImagingSettings) -> int:
@@ -36,7 +37,9 @@ def edge_map(image: Image, mask: Mask, settings: ImagingSettings) -> Image:
     border_px = margin + settings.edges.blur_px + 1
     u0, v0 = max(left - border_px, 0), max(top - border_px, 0)
     u1, v1 = min(left + w + border_px, width), min(top + h + border_px, height)
-    strength = _gradient_strength(grey_of(image[v0:v1, u0:u1]), settings)
+    # All parts are contiguous and read-only, so that the kernel is compiled once.
+    grey = locked(grey_of(image[v0:v1, u0:u1]), np.uint8)
+    strength = _gradient_strength(grey, settings)
     near = mask[v0:v1, u0:u1]
     if margin > 0:
         brush = np.ones((2 * margin + 1, 2 * margin + 1), dtype=np.uint8)

@@ -134,21 +134,26 @@ class ShadowSettings(SettingsGroup):
     )
     grey_value_min: float = setting(
         0.75,
-        "value_min of grey cameras, where no colour protects clothes",
+        "value_min of grey cameras, where no colour protects clothes (without `undecided`)",
         least=0.0,
         most=1.0,
     )
-    grey_value_max: float = setting(0.95, "value_max of grey cameras", least=0.0, most=2.0)
+    grey_value_max: float = setting(
+        0.95, "value_max of grey cameras (without `undecided`)", least=0.0, most=2.0
+    )
     grey_blob_share: float = setting(
         1e-3,
-        "blob_share of grey cameras; the patches are opened first",
+        "blob_share of grey cameras, whose patches are opened first (with `undecided` all are)",
         least=0.0,
         most=1.0,
     )
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for least, most in (("value_min", "value_max"), ("grey_value_min", "grey_value_max")):
+        pairs = [("value_min", "value_max"), ("grey_value_min", "grey_value_max")]
+        if self.undecided:
+            pairs.append(("undecided_value_min", "value_max"))
+        for least, most in pairs:
             low, high = getattr(self, least), getattr(self, most)
             if low > high:
                 raise ConfigError(f"shadow.{least}: got {low}, expected at most {most} ({high})")

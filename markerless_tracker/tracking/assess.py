@@ -90,6 +90,7 @@ class Assessor:
     def give_up(self) -> None:
         """End the track: the body was lost for too long."""
         self.track = self.track.after(Event.GIVEN_UP)
+        self.limbs.reset()
         self.jump()
 
     def without_person(self, seen: Seen) -> TrackResult:

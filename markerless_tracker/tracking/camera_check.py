@@ -117,8 +117,9 @@ class CameraCheck:
 
     def _suspect(self) -> None:
         """Exclude the camera that disagrees most from the others' checks, which begin anew."""
-        worst = max(self.shifts().items(), key=lambda item: item[1].length_m, default=None)
-        if worst is None or worst[0] in self._suspects or not worst[1].disagrees:
+        others = {n: shift for n, shift in self.shifts().items() if n not in self._suspects}
+        worst = max(others.items(), key=lambda item: item[1].length_m, default=None)
+        if worst is None or not worst[1].disagrees:
             return
         if len(self._rig) - len(self._suspects) - 1 < LEAST_VIEWS:
             return

@@ -140,8 +140,7 @@ class Tracker:
 
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
-        blank = self.evidence.warm_up()
-        pose = self._motion.pose
+        blank, pose = self.evidence.warm_up(), self._motion.pose
         seen = Seen(0, blank, decide(blank, self._cameras, self.body, pose), blank)
         search = self._searcher.frame(seen.used, 0, pose)
         search.run(swarm_stages(self.body, self.config, pose, self.body.sigma))
@@ -345,6 +344,7 @@ class Tracker:
 
     def _new_starter(self, last_pose: FloatArray | None = None) -> Starter:
         return Starter(
-            self.rig, self.body, self._start_searcher_for, self.evidence.select,
+            # A start in progress follows `configure`.
+            self.rig, self.body, lambda body: self._start_searcher_for(body), self.evidence.select,
             sized=self._body.sized, fit_shape=not self._body.sections_fitted, last_pose=last_pose,
         )  # fmt: skip

@@ -86,3 +86,18 @@ def test_after_many_checks_the_next_ones_come_less_often(scene) -> None:
     shifts = checked(scene, scene.rig, frames)
     most = MANY_CHECKS + later // LATER_EVERY_NS
     assert MANY_CHECKS < shifts["cam01"].checks <= most < frames - _FIRST // FRAME_NS
+
+
+def test_a_second_camera_is_left_out_after_the_worst_one(scene) -> None:
+    check = CameraCheck(cameras_like(scene.rig, 6), CONFIG)
+    bad = {"cam01": (20.0, 0.0, 200.0), "cam02": (0.0, 16.0, 200.0)}
+    for left_out in (set(), {"cam01"}, {"cam01", "cam02"}):
+        assert check._suspects == left_out
+        for name in check._found:
+            check._found[name] = [bad.get(name, (0.0, 0.0, 200.0))] * 8
+        check._suspect()
+
+
+def cameras_like(rig: CameraRig, count: int) -> CameraRig:
+    """A rig of so many cameras, all where the first one is."""
+    return CameraRig(tuple(replace(rig["cam01"], name=f"cam{i + 1:02d}") for i in range(count)))

@@ -28,7 +28,8 @@ class OutlineRows:
         place: (n, 5) the point on the cone, as in `Samples.place`.
         gradient: (n, 3) of the residual with respect to that point, world frame.
         value: (n,) residual, m.
-        weight: (n,) represented length of outline, m, times the robust weight.
+        weight: (n,) factor of the squared residual; of an outline its represented length, m, times
+            the robust weight.
     """
 
     view: IntArray

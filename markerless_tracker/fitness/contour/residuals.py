@@ -96,7 +96,8 @@ def collect_residuals(view, views, contours, truncation_m, samples, start, order
     """Fill the residuals of one view, in both directions.
 
     With the truncation c, robust weights are Tukey's, (1 - (r / c)²)², and the cost is
-    c² / 6 (1 - (1 - (r / c)²)³).
+    c² / 6 (1 - (1 - (r / c)²)³). For points of the edge, r in both is the whole distance to the
+    model's point, not the one along the normal.
     """
     r, t = views.rotation[view], views.translation[view]
     k, d = views.intrinsics[view], views.distortion[view]

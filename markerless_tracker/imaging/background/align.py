@@ -53,6 +53,8 @@ def align_geometry(image: Image, reference: Image) -> Image:
 def _tile_shifts(image: Image, reference: Image) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Centres of tiles in the image and in the reference, (n, 2) px each."""
     height, width = reference.shape
+    if min(height, width) < 2:
+        return np.empty((0, 2), np.float32), np.empty((0, 2), np.float32)
     tile = max(32, 2 * max(height, width) // (_TILES + 1))
     first = cv2.Laplacian(image, cv2.CV_32F, ksize=3)
     second = cv2.Laplacian(reference, cv2.CV_32F, ksize=3)

@@ -38,6 +38,7 @@ class BackgroundGaussians:
         scale: (k, c, h, w) float32, 1 / (sigma sqrt(limit)): the foreground test is |.|^2 > 1.
         grey_mean: (h, w) float32, the first Gaussian's mean as a grey image.
         sigma: median noise of the grey image, grey levels.
+        smooths: whether images are blurred before they are compared.
         size_px: (width, height).
     """
 
@@ -49,7 +50,7 @@ class BackgroundGaussians:
         spread = background.mean.max(axis=2) - background.mean.min(axis=2)
         self.is_grey = background.channels == 1 or bool(spread.max() <= _GREY_TOLERANCE)
         sigma = float(np.sqrt(np.median(background.variance)))
-        self._smooth = sigma > settings.background.denoise_sigma
+        self.smooths = sigma > settings.background.denoise_sigma
         self.mean, self.scale = self._learned()
         mean, variance = self._smoothed(background.mean, background.variance)
         if self.is_grey:
@@ -69,9 +70,9 @@ class BackgroundGaussians:
 
         The array is contiguous and must not be written.
         """
-        wide = region.grown(_SMOOTH_PX[0] // 2 if self._smooth else 0, self.size_px)
+        wide = region.grown(_SMOOTH_PX[0] // 2 if self.smooths else 0, self.size_px)
         part = image[wide.slices]
-        if self._smooth:
+        if self.smooths:
             part = np.asarray(cv2.GaussianBlur(part, _SMOOTH_PX, 0.0), dtype=np.uint8)
             part = part[region.relative_to(wide).slices]
         if self.is_grey:
@@ -81,7 +82,7 @@ class BackgroundGaussians:
 
     def _smoothed(self, mean: FloatImage, variance: FloatImage) -> tuple[FloatImage, FloatImage]:
         """Mean and variance (h, w, c) for comparison: smoothed if too noisy."""
-        if not self._smooth:
+        if not self.smooths:
             return mean, variance
         smooth = np.asarray(cv2.GaussianBlur(mean, _SMOOTH_PX, 0.0), dtype=np.float32)
         row = cv2.getGaussianKernel(_SMOOTH_PX[0], 0.0, cv2.CV_64F)

@@ -125,7 +125,12 @@ class PixelLabeller:
     def measure_exposure(self, image: Image) -> None:
         """Set `gain` from a whole image (h, w) or (h, w, 3), if the settings require it."""
         if self._settings.background.exposure_compensation:
-            self.gain[:] = self._meter.gain(image.reshape(image.shape[0], image.shape[1], -1))
+            values = self._whole(image) if self.background.smooths else image
+            self.gain[:] = self._meter.gain(values.reshape(*values.shape[:2], -1))
+
+    def _whole(self, image: Image) -> Image:
+        """A whole image as it is compared with the background, (h, w, c)."""
+        return self.background.pixels(image, Region.whole(self.background.size_px))
 
     def label(self, image: Image, window: Region, corrected: Region) -> Mask:
         """Labels (h, w) uint8 of a window of the image; overwritten by the next call.
@@ -242,9 +247,8 @@ class PixelLabeller:
         if mask is None:
             self._adaptation.pass_over(stamp_ns)
             return
-        values = grey_of(image) if self.background.is_grey else image
         self._adaptation.follow(
-            values.reshape(*mask.shape, -1), mask, stamp_ns, self.gain,
+            self._whole(image), mask, stamp_ns, self.gain,
             self._means_channels_last, self._scales_channels_last,
         )  # fmt: skip
         self._first = kernels.coarse(self.background.mean[0], self.background.scale[0])

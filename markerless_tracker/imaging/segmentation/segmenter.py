@@ -75,7 +75,9 @@ class Segmenter:
         width, height = self._size_px
         channels = self.background.channels
         shape = (height, width) if channels == 1 else (height, width, channels)
-        self.observe(np.zeros(shape, dtype=np.uint8), 0)
+        # A background follows from the second image on.
+        for stamp_ns in (0, 1):
+            self.observe(np.zeros(shape, dtype=np.uint8), stamp_ns)
         self.reset()
 
     def reset(self) -> None:

@@ -26,8 +26,6 @@ STEP = 0.006
 """Largest change of light between neighbouring pixels of one shadow."""
 SPREAD_PX = 24
 """Distance over which light spreads to windows without a pattern: along rows, then columns."""
-MOST_RADIUS = 6
-"""Largest radius of a window, px."""
 # Standard deviations of the noise within which a pixel agrees with a window's light.
 _AGREE = 3.5
 
@@ -77,7 +75,7 @@ def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[
         noise: variance of the sensor's noise.
     """
     for j in range(out.size):
-        # n times a sum of squares fits into 31 bits up to a radius of `MOST_RADIUS`. Without the
+        # n times a sum of squares fits into 31 bits up to a radius of 6. Without the
         # casts the products would have 64 bits, for which there are few vector instructions.
         n = np.int32(down * across[j])
         share = np.float32(1.0) / np.float32(n)
@@ -104,8 +102,9 @@ def _whole_levels(image, mean, gain, a, b):  # type: ignore[no-untyped-def]
     """Fill a with a row of the image and b with that of the background, in whole grey levels."""
     for j in range(a.size):
         a[j] = np.int32(image[j])
+    white = np.float32(255.0)
     for j in range(b.size):
-        b[j] = np.int32(mean[j] * gain + np.float32(0.5))
+        b[j] = np.int32(min(mean[j] * gain, white) + np.float32(0.5))
 
 
 @compiled()
@@ -268,7 +267,7 @@ def apply_light(  # type: ignore[no-untyped-def]
             explained = False
             if near_valid[i, j] != 0:
                 value = np.float32(image[i, j])
-                base = mean[top + i, left + j] * gain
+                base = min(mean[top + i, left + j] * gain, np.float32(255.0))
                 for di in range(max(i - radius, 0), min(i + radius + 1, rows)):
                     for dj in range(max(j - radius, 0), min(j + radius + 1, columns)):
                         p = light[di, dj]

@@ -194,15 +194,16 @@ class BodyEstimate:
     def restart_lengths(self) -> FloatArray | None:
         """Restart the fit of an unmeasured body, which was fitted to poses with a wrong heading.
 
+        Without fits of lengths the sections stay as the start found them.
+
         Returns:
             As `fit_tracked_frame`.
         """
-        if self._person is None or not self._fits_sections:
+        if self._person is None or not (self._fits_sections and self._config.fit_lengths):
             return None
         sizes = self._person.sizes
         self.body = sizes.body(sizes.of(self.body))
-        if self._config.fit_lengths:
-            self._begin_lengths(self._person)
+        self._begin_lengths(self._person)
         return np.zeros(self.body.size)
 
     def _limb_was_wrong(self) -> None:

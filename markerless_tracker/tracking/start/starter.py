@@ -10,6 +10,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.fitness.shape import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
+from markerless_tracker.tracking.candidates.mirror import TRUNK
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
 from markerless_tracker.tracking.candidates.population import FramePopulation, Population
 from markerless_tracker.tracking.candidates.postures import put_at
@@ -54,7 +55,6 @@ _DOUBTFUL = 0.12
 _SURE_FIT, _SURE_GAP = 0.91, 0.025
 """There is no second search if 1 - cost is at least this in the first frame, and that of the
 opposite heading is lower by at least this gap."""
-_TRUNK_MARKERS = [0, 1]
 
 Select = Callable[
     [Mapping[str, Observation], BodyModel, FloatArray],
@@ -201,11 +201,12 @@ class Starter:
 
     def _moved(self, population: Population, observed: Mapping[str, Observation]) -> Population:
         """A population moved to where the person is now."""
-        hull = next(find_hulls(self._cameras, observed), None)
-        if hull is None:
-            return population
         assert self._searcher is not None
-        body = self._searcher.body
+        body, was_m = self._searcher.body, self._trunk(population.poses[0])
+        if not (hulls := list(find_hulls(self._cameras, observed))):
+            return population
+        # The nearest one; the largest may be an object.
+        hull = min(hulls, key=lambda h: float(np.linalg.norm(h.trunk_m.mean(axis=0) - was_m)))
         poses = np.array([put_at(body, hull, pose) for pose in population.poses])
         return replace(population, poses=poses)
 
@@ -326,7 +327,7 @@ class Starter:
 
     def _trunk(self, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None
-        return np.asarray(markers(self._searcher.body, pose)[_TRUNK_MARKERS].mean(axis=0))
+        return np.asarray(markers(self._searcher.body, pose)[TRUNK].mean(axis=0))
 
 
 def _is_sure(population: Population) -> bool:

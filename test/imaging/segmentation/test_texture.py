@@ -11,7 +11,6 @@ from markerless_tracker.imaging import Region
 from markerless_tracker.imaging.segmentation import texture
 from markerless_tracker.imaging.segmentation.texture import (
     HIDDEN_LEAST,
-    MOST_RADIUS,
     OTHER,
     SAME,
     SHOWN_LEAST,
@@ -29,6 +28,7 @@ FloatImage = NDArray[np.float32]
 Levels = NDArray[np.uint8]
 
 SEEDS = st.integers(0, 2**32 - 1)
+MOST_RADIUS = 6
 RADII = st.integers(1, MOST_RADIUS)
 NOISE = np.float32(2.0**2)
 few = settings(max_examples=15, deadline=None)
@@ -90,7 +90,8 @@ def test_grey_levels_of_the_background_are_rounded(seed: int) -> None:
     a, b = np.empty((2, 40), dtype=np.int32)
     texture._whole_levels(image, one, gain, a, b)
     np.testing.assert_array_equal(a, image)
-    np.testing.assert_array_equal(b, np.floor(one * gain + np.float32(0.5)))
+    lit = np.minimum(one * gain, np.float32(255.0))
+    np.testing.assert_array_equal(b, np.floor(lit + np.float32(0.5)))
 
 
 def slow_light(image: NDArray[np.int64], base: NDArray[np.int64]) -> tuple[float, float]:
@@ -123,7 +124,8 @@ def test_light_of_windows(seed: int, radius: int, rows: int, columns: int) -> No
     part = np.ascontiguousarray(image[top : top + rows, left : left + columns])
     light = np.empty(part.shape, dtype=np.float32)
     window_light(part, mean, gain, NOISE, radius, left, top, light)
-    levels = np.floor(mean * gain + np.float32(0.5)).astype(np.int64)
+    lit_mean = np.minimum(mean * gain, np.float32(255.0))
+    levels = np.floor(lit_mean + np.float32(0.5)).astype(np.int64)
     base = levels[top : top + rows, left : left + columns]
     for i in range(rows):
         for j in range(columns):
@@ -301,8 +303,8 @@ def test_labels_by_light(seed: int, radius: int, protect: bool, reveal: bool) ->
     expected = labels.copy()
     inner = np.s_[part[1] : part[3], part[0] : part[2]]
     expected[inner] = slow_labels(
-        image, mean * gain, light, labels, examined, agree=agree, radius=radius, protect=protect,
-        reveal=reveal,
+        image, np.minimum(mean * gain, 255.0), light, labels, examined, agree=agree,
+        radius=radius, protect=protect, reveal=reveal,
     )[inner]  # fmt: skip
     np.testing.assert_array_equal(wide[2:, 3:], expected)
 

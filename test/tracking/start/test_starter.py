@@ -1,5 +1,7 @@
 """Starting without a start pose."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,8 @@ from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig, build_tracker
+from markerless_tracker.tracking.evidence.hull import find_hulls
+from markerless_tracker.tracking.start.starter import GAP_NS
 from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
 
 FRAMES = SETTLING_FRAMES + 2
@@ -204,3 +208,33 @@ def test_who_walks_on_during_the_first_search_is_found_again() -> None:
         assert heading_difference(heading(result.markers_m), heading(true)) < 0.5
     moved_m = np.linalg.norm(scene.markers(28) - scene.markers(1), axis=1).mean()
     assert moved_m > 0.3
+
+
+def test_after_a_gap_the_start_goes_on_at_the_person_not_at_a_larger_object(
+    walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, taken = walk
+    tracker = tracker_of(scene)
+    first, later = taken[0], taken[2]
+    assert tracker.step(first[1], first[0]).state is TrackState.TRACKING
+
+    def with_object(cameras, observed):
+        """A large object 3 m away, then the person."""
+        person = next(find_hulls(cameras, observed))
+        points = np.concatenate([person.points_m] * 3) + [3.0, 0.0, 0.0]
+        yield replace(person, points_m=points, trunk_m=person.trunk_m + [3.0, 0.0, 0.0])
+        yield person
+
+    monkeypatch.setattr(f"{STARTER}.find_hulls", with_object)
+    result = tracker.step(later[1], first[0] + 2 * GAP_NS)
+    assert result.state is TrackState.TRACKING and error_mm(result, later[2]) < 120.0
+
+
+def test_a_start_in_progress_follows_other_settings(walk) -> None:
+    scene, taken = walk
+    tracker = tracker_of(scene)
+    assert tracker.step(taken[0][1], taken[0][0]).settling
+    config = TrackerConfig.from_mapping({"threads": 1, "refine.floor_sd_m": 0.5})
+    tracker.configure(config)
+    assert tracker._starter is not None
+    assert tracker._starter._searcher_for(tracker.body).config == config

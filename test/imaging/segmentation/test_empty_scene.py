@@ -1,0 +1,79 @@
+"""An empty scene has no person: bright walls in more light, noise on patterns, a slow follower."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.imaging import ImagingSettings, Segmenter, learn_background
+from markerless_tracker.imaging.background.adapt import adapt_means
+from markerless_tracker.imaging.edges import gradient_strength
+
+SHAPE = (120, 160)
+
+
+def noisy(image: np.ndarray, seed: int, sigma: float) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(0.0, sigma, image.shape)
+    return np.clip(np.rint(image + noise), 0, 255).astype(np.uint8)
+
+
+def wall(level: float, pattern: float) -> np.ndarray:
+    """A grey wall (h, w) with coarse texture."""
+    rng = np.random.default_rng(0)
+    return np.clip(level + rng.normal(0.0, pattern, SHAPE), 0.0, 255.0)
+
+
+def stripes() -> np.ndarray:
+    """A colour scene (h, w, 3) of narrow stripes, which a blur changes."""
+    columns = np.where(np.arange(SHAPE[1]) % 4 < 2, 70.0, 170.0)
+    return np.repeat(np.broadcast_to(columns, SHAPE)[:, :, None], 3, axis=2)
+
+
+@pytest.mark.parametrize("gain", [1.0, 1.1, 1.2, 1.3])
+def test_a_bright_wall_in_more_light_is_no_person(gain: float) -> None:
+    """Where it is white, the image has less pattern than the background times the light."""
+    empty = wall(235.0, 10.0)
+    # The brightness is measured where the image is not white.
+    empty[:, :80] -= 130.0
+    segmenter = Segmenter("cam", learn_background([noisy(empty, s, 2.0) for s in range(12)]))
+    mask = segmenter.mask(noisy(np.clip(empty * gain, 0.0, 255.0), 99, 2.0))
+    assert (mask > 0).mean() < 0.03
+
+
+def test_the_brightness_of_a_noisy_patterned_scene_is_measured_as_it_is_compared() -> None:
+    empty = stripes()
+    segmenter = Segmenter("cam", learn_background([noisy(empty, s, 8.0) for s in range(12)]))
+    mask, undecided = segmenter.classes(noisy(empty, 99, 8.0))
+    np.testing.assert_allclose(segmenter.gain, 1.0, atol=0.01)
+    assert undecided is not None and ((mask | undecided) > 0).mean() < 0.02
+
+
+def test_a_background_that_follows_noisy_images_stays() -> None:
+    empty = stripes()
+    settings = ImagingSettings.from_mapping(
+        {"background.follow_s": 0.5, "background.exposure_compensation": False}
+    )
+    model = learn_background([noisy(empty, s, 8.0) for s in range(12)])
+    segmenter = Segmenter("cam", model, settings)
+    before = segmenter._labeller.background.mean.copy()
+    for index in range(60):
+        segmenter.observe(noisy(empty, 100 + index, 8.0), index * 33_000_000)
+    assert np.abs(segmenter._labeller.background.mean - before).max() < 8.0
+
+
+@pytest.mark.parametrize("grey", [True, False])
+def test_no_kernel_is_compiled_after_the_warm_up(grey: bool) -> None:
+    empty = wall(120.0, 20.0) if grey else stripes()
+    settings = ImagingSettings.from_mapping({"background.follow_s": 2.0})
+    segmenter = Segmenter(
+        "cam", learn_background([noisy(empty, s, 2.0) for s in range(8)]), settings
+    )
+    segmenter.warm_up()
+    kernels = (gradient_strength, adapt_means)
+    known = [len(kernel.signatures) for kernel in kernels]
+    assert min(known) > 0
+    person = empty.copy()
+    person[30:90, 60:100] = 250.0 if grey else (250.0, 20.0, 20.0)
+    for index in range(3):
+        image = noisy(person, index, 2.0)
+        image.flags.writeable = index != 1
+        segmenter.observe(image, 1 + index * 33_000_000)
+    assert [len(kernel.signatures) for kernel in kernels] == known
