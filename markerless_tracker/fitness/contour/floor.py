@@ -41,7 +41,9 @@ def _above(k, body, world):  # type: ignore[no-untyped-def]
 def add_floor(body, world, weight, standing, sums):  # type: ignore[no-untyped-def]
     """Add a residual for each end of a cone below the floor, and those of the ankles.
 
-    No ankle is lower than in a foot that stands flat, and the lower one is not much higher.
+    No ankle is lower than in a foot that stands flat, and the lower one is not much higher. A
+    residual lifts the end's centre. Its derivatives are not those of the end's lowest point, which
+    would rotate a shank whose foot has no ankle joint: it is upright then where toes are bent.
 
     Args:
         body: `BodyArrays`.
