@@ -28,6 +28,8 @@ _LOSS_PX = 0.5
 _DEPTH_M = 1e-3
 # Added to the diagonal of scaled normal equations, so that what is not determined has an inverse.
 _RIDGE = 1e-12
+# Beyond this factor from errors to variances, nothing is determined.
+_UNSURE = 1e-3 / _RIDGE
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,8 +250,9 @@ def _deviations(jacobian: csr_matrix, errors: FloatArray, free: NDArray[np.bool_
     deviations[columns] = np.inf
     try:
         # With one or two corners left, a pose is not determined either.
-        spread = np.diag(np.linalg.inv(scaled + _RIDGE * np.eye(len(scaled)))) * variance
-        found = np.where(spread >= 0.0, np.sqrt(np.abs(spread)), np.inf) / scale
+        inverse = np.diag(np.linalg.inv(scaled + _RIDGE * np.eye(len(scaled))))
+        sure = (inverse >= 0.0) & (inverse < _UNSURE)
+        found = np.where(sure, np.sqrt(np.abs(inverse) * variance), np.inf) / scale
         deviations[columns[known]] = found
     except np.linalg.LinAlgError:
         pass  # The views determine nothing.

@@ -344,7 +344,6 @@ class Tracker:
 
     def _new_starter(self, last_pose: FloatArray | None = None) -> Starter:
         return Starter(
-            # A start in progress follows `configure`.
-            self.rig, self.body, lambda body: self._start_searcher_for(body), self.evidence.select,
+            self.rig, self.body, self._start_searcher_for, self.evidence.select,
             sized=self._body.sized, fit_shape=not self._body.sections_fitted, last_pose=last_pose,
         )  # fmt: skip

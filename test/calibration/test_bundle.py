@@ -174,3 +174,4 @@ def test_a_pose_with_few_corners_left_leaves_the_rest_certain(rows: int, seed: i
     variance = (errors**2).sum() / (errors.size - 21)
     alone = np.sqrt(np.diag(np.linalg.inv(kept.T @ kept)) * variance)
     np.testing.assert_allclose(found[:15], alone, rtol=0.05)
+    assert np.isinf(found[15:]).any()

@@ -26,6 +26,10 @@ STEP = 0.006
 """Largest change of light between neighbouring pixels of one shadow."""
 SPREAD_PX = 24
 """Distance over which light spreads to windows without a pattern: along rows, then columns."""
+CLIPPED = 250
+"""Grey level from which on an image may be white."""
+# Largest integer whose square fits into 31 bits.
+_LARGEST_ROOT = 46340
 # Standard deviations of the noise within which a pixel agrees with a window's light.
 _AGREE = 3.5
 
@@ -75,7 +79,7 @@ def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[
         noise: variance of the sensor's noise.
     """
     for j in range(out.size):
-        # n times a sum of squares fits into 31 bits up to a radius of 6. Without the
+        # n times a sum of squares fits into 31 bits. Without the
         # casts the products would have 64 bits, for which there are few vector instructions.
         n = np.int32(down * across[j])
         share = np.float32(1.0) / np.float32(n)
@@ -98,13 +102,17 @@ def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[
 
 
 @compiled()
-def _whole_levels(image, mean, gain, a, b):  # type: ignore[no-untyped-def]
-    """Fill a with a row of the image and b with that of the background, in whole grey levels."""
+def _whole_levels(image, mean, gain, most, a, b):  # type: ignore[no-untyped-def]
+    """Fill a with a row of the image and b with that of the background, in whole grey levels.
+
+    Where the image is white, the background in more light is white, too; else it is `most` at most.
+    """
     for j in range(a.size):
         a[j] = np.int32(image[j])
     white = np.float32(255.0)
     for j in range(b.size):
-        b[j] = np.int32(min(mean[j] * gain, white) + np.float32(0.5))
+        bound = white if image[j] >= CLIPPED else most
+        b[j] = np.int32(min(mean[j] * gain, bound) + np.float32(0.5))
 
 
 @compiled()
@@ -124,6 +132,7 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
     """
     rows, columns = light.shape
     side = 2 * radius + 1
+    most = np.float32(_LARGEST_ROOT // (side * side))
     # Column sums of integers (exact in any order), with room for windows at the sides.
     sums = np.zeros((5, columns + 2 * radius), dtype=np.int32)
     window = np.empty((5, columns), dtype=np.int32)
@@ -140,7 +149,7 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
         a, b = grey[came], base[came]
         old_a, old_b = grey[gone], base[gone]
         if v < rows:
-            _whole_levels(image[v], mean[top + v, left : left + columns], gain, a, b)
+            _whole_levels(image[v], mean[top + v, left : left + columns], gain, most, a, b)
         else:
             a[:] = 0
             b[:] = 0
@@ -267,7 +276,8 @@ def apply_light(  # type: ignore[no-untyped-def]
             explained = False
             if near_valid[i, j] != 0:
                 value = np.float32(image[i, j])
-                base = min(mean[top + i, left + j] * gain, np.float32(255.0))
+                base = mean[top + i, left + j] * gain
+                base = min(base, np.float32(255.0)) if image[i, j] >= CLIPPED else base
                 for di in range(max(i - radius, 0), min(i + radius + 1, rows)):
                     for dj in range(max(j - radius, 0), min(j + radius + 1, columns)):
                         p = light[di, dj]

@@ -80,6 +80,10 @@ class Rejections:
             and self._stamp_ns - last.searched_ns < LONGEST_WAIT_NS
         )
 
+    def rejected(self, hull: Hull) -> bool:
+        """Whether a hull was found to be no person."""
+        return self._known(hull) is not None
+
     def note(self, hull: Hull) -> None:
         """Note that a search of a hull in this frame found no person."""
         known = self._known(hull)

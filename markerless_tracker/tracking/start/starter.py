@@ -53,8 +53,7 @@ _GAIN = 0.002
 _DOUBTFUL = 0.12
 """If the first search's best pose costs more, it is repeated with a cost of unusual postures."""
 _SURE_FIT, _SURE_GAP = 0.91, 0.025
-"""There is no second search if 1 - cost is at least this in the first frame, and that of the
-opposite heading is lower by at least this gap."""
+"""No second search if 1 - cost of the first is at least this, and the opposite's lower by this."""
 
 Select = Callable[
     [Mapping[str, Observation], BodyModel, FloatArray],
@@ -203,12 +202,13 @@ class Starter:
         """A population moved to where the person is now."""
         assert self._searcher is not None
         body, was_m = self._searcher.body, self._trunk(population.poses[0])
-        if not (hulls := list(find_hulls(self._cameras, observed))):
+        if not (found := list(find_hulls(self._cameras, observed))):
             return population
-        # The nearest one; the largest may be an object.
+        # Not an object that was searched before, nor one farther off than the person.
+        hulls = [h for h in found if not self._rejections.rejected(h)] or found
         hull = min(hulls, key=lambda h: float(np.linalg.norm(h.trunk_m.mean(axis=0) - was_m)))
-        poses = np.array([put_at(body, hull, pose) for pose in population.poses])
-        return replace(population, poses=poses)
+        poses = [put_at(body, hull, pose) for pose in population.poses]
+        return replace(population, poses=np.array(poses))
 
     def _decide(
         self, observations: Mapping[str, Observation], pose: FloatArray

@@ -88,9 +88,9 @@ def test_grey_levels_of_the_background_are_rounded(seed: int) -> None:
     image, mean = rng.integers(0, 256, 40).astype(np.uint8), rng.uniform(0, 255, 40)
     gain, one = np.float32(rng.uniform(0.5, 1.5)), mean.astype(np.float32)
     a, b = np.empty((2, 40), dtype=np.int32)
-    texture._whole_levels(image, one, gain, a, b)
+    texture._whole_levels(image, one, gain, np.float32(274.0), a, b)
     np.testing.assert_array_equal(a, image)
-    lit = np.minimum(one * gain, np.float32(255.0))
+    lit = np.minimum(one * gain, np.where(image >= 250, 255.0, 274.0).astype(np.float32))
     np.testing.assert_array_equal(b, np.floor(lit + np.float32(0.5)))
 
 
@@ -124,7 +124,8 @@ def test_light_of_windows(seed: int, radius: int, rows: int, columns: int) -> No
     part = np.ascontiguousarray(image[top : top + rows, left : left + columns])
     light = np.empty(part.shape, dtype=np.float32)
     window_light(part, mean, gain, NOISE, radius, left, top, light)
-    lit_mean = np.minimum(mean * gain, np.float32(255.0))
+    most = 46340 // (2 * radius + 1) ** 2
+    lit_mean = np.minimum(mean * gain, np.where(image >= 250, 255.0, most))
     levels = np.floor(lit_mean + np.float32(0.5)).astype(np.int64)
     base = levels[top : top + rows, left : left + columns]
     for i in range(rows):
@@ -302,9 +303,10 @@ def test_labels_by_light(seed: int, radius: int, protect: bool, reveal: bool) ->
     )  # fmt: skip
     expected = labels.copy()
     inner = np.s_[part[1] : part[3], part[0] : part[2]]
+    lit = np.where(image >= 250, np.minimum(mean * gain, 255.0), mean * gain)
     expected[inner] = slow_labels(
-        image, np.minimum(mean * gain, 255.0), light, labels, examined, agree=agree,
-        radius=radius, protect=protect, reveal=reveal,
+        image, lit, light, labels, examined, agree=agree, radius=radius, protect=protect,
+        reveal=reveal,
     )[inner]  # fmt: skip
     np.testing.assert_array_equal(wide[2:, 3:], expected)
 

@@ -95,7 +95,7 @@ def test_a_signal_is_noted_and_breaks_nothing(number: int) -> None:
             ),
         ),
         ("player", ("bag", "loop start again at the end [false]")),
-        ("segmenter", ("camera", "value_max of grey cameras [0.95]")),
+        ("segmenter", ("camera", "value_max of grey cameras (without `undecided`) [0.95]")),
     ],
 )  # fmt: skip
 def test_help_lists_the_parameters_with_their_defaults(

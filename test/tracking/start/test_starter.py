@@ -228,13 +228,3 @@ def test_after_a_gap_the_start_goes_on_at_the_person_not_at_a_larger_object(
     monkeypatch.setattr(f"{STARTER}.find_hulls", with_object)
     result = tracker.step(later[1], first[0] + 2 * GAP_NS)
     assert result.state is TrackState.TRACKING and error_mm(result, later[2]) < 120.0
-
-
-def test_a_start_in_progress_follows_other_settings(walk) -> None:
-    scene, taken = walk
-    tracker = tracker_of(scene)
-    assert tracker.step(taken[0][1], taken[0][0]).settling
-    config = TrackerConfig.from_mapping({"threads": 1, "refine.floor_sd_m": 0.5})
-    tracker.configure(config)
-    assert tracker._starter is not None
-    assert tracker._starter._searcher_for(tracker.body).config == config
