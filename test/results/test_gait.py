@@ -46,6 +46,7 @@ def walker(
         parameters=empty,
         parameters_sd=empty,
         angles_deg=empty,
+        angles_sd_deg=empty,
         overlap=empty,
     )
 
