@@ -1,7 +1,14 @@
 """Body models: descriptions, subjects, forward kinematics, constraints, start poses."""
 
 from markerless_tracker.body.collision import RULES, Feasibility
-from markerless_tracker.body.kinematics import cone_transforms, markers, root_transform, transforms
+from markerless_tracker.body.kinematics import (
+    cone_transforms,
+    markers,
+    markers_of_many,
+    root_transform,
+    transforms,
+    transforms_of_many,
+)
 from markerless_tracker.body.load import load_body, load_description
 from markerless_tracker.body.model import LIMB_MARKERS, MARKER_NAMES, BodyModel
 from markerless_tracker.body.start import pose_from_markers, read_pose, write_pose
@@ -26,6 +33,7 @@ __all__ = [
     "load_body",
     "load_description",
     "markers",
+    "markers_of_many",
     "pose_from_markers",
     "read_pose",
     "read_subject",
@@ -33,6 +41,7 @@ __all__ = [
     "subject_from_markers",
     "subject_from_stature",
     "transforms",
+    "transforms_of_many",
     "write_pose",
     "write_subject",
 ]

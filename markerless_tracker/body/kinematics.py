@@ -140,10 +140,11 @@ def node_transform(n, pose, parent, fixed, kind, sign, parameter, out):  # type:
 
 
 @kernel
-def node_transforms(pose, parent, fixed, kind, sign, parameter, out):  # type: ignore[no-untyped-def]
-    """Fill out (m, 3, 4) with the world transforms of all nodes at a pose (p,)."""
-    for n in range(parent.size):
-        node_transform(n, pose, parent, fixed, kind, sign, parameter, out)
+def node_transforms(poses, parent, fixed, kind, sign, parameter, out):  # type: ignore[no-untyped-def]
+    """Fill out (n, m, 3, 4) with the world transforms of all nodes at poses (n, p)."""
+    for i in range(len(poses)):
+        for n in range(parent.size):
+            node_transform(n, poses[i], parent, fixed, kind, sign, parameter, out[i])
 
 
 def moving_nodes(body: BodyModel, active: IntArray) -> NDArray[np.bool_]:
@@ -164,9 +165,14 @@ def _find_moving(parent, parameter, active, moves):  # type: ignore[no-untyped-d
 
 def transforms(body: BodyModel, pose: FloatArray) -> FloatArray:
     """World transforms (m, 3, 4) of all nodes at a pose (p,)."""
-    out = np.empty((body.node_parent.size, 3, 4))
+    return np.asarray(transforms_of_many(body, np.asarray(pose)[None])[0])
+
+
+def transforms_of_many(body: BodyModel, poses: FloatArray) -> FloatArray:
+    """World transforms (n, m, 3, 4) of all nodes at poses (n, p)."""
+    out = np.empty((len(poses), body.node_parent.size, 3, 4))
     node_transforms(
-        np.ascontiguousarray(pose, dtype=np.float64),
+        np.ascontiguousarray(poses, dtype=np.float64),
         body.node_parent,
         body.node_fixed,
         body.node_kind,
@@ -188,6 +194,13 @@ def markers(body: BodyModel, pose: FloatArray) -> FloatArray:
     """The 15 markers (15, 3) in m, world frame, at a pose (p,)."""
     nodes = transforms(body, pose)[body.marker_node]
     return np.asarray(np.einsum("nij,nj->ni", nodes[:, :, :3], body.marker_offset) + nodes[:, :, 3])
+
+
+def markers_of_many(body: BodyModel, poses: FloatArray) -> FloatArray:
+    """The markers (n, 15, 3) in m, world frame, at poses (n, p)."""
+    nodes = transforms_of_many(body, poses)[:, body.marker_node]
+    rotated = np.matmul(nodes[..., :3], body.marker_offset[:, :, None])[..., 0]
+    return np.asarray(rotated + nodes[..., 3])
 
 
 def cone_transforms(body: BodyModel, pose: FloatArray) -> FloatArray:

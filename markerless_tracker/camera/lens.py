@@ -5,17 +5,25 @@ import numpy as np
 from markerless_tracker.compiled import kernel
 
 _NEAREST_M = 1e-6
+_OUTSIDE = 1e3
+"""Factor of the distance from the optical axis that puts a point outside of any image."""
 _INVERSE_STEPS = 5
 """Of `without_lens`: as many as OpenCV's."""
 
 
 @kernel
 def lens(a, b, distortion):  # type: ignore[no-untyped-def]
-    """Distorted position of a point of the plane at focal length 1, lens (5,) k1 k2 p1 p2 k3."""
+    """Distorted position of a point of the plane at focal length 1, lens (5,) k1 k2 p1 p2 k3.
+
+    Beyond some distance from the optical axis the polynomial falls: it would put points far beside
+    the camera into the image. They are put outside of any image instead.
+    """
     k1, k2, k3 = distortion[0], distortion[1], distortion[4]
     p1, p2 = distortion[2], distortion[3]
     r2 = a * a + b * b
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    if 1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3)) <= 0.0:
+        radial = _OUTSIDE
     ab = a * b
     return (
         a * radial + 2.0 * p1 * ab + p2 * (r2 + 2.0 * a * a),

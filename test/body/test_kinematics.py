@@ -197,12 +197,12 @@ def test_any_tree_agrees_with_the_numpy_reference(seed, nodes, parameters) -> No
     fixed = np.stack(
         [(e(*rng.uniform(-3, 3, 3)) @ move(*rng.uniform(-1, 1, 3)))[:3] for _ in range(nodes)]
     )
-    pose = rng.uniform(-3, 3, parameters)
-    out = np.full((nodes, 3, 4), np.nan)
-    node_transforms(pose, parent, fixed, kind, sign, parameter, out)
-    np.testing.assert_allclose(
-        out, slow_transforms(pose, parent, fixed, kind, sign, parameter), atol=1e-12
-    )
+    poses = rng.uniform(-3, 3, (2, parameters))
+    out = np.full((2, nodes, 3, 4), np.nan)
+    node_transforms(poses, parent, fixed, kind, sign, parameter, out)
+    for pose, placed in zip(poses, out, strict=True):
+        expected = slow_transforms(pose, parent, fixed, kind, sign, parameter)
+        np.testing.assert_allclose(placed, expected, atol=1e-12)
 
 
 def test_description_and_body_agree_on_names() -> None:

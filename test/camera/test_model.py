@@ -3,10 +3,12 @@
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from markerless_tracker.body import load_body
 from markerless_tracker.camera import CameraModel, CameraRig, project, project_camera, scaled_size
+from markerless_tracker.drawing import silhouette
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import rotation_from_rodrigues, transform
 
@@ -39,6 +41,9 @@ small = st.floats(-0.1, 0.1)
 def test_projection_agrees_with_opencv(rotation, local, lens) -> None:
     view = camera(rotation=rotation, lens=lens)
     depth = np.array(local)[:, 2:]
+    k1, k2, _, _, k3 = lens
+    r2 = (np.array(local)[:, :2] ** 2).sum(axis=1)
+    assume((1.0 + 3.0 * k1 * r2 + 5.0 * k2 * r2**2 + 7.0 * k3 * r2**3 > 0.0).all())
     points_cam = np.hstack([np.array(local)[:, :2] * depth, depth])
     points_world = points_cam @ view.T_world_cam[:3, :3].T + view.T_world_cam[:3, 3]
     expected, _ = cv2.projectPoints(
@@ -51,6 +56,33 @@ def test_projection_agrees_with_opencv(rotation, local, lens) -> None:
     np.testing.assert_allclose(
         project_camera(points_world, view), expected[:, 0], rtol=1e-7, atol=1e-5
     )
+
+
+@given(st.floats(0.0, 6.28), st.floats(0.0, 89.0), st.floats(-0.5, -0.05))
+def test_no_point_far_beside_a_camera_is_projected_into_its_image(around, beside, k1) -> None:
+    matrix = np.array([[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]])
+    view = CameraModel("cam01", (641, 481), matrix, np.array([k1, 0, 0, 0, 0]), np.eye(4))
+    tangent = np.tan(np.radians(beside))
+    point = np.array([[tangent * np.cos(around), tangent * np.sin(around), 1.0]])
+    u, v = project_camera(point, view)[0] - (320.0, 240.0)
+    turning = np.sqrt(-1.0 / (3.0 * k1))
+    if tangent < turning:
+        assert np.hypot(u, v) == pytest.approx(500.0 * tangent * (1.0 + k1 * tangent**2))
+    elif tangent > turning:
+        assert np.hypot(u, v) > 100.0 * 500.0 * turning
+
+
+def test_a_body_far_beside_a_camera_is_not_drawn_into_its_image() -> None:
+    matrix = np.array([[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]])
+    level = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.2], [1.0, 0.0, 0.0, 0.0],
+                      [0.0, 0.0, 0.0, 1.0]])  # fmt: skip
+    view = CameraModel("cam01", (640, 480), matrix, np.array([-0.3, 0, 0, 0, 0]), level)
+    body = load_body("person31", 1.75)
+    pose = body.neutral.copy()
+    pose[body.root_position] = (1.0, 2.0, 1.0)
+    assert not silhouette(body, pose, view).any()
+    pose[body.root_position] = (4.0, 0.0, 1.0)
+    assert silhouette(body, pose, view).any()
 
 
 def test_points_behind_the_camera_are_nan() -> None:

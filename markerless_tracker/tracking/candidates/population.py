@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from markerless_tracker.body import BodyModel
+from markerless_tracker.body import BodyModel, markers_of_many
 from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.fitness import Evaluator
@@ -16,7 +16,6 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.tracking.candidates.crossed import PAIRS, in_each_others_place
-from markerless_tracker.tracking.candidates.many_poses import markers_of_many
 from markerless_tracker.tracking.candidates.posture_costs import off_floor, unlike_postures
 from markerless_tracker.tracking.candidates.postures import first_guesses
 from markerless_tracker.tracking.candidates.prior_costs import prior_costs

@@ -9,9 +9,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from markerless_tracker.body import MARKER_NAMES, BodyModel
+from markerless_tracker.body import MARKER_NAMES, BodyModel, markers_of_many
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.candidates.many_poses import markers_of_many
 from markerless_tracker.tracking.candidates.postures import postures
 
 LOWER_M, UPPER_M, IN_FLOOR_M = 0.25, 0.70, 0.05

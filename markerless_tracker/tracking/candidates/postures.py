@@ -6,11 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from markerless_tracker.body import BodyModel
+from markerless_tracker.body import BodyModel, markers_of_many, transforms_of_many
 from markerless_tracker.body.anatomy import posture
 from markerless_tracker.body.model import MARKER_NAMES
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.candidates.many_poses import markers_of_many, transforms_of_many
 from markerless_tracker.tracking.evidence.hull import Hull
 
 HEADINGS = 16

@@ -6,13 +6,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from markerless_tracker.body import cone_transforms, load_body, markers
+from markerless_tracker.body import (
+    cone_transforms,
+    load_body,
+    markers,
+    markers_of_many,
+    transforms_of_many,
+)
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.candidates.crossed import PAIRS
-from markerless_tracker.tracking.candidates.many_poses import markers_of_many, transforms_of_many
 from markerless_tracker.tracking.candidates.mirror import mirror_of
 from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.candidates.postures import POSTURES, postures

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.body import load_body
+from markerless_tracker.body import load_body, markers_of_many
 from markerless_tracker.body.anatomy import heading, heading_difference, posture
 from markerless_tracker.body.model import MARKER_NAMES
-from markerless_tracker.tracking.candidates.many_poses import markers_of_many
 from markerless_tracker.tracking.candidates.postures import (
     ANKLE_M,
     HEADINGS,
