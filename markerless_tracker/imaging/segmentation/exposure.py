@@ -2,7 +2,8 @@
 
 Exposure control, flicker and clouds multiply a whole image by a factor. The factor is estimated as
 the mode of the ratios of pixels to their background: a person or a shadow gives other ratios, but
-in fewer pixels. It depends on this image only.
+in fewer pixels. Bright pixels weigh more, since noise, and what a video's coding shifts, are alike
+in grey levels. It depends on this image only.
 """
 
 import math
@@ -29,7 +30,7 @@ _LEAST_SAMPLES = 200
 
 
 @compiled()
-def _mode(counts, sums):  # type: ignore[no-untyped-def]
+def _mode(counts, weights, sums):  # type: ignore[no-untyped-def]
     """Ratio at the window of bins with the most samples; 1 if it has too few."""
     inside = 0
     for place in range(_WINDOW):
@@ -56,10 +57,11 @@ def _mode(counts, sums):  # type: ignore[no-untyped-def]
         place += 1
         if inside == most:
             seen += 1
-    middle = 0.0
+    weight, total = 0.0, 0.0
     for k in range(place, place + _WINDOW):
-        middle += sums[k]
-    return math.exp(middle / most)
+        weight += weights[k]
+        total += sums[k]
+    return math.exp(total / weight)
 
 
 @compiled()
@@ -72,6 +74,7 @@ def modal_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-u
     per_log = _BINS / (2.0 * _LOG_RANGE)
     channels = gain.size
     counts = np.zeros((channels, _BINS), dtype=np.int64)
+    weights = np.zeros((channels, _BINS), dtype=np.float64)
     sums = np.zeros((channels, _BINS), dtype=np.float64)
     # The channels of a pixel are adjacent in memory.
     for i in range(where.shape[0]):
@@ -80,10 +83,13 @@ def modal_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-u
             ratio = value_logs[pixel[c]] - base_logs[i, c]
             if abs(ratio) < _LOG_RANGE:  # False for NaN.
                 place = min(int((ratio + _LOG_RANGE) * per_log), _BINS - 1)
+                # The inverse variance of a ratio whose error is the same in grey levels.
+                weight = math.exp(2.0 * base_logs[i, c])
                 counts[c, place] += 1
-                sums[c, place] += ratio
+                weights[c, place] += weight
+                sums[c, place] += weight * ratio
     for c in range(channels):
-        gain[c] = _mode(counts[c], sums[c])
+        gain[c] = _mode(counts[c], weights[c], sums[c])
 
 
 class ExposureMeter:

@@ -216,20 +216,21 @@ class FramePopulation:
         return np.where(np.isfinite(costs), costs, np.inf)
 
     def costs_with_prior(self, poses: FloatArray) -> FloatArray:
-        """`costs` plus `prior_costs`, to compare poses."""
-        return self.costs(poses) + prior_costs(self._searcher.body, poses)
+        """`costs` plus `prior_costs` and, with a floor, feet off it; to compare poses."""
+        costs = self.costs(poses) + prior_costs(self._searcher.body, poses)
+        if self._searcher.config.refine.floor_sd_m > 0.0:
+            costs += off_floor(self._searcher.body, poses)
+        return np.asarray(costs)
 
     def best_cost(self, population: Population) -> float:
         """1 - f_s of the best pose of a population."""
         return float(self.costs(population.poses[:1])[0])
 
     def total_costs(self, poses: FloatArray) -> FloatArray:
-        """`costs_with_prior`, unusual postures (`usual`) and, with a floor, feet off it."""
+        """`costs_with_prior` and unusual postures (`usual`)."""
         costs = self.costs_with_prior(poses)
         if self.usual:
             costs += unlike_postures(self._searcher.body, poses)
-        if self._searcher.config.refine.floor_sd_m > 0.0:
-            costs += off_floor(self._searcher.body, poses)
         return costs
 
     def limb_costs(self, pose: FloatArray, limb: IntArray) -> Evaluator:

@@ -1,8 +1,9 @@
-"""Costs of poses that people hardly take, added to f_s in the search of a start.
+"""Costs of poses that people hardly take, added to 1 - f_s where poses are compared.
 
 Trousers of the floor's colour leave no silhouette, so that a body with its legs drawn up would fit
 best. Where a shadow is taken for a part of the person, a body with its feet in the floor would.
-Silhouettes with holes may be explained best by a posture that no person takes.
+Silhouettes with holes may be explained best by a posture that no person takes; that cost is for the
+search of a start alone.
 """
 
 from functools import lru_cache

@@ -36,10 +36,13 @@ MOST_COARSE_M3 = 6.0
 """The same upper limit on the coarse grid."""
 FLOOR_M = 0.08
 """Below this height above the floor, z = 0, undecided pixels are taken for shadows."""
-LEAST_PERSON = 0.25
+LEAST_PERSON = 0.15
 """Fraction of a component's points that two cameras must see as person."""
 HIGH_M = 0.35
 """Hulls of shadows on the floor are hardly higher than this. The trunk is searched above it."""
+FLAT_M = 0.7
+"""A hull lower than this, its trunk at the floor, is a shadow as dark as a person. The trunk of a
+person who lies is higher than `FLOOR_M`."""
 FOOT_M, SHIN_M = 0.22, 0.16
 """Points lower than `SHIN_M` are feet only within `FOOT_M`, horizontally, of a leg above."""
 TRUNK_DISTANCE_M = 0.45
@@ -85,6 +88,11 @@ class Hull:
     def height_m(self) -> float:
         """From its lowest to its highest point, less one spacing of the grid."""
         return self.high_m - self.low_m - FINE_M
+
+    @property
+    def on_floor(self) -> bool:
+        """Whether it is as flat as a shadow and lies about the floor."""
+        return self.height_m < FLAT_M and abs(float(self.trunk_m[:, 2].mean())) < FLOOR_M
 
     @classmethod
     def without_shadows(
@@ -165,7 +173,10 @@ def _fine(
     if count == 0:
         return None
     # The coarse component may include a shadow beside the person, which may be the larger part.
-    persons = np.bincount(parts.ravel(), weights=person.ravel())[1:]
+    high = person & inside
+    high[:, :, : max(0, int((HIGH_M - first[2]) / FINE_M))] = False
+    shown = high if FINE_M**3 * high.sum() >= LEAST_VOLUME_M3 else person
+    persons = np.bincount(parts.ravel(), weights=shown.ravel())[1:]
     part = parts == 1 + int(persons.argmax())
     volume = FINE_M**3 * float(part.sum())
     if not LEAST_VOLUME_M3 <= volume <= MOST_VOLUME_M3:
@@ -178,7 +189,8 @@ def _fine(
         return None
     if float(person[part].mean()) < LEAST_PERSON:
         return None
-    return Hull.without_shadows(points, FINE_M * depth[part], person[part])
+    hull = Hull.without_shadows(points, FINE_M * depth[part], person[part])
+    return None if hull.on_floor else hull
 
 
 @dataclass(frozen=True, eq=False)

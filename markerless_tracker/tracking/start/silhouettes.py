@@ -16,12 +16,22 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.observation import locked
 from markerless_tracker.records import Observation, pack_mask
 from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, lit_elsewhere
-from markerless_tracker.tracking.evidence.hull import FINE_M, Hull
+from markerless_tracker.tracking.evidence.hull import FINE_M, TRUNK_DISTANCE_M, Hull
 
 FLOOR_RADIUS_M = 3.0
 """Floor points farther than this from the hull are not tested: they may lie behind a wall."""
 _BLOCK_PX = 2
 """The floor test is made once per block of this many rows and columns."""
+_REACH_M = (-1.2, 1.0)
+"""Lower and upper end of the cylinder about the trunk, from the trunk's middle. Its radius is
+`TRUNK_DISTANCE_M`."""
+_INSIDE = 0.8
+"""Least share of a component's pixels in the cylinder's image."""
+_SMALL = 0.25
+"""Largest area of such a component, as a fraction of what the hull's points fall on: a larger one
+may be another person, farther away."""
+_FAR_PX = 1e5
+"""Points projected farther than this from the image are beside the camera."""
 
 
 def hulls_silhouettes(
@@ -39,7 +49,11 @@ def hulls_silhouettes(
 
 
 def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
-    """The silhouette's components that a hull's points fall on; the same object if that is all."""
+    """The silhouette's components that belong to the person; the same object if all do.
+
+    A hull's points fall on them, or they are small and lie around the trunk: where one view shows
+    a head or a leg in pieces, the hull of all views lacks it.
+    """
     mask = observation.not_background.view(np.uint8)
     count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
     if count <= 2:
@@ -47,6 +61,10 @@ def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Obs
     u, v = _pixels(hull.points_m, observation, camera)
     kept = np.zeros(count, dtype=np.bool_)
     kept[np.unique(labels[v, u])] = True
+    kept[0] = False
+    areas = np.bincount(labels.ravel(), minlength=count)
+    around = np.bincount(labels[_around(hull, observation, camera)], minlength=count)
+    kept |= (areas < _SMALL * areas[kept].sum()) & (around >= _INSIDE * areas)
     kept[0] = False
     if not kept.any() or kept[1:].all():
         return observation
@@ -139,6 +157,19 @@ def _covered(
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     change = cv2.MORPH_DILATE if grown else cv2.MORPH_CLOSE
     return np.asarray(cv2.morphologyEx(out, change, kernel) > 0)
+
+
+def _around(hull: Hull, observation: Observation, camera: CameraModel) -> NDArray[np.bool_]:
+    """Pixels (h, w) of an upright cylinder about the trunk; none if the camera is next to it."""
+    out = np.zeros((observation.height, observation.width), dtype=np.uint8)
+    angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+    ring = TRUNK_DISTANCE_M * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(16)])
+    middle = hull.trunk_m.mean(axis=0)
+    points = np.concatenate([middle + ring + (0.0, 0.0, height_m) for height_m in _REACH_M])
+    pixels = project_camera(points, camera) - observation.offset_px
+    if (np.abs(pixels) < _FAR_PX).all():
+        cv2.fillConvexPoly(out, cv2.convexHull(np.round(pixels).astype(np.int32)), 1)
+    return out.view(np.bool_)
 
 
 def _pixels(

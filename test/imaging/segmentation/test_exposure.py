@@ -9,8 +9,8 @@ def wall(channels: int = 3) -> np.ndarray:
     return np.random.default_rng(0).uniform(60.0, 180.0, (120, 160, channels)).astype(np.float32)
 
 
-def shot(mean: np.ndarray, gain: object, seed: int = 1) -> np.ndarray:
-    noise = np.random.default_rng(seed).normal(0.0, 3.0, mean.shape)
+def shot(mean: np.ndarray, gain: object, seed: int = 1, noise_sd: float = 3.0) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(0.0, noise_sd, mean.shape)
     return np.clip(np.rint(mean * gain + noise), 0, 255).astype(np.uint8)
 
 
@@ -31,6 +31,18 @@ def test_an_image_of_another_scene_gives_no_factor() -> None:
     assert (ExposureMeter(wall(1)).gain(np.zeros((120, 160, 1), np.uint8)) == 1.0).all()
     noise = np.random.default_rng(5).integers(0, 256, (120, 160, 1), dtype=np.uint8)
     assert (ExposureMeter(wall(1)).gain(noise) == 1.0).all()
+
+
+def test_a_video_that_shifts_grey_levels_is_not_brighter_at_a_wall() -> None:
+    """A dark floor has more pixels than a bright wall; the same shift is another factor there."""
+    mean = np.full((120, 160, 3), 70.0, np.float32)
+    mean[:36] = 171.0
+    frames = [shot(mean, 1.0, i, 1.0) for i in range(8)]
+    shifted = shot(mean - 4.0, 1.0, 9, 1.0)
+    gain = ExposureMeter(mean).gain(shifted)
+    assert np.abs(gain * mean - (mean - 4.0)).max() < 2.2
+    seen = Segmenter("cam01", learn_background(frames)).observe(shifted, 0)
+    assert not seen.not_background.any()
 
 
 @pytest.mark.parametrize("channels", [1, 3])

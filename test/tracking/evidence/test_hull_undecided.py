@@ -5,11 +5,14 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+from markerless_tracker.body import markers
 from markerless_tracker.camera import project_camera
+from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking.evidence.hull import (
     FINE_M,
+    FLAT_M,
     FLOOR_M,
     FOOT_M,
     SHIN_M,
@@ -163,6 +166,49 @@ def test_the_floor_far_from_the_legs_is_no_foot(person) -> None:
     assert gaps[hull.points_m[far, 2] < SHIN_M].max() < FOOT_M + 2 * FINE_M
     # The feet stay.
     assert hull.low_m < plain.low_m + 0.04
+
+
+def floor_patch(scene, masks, away_m, size_m):
+    """(h, w) per view: a patch of the floor beside the person, along x."""
+    pelvis = scene.markers(0)[0]
+    low = (pelvis[0] + away_m, pelvis[1] - 0.5 * size_m, -0.001)
+    high = (low[0] + size_m, low[1] + size_m, 0.001)
+    return {n: box_pixels(scene.rig[n], low, high, m.shape) for n, m in masks.items()}
+
+
+def test_a_dark_shadow_is_nobody(person) -> None:
+    """A patch of the floor that all views show as person has a hull as thick as masks are grown."""
+    scene, masks = person
+    patch = floor_patch(scene, masks, 0.0, 0.9)
+    nothing = {name: np.zeros_like(mask) for name, mask in masks.items()}
+    assert not list(
+        find_hulls(cameras(scene), {n: observe(n, patch[n], nothing[n]) for n in masks})
+    )
+
+
+def test_a_dark_shadow_does_not_hide_the_person(person) -> None:
+    """Legs without silhouettes separate it from the person, of whom it has more points."""
+    scene, masks = person
+    patch = floor_patch(scene, masks, -0.45, 0.9)
+    nothing = {name: np.zeros_like(mask) for name, mask in masks.items()}
+    upper = {name: mask & ~lower_half(mask) for name, mask in masks.items()}
+    seen = {n: observe(n, upper[n] | patch[n], nothing[n]) for n in masks}
+    hull = next(find_hulls(cameras(scene), seen))
+    assert np.linalg.norm(hull.trunk_m.mean(axis=0) - scene.markers(0)[:2].mean(axis=0)) < 0.25
+
+
+def test_a_person_who_lies_is_found() -> None:
+    scene = SyntheticScene(body="person31", size_px=(256, 192), seed=4)
+    pose = scene.body.neutral.copy()
+    pose[scene.body.root_position] = (0.0, 0.0, 0.16)
+    pose[scene.body.index("pelvis_ry")] = 0.5 * np.pi
+    nothing = np.zeros((192, 256), dtype=np.bool_)
+    masks = {c.name: silhouette(scene.body, pose, c) > 0 for c in scene.rig}
+    seen = {name: observe(name, mask, nothing) for name, mask in masks.items()}
+    hull = next(find_hulls(cameras(scene), seen))
+    assert hull.height_m < FLAT_M
+    trunk_m = markers(scene.body, pose)[:2].mean(axis=0)
+    assert np.linalg.norm((hull.trunk_m.mean(axis=0) - trunk_m)[:2]) < 0.4
 
 
 def box_pixels(camera, low_m, high_m, shape):

@@ -1,9 +1,12 @@
 """A limb is found where the evidence that was decided for a wrong pose speaks against it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from markerless_tracker.body import MARKER_NAMES, markers
+from markerless_tracker.camera import project_camera
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking import TrackerConfig
@@ -17,6 +20,7 @@ from markerless_tracker.tracking.search import Searcher
 
 SEARCH = "markerless_tracker.tracking.limbs.search"
 ANKLE = MARKER_NAMES.index("LAnkle")
+ANKLES = [ANKLE, MARKER_NAMES.index("RAnkle")]
 
 
 @pytest.fixture(scope="module")
@@ -126,6 +130,32 @@ def test_poses_are_compared_with_the_prior_of_their_limbs(bent, monkeypatch) -> 
     assert search.own_cost == pytest.approx(plain + 0.25)
     found, cost = own.refined(true, 3, (0.1, 0.03))
     assert cost == pytest.approx(own.cost(found) + 0.25)
+
+
+@pytest.mark.parametrize(("floor_sd_m", "found"), [(0.03, True), (0.0, False)])
+def test_legs_of_which_little_shows_are_found_on_the_floor(bent_leg, floor_sd_m, found) -> None:
+    """Trousers with stripes of the floor's colour: one leg alone hardly explains more there."""
+    scene, masks, standing, _, _ = bent_leg(0.0, 0.0)
+    body = scene.body
+    folded = standing.copy()
+    for side in "lr":
+        folded[[body.index(f"{side}_hip_y"), body.index(f"{side}_knee")]] = 2.0, 2.4
+    pelvis_m = markers(body, standing)[[MARKER_NAMES.index("Pelvis")]]
+    seen = {}
+    for camera in scene.rig:
+        mask = masks[camera.name].copy()
+        rows = np.arange(len(mask))
+        mask[(rows > project_camera(pelvis_m, camera)[0, 1]) & (rows % 3 > 0)] = False
+        edges = np.zeros(mask.shape, np.uint8)
+        seen[camera.name] = Observation.from_mask(camera.name, 0, mask, edges)
+    config = TrackerConfig(threads=1, refine=replace(TrackerConfig().refine, floor_sd_m=floor_sd_m))
+    searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
+    frame = FramePopulation(searcher, seen, 0, folded)
+    own = OwnEvidence(searcher, seen, 0, frame)
+    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, folded, 0.003)
+    for turn, name in enumerate(("l_leg", "r_leg") * 3):
+        search.elsewhere(body.subspaces[name], keyed_generator(0, 0, f"turn {turn}"), None)
+    assert (markers(body, search.pose)[ANKLES, 2].max() < 0.3) == found
 
 
 def test_the_best_draws_are_those_by_f_s_and_those_with_the_prior(bent) -> None:

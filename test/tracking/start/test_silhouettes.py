@@ -133,6 +133,38 @@ def test_other_components_are_left_out(person) -> None:
     assert hulls_part(alone, scene.rig[name], hull) is alone
 
 
+def cut(mask, share):
+    """A mask without four of its rows, at a share of its height, and the rows above them."""
+    rows = np.flatnonzero(mask.any(axis=1))
+    row = rows[0] + int(share * (rows[-1] - rows[0]))
+    out = mask.copy()
+    out[row : row + 4] = False
+    return out, np.arange(len(mask))[:, None] < row
+
+
+@pytest.mark.parametrize(
+    ("share", "stays"),
+    [
+        pytest.param(0.14, True, id="head"),
+        # As large as another person, farther away.
+        pytest.param(0.5, False, id="upper-half"),
+    ],
+)
+def test_a_small_part_that_another_view_does_not_show_stays(person, share, stays) -> None:
+    """One view carves it from the hull; in the others a gap separates it."""
+    scene, masks, _ = person
+    first, *others = masks
+    parts = {name: cut(mask, share) for name, mask in masks.items()}
+    seen = {name: observe(name, part) for name, (part, _) in parts.items()}
+    seen[first] = observe(first, parts[first][0] & ~parts[first][1])
+    hull = next(find_hulls(cameras(scene), seen))
+    assert hull.high_m < scene.markers(0)[:, 2].max() - 0.1
+    for name in others:
+        above = parts[name][0] & parts[name][1]
+        assert above.any()
+        assert hulls_part(seen[name], scene.rig[name], hull).mask[above].all() == stays
+
+
 def near(mask, px=6):
     """(h, w): the pixels within a square about those of a mask."""
     rows, columns = np.nonzero(mask)
