@@ -9,6 +9,7 @@ import numpy as np
 
 from markerless_tracker.body import (
     MARKER_NAMES,
+    BodyModel,
     Subject,
     load_description,
     pose_from_markers,
@@ -86,7 +87,8 @@ def build_tracker(
         stature: the person's height, m; the lengths are those of a generic person.
 
     Raises:
-        ConfigError: more than one subject, or none and the start is no TRC.
+        ConfigError: more than one subject, or none and the start is no TRC; or a body that cannot
+            be found automatically, without a start pose or with `search_again`.
         TrackerError: a file cannot be read or does not fit.
     """
     given = {"subject_file": subject_file, "subject_from": subject_from, "stature": stature}
@@ -116,6 +118,8 @@ def build_tracker(
         pose = pose_from_markers(body, start.markers_m, limits=joint_limits(body, config))
     elif start_file is not None:
         pose = read_pose(start_file, body)
+    if pose is None or config.search_again:
+        _require_parts_of_a_start(body)
     make = partial(
         Tracker,
         rig,
@@ -128,6 +132,19 @@ def build_tracker(
         person=person,
     )
     return TrackerSetup(make(), make, None if start is None else start.stamp_ns, person)
+
+
+def _require_parts_of_a_start(body: BodyModel) -> None:
+    """Refuse a body that the automatic start cannot place."""
+    rotations = ("pelvis_rx", "pelvis_ry", "pelvis_rz")
+    missing = [f"parameter {name}" for name in rotations if name not in body.parameter_names]
+    if body.hierarchies and "six" not in body.hierarchies:
+        missing.append("hierarchy six")
+    if missing:
+        raise ConfigError(
+            f"body {body.name} has no {', no '.join(missing)}, which finding a person takes: "
+            "add it, or give a start pose and set search_again to false"
+        )
 
 
 def _subject(

@@ -16,6 +16,7 @@ from markerless_tracker.body import (
 from markerless_tracker.datasets import MarkerTrack, write_trc
 from markerless_tracker.errors import BodyModelError, ConfigError, DatasetError
 from markerless_tracker.records import TrackState
+from markerless_tracker.resources import config_dir
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 
 
@@ -149,3 +150,26 @@ def test_sections_given_with_the_subject_are_not_fitted(scene, refined_settings,
         tracker.step(frames[0].observations, 0)
         fitted.append(not np.array_equal(tracker.body.cone_shape, before))
     assert fitted == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        pytest.param("  six:", "  steps:", "no hierarchy six", id="hierarchy"),
+        pytest.param("pelvis_rx", "trunk_rx", "no parameter pelvis_rx", id="parameter"),
+    ],
+)
+def test_a_body_that_cannot_be_found_is_refused_before_the_first_frame(
+    scene, config, files, old, new, named
+):
+    description = (config_dir() / "bodies" / "balan31.yaml").read_text()
+    assert old in description
+    path = files / "own.yaml"
+    path.write_text(description.replace(old, new))
+    config = dataclasses.replace(config, body=str(path))
+    with pytest.raises(ConfigError, match=f"{named}.*give a start pose"):
+        build_tracker(scene.rig, config)
+    start = files / "start.trc"
+    with pytest.raises(ConfigError, match="search_again"):
+        build_tracker(scene.rig, dataclasses.replace(config, search_again=True), start_file=start)
+    build_tracker(scene.rig, dataclasses.replace(config, search_again=False), start_file=start)
