@@ -32,6 +32,8 @@ HELP = (
 )
 EXAMPLE = "markerless_tracker view out/walk --film walk.webm --sheet walk.png"
 
+_FRAMES = 4
+"""Frames of a picture, if none are given."""
 MOST_RRD_PICTURES = 300
 """Largest number of frames with pictures in the file for the Rerun viewer."""
 
@@ -75,8 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--frames",
         metavar="N",
         type=count,
-        default=4,
-        help="frames of the picture, from the first to the last (default 4)",
+        help=f"frames of the picture, from the first to the last (default {_FRAMES})",
     )
     parser.add_argument(
         "--width",
@@ -125,8 +126,8 @@ def run(args: argparse.Namespace) -> int:
             _write(result, images, rrd=path)
             return subprocess.run([sys.executable, "-m", "rerun", str(path)]).returncode
     _write(
-        result, images, film=args.film, sheet=args.sheet, rrd=args.rrd, frames=args.frames,
-        width_px=args.width,
+        result, images, film=args.film, sheet=args.sheet, rrd=args.rrd,
+        frames=_FRAMES if args.frames is None else args.frames, width_px=args.width,
     )  # fmt: skip
     if args.json:
         json.dump({"files": [str(path) for path in targets]}, sys.stdout, indent=2)

@@ -28,8 +28,12 @@ def run_node(args: argparse.Namespace) -> int:
         ConfigError: options that need a result, or no output to show it in.
         RosMissingError: ROS 2 is not installed.
     """
-    if args.name is not None or args.film is not None or args.source is not None:
-        raise ConfigError("--node shows a running tracker, expected no NAME, --film and --source")
+    of_results = (args.name, args.film, args.source, args.frames)
+    if args.whole or any(value is not None for value in of_results):
+        raise ConfigError(
+            "--node shows a running tracker, "
+            "expected no NAME, --film, --source, --frames and --whole"
+        )
     shows = args.rrd is not None or args.sheet is None
     if shows:
         require_rerun()

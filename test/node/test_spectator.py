@@ -92,6 +92,8 @@ def test_without_a_tracker_it_says_so(other_domain: None, tmp_path: Path) -> Non
     ("words", "reason"),
     [
         (["out/walk", "--node"], "expected no NAME"),
+        (["--node", "--frames", "3"], "expected no NAME, --film, --source, --frames"),
+        (["--node", "--whole"], "and --whole"),
         (["out/walk", "--seconds", "2"], "--seconds is given without --node"),
         ([], "expected NAME of a result, or --node"),
     ],
