@@ -40,9 +40,9 @@ LEAST_PERSON = 0.15
 """Fraction of a component's points that two cameras must see as person."""
 HIGH_M = 0.35
 """Hulls of shadows on the floor are hardly higher than this. The trunk is searched above it."""
-FLAT_M = 0.7
-"""A hull lower than this, its trunk at the floor, is a shadow as dark as a person. The trunk of a
-person who lies is higher than `FLOOR_M`."""
+FLAT_M, AT_FLOOR_M = 0.7, 0.06
+"""A hull lower than the first, with its trunk nearer to the floor's plane than the second, is a
+shadow as dark as a person. The trunk of a person who lies on the floor is 0.10 m above it."""
 FOOT_M, SHIN_M = 0.22, 0.16
 """Points lower than `SHIN_M` are feet only within `FOOT_M`, horizontally, of a leg above."""
 TRUNK_DISTANCE_M = 0.45
@@ -92,7 +92,7 @@ class Hull:
     @property
     def on_floor(self) -> bool:
         """Whether it is as flat as a shadow and lies about the floor."""
-        return self.height_m < FLAT_M and abs(float(self.trunk_m[:, 2].mean())) < FLOOR_M
+        return self.height_m < FLAT_M and abs(float(self.trunk_m[:, 2].mean())) < AT_FLOOR_M
 
     @classmethod
     def without_shadows(
