@@ -31,7 +31,7 @@ _LEAST_SAMPLES = 200
 
 @compiled()
 def _mode(counts, weights, sums):  # type: ignore[no-untyped-def]
-    """Ratio at the window of bins with the most samples; 1 if it has too few."""
+    """Weighted mean ratio in the window of bins with the most samples; 1 if it has too few."""
     inside = 0
     for place in range(_WINDOW):
         inside += counts[place]
