@@ -18,7 +18,7 @@ FIRST = "README.md"
 """The first page."""
 ALWAYS = (
     "CONTRIBUTING.md", "CHANGELOG.md", "QUALITY_DECLARATION.md", "bench/README.md",
-    "bags/README.md",
+    "bench/choices.md", "bags/README.md",
 )  # fmt: skip
 """Pages of the navigation that lie outside docs/."""
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".xml": "xml", ".json": "json"}
