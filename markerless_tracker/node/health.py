@@ -9,6 +9,8 @@ from markerless_tracker.records import TrackState
 
 QUIET_S = 2.0
 """Time without images, sets or results after which their absence is reported."""
+MOST = 0.5
+"""Share of skipped sets from which they are reported."""
 PROCESSING = "processing images"
 """Activity of a tracker that processes images as they come."""
 NEWS: Mapping[TrackState, str] = MappingProxyType(
@@ -52,6 +54,7 @@ class Facts:
         last_error: error of the last set; empty if it was tracked.
         clock_missing: whether `use_sim_time` is set and no /clock is received.
         doubts: about the run so far, one line each.
+        skipped: share of the sets that were skipped for newer ones lately.
     """
 
     ready: bool
@@ -70,6 +73,7 @@ class Facts:
     last_error: str = ""
     clock_missing: bool = False
     doubts: Sequence[str] = ()
+    skipped: float | None = None
 
 
 @dataclass(frozen=True)
@@ -82,12 +86,14 @@ class Health:
         trouble: the reason for missing results; empty if there are results, None while unknown.
         without: the cameras that results come without, and why; empty if there is none, None
             without recent results.
+        skipping: says that most sets are skipped; empty if they are not.
     """
 
     level: Level
     message: str
     trouble: str | None = None
     without: str | None = None
+    skipping: str = ""
 
 
 def assess(facts: Facts) -> Health:
@@ -131,7 +137,16 @@ def _working(facts: Facts) -> Health:
         return Health(Level.WARN, f"{facts.state.value}: {without}", "", without)
     if facts.doubts:
         return Health(Level.WARN, f"{facts.state.value}: doubt: {facts.doubts[0]}", "", without)
-    return Health(Level.OK, facts.state.value, "", without)
+    skipping = _skipping(facts)
+    message = f"{facts.state.value}: {skipping}" if skipping else facts.state.value
+    return Health(Level.OK, message, "", without, skipping)
+
+
+def _skipping(facts: Facts) -> str:
+    if facts.skipped is None or facts.skipped < MOST:
+        return ""
+    share = f"{100.0 * facts.skipped:.0f} %"
+    return f"{share} of the sets are skipped: they come faster than this machine tracks them"
 
 
 def _trouble(facts: Facts) -> str:

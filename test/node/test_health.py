@@ -29,6 +29,13 @@ def facts(**changes: Any) -> Facts:
     ("changes", "level", "message"),
     [
         ({}, Level.OK, "TRACKING"),
+        ({"skipped": 0.49}, Level.OK, "TRACKING"),
+        (
+            {"skipped": 0.714}, Level.OK,
+            "TRACKING: 71 % of the sets are skipped: they come faster than this machine tracks "
+            "them",
+        ),
+        ({"skipped": 0.9, "doubts": ("low",)}, Level.WARN, "TRACKING: doubt: low"),
         ({"state": TrackState.LOST}, Level.WARN, "LOST: person lost"),
         ({"doubts": ("too small", "too low")}, Level.WARN, "TRACKING: doubt: too small"),
         (

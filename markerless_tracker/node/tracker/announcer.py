@@ -72,6 +72,7 @@ class Announcer:
         self._state = TrackState.SEARCHING
         self._found = False
         self._trouble = self._without = ""
+        self._skipping = False
         self._late: set[str] = set()
         self._doubted: set[str] = set()
 
@@ -94,7 +95,13 @@ class Announcer:
                 self._notices.say(f"doubt: {doubt}")
 
     def health(self, health: Health) -> None:
-        """Log lost and recovered cameras, the reason for missing results, and its end."""
+        """Log lost and recovered cameras, the reason for missing results, and its end.
+
+        That most sets are skipped is logged once.
+        """
+        if health.skipping and not self._skipping:
+            self._notices.say(health.skipping)
+            self._skipping = True
         if health.without is not None and kind_of(health.without) != kind_of(self._without):
             if health.without:
                 self._notices.say(f"{self._state.value}: {health.without}")

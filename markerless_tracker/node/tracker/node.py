@@ -24,6 +24,7 @@ from markerless_tracker.node.tracker import parameters
 from markerless_tracker.node.tracker.announcer import Announcer
 from markerless_tracker.node.tracker.cameras.build import make_inputs, view_reader
 from markerless_tracker.node.tracker.changes import LIVE, LiveSettings
+from markerless_tracker.node.tracker.pace.skipping import SkippedShare
 from markerless_tracker.node.tracker.pace.states import StatePace
 from markerless_tracker.node.tracker.pace.waiting import kept_sets
 from markerless_tracker.node.tracker.publishing.files import Pictures, ResultFile
@@ -85,6 +86,7 @@ class TrackerNode(GivenNode):
         self._found = False
         self._missing: Sequence[str] = ()
         self._repeated = (0, 0.0)
+        self._skipped = SkippedShare()
         self._late_ns: int | None = None
         self._state_lock = Lock()
         self._state_pace = StatePace()
@@ -309,7 +311,13 @@ class TrackerNode(GivenNode):
             and now_s - self._started_s > QUIET_S
             and self.get_clock().now().nanoseconds == 0,
             doubts=self._report.doubts,
+            skipped=self._skipped_share(now_s),
         )
+
+    def _skipped_share(self, now_s: float) -> float | None:
+        if not self._status.ready:
+            return None
+        return self._skipped.update(now_s, self._status.tracked_sets, self._sets.counts.skipped)
 
     def _tick(self) -> None:
         now_s = self._seconds()

@@ -67,6 +67,12 @@ class TrackerStatus:
             return self._ready
 
     @property
+    def tracked_sets(self) -> int:
+        """Number of sets that were tracked."""
+        with self._lock:
+            return self._tracked
+
+    @property
     def stamp_ns(self) -> int:
         """Stamp of the last result; 0 before the first."""
         with self._lock:

@@ -79,6 +79,17 @@ def test_each_kind_of_doubt_is_said_once() -> None:
     assert log.warnings == ["doubt: body and silhouettes overlap by 0.71", "doubt: too low"]
 
 
+def test_skipped_sets_are_said_once() -> None:
+    log = Log()
+    log.results(TRACKING)
+    for share in (None, 0.6, 0.2, 0.8):
+        log.now_s += 60.0
+        log.announcer.health(assess(facts(skipped=share)))
+    assert log.warnings == [
+        "60 % of the sets are skipped: they come faster than this machine tracks them"
+    ]
+
+
 def test_a_camera_that_is_gone_and_back_is_said_once_each() -> None:
     log = Log()
     log.results(TRACKING)
