@@ -29,6 +29,8 @@ LEAST_VIEWS = 2
 LEAST_EXTENT_M = 0.45
 """A component with a smaller extent in every direction is no person."""
 LEAST_VOLUME_M3 = 0.015
+LEAST_PIECE_M3 = 0.0027
+"""A smaller piece of a hull, half the volume of a head, does not count."""
 MOST_VOLUME_M3 = 1.5
 """Limits of a person's volume. The upper one is that of a tall person seen by two cameras only,
 whose hull is too large."""
@@ -49,6 +51,8 @@ TRUNK_DISTANCE_M = 0.45
 """Horizontal distance from the trunk. Beyond it, points on the floor are shadows, and so are points
 lower than `HIGH_M` that no two cameras see as person. A component has no points farther than this
 from those that two cameras see as person, since shadows on walls are connected to it."""
+_BRIDGED = 2
+"""Number of cells of the room's grid that may lie between two pieces, one above the other."""
 _RADIUS_M = 5.0
 _UP_M = 2.5
 """Half the width and half the height of the grid."""
@@ -141,7 +145,10 @@ def find_hulls(
     low = middle - (_RADIUS_M, _RADIUS_M, _UP_M)
     size = np.ceil(2.0 * np.array([_RADIUS_M, _RADIUS_M, _UP_M]) / COARSE_M).astype(np.int64)
     inside, view_count, _ = _occupied(low, size, COARSE_M, views)
-    labels, count = ndimage.label(inside, structure=np.ones((3, 3, 3), dtype=np.bool_))
+    # Where a view lacks a piece of the person, the hull is in pieces, one above the other.
+    bridged = inside | ndimage.binary_closing(inside, structure=np.ones((1, 1, _BRIDGED + 1)))
+    labels, count = ndimage.label(bridged, structure=np.ones((3, 3, 3), dtype=np.bool_))
+    labels[~inside] = 0
     support = np.bincount(labels[inside], weights=view_count[inside], minlength=count + 1)
     boxes = ndimage.find_objects(labels)
     for number in np.argsort(-support[1:], kind="stable") + 1:
@@ -167,17 +174,22 @@ def _fine(
     near = ndimage.binary_dilation(
         np.pad(labels[box] == number, 1), structure=np.ones((3, 3, 3), dtype=np.bool_)
     )
-    inside, _, person = _occupied(first, size, FINE_M, views, near)
+    inside, view_count, person = _occupied(first, size, FINE_M, views, near)
     inside &= _dilated(np.asarray((person & inside).any(axis=2)))[:, :, None]
     parts, count = ndimage.label(inside)
     if count == 0:
         return None
-    # The coarse component may include a shadow beside the person, which may be the larger part.
+    # The coarse component may include a shadow beside the person, or space before a camera that the
+    # others do not see. Either may be the larger part.
     high = person & inside
     high[:, :, : max(0, int((HIGH_M - first[2]) / FINE_M))] = False
     shown = high if FINE_M**3 * high.sum() >= LEAST_VOLUME_M3 else person
-    persons = np.bincount(parts.ravel(), weights=shown.ravel())[1:]
+    persons = np.bincount(parts.ravel(), weights=(shown * view_count).ravel())[1:]
     part = parts == 1 + int(persons.argmax())
+    above = parts[:, :, max(0, int((HIGH_M - first[2]) / FINE_M)) :]
+    pieces = FINE_M**3 * np.bincount(above.ravel(), minlength=count + 1) >= LEAST_PIECE_M3
+    pieces[0] = False
+    part |= pieces[parts] & _dilated(np.asarray((part & person).any(axis=2)))[:, :, None]
     volume = FINE_M**3 * float(part.sum())
     if not LEAST_VOLUME_M3 <= volume <= MOST_VOLUME_M3:
         return None
