@@ -146,7 +146,9 @@ def find_hulls(
     size = np.ceil(2.0 * np.array([_RADIUS_M, _RADIUS_M, _UP_M]) / COARSE_M).astype(np.int64)
     inside, view_count, _ = _occupied(low, size, COARSE_M, views)
     # Where a view lacks a piece of the person, the hull is in pieces, one above the other.
-    bridged = inside | ndimage.binary_closing(inside, structure=np.ones((1, 1, _BRIDGED + 1)))
+    bridged = inside | ndimage.binary_closing(
+        inside, structure=np.ones((1, 1, _BRIDGED + 1), np.bool_)
+    )
     labels, count = ndimage.label(bridged, structure=np.ones((3, 3, 3), dtype=np.bool_))
     labels[~inside] = 0
     support = np.bincount(labels[inside], weights=view_count[inside], minlength=count + 1)
