@@ -57,10 +57,6 @@ class OwnEvidence:
             return self._frame
         return self._population(self._imaged, self._frame.near)
 
-    def cost(self, pose: FloatArray) -> float:
-        """1 - f_s of a pose (p,)."""
-        return float(self._decided(pose).costs(pose[None])[0])
-
     def cost_with_prior(self, pose: FloatArray) -> float:
         """The cost of a pose (p,) as `FramePopulation.costs_with_prior`; to compare poses."""
         return float(self._decided(pose).costs_with_prior(pose[None])[0])

@@ -305,7 +305,7 @@ class Starter:
             if not len(facing):
                 return None
             best = facing.poses[0]
-            return HeadingFit(frame.contours, best, own.cost(best), self._trunk(best))
+            return HeadingFit(frame.contours, best, own.cost_with_prior(best), self._trunk(best))
 
         first, opposite = (fit(heading_rad) for heading_rad in self._headings.both_rad)
         self._headings.note(stamp_ns, (first, opposite))

@@ -39,8 +39,8 @@ def test_evidence_decided_for_a_wrong_pose_speaks_against_the_true_one(legs_unde
     shared = frame.costs(np.array([true, wrong]))
     assert shared[0] > shared[1]
     # A cost of its own does not depend on what was decided before.
-    assert own.cost(true) - own.cost(wrong) < 0.5 * (shared[0] - shared[1])
-    assert own.cost(true) == own_of(searcher, seen, true)[1].cost(true)
+    assert own.cost_with_prior(true) - own.cost_with_prior(wrong) < 0.5 * (shared[0] - shared[1])
+    assert own.cost_with_prior(true) == own_of(searcher, seen, true)[1].cost_with_prior(true)
 
 
 def test_undecided_pixels_count_for_no_pose(legs_undecided) -> None:
@@ -75,7 +75,11 @@ def test_the_evidence_of_a_pose_is_decided_once(legs_undecided, monkeypatch) -> 
         return decide(imaged, cameras, body, pose)
 
     monkeypatch.setattr("markerless_tracker.tracking.candidates.own_evidence.decide", counted)
-    first, again, other = own.cost(true), own.cost(true.copy()), own.cost(wrong)
+    first, again, other = (
+        own.cost_with_prior(true),
+        own.cost_with_prior(true.copy()),
+        own.cost_with_prior(wrong),
+    )
     assert first == again != other and len(poses) == 2
 
 
@@ -88,4 +92,4 @@ def test_without_undecided_pixels_all_poses_share_the_evidence(legs_undecided) -
     }
     frame, own = own_of(searcher, two_classes, true)
     assert not own.differs and own.undecided is frame
-    assert own.cost(wrong) == frame.costs(wrong[None])[0]
+    assert own.cost_with_prior(wrong) == frame.costs_with_prior(wrong[None])[0]

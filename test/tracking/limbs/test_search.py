@@ -46,7 +46,7 @@ def test_a_leg_that_decided_its_evidence_is_found_elsewhere(bent) -> None:
     own = OwnEvidence(searcher, seen, 0, frame)
     costs = frame.costs(np.array([true, wrong]))
     assert costs[0] > costs[1] + CLOSE
-    assert own.cost(true) < own.cost(wrong)
+    assert own.cost_with_prior(true) < own.cost_with_prior(wrong)
     search = LimbSearch(Recombiner(body, searcher.limits), frame, own, wrong, 0.003)
     leg = body.subspaces["l_leg"]
     assert any(search.elsewhere(leg, keyed_generator(0, 0, f"{i}"), None) for i in range(8))
@@ -118,18 +118,20 @@ def test_poses_are_compared_with_the_prior_of_their_limbs(bent, monkeypatch) -> 
     searcher, seen, true, _ = bent
     frame = FramePopulation(searcher, seen, 0, true)
     own = OwnEvidence(searcher, seen, 0, frame)
-    plain = own.cost(true)
+    prior = 0.0
     monkeypatch.setattr(
         "markerless_tracker.tracking.candidates.population.prior_costs",
-        lambda body, poses: np.full(len(poses), 0.25),
+        lambda body, poses: np.full(len(poses), prior),
     )
+    plain = own.cost_with_prior(true)
+    prior = 0.25
     assert own.cost_with_prior(true) == pytest.approx(plain + 0.25)
-    assert own.cost(true) == plain
     assert frame.total_costs(true[None])[0] >= frame.costs(true[None])[0] + 0.25
     search = LimbSearch(Recombiner(searcher.body, searcher.limits), frame, own, true, 0.003)
     assert search.own_cost == pytest.approx(plain + 0.25)
     found, cost = own.refined(true, 3, (0.1, 0.03))
-    assert cost == pytest.approx(own.cost(found) + 0.25)
+    prior = 0.0
+    assert cost == pytest.approx(own.cost_with_prior(found) + 0.25)
 
 
 @pytest.mark.parametrize(("floor_sd_m", "found"), [(0.03, True), (0.0, False)])

@@ -77,6 +77,21 @@ def test_the_stature_need_not_be_known(walk) -> None:
     assert abs(tall["it"] - tall["true"]) < 0.10
 
 
+def test_how_usual_the_limbs_are_counts_for_the_heading(walk, monkeypatch) -> None:
+    """Limbs that are most unusual with the true heading let the opposite one lead."""
+    scene, taken = walk
+    true_rad = heading(taken[0][2])
+
+    def prior(body, poses):
+        right = [heading_difference(heading(markers(body, p)), true_rad) < 1.5 for p in poses]
+        return np.where(right, 0.2, 0.0)
+
+    monkeypatch.setattr("markerless_tracker.tracking.candidates.population.prior_costs", prior)
+    tracker = tracker_of(scene, stature=1.72)
+    results = [tracker.step(seen, stamp) for stamp, seen, _ in taken[:SETTLING_FRAMES]]
+    assert heading_difference(heading(results[-1].markers_m), true_rad) > 2.5
+
+
 def test_nobody_is_a_state_and_no_error(walk) -> None:
     scene, taken = walk
     tracker = tracker_of(scene, stature=1.72)
