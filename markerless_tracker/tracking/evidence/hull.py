@@ -3,8 +3,8 @@
 A point of the room belongs to the visual hull if no camera that has it in view sees background
 there (Laurentini 1994, on a grid of points). Undecided pixels never carve the hull, since legs may
 look like a shadow in some views. Shadows lie on the floor, so points near the floor count only
-where two cameras see a person. A connected component of the hull is a person if it has a person's
-size and two cameras see it.
+where two cameras see a person. A connected component of the hull, with pieces above and below it,
+is a person if it has a person's size and two cameras see it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
