@@ -9,7 +9,7 @@ from markerless_tracker.records import TrackState
 
 QUIET_S = 2.0
 """Time without images, sets or results after which their absence is reported."""
-MOST = 0.5
+MOST_SKIPPED = 0.5
 """Share of skipped sets from which they are reported."""
 PROCESSING = "processing images"
 """Activity of a tracker that processes images as they come."""
@@ -143,7 +143,7 @@ def _working(facts: Facts) -> Health:
 
 
 def _skipping(facts: Facts) -> str:
-    if facts.skipped is None or facts.skipped < MOST:
+    if facts.skipped is None or facts.skipped < MOST_SKIPPED:
         return ""
     share = f"{100.0 * facts.skipped:.0f} %"
     return f"{share} of the sets are skipped: they come faster than this machine tracks them"

@@ -30,7 +30,7 @@ LEAST_EXTENT_M = 0.45
 """A component with a smaller extent in every direction is no person."""
 LEAST_VOLUME_M3 = 0.015
 LEAST_PIECE_M3 = 0.0027
-"""A smaller piece of a hull, half the volume of a head, does not count."""
+"""A piece of a hull with less volume above `HIGH_M`, half a head's, does not count."""
 MOST_VOLUME_M3 = 1.5
 """Limits of a person's volume. The upper one is that of a tall person seen by two cameras only,
 whose hull is too large."""
@@ -184,14 +184,18 @@ def _fine(
     # The coarse component may include a shadow beside the person, or space before a camera that the
     # others do not see. Either may be the larger part.
     high = person & inside
-    high[:, :, : max(0, int((HIGH_M - first[2]) / FINE_M))] = False
+    layer = max(0, int((HIGH_M - first[2]) / FINE_M))
+    high[:, :, :layer] = False
     shown = high if FINE_M**3 * high.sum() >= LEAST_VOLUME_M3 else person
-    persons = np.bincount(parts.ravel(), weights=(shown * view_count).ravel())[1:]
-    part = parts == 1 + int(persons.argmax())
-    above = parts[:, :, max(0, int((HIGH_M - first[2]) / FINE_M)) :]
-    pieces = FINE_M**3 * np.bincount(above.ravel(), minlength=count + 1) >= LEAST_PIECE_M3
-    pieces[0] = False
-    part |= pieces[parts] & _dilated(np.asarray((part & person).any(axis=2)))[:, :, None]
+    persons = np.bincount(parts[shown], weights=view_count[shown], minlength=count + 1)[1:]
+    main = 1 + int(persons.argmax())
+    part = parts == main
+    # Other pieces above and below the part belong to the person, too.
+    above = np.bincount(parts[:, :, layer:].ravel(), minlength=count + 1)
+    pieces = FINE_M**3 * above >= LEAST_PIECE_M3
+    pieces[[0, main]] = False
+    if pieces.any():
+        part |= pieces[parts] & _dilated(np.asarray((part & person).any(axis=2)))[:, :, None]
     volume = FINE_M**3 * float(part.sum())
     if not LEAST_VOLUME_M3 <= volume <= MOST_VOLUME_M3:
         return None

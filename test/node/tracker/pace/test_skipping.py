@@ -17,7 +17,7 @@ def test_one_of_three_is_skipped() -> None:
 def test_what_was_skipped_before_the_window_does_not_count() -> None:
     share = SkippedShare()
     shares = [share.update(1.0 * k, 10 * k, min(30, 10 * k)) for k in range(12)]
-    assert shares[6] == 0.0 + (30 - 10) / (50 + 20)
+    assert shares[6] == (30 - 10) / (50 + 20)
     assert shares[8:] == [0.0] * 4
 
 
