@@ -302,9 +302,8 @@ class Tracker:
         if not anybody(used):
             return None
         if self._body.awaits_first_frame:
-            at = self._motion.pose
-            start = self._body.fit_first_frame(self._searcher_for, used, stamp_ns, at)
-            if start is None:
+            at, fit = self._motion.pose, self._body.fit_first_frame
+            if (start := fit(self._searcher_for, used, stamp_ns, at)) is None:
                 return None
             predicted = start
             self._searcher = self._searcher_for(self.body)
@@ -318,8 +317,10 @@ class Tracker:
         recovered, limbs = Recovered(search.pose), self._assessor.limbs
         again = self.config.refinement != "none" and self.config.search_again
         if again and self._effort.for_limbs:
-            single, contours = self._effort.reduced, search.contours
-            recovered = limbs.recover(self._searcher, contours, seen, search.pose, single=single)
+            recovered = limbs.recover(
+                self._searcher, search.contours, seen, search.pose,
+                badly=self._effort.badly, single=self._effort.reduced,
+            )  # fmt: skip
         notes = seen.notes + self._body.take_warnings() + recovered.notes + seen.left_out
         jumped = recovered.jumped(self.body)
         corrected = self._motion.reachable(stamp_ns, limits, np.full_like(speeds, LIMB_RAD_S))

@@ -26,6 +26,7 @@ from markerless_tracker.tracking.limbs.exchange import CLOSE, PairExchange
 from markerless_tracker.tracking.limbs.facing import FacingWatch
 from markerless_tracker.tracking.limbs.inside import inside_fractions
 from markerless_tracker.tracking.limbs.search import LimbSearch
+from markerless_tracker.tracking.limbs.turns import LimbTurns
 from markerless_tracker.tracking.limbs.unexplained import find_unexplained
 from markerless_tracker.tracking.limbs.walking import CLOSE as WALKING_CLOSE
 from markerless_tracker.tracking.limbs.walking import LEAST_GAIN as WALKING_GAIN
@@ -33,9 +34,6 @@ from markerless_tracker.tracking.limbs.walking import WalkingWatch
 from markerless_tracker.tracking.loss import LimbTrack
 from markerless_tracker.tracking.search import Searcher
 
-TURN_NS, LONGEST_TURN_NS = 100_000_000, 200_000_000
-"""Interval at which the limbs are searched in turn: six frames at 60 frames/s; and longest
-interval, while frames have other searches."""
 DENSE_NS = 40_000_000
 """If frames follow each other faster than this, searches that can wait are put off to other frames,
 since sets that come too late are lost."""
@@ -130,11 +128,10 @@ class LimbWatch:
     def reset(self) -> None:
         """Forget the limbs so far."""
         self._tracks: dict[str, LimbTrack] = {}
-        self._next = 0
+        self._turns = LimbTurns()
         self._calls = 0
         self._unexplained = 0
         self._last_ns: int | None = None
-        self._turn_ns: int | None = None
         self._waits: dict[str, _Wait] = {}
         self._exchange = PairExchange()
         self._facing = FacingWatch()
@@ -177,11 +174,12 @@ class LimbWatch:
         seen: Seen,
         pose: FloatArray,
         *,
+        badly: bool = False,
         single: bool = False,
     ) -> Recovered:
         """Run the searches that are due: other headings, exchanges of legs or arms, and limbs.
 
-        Limbs that are due are the lost ones, those near unexplained silhouette, and one in turn. A
+        Limbs that are due are the lost ones, those near unexplained silhouette, and some in turn. A
         result is taken by the rules of `LimbSearch`; headings and exchanges have least gains of
         their own (`facing`, `walking`, `exchange`).
 
@@ -190,6 +188,7 @@ class LimbWatch:
             contours: the frame's contours.
             seen: the frame's evidence.
             pose: (p,) the estimate.
+            badly: whether the frame is explained worse than usual; all limbs are due then.
             single: whether there is time for a single search: a comparison of whole poses and a
                 search of one limb alternate then.
         """
@@ -201,7 +200,8 @@ class LimbWatch:
             self._waits.clear()
         pair, facing, walking = None, False, []
         self._calls += 1
-        dense = self._last_ns is not None and 0 <= stamp_ns - self._last_ns < DENSE_NS
+        since_ns = 0 if self._last_ns is None else max(0, stamp_ns - self._last_ns)
+        dense = self._last_ns is not None and since_ns < DENSE_NS
         self._last_ns = stamp_ns
         if not single or self._calls % 2:
             pair = self._exchange.due(body, pose, searcher.limits, stamp_ns)
@@ -210,7 +210,10 @@ class LimbWatch:
             if not (dense and (pair or facing)):
                 walking = self._walking.due(body, pose, searcher.limits, stamp_ns)
         whole = facing or pair is not None or bool(walking)
-        due = self._due(body, stamp_ns, unexplained.areas_m2, dense=dense, busy=whole)
+        due = [*dict.fromkeys((*self.lost, *self._suspects(stamp_ns, unexplained.areas_m2)))]
+        put_off = dense and (whole or bool(due))
+        in_turn = self._turns.take(body.limbs, since_ns, put_off=put_off)
+        due += [name for name in (body.limbs if badly else in_turn) if name not in due]
         if single and due:
             due = [] if whole else [due[self._calls // 2 % len(due)]]
         if not due and not whole:
@@ -254,26 +257,6 @@ class LimbWatch:
         if before is not None and area_m2 <= _GROWN * before.area_m2:
             failures = min(before.failures + 1, 1 + _DOUBLINGS)
         self._waits[name] = _Wait(failures, stamp_ns, area_m2)
-
-    def _due(
-        self,
-        body: BodyModel,
-        stamp_ns: int,
-        areas_m2: Mapping[str, float],
-        *,
-        dense: bool,
-        busy: bool,
-    ) -> list[str]:
-        """Limbs to search: the lost ones, those near unexplained silhouette, one in turn."""
-        lost = self.lost
-        due = [*lost, *(n for n in self._suspects(stamp_ns, areas_m2) if n not in lost)]
-        waits_ns = LONGEST_TURN_NS if dense and (busy or due) else TURN_NS
-        if self._turn_ns is not None and 0 <= stamp_ns - self._turn_ns < waits_ns:
-            return due
-        self._turn_ns = stamp_ns
-        name = body.limbs[self._next % len(body.limbs)]
-        self._next += 1
-        return due if name in due else [*due, name]
 
     def _suspects(self, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
         """The limb likeliest to lie in unexplained silhouette, and one of the others in turn.

@@ -87,6 +87,11 @@ class Effort:
         return self._granted
 
     @property
+    def badly(self) -> bool:
+        """Whether this frame is explained worse than usual; valid after `judge`."""
+        return self._badly
+
+    @property
     def reduced(self) -> bool:
         """Whether a frame gets a single search, by swarms or for limbs."""
         return self._reduced
