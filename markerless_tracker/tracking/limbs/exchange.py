@@ -23,8 +23,8 @@ EVERY_NS = 50_000_000
 within half a step."""
 LEAST_M = 0.1
 """An exchange that moves no marker farther than this is not tried."""
-LEAST_GAIN = 0.004
-"""Least gain of an exchange. While the legs pass each other, both poses fit alike."""
+LEAST_GAIN = 0.006
+"""Least gain of an exchange. While the limbs pass each other, both poses fit alike."""
 CLOSE = 0.018
 """Argument of `LimbSearch.compared`. Exchanging limbs that are right costs more than this."""
 
@@ -34,12 +34,12 @@ class Exchange(NamedTuple):
 
     Attributes:
         name: of the pair.
-        pose: (p,) with the pair exchanged.
+        poses: (n, p) with the pair exchanged, one or two.
         least_gain: least gain for which it is taken; 0 if it uncrosses the pair.
     """
 
     name: str
-    pose: FloatArray
+    poses: FloatArray
     least_gain: float
 
 
@@ -71,12 +71,24 @@ class PairExchange:
 
 
 def _exchanged(name: str, body: BodyModel, pose: FloatArray, limits: FloatArray) -> Exchange | None:
-    """A pair exchanged in a pose (p,), unless that changes nothing."""
+    """A pair exchanged in a pose (p,), unless that changes nothing.
+
+    Either its joint angles are, or its limbs take each other's place, which are not the same where
+    the trunk leans or is turned against the limbs. The angles of crossed limbs are not exchanged:
+    that leaves them crossed.
+    """
     if name not in body.subspaces:
         return None
-    other, least_gain = mirrored(body, pose, name, limits), LEAST_GAIN
-    if is_crossed(body, pose, name):
-        other = in_each_others_place(body, pose, name, limits)
-        least_gain = LEAST_GAIN if is_crossed(body, other, name) else 0.0
-    moved_m = np.linalg.norm(markers(body, other) - markers(body, pose), axis=1)
-    return Exchange(name, other, least_gain) if moved_m.max() >= LEAST_M else None
+    mirror = mirrored(body, pose, name, limits)
+    placed = in_each_others_place(body, pose, name, limits)
+    if not is_crossed(body, pose, name):
+        alike = _moved_m(body, pose, mirror) < LEAST_M
+        return None if alike else Exchange(name, np.array([mirror, placed]), LEAST_GAIN)
+    least_gain = LEAST_GAIN if is_crossed(body, placed, name) else 0.0
+    alike = _moved_m(body, pose, placed) < LEAST_M
+    return None if alike else Exchange(name, placed[None], least_gain)
+
+
+def _moved_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:
+    """Largest distance of a marker between two poses (p,)."""
+    return float(np.linalg.norm(markers(body, other) - markers(body, pose), axis=1).max())

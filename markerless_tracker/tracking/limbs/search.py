@@ -106,6 +106,12 @@ class LimbSearch:
         self._take(found, None)
         return True
 
+    def cheapest(self, others: FloatArray) -> FloatArray:
+        """That one (p,) of other poses (n, p) that costs least, not refined."""
+        if len(others) == 1:
+            return np.asarray(others[0])
+        return np.asarray(others[int(self._frame.costs_with_prior(others).argmin())])
+
     def compared(self, other: FloatArray, close: float) -> tuple[FloatArray, float]:
         """Another pose (p,), refined, and its gain: the estimate's `costs_with_prior` less its own.
 

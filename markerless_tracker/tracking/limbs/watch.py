@@ -233,7 +233,7 @@ class LimbWatch:
                 self._facing.reset()
                 return Recovered(search.pose, rotated=True)
         found = []
-        if pair is not None and search.takes(pair.pose, pair.least_gain, CLOSE):
+        if pair and search.takes(search.cheapest(pair.poses), pair.least_gain, CLOSE):
             found.append(pair.name)
         for name in due:
             rng = keyed_generator(searcher.config.seed, stamp_ns, f"{name} elsewhere")
