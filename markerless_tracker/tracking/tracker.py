@@ -319,7 +319,7 @@ class Tracker:
         if again and self._effort.for_limbs:
             recovered = limbs.recover(
                 self._searcher, search.contours, seen, search.pose,
-                badly=self._effort.badly, single=self._effort.reduced,
+                every_limb=self._effort.every_limb, single=self._effort.reduced,
             )  # fmt: skip
         notes = seen.notes + self._body.take_warnings() + recovered.notes + seen.left_out
         jumped = recovered.jumped(self.body)

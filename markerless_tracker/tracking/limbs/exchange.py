@@ -23,8 +23,9 @@ EVERY_NS = 50_000_000
 within half a step."""
 LEAST_M = 0.1
 """An exchange that moves no marker farther than this is not tried."""
-LEAST_GAIN = 0.006
-"""Least gain of an exchange. While the limbs pass each other, both poses fit alike."""
+LEAST_GAIN, LEAST_GAIN_PLACED = 0.004, 0.008
+"""Least gain of exchanged angles, and of limbs in each other's place: the latter fit more nearly
+alike."""
 CLOSE = 0.018
 """Argument of `LimbSearch.compared`. Exchanging limbs that are right costs more than this."""
 
@@ -35,12 +36,12 @@ class Exchange(NamedTuple):
     Attributes:
         name: of the pair.
         poses: (n, p) with the pair exchanged, one or two.
-        least_gain: least gain for which it is taken; 0 if it uncrosses the pair.
+        least_gains: least gain for which each is taken; 0 if it uncrosses the pair.
     """
 
     name: str
     poses: FloatArray
-    least_gain: float
+    least_gains: tuple[float, ...]
 
 
 class PairExchange:
@@ -81,14 +82,11 @@ def _exchanged(name: str, body: BodyModel, pose: FloatArray, limits: FloatArray)
         return None
     mirror = mirrored(body, pose, name, limits)
     placed = in_each_others_place(body, pose, name, limits)
-    if not is_crossed(body, pose, name):
-        alike = _moved_m(body, pose, mirror) < LEAST_M
-        return None if alike else Exchange(name, np.array([mirror, placed]), LEAST_GAIN)
-    least_gain = LEAST_GAIN if is_crossed(body, placed, name) else 0.0
-    alike = _moved_m(body, pose, placed) < LEAST_M
-    return None if alike else Exchange(name, placed[None], least_gain)
-
-
-def _moved_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:
-    """Largest distance of a marker between two poses (p,)."""
-    return float(np.linalg.norm(markers(body, other) - markers(body, pose), axis=1).max())
+    if is_crossed(body, pose, name):
+        least_gain = LEAST_GAIN if is_crossed(body, placed, name) else 0.0
+        exchange, moved = Exchange(name, placed[None], (least_gain,)), placed
+    else:
+        gains = (LEAST_GAIN, LEAST_GAIN_PLACED)
+        exchange, moved = Exchange(name, np.array([mirror, placed]), gains), mirror
+    moved_m = np.linalg.norm(markers(body, moved) - markers(body, pose), axis=1)
+    return exchange if moved_m.max() >= LEAST_M else None

@@ -106,11 +106,9 @@ class LimbSearch:
         self._take(found, None)
         return True
 
-    def cheapest(self, others: FloatArray) -> FloatArray:
-        """That one (p,) of other poses (n, p) that costs least, not refined."""
-        if len(others) == 1:
-            return np.asarray(others[0])
-        return np.asarray(others[int(self._frame.costs_with_prior(others).argmin())])
+    def cheapest(self, others: FloatArray) -> int:
+        """Which of other poses (n, p) costs least, not refined."""
+        return int(self._frame.costs_with_prior(others).argmin()) if len(others) > 1 else 0
 
     def compared(self, other: FloatArray, close: float) -> tuple[FloatArray, float]:
         """Another pose (p,), refined, and its gain: the estimate's `costs_with_prior` less its own.

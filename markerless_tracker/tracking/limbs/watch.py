@@ -174,7 +174,7 @@ class LimbWatch:
         seen: Seen,
         pose: FloatArray,
         *,
-        badly: bool = False,
+        every_limb: bool = False,
         single: bool = False,
     ) -> Recovered:
         """Run the searches that are due: other headings, exchanges of legs or arms, and limbs.
@@ -188,7 +188,7 @@ class LimbWatch:
             contours: the frame's contours.
             seen: the frame's evidence.
             pose: (p,) the estimate.
-            badly: whether the frame is explained worse than usual; all limbs are due then.
+            every_limb: whether all limbs are due.
             single: whether there is time for a single search: a comparison of whole poses and a
                 search of one limb alternate then.
         """
@@ -213,7 +213,7 @@ class LimbWatch:
         due = [*dict.fromkeys((*self.lost, *self._suspects(stamp_ns, unexplained.areas_m2)))]
         put_off = dense and (whole or bool(due))
         in_turn = self._turns.take(body.limbs, since_ns, put_off=put_off)
-        due += [name for name in (body.limbs if badly else in_turn) if name not in due]
+        due += [name for name in (body.limbs if every_limb else in_turn) if name not in due]
         if single and due:
             due = [] if whole else [due[self._calls // 2 % len(due)]]
         if not due and not whole:
@@ -233,8 +233,10 @@ class LimbWatch:
                 self._facing.reset()
                 return Recovered(search.pose, rotated=True)
         found = []
-        if pair and search.takes(search.cheapest(pair.poses), pair.least_gain, CLOSE):
-            found.append(pair.name)
+        if pair:
+            best = search.cheapest(pair.poses)
+            if search.takes(pair.poses[best], pair.least_gains[best], CLOSE):
+                found.append(pair.name)
         for name in due:
             rng = keyed_generator(searcher.config.seed, stamp_ns, f"{name} elsewhere")
             limb = body.subspaces[name]

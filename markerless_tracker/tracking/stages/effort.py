@@ -56,6 +56,7 @@ class Effort:
         self._doubt = False
         self._badly = True
         self._allowed = True
+        self._late = False
 
     def begin(self, effort: float, *, doubt: bool, since_s: float = 0.0) -> None:
         """Begin a frame.
@@ -79,7 +80,7 @@ class Effort:
             self._credit = 0.0
             self._limbs_frame = not self._limbs_frame
         self._reduced, self._swarms = effort < 1.0 and not doubt, False
-        self._doubt, self._allowed = doubt, effort > 0.0
+        self._doubt, self._allowed, self._late = doubt, effort > 0.0, effort < 1.0
 
     @property
     def granted(self) -> bool:
@@ -87,9 +88,12 @@ class Effort:
         return self._granted
 
     @property
-    def badly(self) -> bool:
-        """Whether this frame is explained worse than usual; valid after `judge`."""
-        return self._badly
+    def every_limb(self) -> bool:
+        """Whether there is time to search all limbs, and the frame is explained worse than usual.
+
+        Valid after `judge`. Who is late searches some of them: all would make the next set later.
+        """
+        return self._badly and not self._late
 
     @property
     def reduced(self) -> bool:

@@ -18,6 +18,7 @@ from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.exchange import (
     EVERY_NS,
     LEAST_GAIN,
+    LEAST_GAIN_PLACED,
     LEAST_M,
     PAIRS,
     PairExchange,
@@ -99,8 +100,10 @@ def test_the_pairs_are_tried_in_turn_where_it_changes_anything(walking: Walking)
     assert [one and one[0] for one in tried] == [PAIRS[0], PAIRS[1], PAIRS[0]]
     other = tried[PAIRS.index(walking.pair)]
     assert other is not None
-    np.testing.assert_allclose(markers(body, other.pose), markers(body, walking.swapped), atol=0.01)
-    assert other.least_gain == LEAST_GAIN
+    np.testing.assert_allclose(
+        markers(body, other.poses[0]), markers(body, walking.swapped), atol=0.01
+    )
+    assert other.least_gains == (LEAST_GAIN, LEAST_GAIN_PLACED)
     assert exchange.due(body, walking.pose, body.limits, stamps[-1] + EVERY_NS - 1) is None
     # Time that was set back begins anew.
     assert exchange.due(body, walking.pose, body.limits, 0) is not None
@@ -149,10 +152,10 @@ def test_crossed_legs_take_each_others_place(standing: Walking) -> None:
 def test_what_is_crossed_no_more_need_not_be_better(standing: Walking) -> None:
     body = standing.scene.body
     due = PairExchange().due(body, standing.swapped, body.limits, 0)
-    assert due is not None and due.name == "legs" and due.least_gain == 0.0
-    assert not is_crossed(body, due.pose, "legs")
+    assert due is not None and due.name == "legs" and due.least_gains == (0.0,)
+    assert not is_crossed(body, due.poses[0], "legs")
     due = PairExchange().due(body, standing.pose, body.limits, 0)
-    assert due is None or due.least_gain == LEAST_GAIN
+    assert due is None or due.least_gains == (LEAST_GAIN, LEAST_GAIN_PLACED)
 
 
 def test_legs_that_a_start_crossed_are_found(standing: Walking) -> None:
@@ -161,6 +164,23 @@ def test_legs_that_a_start_crossed_are_found(standing: Walking) -> None:
     assert found.names[:1] == ("legs",)
     assert standing.off_m(found.pose) < 0.05
     assert "legs" not in recovered(standing, standing.pose).names
+
+
+def test_arms_in_each_others_place_return_though_their_elbows_are_not(standing: Walking) -> None:
+    """One arm is stretched out forwards, the other hangs. Exchanged angles do not reach that."""
+    scene, body = standing.scene, standing.scene.body
+    true = body.neutral.copy()
+    for name, angle_rad in (("l_shoulder_y", -1.4), ("l_shoulder_x", -0.3), ("l_elbow", 0.2)):
+        true[body.index(name)] += angle_rad
+    seen = {
+        name: Observation.from_mask(name, 0, mask.astype(np.uint8), np.zeros(mask.shape, np.uint8))
+        for name, mask in body_masks(body, true, list(scene.rig)).items()
+    }
+    swapped = in_each_others_place(body, true, "arms", body.limits)
+    assert not is_crossed(body, swapped, "arms")
+    arms = Walking("arms", scene, seen, true, swapped)
+    assert arms.off_m(swapped) > 0.3
+    assert arms.off_m(recovered(arms, swapped).pose) < 0.05
 
 
 def test_arms_crossed_on_the_chest_are_in_their_place(standing: Walking) -> None:

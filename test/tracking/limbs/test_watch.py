@@ -10,11 +10,11 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
+from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import (
     FIRST_WAIT_NS,
     RECOVERED_M,
-    TURN_NS,
     LimbWatch,
     Recovered,
 )
@@ -23,6 +23,8 @@ from markerless_tracker.tracking.search import Searcher
 TRACKING, LOST = TrackState.TRACKING, TrackState.LOST
 ARM = [MARKER_NAMES.index(name) for name in ("LElbow", "LWrist")]
 SIZE_PX = (328, 245)
+APART_NS = 100_000_000
+"""Time between frames so far apart that all limbs are searched."""
 
 
 def observed(masks):
@@ -106,7 +108,7 @@ def test_a_wrong_arm_inside_the_silhouettes_is_found_in_rotation(balancing) -> N
     states = watch.assess(body, hidden, seen, np.full(body.size, np.nan))
     assert states["l_arm"].state is TRACKING
     at, taken = hidden, []
-    for stamp_ns in range(0, 8 * TURN_NS, TURN_NS):
+    for stamp_ns in range(0, 8 * APART_NS, APART_NS):
         at, names = recover(watch, searcher, contours_of(searcher, seen, at), seen, stamp_ns, at)
         taken += names
     assert taken[0] == "l_arm"
@@ -117,7 +119,7 @@ def test_limbs_in_their_place_are_left_alone(balancing) -> None:
     scene, seen, pose, _ = balancing
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
-    for stamp_ns in range(0, 4 * TURN_NS, TURN_NS):
+    for stamp_ns in range(0, 4 * APART_NS, APART_NS):
         contours = contours_of(searcher, seen, pose)
         assert recover(watch, searcher, contours, seen, stamp_ns, pose) == (pose, ())
 
@@ -158,8 +160,8 @@ def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch)
         return [recover(watch, searcher, contours, seen, stamp, hidden)[1] for stamp in stamps]
 
     # The arm is the first in rotation, and no limb comes again so soon.
-    assert found([0, 1, TURN_NS - 1]) == [("l_arm",), (), ()]
-    assert found([0, TURN_NS], threads=2) == found([0, TURN_NS])
+    assert found([0, 1, PER_LIMB_NS // 2]) == [("l_arm",), (), ()]
+    assert found([0, PER_LIMB_NS], threads=2) == found([0, PER_LIMB_NS])
     assert scene.body.limbs[0] == "l_arm"
 
 
@@ -168,7 +170,7 @@ def test_a_limb_near_unexplained_silhouette_is_searched_in_every_frame(balancing
     searcher = searcher_of(scene)
     watch = LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, hidden)
-    for stamp_ns in (0, 1, TURN_NS - 1):
+    for stamp_ns in (0, 1, PER_LIMB_NS):
         names = recover(watch, searcher, contours, seen, stamp_ns, hidden)[1]
         assert "l_arm" in names
 
@@ -223,7 +225,7 @@ def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_turns(
     contours = contours_of(searcher, seen, pose)
     for number in range(24):
         before = len(done)
-        recover(watch, searcher, contours, seen, number * TURN_NS, pose, single=True)
+        recover(watch, searcher, contours, seen, number * APART_NS, pose, single=True)
         assert len(done) == before + 1
     assert set(done) == {*limbs, "facing"}
 
@@ -234,8 +236,7 @@ def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monk
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})),
         ("search.other_limb", lambda _f, _r, at, limb, *_: searched.append(now) or (at, 9.0)),
-        ("watch.TURN_NS", 10**12),
-        ("watch.LONGEST_TURN_NS", 10**12),
+        ("turns.PER_LIMB_NS", 10**12),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
@@ -265,7 +266,7 @@ def test_a_limb_does_not_wait_where_more_silhouette_is_unexplained_than_before(
     arm = scene.body.subspaces["l_arm"].tobytes()
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, pose)
-    for now in range(0, 20 * TURN_NS, TURN_NS):
+    for now in range(0, 20 * APART_NS, APART_NS):
         recover(watch, searcher, contours, seen, now, pose)
     assert scene.body.limbs[0] == "l_arm"
     last = max(at for at, limb in searched if limb.tobytes() == arm)

@@ -1,17 +1,20 @@
 """Which frames the searches of limbs, headings and exchanged pairs fall on."""
 
+from math import ceil
+
 import numpy as np
 
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
+from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS, PUT_OFF
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
-from markerless_tracker.tracking.limbs.watch import LONGEST_TURN_NS, LimbWatch
+from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
 
 
-def searches_of(monkeypatch, every_ns, count, areas_m2=None):
+def searches_of(monkeypatch, every_ns, count, areas_m2=None, *, every_limb=False):
     """What each of `count` frames searches, while an exchange is always possible."""
     scene = SyntheticScene(body="person31", motion="stand", size_px=(164, 123), seed=3)
     _, masks, pose = scene.frame(0)
@@ -36,7 +39,8 @@ def searches_of(monkeypatch, every_ns, count, areas_m2=None):
     frames = []
     for number in range(count):
         now.clear()
-        watch.recover(searcher, contours, Seen(number * every_ns, seen, seen, seen), pose)
+        at = Seen(number * every_ns, seen, seen, seen)
+        watch.recover(searcher, contours, at, pose, every_limb=every_limb)
         frames.append(sorted(now))
     return frames
 
@@ -47,20 +51,26 @@ def test_searches_that_can_wait_are_spread_over_dense_frames(monkeypatch) -> Non
     assert first == ["exchange", "facing", "limb"]
     assert max(map(len, others)) == 1
     counts = {name: sum(frame == [name] for frame in others) for name in first}
-    # In a second: every 50, 250 and 100 ms, the last two up to three frames later.
-    assert counts == {"exchange": 20, "facing": 3, "limb": 9}
+    # In a second: every 50, 250 and 96 ms, the last two up to three frames later.
+    assert counts == {"exchange": 20, "facing": 3, "limb": 10}
+
+
+def test_all_limbs_are_searched_where_a_frame_is_explained_badly(monkeypatch) -> None:
+    frames = searches_of(monkeypatch, 16_666_667, 7, every_limb=True)
+    assert all(frame.count("limb") == 4 for frame in frames)
 
 
 def test_searches_of_frames_far_apart_do_not_wait(monkeypatch) -> None:
     frames = searches_of(monkeypatch, 50_000_000, 21)
-    assert frames[2::10] == [["exchange", "limb"]] * 2
-    assert sum("exchange" in frame for frame in frames) == 21
-    assert sum("limb" in frame for frame in frames) == 11
+    assert all(frame.count("exchange") == 1 for frame in frames)
+    # (50 / 40)² a frame.
+    assert {frame.count("limb") for frame in frames[1:]} == {1, 2}
+    assert sum(frame.count("limb") for frame in frames) == 1 + 31
 
 
 def test_the_rotation_goes_on_while_every_dense_frame_is_searched(monkeypatch) -> None:
     frames = searches_of(monkeypatch, 16_666_667, 61, {"r_leg": 0.01})
     # The leg near unexplained silhouette, and the limb in rotation; once that is the leg itself.
     both = [number for number, frame in enumerate(frames) if frame.count("limb") == 2]
-    every = LONGEST_TURN_NS // 16_666_667 + 1
-    assert np.diff(both).tolist() == [every, every, 2 * every, every]
+    every = ceil(PUT_OFF * (PER_LIMB_NS / 16_666_667) ** 2)
+    np.testing.assert_allclose(np.diff(both), [every, every, 2 * every, every], atol=1)

@@ -1,0 +1,45 @@
+"""Limbs that take their turn to be searched."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS, LimbTurns
+
+LIMBS = ("l_arm", "r_arm", "l_leg", "r_leg")
+
+
+def taken(every_ns: int, count: int, *, put_off: bool = False) -> list[list[str]]:
+    """The limbs of frames at intervals, without the first frame."""
+    turns = LimbTurns()
+    assert turns.take(LIMBS, 0) == ["l_arm"]
+    return [turns.take(LIMBS, every_ns, put_off=put_off) for _ in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("rate", "per_second"), [(60.0, 10.4), (30.0, 20.8), (20.0, 31.2), (12.0, 48.0), (5.0, 20.0)]
+)
+def test_limbs_grow_in_number_with_the_square_of_the_time_between_frames(rate, per_second) -> None:
+    frames = taken(round(1e9 / rate), round(4 * rate))
+    assert sum(map(len, frames)) / 4 == pytest.approx(per_second, abs=0.5)
+    assert max(map(len, frames)) - min(map(len, frames)) <= 1
+
+
+def test_every_limb_has_its_turn() -> None:
+    names = [name for frame in taken(16_666_667, 100) for name in frame]
+    assert names[:5] == ["r_arm", "l_leg", "r_leg", "l_arm", "r_arm"]
+    assert all(len(set(frame)) == 4 for frame in taken(10 * PER_LIMB_NS, 3))
+
+
+def test_a_turn_that_can_wait_is_put_off_and_comes_alone() -> None:
+    frames = taken(16_666_667, 60, put_off=True)
+    at = [number for number, frame in enumerate(frames) if frame]
+    assert len(at) == 5 and all(len(frames[number]) == 1 for number in at)
+    assert np.diff(at).min() >= 11
+
+
+def test_the_first_limb_is_next_after_a_reset() -> None:
+    turns = LimbTurns()
+    assert turns.take(LIMBS, PER_LIMB_NS)[0] == "l_arm"
+    turns.reset()
+    assert turns.take(LIMBS, 0) == ["l_arm"]
+    assert turns.take(LIMBS, 0) == []
