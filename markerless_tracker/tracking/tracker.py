@@ -316,10 +316,10 @@ class Tracker:
         self._effort.search(search, self.body, self.config, predicted, sigma)
         recovered, limbs = Recovered(search.pose), self._assessor.limbs
         again = self.config.refinement != "none" and self.config.search_again
-        if again and self._effort.for_limbs:
+        if again and (effort := self._effort).for_limbs:
             recovered = limbs.recover(
                 self._searcher, search.contours, seen, search.pose,
-                every_limb=self._effort.every_limb, single=self._effort.reduced,
+                badly=effort.badly, late=effort.late, single=effort.reduced,
             )  # fmt: skip
         notes = seen.notes + self._body.take_warnings() + recovered.notes + seen.left_out
         jumped = recovered.jumped(self.body)

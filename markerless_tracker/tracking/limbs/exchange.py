@@ -80,13 +80,18 @@ def _exchanged(name: str, body: BodyModel, pose: FloatArray, limits: FloatArray)
     """
     if name not in body.subspaces:
         return None
-    mirror = mirrored(body, pose, name, limits)
-    placed = in_each_others_place(body, pose, name, limits)
     if is_crossed(body, pose, name):
+        placed = in_each_others_place(body, pose, name, limits)
         least_gain = LEAST_GAIN if is_crossed(body, placed, name) else 0.0
-        exchange, moved = Exchange(name, placed[None], (least_gain,)), placed
-    else:
-        gains = (LEAST_GAIN, LEAST_GAIN_PLACED)
-        exchange, moved = Exchange(name, np.array([mirror, placed]), gains), mirror
-    moved_m = np.linalg.norm(markers(body, moved) - markers(body, pose), axis=1)
-    return exchange if moved_m.max() >= LEAST_M else None
+        moves = _moved_m(body, pose, placed) >= LEAST_M
+        return Exchange(name, placed[None], (least_gain,)) if moves else None
+    mirror = mirrored(body, pose, name, limits)
+    if _moved_m(body, pose, mirror) < LEAST_M:
+        return None
+    placed = in_each_others_place(body, pose, name, limits)
+    return Exchange(name, np.array([mirror, placed]), (LEAST_GAIN, LEAST_GAIN_PLACED))
+
+
+def _moved_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:
+    """Largest distance of a marker between two poses (p,)."""
+    return float(np.linalg.norm(markers(body, other) - markers(body, pose), axis=1).max())

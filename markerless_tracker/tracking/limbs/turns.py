@@ -25,18 +25,21 @@ class LimbTurns:
         self._next = 0
         self._due = 1.0
 
-    def take(self, limbs: Sequence[str], since_ns: int, *, put_off: bool = False) -> list[str]:
+    def take(
+        self, limbs: Sequence[str], since_ns: int, *, put_off: bool = False, single: bool = False
+    ) -> list[str]:
         """The limbs whose turn it is in a frame.
 
         Args:
             limbs: names of all limbs, in the same order in every call.
             since_ns: time since the last frame, ns; 0 for the first one.
             put_off: whether turns that can wait are put off; then one limb at most is due.
+            single: whether there is time for one limb at most.
         """
         self._due += (since_ns / PER_LIMB_NS) ** 2
         if self._due < (PUT_OFF if put_off else 1.0):
             return []
-        count = 1 if put_off else min(int(self._due), len(limbs))
+        count = 1 if put_off or single else min(int(self._due), len(limbs))
         self._due %= 1.0
         names = [limbs[(self._next + i) % len(limbs)] for i in range(count)]
         self._next += count

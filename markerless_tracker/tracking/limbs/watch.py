@@ -174,7 +174,8 @@ class LimbWatch:
         seen: Seen,
         pose: FloatArray,
         *,
-        every_limb: bool = False,
+        badly: bool = False,
+        late: bool = False,
         single: bool = False,
     ) -> Recovered:
         """Run the searches that are due: other headings, exchanges of legs or arms, and limbs.
@@ -188,7 +189,8 @@ class LimbWatch:
             contours: the frame's contours.
             seen: the frame's evidence.
             pose: (p,) the estimate.
-            every_limb: whether all limbs are due.
+            badly: whether the frame is explained worse than usual; all limbs are due then.
+            late: whether sets come faster than they are tracked; one limb in turn is due then.
             single: whether there is time for a single search: a comparison of whole poses and a
                 search of one limb alternate then.
         """
@@ -212,8 +214,9 @@ class LimbWatch:
         whole = facing or pair is not None or bool(walking)
         due = [*dict.fromkeys((*self.lost, *self._suspects(stamp_ns, unexplained.areas_m2)))]
         put_off = dense and (whole or bool(due))
-        in_turn = self._turns.take(body.limbs, since_ns, put_off=put_off)
-        due += [name for name in (body.limbs if every_limb else in_turn) if name not in due]
+        in_turn = self._turns.take(body.limbs, since_ns, put_off=put_off, single=late)
+        others = body.limbs if badly and not late else in_turn
+        due += [name for name in others if name not in due]
         if single and due:
             due = [] if whole else [due[self._calls // 2 % len(due)]]
         if not due and not whole:

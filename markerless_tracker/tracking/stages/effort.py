@@ -88,12 +88,14 @@ class Effort:
         return self._granted
 
     @property
-    def every_limb(self) -> bool:
-        """Whether there is time to search all limbs, and the frame is explained worse than usual.
+    def badly(self) -> bool:
+        """Whether this frame is explained worse than usual; valid after `judge`."""
+        return self._badly
 
-        Valid after `judge`. Who is late searches some of them: all would make the next set later.
-        """
-        return self._badly and not self._late
+    @property
+    def late(self) -> bool:
+        """Whether the effort is below 1: sets come faster than they are tracked."""
+        return self._late
 
     @property
     def reduced(self) -> bool:

@@ -37,6 +37,12 @@ def test_a_turn_that_can_wait_is_put_off_and_comes_alone() -> None:
     assert np.diff(at).min() >= 11
 
 
+def test_one_limb_at_most_has_its_turn_where_there_is_no_time_for_more() -> None:
+    turns = LimbTurns()
+    names = [turns.take(LIMBS, 10 * PER_LIMB_NS, single=True) for _ in range(5)]
+    assert names == [["l_arm"], ["r_arm"], ["l_leg"], ["r_leg"], ["l_arm"]]
+
+
 def test_the_first_limb_is_next_after_a_reset() -> None:
     turns = LimbTurns()
     assert turns.take(LIMBS, PER_LIMB_NS)[0] == "l_arm"

@@ -14,7 +14,7 @@ from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
 
 
-def searches_of(monkeypatch, every_ns, count, areas_m2=None, *, every_limb=False):
+def searches_of(monkeypatch, every_ns, count, areas_m2=None, **how):
     """What each of `count` frames searches, while an exchange is always possible."""
     scene = SyntheticScene(body="person31", motion="stand", size_px=(164, 123), seed=3)
     _, masks, pose = scene.frame(0)
@@ -40,7 +40,7 @@ def searches_of(monkeypatch, every_ns, count, areas_m2=None, *, every_limb=False
     for number in range(count):
         now.clear()
         at = Seen(number * every_ns, seen, seen, seen)
-        watch.recover(searcher, contours, at, pose, every_limb=every_limb)
+        watch.recover(searcher, contours, at, pose, **how)
         frames.append(sorted(now))
     return frames
 
@@ -56,8 +56,10 @@ def test_searches_that_can_wait_are_spread_over_dense_frames(monkeypatch) -> Non
 
 
 def test_all_limbs_are_searched_where_a_frame_is_explained_badly(monkeypatch) -> None:
-    frames = searches_of(monkeypatch, 16_666_667, 7, every_limb=True)
+    frames = searches_of(monkeypatch, 16_666_667, 7, badly=True)
     assert all(frame.count("limb") == 4 for frame in frames)
+    late = searches_of(monkeypatch, 100_000_000, 7, badly=True, late=True)
+    assert all(frame.count("limb") == 1 for frame in late)
 
 
 def test_searches_of_frames_far_apart_do_not_wait(monkeypatch) -> None:
