@@ -170,8 +170,9 @@ def test_arms_in_each_others_place_return_though_their_elbows_are_not(standing: 
     """One arm is stretched out forwards, the other hangs. Exchanged angles do not reach that."""
     scene, body = standing.scene, standing.scene.body
     true = body.neutral.copy()
-    for name, angle_rad in (("l_shoulder_y", -1.4), ("l_shoulder_x", -0.3), ("l_elbow", 0.2)):
-        true[body.index(name)] += angle_rad
+    names = ("l_shoulder_y", "l_shoulder_x", "l_elbow", "r_elbow")
+    true[[body.index(name) for name in names]] += (-1.4, -0.3, 0.2, 0.2)
+    true = np.clip(true, *body.limits)
     seen = {
         name: Observation.from_mask(name, 0, mask.astype(np.uint8), np.zeros(mask.shape, np.uint8))
         for name, mask in body_masks(body, true, list(scene.rig)).items()
