@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.crossed import (
     PAIRS,
@@ -17,6 +17,7 @@ from markerless_tracker.tracking.candidates.crossed import (
     is_crossed,
     mirrored,
 )
+from markerless_tracker.tracking.limbs.search import distance_m
 
 EVERY_NS = 50_000_000
 """Interval at which an exchange is tried, of the two pairs in rotation. Each is tried several times
@@ -24,8 +25,8 @@ within half a step."""
 LEAST_M = 0.1
 """An exchange that moves no marker farther than this is not tried."""
 LEAST_GAIN, LEAST_GAIN_PLACED = 0.004, 0.008
-"""Least gain of exchanged angles, and of limbs in each other's place: the latter fit more nearly
-alike."""
+"""Least gain of exchanged angles, and of limbs in each other's place. While the limbs pass each
+other, both poses fit alike, and in each other's place more so."""
 CLOSE = 0.018
 """Argument of `LimbSearch.compared`. Exchanging limbs that are right costs more than this."""
 
@@ -74,24 +75,19 @@ class PairExchange:
 def _exchanged(name: str, body: BodyModel, pose: FloatArray, limits: FloatArray) -> Exchange | None:
     """A pair exchanged in a pose (p,), unless that changes nothing.
 
-    Either its joint angles are, or its limbs take each other's place, which are not the same where
-    the trunk leans or is turned against the limbs. The angles of crossed limbs are not exchanged:
-    that leaves them crossed.
+    Its joint angles are exchanged, or its limbs take each other's place. That is not the same where
+    the trunk leans or turns. The angles of crossed limbs are not exchanged, as that leaves them
+    crossed.
     """
     if name not in body.subspaces:
         return None
     if is_crossed(body, pose, name):
         placed = in_each_others_place(body, pose, name, limits)
         least_gain = LEAST_GAIN if is_crossed(body, placed, name) else 0.0
-        moves = _moved_m(body, pose, placed) >= LEAST_M
+        moves = distance_m(body, pose, placed) >= LEAST_M
         return Exchange(name, placed[None], (least_gain,)) if moves else None
     mirror = mirrored(body, pose, name, limits)
-    if _moved_m(body, pose, mirror) < LEAST_M:
+    if distance_m(body, pose, mirror) < LEAST_M:
         return None
     placed = in_each_others_place(body, pose, name, limits)
     return Exchange(name, np.array([mirror, placed]), (LEAST_GAIN, LEAST_GAIN_PLACED))
-
-
-def _moved_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:
-    """Largest distance of a marker between two poses (p,)."""
-    return float(np.linalg.norm(markers(body, other) - markers(body, pose), axis=1).max())

@@ -85,7 +85,7 @@ class LimbSearch:
             refined = frame.refined(self.pose[None], *_REFINE)
             better = other_cost < float(frame.costs_with_prior(refined)[0]) - self._least_gain
         if self._own.differs:
-            if other_cost > cost + CLOSE or _distance_m(self._own.body, other, self.pose) < LEAST_M:
+            if other_cost > cost + CLOSE or distance_m(self._own.body, other, self.pose) < LEAST_M:
                 return False
             other, other_cost = self._own.refined(other, *_REFINE)
             least_gain = 0.0 if better else LEAST_GAIN
@@ -195,7 +195,7 @@ def other_limb(
         best = _best(body, poses, costs, count)
     if costs.min() > most_cost + HOPELESS:
         return pose, float(costs.min())
-    far = [other for other in poses[best] if _distance_m(body, other, pose) >= NEAR_M]
+    far = [other for other in poses[best] if distance_m(body, other, pose) >= NEAR_M]
     if not far:
         return pose, most_cost
     refined = frame.refined(np.array(far), *_REFINE)
@@ -212,6 +212,6 @@ def _best(body: BodyModel, poses: FloatArray, costs: FloatArray, count: int) -> 
     return np.concatenate([first, second[~np.isin(second, first)]])
 
 
-def _distance_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:
+def distance_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:
     """Largest distance of a marker between two poses (p,)."""
     return float(np.linalg.norm(markers(body, pose) - markers(body, other), axis=1).max())

@@ -11,10 +11,10 @@ PUT_OFF = 2.0
 class LimbTurns:
     """Lets the limbs take turns.
 
-    The pose of a frame is predicted from the motion so far. A limb's acceleration moves it away
-    from there by the square of the time between the frames, and the refinement loses it the more
-    easily. The number of limbs in a frame therefore is the square of that time in `PER_LIMB_NS`:
-    one limb in every sixth frame at 60 frames/s, two in three frames at 30, all at 12.
+    The pose of a frame is predicted from the motion so far. How far a limb's acceleration takes it
+    from there grows with the square of the time between frames, and the refinement loses limbs
+    that are far. So the number of limbs in a frame is (time / `PER_LIMB_NS`)²: one in every sixth
+    frame at 60 frames/s, two in three frames at 30, all four at 12.
     """
 
     def __init__(self) -> None:

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body import BodyModel
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.fitness.contour import ContourFrame
@@ -25,7 +25,7 @@ from markerless_tracker.tracking.limbs.aimed import most_aimed
 from markerless_tracker.tracking.limbs.exchange import CLOSE, PairExchange
 from markerless_tracker.tracking.limbs.facing import FacingWatch
 from markerless_tracker.tracking.limbs.inside import inside_fractions
-from markerless_tracker.tracking.limbs.search import LimbSearch
+from markerless_tracker.tracking.limbs.search import LimbSearch, distance_m
 from markerless_tracker.tracking.limbs.turns import LimbTurns
 from markerless_tracker.tracking.limbs.unexplained import find_unexplained
 from markerless_tracker.tracking.limbs.walking import CLOSE as WALKING_CLOSE
@@ -189,8 +189,9 @@ class LimbWatch:
             contours: the frame's contours.
             seen: the frame's evidence.
             pose: (p,) the estimate.
-            badly: whether the frame is explained worse than usual; all limbs are due then.
-            late: whether sets come faster than they are tracked; one limb in turn is due then.
+            badly: whether the frame is explained worse than usual; if not `late`, all limbs are
+                due.
+            late: whether sets come faster than they are tracked; one limb in turn is due.
             single: whether there is time for a single search: a comparison of whole poses and a
                 search of one limb alternate then.
         """
@@ -253,8 +254,8 @@ class LimbWatch:
                 self._waits.pop(name, None)
             else:
                 self._search_failed(name, stamp_ns, unexplained.areas_m2.get(name, 0.0))
-        moved_m = np.linalg.norm(markers(body, search.pose) - markers(body, pose), axis=1).max()
-        return Recovered(search.pose, tuple(found), moved_m=float(moved_m))
+        moved_m = distance_m(body, search.pose, pose)
+        return Recovered(search.pose, tuple(found), moved_m=moved_m)
 
     def _search_failed(self, name: str, stamp_ns: int, area_m2: float) -> None:
         failures = 1
