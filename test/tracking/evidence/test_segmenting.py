@@ -17,6 +17,8 @@ from markerless_tracker.tracking.evidence.segmenting import SegmentingProcess
 
 WIDTH, HEIGHT = 96, 80
 CONFIG = TrackerConfig.from_mapping({"threads": 2})
+# Has the fewest kernels.
+FEW_KERNELS = TrackerConfig.from_mapping({"threads": 2, "preset": "paper"})
 REGION = Region(20, 10, 80, 70)
 
 
@@ -112,7 +114,7 @@ def test_what_it_has_compiled_counts_here(backgrounds, tmp_path, monkeypatch) ->
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     with compilation(lambda *_: None) as kernels:
         process = SegmentingProcess(RIG)
-        process.use(CONFIG, backgrounds)
+        process.use(FEW_KERNELS, backgrounds)
         process.wait()
         process.close()
     assert kernels.done > 10
