@@ -180,19 +180,20 @@ def other_limb(
         ]
         poses = np.concatenate([poses, aim(np.concatenate(many), AIMED)])
     costs_of = frame.limb_costs(pose, limb)
-    costs = costs_of(poses[:, limb])
-    best = _best(body, poses, costs, _PARENTS)
+    costs, priors = costs_of(poses[:, limb]), prior_costs(body, poses)
+    best = _best(costs, priors, _PARENTS)
     for fraction in LAYERS:
         near = recombiner.with_limb_near(
             np.repeat(poses[best], _CHILDREN, axis=0), limb, fraction, rng
         )
         # Of the last layer only the best draws of both kinds are used, of the others the parents.
         count = 1 if fraction == LAYERS[-1] else _PARENTS
-        cutoff = costs[_best(body, poses, costs, count)].max()
+        cutoff = costs[_best(costs, priors, count)].max()
         poses = np.concatenate([poses[best], near])
         more = costs_of(near[:, limb], np.full(len(near), cutoff))
         costs = np.concatenate([costs[best], more])
-        best = _best(body, poses, costs, count)
+        priors = np.concatenate([priors[best], prior_costs(body, near)])
+        best = _best(costs, priors, count)
     if costs.min() > most_cost + HOPELESS:
         return pose, float(costs.min())
     far = [other for other in poses[best] if distance_m(body, other, pose) >= NEAR_M]
@@ -203,12 +204,12 @@ def other_limb(
     return refined[int(costs.argmin())], float(costs.min())
 
 
-def _best(body: BodyModel, poses: FloatArray, costs: FloatArray, count: int) -> IntArray:
-    """Indices of the poses (n, p) that are among the `count` of least cost, 1 - f_s (n,), or of
-    least cost with the prior; in that order.
+def _best(costs: FloatArray, priors: FloatArray, count: int) -> IntArray:
+    """Indices of the draws that are among the `count` of least cost, 1 - f_s (n,), or of least cost
+    with the prior (n,); in that order.
     """
     first = np.argsort(costs, kind="stable")[:count]
-    second = np.argsort(costs + prior_costs(body, poses), kind="stable")[:count]
+    second = np.argsort(costs + priors, kind="stable")[:count]
     return np.concatenate([first, second[~np.isin(second, first)]])
 
 

@@ -12,6 +12,7 @@ from markerless_tracker.records import Observation
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
 from markerless_tracker.tracking.candidates.population import FramePopulation
+from markerless_tracker.tracking.candidates.prior_costs import prior_costs
 from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.limbs import search as search_module
@@ -166,11 +167,11 @@ def test_the_best_draws_are_those_by_f_s_and_those_with_the_prior(bent) -> None:
     elbow = body.index("l_elbow")
     poses[:, elbow] -= np.array([9.0, 0.0, 9.0, 0.0]) * body.prior_sd[elbow]
     # The prior of the first and the third: 10 units of 0.001.
-    costs = np.array([0.100, 0.105, 0.101, 0.108])
-    assert list(search_module._best(body, poses, costs, 1)) == [0, 1]
-    assert list(search_module._best(body, poses, costs, 2)) == [0, 2, 1, 3]
-    assert list(search_module._best(body, poses, costs, 4)) == [0, 2, 1, 3]
-    assert list(search_module._best(body, poses, np.array([0.1, 0.05, 0.2, 0.3]), 1)) == [1]
+    costs, priors = np.array([0.100, 0.105, 0.101, 0.108]), prior_costs(body, poses)
+    assert list(search_module._best(costs, priors, 1)) == [0, 1]
+    assert list(search_module._best(costs, priors, 2)) == [0, 2, 1, 3]
+    assert list(search_module._best(costs, priors, 4)) == [0, 2, 1, 3]
+    assert list(search_module._best(np.array([0.1, 0.05, 0.2, 0.3]), priors, 1)) == [1]
 
 
 def test_a_limb_with_the_prior_is_refined_beside_the_best_one(bent, monkeypatch) -> None:
@@ -185,7 +186,7 @@ def test_a_limb_with_the_prior_is_refined_beside_the_best_one(bent, monkeypatch)
     monkeypatch.setattr(Recombiner, "with_prior_limb", lambda _, at, limb, n, rng: drawn)
     monkeypatch.setattr(Recombiner, "with_limb", lambda _, at, limb, n, rng: drawn)
     monkeypatch.setattr(Recombiner, "with_limb_near", lambda _, at, limb, f, rng: at.copy())
-    monkeypatch.setattr(f"{SEARCH}._best", lambda body, poses, costs, count: np.array([0, 1]))
+    monkeypatch.setattr(f"{SEARCH}._best", lambda costs, priors, count: np.array([0, 1]))
     monkeypatch.setattr(FramePopulation, "refined", lambda _, poses, *args: poses.copy())
     for better in (0, 1):
         costs = np.full(2, 0.2)
