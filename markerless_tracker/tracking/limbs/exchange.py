@@ -27,8 +27,13 @@ LEAST_M = 0.1
 LEAST_GAIN, LEAST_GAIN_PLACED = 0.004, 0.008
 """Least gain of exchanged angles, and of limbs in each other's place. While the limbs pass each
 other, both poses fit alike, and in each other's place more so."""
+LEAST_SUM, LEAST_COMPARISONS = 0.008, 3
+"""Least sum of smaller gains for which an exchange is taken, and of its comparisons. If arms reach
+through the trunk into each other's place, the silhouettes hardly show it."""
 CLOSE = 0.018
 """Argument of `LimbSearch.compared`. Exchanging limbs that are right costs more than this."""
+_FORGET = 0.9
+"""Factor of the earlier sum in each comparison."""
 
 
 class Exchange(NamedTuple):
@@ -46,15 +51,25 @@ class Exchange(NamedTuple):
 
 
 class PairExchange:
-    """Proposes the exchange of the legs or of the arms at intervals."""
+    """Proposes the exchange of the legs or of the arms at intervals, and decides on it.
+
+    A single frame decides if the gain is clear. Smaller gains are summed, as those of headings are
+    (`facing`): a comparison in which the exchange fits worse lowers the sum.
+    """
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Forget when an exchange was tried last."""
+        """Forget all trials."""
         self._tried_ns: int | None = None
         self._next = 0
+        self.forget_gains()
+
+    def forget_gains(self) -> None:
+        """Forget all gains: left and right are no longer what they were."""
+        self._gains = dict.fromkeys(PAIRS, 0.0)
+        self._counts = dict.fromkeys(PAIRS, 0)
 
     def due(
         self, body: BodyModel, pose: FloatArray, limits: FloatArray, stamp_ns: int
@@ -70,6 +85,25 @@ class PairExchange:
                 self._next = PAIRS.index(name) + 1
                 return other
         return None
+
+    def takes(self, name: str, gain: float, least_gain: float, moved_m: float) -> bool:
+        """Whether to take an exchange that was compared with the estimate; its gain is noted.
+
+        Args:
+            name: of the pair.
+            gain: as of `LimbSearch.compared`.
+            least_gain: the exchange's own, of which one comparison is enough.
+            moved_m: farthest marker between the refined exchange and the estimate. An exchange that
+                was refined back to the estimate tells nothing.
+        """
+        sum_ = max(0.0, _FORGET * self._gains[name] + (gain if moved_m >= LEAST_M else 0.0))
+        count = self._counts[name] + 1 if sum_ > 0.0 else 0
+        self._gains[name], self._counts[name] = sum_, count
+        summed = gain > 0.0 and sum_ >= LEAST_SUM and count >= LEAST_COMPARISONS
+        taken = gain >= least_gain or summed
+        if taken:
+            self._gains[name], self._counts[name] = 0.0, 0
+        return taken
 
 
 def _exchanged(name: str, body: BodyModel, pose: FloatArray, limits: FloatArray) -> Exchange | None:

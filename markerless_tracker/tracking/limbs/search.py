@@ -103,8 +103,12 @@ class LimbSearch:
         found, gain = self.compared(other, close)
         if gain < least_gain:
             return False
-        self._take(found, None)
+        self.take(found)
         return True
+
+    def take(self, other: FloatArray) -> None:
+        """Take another pose (p,)."""
+        self._take(other, None)
 
     def cheapest(self, others: FloatArray) -> int:
         """Which of other poses (n, p) costs least, not refined."""

@@ -230,16 +230,21 @@ class LimbWatch:
         if facing:
             rotated = self._facing.compare(search, body, searcher.limits)
             if rotated is not None:
+                self._exchange.forget_gains()
                 return Recovered(rotated, rotated=True)
         for other in walking:
             if search.takes(other, WALKING_GAIN, WALKING_CLOSE):
                 # The sums were of comparisons with the former heading.
                 self._facing.reset()
+                self._exchange.forget_gains()
                 return Recovered(search.pose, rotated=True)
         found = []
         if pair:
             best = search.cheapest(pair.poses)
-            if search.takes(pair.poses[best], pair.least_gains[best], CLOSE):
+            other, gain = search.compared(pair.poses[best], CLOSE)
+            other_m = distance_m(body, other, pose)
+            if self._exchange.takes(pair.name, gain, pair.least_gains[best], other_m):
+                search.take(other)
                 found.append(pair.name)
         for name in due:
             rng = keyed_generator(searcher.config.seed, stamp_ns, f"{name} elsewhere")

@@ -20,12 +20,14 @@ from markerless_tracker.tracking.limbs.exchange import (
     LEAST_GAIN,
     LEAST_GAIN_PLACED,
     LEAST_M,
+    LEAST_SUM,
     PAIRS,
     PairExchange,
 )
 from markerless_tracker.tracking.limbs.watch import LimbWatch, Recovered
 from markerless_tracker.tracking.search import Searcher
 
+EXCHANGE = "markerless_tracker.tracking.limbs.exchange"
 ENDS = {"legs": ("LAnkle", "RAnkle"), "arms": ("LWrist", "RWrist")}
 
 
@@ -67,15 +69,17 @@ def walking(request) -> Walking:
     return Walking(pair, scene, seen, pose, swapped)
 
 
-def recovered(walking: Walking, pose: FloatArray) -> Recovered:
+def recovered(
+    walking: Walking, pose: FloatArray, watch: LimbWatch | None = None, stamp_ns: int = 0
+) -> Recovered:
     """What is found elsewhere at a pose while that pair's exchange is due."""
     scene = walking.scene
     body, config = scene.body, TrackerConfig(threads=1)
     searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
-    watch = LimbWatch(scene.rig)
+    watch = watch or LimbWatch(scene.rig)
     watch._exchange._next = PAIRS.index(walking.pair)
-    contours = searcher.frame(walking.seen, 0, pose).contours
-    seen = Seen(0, walking.seen, walking.seen, walking.seen)
+    contours = searcher.frame(walking.seen, stamp_ns, pose).contours
+    seen = Seen(stamp_ns, walking.seen, walking.seen, walking.seen)
     return watch.recover(searcher, contours, seen, pose)
 
 
@@ -87,6 +91,46 @@ def test_an_exchanged_pair_is_exchanged_back(walking: Walking) -> None:
     body = walking.scene.body
     assert set(body.subspaces[walking.pair]) <= set(found.jumped(body))
     assert walking.off_m(found.pose) < 0.05
+
+
+def test_gains_too_small_for_one_frame_add_up(walking: Walking, monkeypatch) -> None:
+    for name in ("LEAST_GAIN", "LEAST_GAIN_PLACED"):
+        monkeypatch.setattr(f"{EXCHANGE}.{name}", 9.0)
+    watch = LimbWatch(walking.scene.rig)
+    found = [recovered(walking, walking.swapped, watch, i * EVERY_NS) for i in range(3)]
+    assert [walking.pair in one.names for one in found] == [False, False, True]
+    assert walking.off_m(found[2].pose) < 0.05
+
+
+def test_when_an_exchange_is_taken() -> None:
+    exchange, some, far_m = PairExchange(), 0.4 * LEAST_SUM, 2.0 * LEAST_M
+
+    def taken(*gains: float, least_gain: float = LEAST_GAIN, moved_m: float = far_m) -> list[bool]:
+        exchange.forget_gains()
+        return [exchange.takes("arms", gain, least_gain, moved_m) for gain in gains]
+
+    assert taken(LEAST_GAIN) == [True]
+    # 0.4, 0.76 and 1.08 of the least sum; then it begins anew.
+    assert taken(some, some, some, some) == [False, False, True, False]
+    # A worse fit lowers the sum, to 0 at least.
+    assert taken(some, some, -some, some) == [False, False, False, False]
+    assert taken(-1.0, some, some, some) == [False, False, False, True]
+    # The exchange must fit better now, too.
+    assert taken(some, some, 0.99 * LEAST_GAIN, least_gain=1.0)[2]
+    assert taken(0.9, 0.9, -0.1, 0.1, least_gain=1.0) == [False, False, False, True]
+    # Two comparisons are too few.
+    assert taken(0.9, 0.9, 0.9, least_gain=1.0) == [False, False, True]
+    # An exchange that the refinement took back tells nothing.
+    assert taken(some, some, some, some, moved_m=0.0) == [False] * 4
+
+
+def test_each_pair_has_a_sum_of_its_own() -> None:
+    exchange, some, far_m = PairExchange(), 0.4 * LEAST_SUM, 2.0 * LEAST_M
+    pairs = ("arms", "legs") * 2
+    assert not any(exchange.takes(pair, some, LEAST_GAIN, far_m) for pair in pairs)
+    assert exchange.takes("legs", some, LEAST_GAIN, far_m)
+    exchange.reset()
+    assert not exchange.takes("arms", some, LEAST_GAIN, far_m)
 
 
 def test_a_pair_in_its_place_stays(walking: Walking) -> None:
