@@ -24,12 +24,17 @@ def searches_of(monkeypatch, every_ns, count, areas_m2=None, **how):
     }
     package = "markerless_tracker.tracking.limbs"
     now: list[str] = []
+
+    def compared(_, other, close):
+        now.append("exchange")
+        return other, -1.0
+
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained(dict(areas_m2 or {}), {})),
         ("watch.FIRST_WAIT_NS", 0),
         ("facing.FacingWatch.compare", lambda *_: now.append("facing")),
         ("exchange.LEAST_M", 0.0),
-        ("search.LimbSearch.takes", lambda *_: now.append("exchange")),
+        ("search.LimbSearch.compared", compared),
         ("search.LimbSearch.elsewhere", lambda *_: now.append("limb")),
     ):
         monkeypatch.setattr(f"{package}.{name}", value)
