@@ -96,10 +96,11 @@ class PairExchange:
             moved_m: farthest marker between the refined exchange and the estimate. An exchange that
                 was refined back to the estimate tells nothing.
         """
-        sum_ = max(0.0, _FORGET * self._gains[name] + (gain if moved_m >= LEAST_M else 0.0))
+        known = gain if moved_m >= LEAST_M else 0.0
+        sum_ = max(0.0, _FORGET * self._gains[name] + known)
         count = self._counts[name] + 1 if sum_ > 0.0 else 0
         self._gains[name], self._counts[name] = sum_, count
-        summed = gain > 0.0 and sum_ >= LEAST_SUM and count >= LEAST_COMPARISONS
+        summed = known > 0.0 and sum_ >= LEAST_SUM and count >= LEAST_COMPARISONS
         taken = gain >= least_gain or summed
         if taken:
             self._gains[name], self._counts[name] = 0.0, 0

@@ -17,7 +17,7 @@ from markerless_tracker.tracking.evidence.segmenting import SegmentingProcess
 
 WIDTH, HEIGHT = 96, 80
 CONFIG = TrackerConfig.from_mapping({"threads": 2})
-# Has the fewest kernels.
+# Has fewer kernels.
 FEW_KERNELS = TrackerConfig.from_mapping({"threads": 2, "preset": "paper"})
 REGION = Region(20, 10, 80, 70)
 
