@@ -44,6 +44,7 @@ class Bundle:
         error_px: (n, 2) projected minus observed.
         used: (n,) whether an observation is no outlier.
         sd: camera -> (15,) standard deviations of its parameters; 0 of those held fixed.
+        position_sd_m: camera -> (3,) standard deviations of its position in the world, m.
     """
 
     rig: CameraRig
@@ -55,6 +56,7 @@ class Bundle:
     error_px: FloatArray
     used: NDArray[np.bool_]
     sd: Mapping[str, FloatArray]
+    position_sd_m: Mapping[str, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,17 +95,18 @@ def adjust(
     used = size <= max(OUTLIER * float(np.median(size)), OUTLIER_PX)
     value, jacobian = _solved(data, used, value, free, len(names), loss_px=None)
     errors = projection(value, data, len(names))[0]
-    deviations = _deviations(jacobian, errors[used], free)
-    cameras, sd = [], {}
+    covariance = _covariance(jacobian, errors[used], free)
+    cameras, sd, position_sd_m = [], {}, {}
     for number, name in enumerate(names):
-        part = value[CAMERA * number : CAMERA * (number + 1)]
-        cameras.append(_camera(name, views.sizes_px[name], part))
-        sd[name] = deviations[CAMERA * number : CAMERA * (number + 1)]
+        own = slice(CAMERA * number, CAMERA * (number + 1))
+        cameras.append(_camera(name, views.sizes_px[name], value[own]))
+        sd[name] = np.sqrt(np.diag(covariance)[own])
+        position_sd_m[name] = _position_sd_m(value[own], covariance[own, own])
     rest = value[CAMERA * len(names) :].reshape(-1, BOARD)
     boards = (np.eye(4), *(_pose(vector) for vector in rest))
     return Bundle(
         CameraRig(tuple(cameras)), boards, data.camera, data.pose, data.corner, data.pixels,
-        errors, used, sd,
+        errors, used, sd, position_sd_m,
     )  # fmt: skip
 
 
@@ -235,8 +238,11 @@ def _skews(vectors: FloatArray) -> FloatArray:
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
 
 
-def _deviations(jacobian: csr_matrix, errors: FloatArray, free: NDArray[np.bool_]) -> FloatArray:
-    """Standard deviations of all parameters; infinite where the views do not determine them."""
+def _covariance(jacobian: csr_matrix, errors: FloatArray, free: NDArray[np.bool_]) -> FloatArray:
+    """Covariance (p, p) of all parameters.
+
+    Parameters that the views do not determine have an infinite variance, and no covariances.
+    """
     freedom = max(errors.size - int(free.sum()), 1)
     variance = float((errors**2).sum()) / freedom
     normal = (jacobian.T @ jacobian).toarray()
@@ -246,17 +252,30 @@ def _deviations(jacobian: csr_matrix, errors: FloatArray, free: NDArray[np.bool_
     normal = normal[np.ix_(known, known)]
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
     scaled = normal / scale[:, None] / scale
-    deviations = np.zeros(free.size)
-    deviations[columns] = np.inf
+    covariance = np.zeros((free.size, free.size))
+    covariance[columns, columns] = np.inf
     try:
-        # With one or two corners left, a pose is not determined either.
-        inverse = np.diag(np.linalg.inv(scaled + _RIDGE * np.eye(len(scaled))))
-        sure = (inverse >= 0.0) & (inverse < _UNSURE)
-        found = np.where(sure, np.sqrt(np.abs(inverse) * variance), np.inf) / scale
-        deviations[columns[known]] = found
+        inverse = np.linalg.inv(scaled + _RIDGE * np.eye(len(scaled)))
     except np.linalg.LinAlgError:
-        pass  # The views determine nothing.
-    return deviations
+        return covariance  # The views determine nothing.
+    # With one or two corners left, a pose is not determined either.
+    factors = np.diag(inverse)
+    sure = (factors >= 0.0) & (factors < _UNSURE)
+    found = variance * inverse / scale[:, None] / scale
+    at = columns[known][sure]
+    covariance[np.ix_(at, at)] = found[np.ix_(sure, sure)]
+    return covariance
+
+
+def _position_sd_m(value: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Standard deviations (3,) of a camera's position -Rᵀt, from those of its parameters (15,)."""
+    pose = covariance[9:CAMERA, 9:CAMERA]
+    if not np.isfinite(np.diag(pose)).all():
+        return np.full(3, np.inf)
+    rotations, left = _turns(value[None, 9:12])
+    to_world, shift = rotations[0].T, value[None, 12:15]
+    by_pose = -to_world @ np.hstack([_skews(shift)[0] @ left[0], np.eye(3)])
+    return np.sqrt(np.maximum(np.diag(by_pose @ pose @ by_pose.T), 0.0))
 
 
 def _camera_vector(lens: Lens, T_cam_world: FloatArray) -> FloatArray:

@@ -71,7 +71,7 @@ def camera_measures(bundle: Bundle) -> dict[str, CameraMeasures]:
             coverage=float((cells > 0).mean()),
             focal_sd=float(max(sd[0] / camera.matrix[0, 0], sd[1] / camera.matrix[1, 1])),
             centre_sd_px=float(max(sd[2], sd[3])),
-            position_sd_mm=1000.0 * float(np.linalg.norm(sd[12:15])),
+            position_sd_mm=1000.0 * float(np.linalg.norm(bundle.position_sd_m[camera.name])),
         )
     return found
 

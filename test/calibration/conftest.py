@@ -53,9 +53,8 @@ def views(rig, board):
 
 @pytest.fixture(scope="session")
 def make_views():
-    def make(rig, board, *, noise=0.03):
-        return views_of(
-            rig, board, seen_by(rig, board, BoardMotion(board, rig, 10.0, 0).poses, noise=noise)
-        )
+    def make(rig, board, *, noise=0.03, seed=0):
+        poses = BoardMotion(board, rig, 10.0, 0).poses
+        return views_of(rig, board, seen_by(rig, board, poses, noise=noise, seed=seed))
 
     return make

@@ -10,9 +10,11 @@ from markerless_tracker.calibration.bundle import (
     BOARD,
     CAMERA,
     _camera_vector,
-    _deviations,
+    _covariance,
     _observations,
+    _pose,
     _pose_vector,
+    _position_sd_m,
     adjust,
     projection,
 )
@@ -150,7 +152,7 @@ def test_what_no_corner_determines_leaves_the_rest_certain() -> None:
     jacobian, errors = rng.normal(size=(40, 5)), rng.normal(size=40)
     jacobian[:, 3] = 0.0
     free = np.array([True, True, False, True, True, True])
-    found = _deviations(csr_matrix(jacobian), errors, free)
+    found = np.sqrt(np.diag(_covariance(csr_matrix(jacobian), errors, free)))
     known = np.array([0, 1, 3, 5])
     kept = np.delete(jacobian, 3, axis=1)
     variance = (errors**2).sum() / 35
@@ -169,9 +171,39 @@ def test_a_pose_with_few_corners_left_leaves_the_rest_certain(rows: int, seed: i
     jacobian[:, :15] = rng.normal(size=(200 + rows, 15))
     jacobian[200:, 15:] = rng.normal(size=(rows, 6))
     errors = rng.normal(size=200 + rows)
-    found = _deviations(csr_matrix(jacobian), errors, np.ones(21, dtype=bool))
+    covariance = _covariance(csr_matrix(jacobian), errors, np.ones(21, dtype=bool))
+    found = np.sqrt(np.diag(covariance))
     kept = jacobian[:200, :15]
     variance = (errors**2).sum() / (errors.size - 21)
     alone = np.sqrt(np.diag(np.linalg.inv(kept.T @ kept)) * variance)
     np.testing.assert_allclose(found[:15], alone, rtol=0.05)
     assert np.isinf(found[15:]).any()
+
+
+def test_the_sd_of_a_position_is_that_of_cameras_drawn_from_the_covariance() -> None:
+    rng = np.random.default_rng(0)
+    root = np.diag([1e-4] * 9 + [2e-3] * 3 + [8e-3] * 3) @ rng.normal(size=(15, 15))
+    covariance, value = root @ root.T, np.zeros(15)
+    value[9:] = 1.2, -0.7, 0.4, 0.5, -1.0, 4.0
+    drawn = [
+        np.linalg.inv(_pose(v[9:]))[:3, 3] for v in value + rng.normal(size=(4000, 15)) @ root.T
+    ]
+    np.testing.assert_allclose(_position_sd_m(value, covariance), np.std(drawn, axis=0), rtol=0.05)
+
+
+def test_the_sd_of_the_position_is_the_error_of_calibrations(rig, board, make_views) -> None:
+    """The translation, of the world's origin, is known much worse than the position."""
+    runs = [adjusted(make_views(rig, board, noise=0.3, seed=seed)) for seed in range(6)]
+    for camera in rig:
+        away = [
+            np.linalg.norm(run.rig[camera.name].T_world_cam[:3, 3] - camera.T_world_cam[:3, 3])
+            for run in runs
+        ]
+        reported = np.mean([camera_measures(run)[camera.name].position_sd_mm for run in runs])
+        assert 0.5 < 1000.0 * np.sqrt(np.mean(np.square(away))) / reported < 1.7
+
+
+def test_a_camera_that_is_not_determined_has_an_infinite_sd() -> None:
+    covariance = np.eye(15)
+    covariance[14, 14] = np.inf
+    assert np.isinf(_position_sd_m(np.ones(15), covariance)).all()
