@@ -25,18 +25,21 @@ class LimbTurns:
         self._next = 0
         self._due = 1.0
 
+    def advance(self, since_ns: int) -> None:
+        """Note a frame, and the time since the one before it, ns; 0 for the first one."""
+        self._due += (since_ns / PER_LIMB_NS) ** 2
+
     def take(
-        self, limbs: Sequence[str], since_ns: int, *, put_off: bool = False, single: bool = False
+        self, limbs: Sequence[str], *, put_off: bool = False, single: bool = False
     ) -> list[str]:
-        """The limbs whose turn it is in a frame.
+        """The limbs whose turn it is in a frame, after `advance`; those of a frame in which it is
+        not called have their turn later.
 
         Args:
             limbs: names of all limbs, in the same order in every call.
-            since_ns: time since the last frame, ns; 0 for the first one.
             put_off: whether turns that can wait are put off; then one limb at most is due.
             single: whether there is time for one limb at most.
         """
-        self._due += (since_ns / PER_LIMB_NS) ** 2
         if self._due < (PUT_OFF if put_off else 1.0):
             return []
         count = 1 if put_off or single else min(int(self._due), len(limbs))

@@ -40,12 +40,21 @@ class WalkingWatch:
         self._trunks: deque[tuple[int, FloatArray]] = deque()
         self._compared_ns: int | None = None
 
+    def note(self, body: BodyModel, pose: FloatArray, stamp_ns: int) -> None:
+        """Note where the trunk is in the pose (p,) of a frame."""
+        if self._trunks and stamp_ns <= self._trunks[-1][0]:
+            self._trunks.clear()
+        self._trunks.append((stamp_ns, markers(body, pose)[TRUNK].mean(axis=0)))
+        while stamp_ns - self._trunks[0][0] > WALKED_NS:
+            self._trunks.popleft()
+
     def due(
         self, body: BodyModel, pose: FloatArray, limits: FloatArray, stamp_ns: int
     ) -> list[FloatArray]:
         """Poses (p,) facing the walking direction, if the body does not and a comparison is due.
 
-        The joints keep their angles in one of them; in the other, left and right are exchanged.
+        The frame has been noted (`note`). The joints keep their angles in one of the poses; in the
+        other, left and right are exchanged.
 
         Args:
             body: the body.
@@ -53,9 +62,7 @@ class WalkingWatch:
             limits: (2, p) of the poses.
             stamp_ns: its time.
         """
-        points = markers(body, pose)
-        direction_rad = self._direction_rad(points[TRUNK].mean(axis=0), stamp_ns)
-        faced_rad = heading(points)
+        direction_rad, faced_rad = self._direction_rad(), heading(markers(body, pose))
         if direction_rad is None or heading_difference(direction_rad, faced_rad) < LEAST_ANGLE_RAD:
             return []
         last_ns = self._compared_ns
@@ -66,15 +73,10 @@ class WalkingWatch:
         found = [rotated_by(body, other, direction_rad - faced_rad, about=pose) for other in both]
         return [np.clip(other, *limits) for other in found]
 
-    def _direction_rad(self, trunk_m: FloatArray, stamp_ns: int) -> float | None:
+    def _direction_rad(self) -> float | None:
         """Walking direction, about the vertical; None if the person stands, or began just now."""
-        if self._trunks and stamp_ns <= self._trunks[-1][0]:
-            self._trunks.clear()
-        self._trunks.append((stamp_ns, trunk_m))
-        while stamp_ns - self._trunks[0][0] > WALKED_NS:
-            self._trunks.popleft()
-        since_ns, from_m = self._trunks[0]
-        along, across = (trunk_m - from_m)[:2]
+        (since_ns, from_m), (stamp_ns, at_m) = self._trunks[0], self._trunks[-1]
+        along, across = (at_m - from_m)[:2]
         seconds = (stamp_ns - since_ns) * 1e-9
         if stamp_ns - since_ns < LEAST_WALKED_NS:
             return None

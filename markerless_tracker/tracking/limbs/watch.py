@@ -4,7 +4,7 @@ A limb outside the silhouettes is detected. A wrong limb inside the silhouettes 
 all limbs are searched elsewhere in turn, and exchanges of both legs or both arms are tried.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -130,6 +130,8 @@ class LimbWatch:
         self._tracks: dict[str, LimbTrack] = {}
         self._turns = LimbTurns()
         self._calls = 0
+        self._rounds = 0
+        self._round_of: dict[str, int] = {}
         self._unexplained = 0
         self._last_ns: int | None = None
         self._waits: dict[str, _Wait] = {}
@@ -203,9 +205,11 @@ class LimbWatch:
             self._waits.clear()
         pair, facing, walking = None, False, []
         self._calls += 1
+        self._walking.note(body, pose, stamp_ns)
         since_ns = 0 if self._last_ns is None else max(0, stamp_ns - self._last_ns)
         dense = self._last_ns is not None and since_ns < DENSE_NS
         self._last_ns = stamp_ns
+        self._turns.advance(since_ns)
         if not single or self._calls % 2:
             pair = self._exchange.due(body, pose, searcher.limits, stamp_ns)
             if not (dense and pair):
@@ -213,13 +217,14 @@ class LimbWatch:
             if not (dense and (pair or facing)):
                 walking = self._walking.due(body, pose, searcher.limits, stamp_ns)
         whole = facing or pair is not None or bool(walking)
-        due = [*dict.fromkeys((*self.lost, *self._suspects(stamp_ns, unexplained.areas_m2)))]
-        put_off = dense and (whole or bool(due))
-        in_turn = self._turns.take(body.limbs, since_ns, put_off=put_off, single=late)
-        others = body.limbs if badly and not late else in_turn
-        due += [name for name in others if name not in due]
-        if single and due:
-            due = [] if whole else [due[self._calls // 2 % len(due)]]
+        if single:
+            due = [] if whole else self._one_limb(body.limbs, unexplained.areas_m2, stamp_ns)
+        else:
+            due = [*dict.fromkeys((*self.lost, *self._suspects(stamp_ns, unexplained.areas_m2)))]
+            put_off = dense and (whole or bool(due))
+            in_turn = self._turns.take(body.limbs, put_off=put_off, single=late)
+            others = body.limbs if badly and not late else in_turn
+            due += [name for name in others if name not in due]
         if not due and not whole:
             return Recovered(pose)
         frame = FramePopulation(searcher, observations, stamp_ns, pose, contours=contours)
@@ -262,6 +267,24 @@ class LimbWatch:
         moved_m = distance_m(body, search.pose, pose)
         return Recovered(search.pose, tuple(found), moved_m=moved_m)
 
+    def _one_limb(
+        self, limbs: Sequence[str], areas_m2: Mapping[str, float], stamp_ns: int
+    ) -> list[str]:
+        """The limb to search where there is time for one, if any is due.
+
+        Limbs in doubt are searched in rotation, and in between those that nothing suggests.
+        """
+        doubted = [*dict.fromkeys((*self.lost, *self._rested(areas_m2, areas_m2, stamp_ns)))]
+        self._rounds += 1
+        if self._rounds % (len(doubted) + 1) == 0 and (
+            in_turn := self._turns.take(limbs, single=True)
+        ):
+            return in_turn
+        # The one whose last search lies farthest back.
+        names = sorted(doubted, key=lambda name: self._round_of.get(name, 0))[:1]
+        self._round_of.update(dict.fromkeys(names, self._rounds))
+        return names
+
     def _search_failed(self, name: str, stamp_ns: int, area_m2: float) -> None:
         failures = 1
         before = self._waits.get(name)
@@ -270,9 +293,8 @@ class LimbWatch:
         self._waits[name] = _Wait(failures, stamp_ns, area_m2)
 
     def _suspects(self, stamp_ns: int, areas_m2: Mapping[str, float]) -> list[str]:
-        """The limb likeliest to lie in unexplained silhouette, and one of the others in turn.
-
-        Limbs whose last search failed a short time ago are left out.
+        """The limb likeliest to lie in unexplained silhouette, and one of the others in turn, if
+        they are `_rested`.
         """
         if not areas_m2:
             self._unexplained = 0
@@ -280,5 +302,11 @@ class LimbWatch:
         self._unexplained += 1
         first, *others = areas_m2
         names = [first, *others[(self._unexplained - 1) % len(others) :][:1]] if others else [first]
+        return self._rested(names, areas_m2, stamp_ns)
+
+    def _rested(
+        self, names: Iterable[str], areas_m2: Mapping[str, float], stamp_ns: int
+    ) -> list[str]:
+        """The limbs whose last search has not failed a short time ago."""
         waits = self._waits
         return [n for n in names if n not in waits or waits[n].over(stamp_ns, areas_m2[n])]

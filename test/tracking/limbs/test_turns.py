@@ -11,8 +11,13 @@ LIMBS = ("l_arm", "r_arm", "l_leg", "r_leg")
 def taken(every_ns: int, count: int, *, put_off: bool = False) -> list[list[str]]:
     """The limbs of frames at intervals, without the first frame."""
     turns = LimbTurns()
-    assert turns.take(LIMBS, 0) == ["l_arm"]
-    return [turns.take(LIMBS, every_ns, put_off=put_off) for _ in range(count)]
+    assert turns.take(LIMBS) == ["l_arm"]
+    return [next_of(turns, every_ns, put_off=put_off) for _ in range(count)]
+
+
+def next_of(turns: LimbTurns, since_ns: int, **how) -> list[str]:
+    turns.advance(since_ns)
+    return turns.take(LIMBS, **how)
 
 
 @pytest.mark.parametrize(
@@ -39,13 +44,23 @@ def test_a_turn_that_can_wait_is_put_off_and_comes_alone() -> None:
 
 def test_one_limb_at_most_has_its_turn_where_there_is_no_time_for_more() -> None:
     turns = LimbTurns()
-    names = [turns.take(LIMBS, 10 * PER_LIMB_NS, single=True) for _ in range(5)]
+    names = [next_of(turns, 10 * PER_LIMB_NS, single=True) for _ in range(5)]
     assert names == [["l_arm"], ["r_arm"], ["l_leg"], ["r_leg"], ["l_arm"]]
 
 
 def test_the_first_limb_is_next_after_a_reset() -> None:
     turns = LimbTurns()
-    assert turns.take(LIMBS, PER_LIMB_NS)[0] == "l_arm"
+    assert next_of(turns, PER_LIMB_NS)[0] == "l_arm"
     turns.reset()
-    assert turns.take(LIMBS, 0) == ["l_arm"]
-    assert turns.take(LIMBS, 0) == []
+    assert turns.take(LIMBS) == ["l_arm"]
+    assert turns.take(LIMBS) == []
+
+
+def test_a_turn_is_not_lost_in_frames_that_search_no_limb() -> None:
+    turns = LimbTurns()
+    names = []
+    for number in range(8):
+        turns.advance(PER_LIMB_NS)
+        if number % 2:
+            names += turns.take(LIMBS, single=True)
+    assert names == ["l_arm", "r_arm", "l_leg", "r_leg"]

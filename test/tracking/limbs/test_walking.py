@@ -35,6 +35,7 @@ def walk_along(watch, direction_rad, faced_rad, speed_m_s, count, begin_ns=0):
         metres = speed_m_s * k * STEP_NS * 1e-9
         pose[BODY.index("pelvis_tx")] += metres * np.cos(direction_rad)
         pose[BODY.index("pelvis_ty")] += metres * np.sin(direction_rad)
+        watch.note(BODY, pose, begin_ns + k * STEP_NS)
         found.append((pose, watch.due(BODY, pose, BODY.limits, begin_ns + k * STEP_NS)))
     return found
 

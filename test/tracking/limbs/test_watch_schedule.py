@@ -1,8 +1,10 @@
 """Which frames the searches of limbs, headings and exchanged pairs fall on."""
 
+from collections import Counter
 from math import ceil
 
 import numpy as np
+import pytest
 
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
@@ -14,8 +16,11 @@ from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
 
 
-def searches_of(monkeypatch, every_ns, count, areas_m2=None, **how):
-    """What each of `count` frames searches, while an exchange is always possible."""
+def searches_of(monkeypatch, every_ns, count, areas_m2=None, named=False, **how):
+    """What each of `count` frames searches, while an exchange is always possible.
+
+    Limbs are `limb`, or their names with `named`.
+    """
     scene = SyntheticScene(body="person31", motion="stand", size_px=(164, 123), seed=3)
     _, masks, pose = scene.frame(0)
     seen = {
@@ -29,13 +34,18 @@ def searches_of(monkeypatch, every_ns, count, areas_m2=None, **how):
         now.append("exchange")
         return other, -1.0
 
+    def elsewhere(_, limb, *__):
+        name = next(n for n in body.limbs if np.array_equal(body.subspaces[n], limb))
+        now.append(name if named else "limb")
+        return False
+
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained(dict(areas_m2 or {}), {})),
         ("watch.FIRST_WAIT_NS", 0),
         ("facing.FacingWatch.compare", lambda *_: now.append("facing")),
         ("exchange.LEAST_M", 0.0),
         ("search.LimbSearch.compared", compared),
-        ("search.LimbSearch.elsewhere", lambda *_: now.append("limb")),
+        ("search.LimbSearch.elsewhere", elsewhere),
     ):
         monkeypatch.setattr(f"{package}.{name}", value)
     body, watch = scene.body, LimbWatch(scene.rig)
@@ -73,6 +83,19 @@ def test_searches_of_frames_far_apart_do_not_wait(monkeypatch) -> None:
     # (50 / 40)² a frame.
     assert {frame.count("limb") for frame in frames[1:]} == {1, 2}
     assert sum(frame.count("limb") for frame in frames) == 1 + 31
+
+
+@pytest.mark.parametrize("every_ns", [50_000_000, 66_666_667, 100_000_000, 133_333_333])
+@pytest.mark.parametrize("areas_m2", [{}, {"r_leg": 0.02, "l_leg": 0.01}])
+def test_a_late_tracker_searches_every_limb(monkeypatch, every_ns, areas_m2) -> None:
+    """Comparisons of whole poses fall on the same frames as some limbs' turns."""
+    frames = searches_of(monkeypatch, every_ns, 120, areas_m2, named=True, late=True, single=True)
+    limbs = {"l_arm", "r_arm", "l_leg", "r_leg"}
+    assert all(len(frame) == 1 for frame in frames if limbs.intersection(frame))
+    counts = Counter(name for frame in frames for name in frame)
+    for name in limbs:
+        assert counts[name] >= (5 if areas_m2 else 14)
+    assert all(counts[name] >= 20 for name in areas_m2)
 
 
 def test_the_rotation_goes_on_while_every_dense_frame_is_searched(monkeypatch) -> None:
