@@ -40,6 +40,11 @@ def unpack_mask(words: MaskWords, width: int) -> NDArray[np.bool_]:
     return np.unpackbits(raw, axis=1, count=width, bitorder="little").view(np.bool_)
 
 
+def no_edges(shape: tuple[int, int]) -> NDArray[np.uint8]:
+    """An edge map (h, w) without edges, read-only. It takes no memory: all values are the same."""
+    return np.broadcast_to(np.uint8(0), shape)
+
+
 @dataclass(frozen=True, eq=False)
 class Observation:
     """The evidence of one camera's image, in that camera's own (distorted) pixels.
@@ -79,7 +84,9 @@ class Observation:
                     f"{self.camera}: undecided words {words.shape} beside mask words "
                     f"{self.mask_words.shape}, expected the same shape and no pixel in both"
                 )
-        object.__setattr__(self, "edges", locked(self.edges, np.uint8))
+        # An array with strides of 0 is `no_edges`, which stays as small as it is.
+        if any(self.edges.strides):
+            object.__setattr__(self, "edges", locked(self.edges, np.uint8))
         if self.edges.ndim != 2 or self.mask_words.shape != (self.height, (self.width + 63) // 64):
             raise ImageError(
                 f"{self.camera}: observation holds edges {self.edges.shape} and mask words "
@@ -102,13 +109,13 @@ class Observation:
     def __setstate__(self, state: dict[str, Any]) -> None:
         edges = state["edges"]
         if isinstance(edges, tuple):
-            state = {**state, "edges": locked(np.zeros(edges, dtype=np.uint8), np.uint8)}
+            state = {**state, "edges": no_edges(edges)}
         self.__dict__.update(state)
 
     @cached_property
     def has_edges(self) -> bool:
         """Whether the edge map holds any edge."""
-        return bool(self.edges.any())
+        return any(self.edges.strides) and bool(self.edges.any())
 
     @property
     def width(self) -> int:
@@ -190,14 +197,12 @@ class Observation:
             return self
         inside = np.s_[top - v : bottom - v, left - u : right - u]
         undecided = self.undecided
-        return Observation.from_mask(
-            self.camera,
-            self.stamp_ns,
-            self.mask[inside],
-            self.edges[inside],
-            undecided=None if undecided is None else undecided[inside],
-            size_px=self.size_px,
+        return replace(
+            self,
             offset_px=(left, top),
+            mask_words=pack_mask(self.mask[inside]),
+            edges=self.edges[inside] if self.has_edges else no_edges((bottom - top, right - left)),
+            undecided_words=None if undecided is None else pack_mask(undecided[inside]),
         )
 
     def with_masks(self, mask: NDArray[Any], undecided: NDArray[Any] | None) -> "Observation":

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from markerless_tracker.errors import ImageError, SearchError
+from markerless_tracker.observation import no_edges
 from markerless_tracker.records import (
     Comparison,
     Observation,
@@ -277,3 +278,18 @@ def test_a_part_of_an_observation_is_cut() -> None:
     np.testing.assert_array_equal(part.undecided, (classes == 2)[inside])
     np.testing.assert_array_equal(part.edges, edges[inside])
     assert seen.cut((30, 20, 120, 60)) is seen
+    assert dataclasses.replace(seen, exposure=(0.9,)).cut((41, 25, 110, 60)).exposure == (0.9,)
+
+
+def test_an_edge_map_without_edges_takes_no_memory() -> None:
+    mask = np.ones((400, 600), np.uint8)
+    seen = Observation.from_mask("cam01", 0, mask, no_edges(mask.shape))
+    part = seen.cut((10, 20, 500, 300))
+    back = pickle.loads(pickle.dumps(part))
+    for one in (seen, part, back):
+        assert not one.has_edges and not one.edges.any() and one.edges.strides == (0, 0)
+        assert one.edges.shape == one.mask.shape
+    # The part of a map whose edges are all elsewhere.
+    edges = np.zeros(mask.shape, np.uint8)
+    edges[0] = 9
+    assert not Observation.from_mask("cam01", 0, mask, edges).cut((0, 5, 600, 400)).edges.any()

@@ -4,14 +4,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import cast
 
-import numpy as np
-
 from markerless_tracker.datasets.recording import DerivedRecording, FrameSet, Recording
 from markerless_tracker.datasets.video.images import numbered_files, read_image
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image
 from markerless_tracker.imaging.images import scale_image
-from markerless_tracker.observation import Observation
+from markerless_tracker.observation import Observation, no_edges
 
 _PERSON = 128
 
@@ -81,6 +79,6 @@ class SilhouetteRecording(DerivedRecording):
                 image = read_image(file)
                 image = image if image.ndim == 2 else image[..., 0]
                 mask = scale_image(image, camera.size_px) >= _PERSON
-                edges = np.zeros(mask.shape, dtype=np.uint8)
+                edges = no_edges((mask.shape[0], mask.shape[1]))
                 found[camera.name] = Observation.from_mask(camera.name, stamp_ns, mask, edges)
         return found

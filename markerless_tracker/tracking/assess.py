@@ -96,6 +96,10 @@ class Assessor:
     def without_person(self, seen: Seen) -> TrackResult:
         """The result of a frame without a pose."""
         self.track = self.track.after(Event.NO_PERSON, seen.stamp_ns)
+        if self.track.state is TrackState.SEARCHING:
+            # The next person's limbs are not those of an abandoned start.
+            self.limbs.reset()
+            self.jump()
         lost = self.track.state is TrackState.LOST
         return TrackResult(
             stamp_ns=seen.stamp_ns, state=self.track.state, pose=None, markers_m=None,

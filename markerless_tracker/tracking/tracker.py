@@ -12,13 +12,19 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import TrackerError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
+from markerless_tracker.imaging import BackgroundModel, Region, Segmenter
 from markerless_tracker.libraries import usable_cores
-from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.tracking.assess import Assessor, Found
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
-from markerless_tracker.tracking.evidence.prepared import Lookahead, Outlook, Prepared, SeenView
+from markerless_tracker.tracking.evidence.prepared import (
+    Lookahead,
+    Outlook,
+    Prepared,
+    SeenView,
+    Views,
+)
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
@@ -91,9 +97,10 @@ class Tracker:
         # One thread is reserved for the evidence of the next set.
         own = max(1, threads - 1)
         mapper = ThreadPoolExecutor(min(own, len(rig))).map if own > 1 else map
-        searcher_for = partial(make_searcher, rig=rig, config=config, mapper=mapper)
-        self._searcher_for = partial(searcher_for, threads=own)
-        self._start_searcher_for = partial(searcher_for, threads=threads)
+        self._searcher_for = partial(
+            make_searcher, rig=rig, config=config, mapper=mapper, threads=own
+        )
+        self._start_searcher_for = partial(self._searcher_for, threads=threads)
         self._searcher = self._searcher_for(body)
         self.evidence = EvidenceMaker(rig, config, backgrounds or {}, mapper)
         self._views = ViewWatch(rig)
@@ -114,7 +121,7 @@ class Tracker:
         return self._body.body
 
     def reset(self) -> None:
-        """Forget the track: the next step searches near the start pose, or for a person."""
+        """Return to before the first step; a background that follows the images is kept."""
         self._views.reset()
         self._motion.reset()
         self._body.reset()
@@ -178,7 +185,7 @@ class Tracker:
         """The segmenter of a camera; None without a background."""
         return self.evidence.segmenters.get(camera)
 
-    def prepare(self, views: Mapping[str, Image | Observation], stamp_ns: int) -> Prepared:
+    def prepare(self, views: Views, stamp_ns: int) -> Prepared:
         """Make the evidence of the set after the one that `step` processes now.
 
         May be called from another thread while `step` runs, once per set and in the order of the
@@ -193,22 +200,18 @@ class Tracker:
             ImageError, CalibrationError: as `step`.
         """
         # A background that follows the images must get them in the order of the steps.
-        outlook = None if self.config.background.follow_s > 0.0 else self._lookahead.take()
+        follows = self.config.background.follow_s > 0.0
+        number, outlook = (0, None) if follows else self._lookahead.take()
         if outlook is None:
-            return Prepared(views, stamp_ns, None, {})
+            return Prepared(views, stamp_ns, None, {}, number)
         try:
             seen = self.evidence.segment(views, stamp_ns, outlook, ahead=True)
         except TrackerError:
             self._lookahead.drop()
             raise
-        return Prepared(views, stamp_ns, outlook, seen)
+        return Prepared(views, stamp_ns, outlook, seen, number)
 
-    def step(
-        self,
-        views: Mapping[str, Image | Observation] | Prepared,
-        stamp_ns: int,
-        effort: float = 1.0,
-    ) -> TrackResult:
+    def step(self, views: Views | Prepared, stamp_ns: int, effort: float = 1.0) -> TrackResult:
         """Find the pose that explains the views of one time.
 
         Args:
@@ -233,14 +236,10 @@ class Tracker:
             self._lookahead.end(latest)
         return replace(result, effort=effort)
 
-    def _step(
-        self,
-        views: Mapping[str, Image | Observation] | Prepared,
-        stamp_ns: int,
-        outlook: Outlook,
-    ) -> TrackResult:
+    def _step(self, views: Views | Prepared, stamp_ns: int, outlook: Outlook) -> TrackResult:
         if self.config.search_again and self._assessor.track.given_up:
             self._assessor.give_up()
+            self._effort.reset()
             self._starter = self._new_starter(self._motion.pose)
         views, made = self._lookahead.made(views, stamp_ns, outlook)
         evidence = made or self.evidence.segment(views, stamp_ns, outlook)
@@ -314,10 +313,9 @@ class Tracker:
         )
         sigma = self.body.sigma * self._motion.widening(stamp_ns)
         self._effort.search(search, self.body, self.config, predicted, sigma)
-        recovered, limbs = Recovered(search.pose), self._assessor.limbs
-        again = self.config.refinement != "none" and self.config.search_again
-        if again and (effort := self._effort).for_limbs:
-            recovered = limbs.recover(
+        recovered, effort = Recovered(search.pose), self._effort
+        if self.config.refinement != "none" and self.config.search_again and effort.for_limbs:
+            recovered = self._assessor.limbs.recover(
                 self._searcher, search.contours, seen, search.pose,
                 badly=effort.badly, late=effort.late, single=effort.reduced,
             )  # fmt: skip
@@ -336,6 +334,7 @@ class Tracker:
         self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
         if not tracked or found.restarted:
             return
+        self._effort.tracked(found.search.cost)
         moved = self._body.fit_tracked_frame(
             found.search, rotated=found.rotated, recovered=found.recovered
         )

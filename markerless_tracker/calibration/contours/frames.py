@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.fitness.arrays import lay_out_views
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.observation import Observation, no_edges
+from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.tracking.person.spread import EvenlySpread, most_different
 from markerless_tracker.tracking.search import pixels_per_m
 
@@ -58,7 +58,10 @@ class FrameChoice:
             return
 
         def without_edges() -> SeenFrame:
-            views = {name: replace(one, edges=_no_edges(one)) for name, one in seen.items()}
+            views = {
+                name: replace(one, edges=no_edges((one.height, one.width)))
+                for name, one in seen.items()
+            }
             return SeenFrame(result.stamp_ns, pose, markers_m, views)
 
         self._kept.offer(without_edges)
@@ -121,8 +124,3 @@ def _distances_m(markers: FloatArray, one: FloatArray) -> FloatArray:
     """Root mean square distance (n,) of markers (n, m, 3) from those of one frame (m, 3)."""
     squares = ((markers - one) ** 2).sum(axis=2)
     return np.asarray(np.sqrt(np.nanmean(squares, axis=1)))
-
-
-def _no_edges(observation: Observation) -> NDArray[np.uint8]:
-    """An edge map without edges, which needs no memory of its own."""
-    return np.broadcast_to(np.uint8(0), observation.edges.shape)

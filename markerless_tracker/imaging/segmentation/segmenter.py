@@ -15,7 +15,7 @@ from markerless_tracker.imaging.segmentation.morphology import split_undecided
 from markerless_tracker.imaging.segmentation.repair import fit_border, repair_mask
 from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
-from markerless_tracker.records import Observation
+from markerless_tracker.observation import Observation, no_edges
 
 # Initial margin beyond the needed region that is labelled, for patches that continue there.
 _SLACK_PX = 8
@@ -90,7 +90,7 @@ class Segmenter:
         The array is overwritten by the next call.
 
         Raises:
-            ImageError: not an image of the background's size and channels; names the camera.
+            ImageError: as `observe`.
         """
         return self.classes(image, region)[0]
 
@@ -98,11 +98,11 @@ class Segmenter:
         """As `mask`, and a mask of the undecided pixels; None with two classes.
 
         Raises:
-            ImageError: as `mask`.
+            ImageError: as `observe`.
         """
-        self.check(image)
-        region = region or self._whole
-        mask, undecided, zone = self._silhouette(image, region, 0)
+        region = self._checked(image, region)
+        with self.lock:
+            mask, undecided, zone = self._silhouette(image, region, 0)
         inside = region.relative_to(zone).slices
         return mask[inside], None if undecided is None else undecided[inside]
 
@@ -135,13 +135,7 @@ class Segmenter:
         Raises:
             ImageError: another size or other channels, or a region outside; names the camera.
         """
-        self.check(image)
-        region = region or self._whole
-        if region.width <= 0 or region.height <= 0 or region.grown(0, self._size_px) != region:
-            raise ImageError(
-                f"{self.camera}: got a region of {tuple(region)}, expected one inside the image of "
-                f"{self._size_px[0]}x{self._size_px[1]} px"
-            )
+        region = self._checked(image, region)
         with self.lock:
             return self._observe(image, stamp_ns, region)
 
@@ -153,7 +147,7 @@ class Segmenter:
         if self._with_edges:
             edges = edge_map(image[zone.slices], either, self.settings)[inside]
         else:
-            edges = np.zeros((region.height, region.width), dtype=np.uint8)
+            edges = no_edges((region.height, region.width))
         self._labeller.follow(image, either if region == self._whole else None, stamp_ns)
         return Observation.from_mask(
             self.camera,
@@ -164,6 +158,17 @@ class Segmenter:
             size_px=self._size_px,
             offset_px=(region.left, region.top),
         )
+
+    def _checked(self, image: Image, region: Region | None) -> Region:
+        """The region to segment, by default the whole image; raises as `observe`."""
+        self.check(image)
+        region = region or self._whole
+        if region.width <= 0 or region.height <= 0 or region.grown(0, self._size_px) != region:
+            raise ImageError(
+                f"{self.camera}: got a region of {tuple(region)}, expected one inside the image of "
+                f"{self._size_px[0]}x{self._size_px[1]} px"
+            )
+        return region
 
     def check(self, image: Image) -> None:
         """Check that an image has the background's size and channels.

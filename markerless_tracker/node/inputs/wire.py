@@ -20,12 +20,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.node.ros.cdr import compressed_fields
-from markerless_tracker.observation import Observation
+from markerless_tracker.observation import Observation, no_edges
 
 SILHOUETTE_TOPIC, EDGES_TOPIC = "NAME/silhouette", "NAME/edges"
 """Topics of a camera's evidence; NAME stands for the camera."""
@@ -155,7 +154,7 @@ def unpack(camera: str, evidence: Evidence) -> Observation:
     if ((person[:, -1] | undecided[:, -1]) & padding).any():
         raise ImageError(f"{seen.topic}: evidence has pixels beyond its width of {width} px")
     if edges is None:
-        edge_map: NDArray[np.uint8] = np.zeros((height, width), dtype=np.uint8)
+        edge_map = no_edges((height, width))
     elif edges.box != seen.box:
         raise ImageError(
             f"{edges.topic}: edges of a region {edges.box}, the silhouette's is {seen.box}"

@@ -13,7 +13,7 @@ from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter
 from markerless_tracker.libraries import usable_cores
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.evidence.prepared import Outlook, SeenView
+from markerless_tracker.tracking.evidence.prepared import Outlook, SeenView, Views
 from markerless_tracker.tracking.evidence.segmenting import SegmentingProcess
 from markerless_tracker.tracking.evidence.selection import (
     BodyLines,
@@ -88,7 +88,7 @@ class EvidenceMaker:
 
     def segment(
         self,
-        views: Mapping[str, Image | Observation],
+        views: Views,
         stamp_ns: int,
         outlook: Outlook,
         *,
@@ -302,11 +302,16 @@ class EvidenceMaker:
             for camera in self._rig
         }
 
-    def _check(self, views: Mapping[str, Image | Observation]) -> None:
+    def _check(self, views: Views) -> None:
         if not views:
             raise ImageError(f"no view came, expected some of {', '.join(self._rig.names)}")
-        for name in views:
-            self._rig[name]
+        for name, view in views.items():
+            expected = self._rig[name].size_px
+            if isinstance(view, Observation) and view.size_px != expected:
+                raise ImageError(
+                    f"{name}: observation of a {view.size_px[0]}x{view.size_px[1]} px frame, "
+                    f"its calibration says {expected[0]}x{expected[1]} px"
+                )
 
     def _segmenter(self, name: str) -> Segmenter:
         if name not in self.segmenters:

@@ -15,6 +15,9 @@ from markerless_tracker.imaging import Image, Region
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.motion import MotionModel
 
+Views = Mapping[str, Image | Observation]
+"""The views of one time: camera name to its image, or to a ready-made observation."""
+
 
 @dataclass(frozen=True, eq=False)
 class Outlook:
@@ -65,12 +68,14 @@ class Prepared:
         stamp_ns: their time.
         outlook: the outlook of the regions; None if no evidence was made ahead.
         seen: by camera; empty if no evidence was made ahead.
+        number: of the prepared sets, in their order.
     """
 
-    views: Mapping[str, Image | Observation]
+    views: Views
     stamp_ns: int
     outlook: Outlook | None
     seen: Mapping[str, SeenView]
+    number: int
 
 
 class Lookahead:
@@ -85,6 +90,8 @@ class Lookahead:
 
     def __init__(self, first: Outlook, second: Outlook) -> None:
         self._lock = threading.Lock()
+        # Numbers of the sets that were prepared last, and processed last.
+        self._prepared = self._done = 0
         self.restart(first, second)
 
     def restart(self, first: Outlook, second: Outlook) -> None:
@@ -92,38 +99,38 @@ class Lookahead:
         with self._lock:
             self._previous, self._latest = first, second
             self._running = False
-            self._ahead = 0
+            self._done = self._prepared
 
     @property
     def current(self) -> Outlook:
         """The outlook of the next step."""
         return self._previous
 
-    def take(self) -> Outlook | None:
-        """The outlook of the set that is prepared now; None if it is not known yet."""
+    def take(self) -> tuple[int, Outlook | None]:
+        """Number and outlook of the set that is prepared now; None if that is not known yet."""
         with self._lock:
-            place = self._ahead + self._running
-            self._ahead += 1
-            return (self._previous, self._latest, None)[min(place, 2)]
+            place = self._prepared - self._done + self._running
+            self._prepared += 1
+            return self._prepared, (self._previous, self._latest, None)[min(place, 2)]
 
     def drop(self) -> None:
-        """Note that a set whose outlook was taken will not be tracked."""
+        """Note that the set whose outlook was taken last will not be tracked."""
         with self._lock:
-            self._ahead = max(0, self._ahead - 1)
+            self._prepared = max(self._done, self._prepared - 1)
 
     def begin(self, prepared: Prepared | None) -> Outlook:
         """Begin a step; returns its outlook."""
         with self._lock:
             self._running = True
-            missed = prepared is None or prepared.outlook not in (None, self._previous)
-            # A set that was prepared and then skipped would be counted forever.
-            self._ahead = 0 if missed else max(0, self._ahead - 1)
+            # Sets that were prepared before this one will not come any more.
+            number = self._prepared if prepared is None else prepared.number
+            self._done = max(self._done, number)
             return self._previous
 
     @staticmethod
     def made(
-        views: Mapping[str, Image | Observation] | Prepared, stamp_ns: int, outlook: Outlook
-    ) -> tuple[Mapping[str, Image | Observation], Mapping[str, SeenView] | None]:
+        views: Views | Prepared, stamp_ns: int, outlook: Outlook
+    ) -> tuple[Views, Mapping[str, SeenView] | None]:
         """The views of a step, and the evidence made ahead if it is valid for the step; else None.
 
         Args:

@@ -94,14 +94,15 @@ class PairExchange:
             gain: as of `LimbSearch.compared`.
             least_gain: the exchange's own, of which one comparison is enough.
             moved_m: farthest marker between the refined exchange and the estimate. An exchange that
-                was refined back to the estimate tells nothing.
+                was refined back to the estimate tells nothing and is not taken.
         """
-        known = gain if moved_m >= LEAST_M else 0.0
+        apart = moved_m >= LEAST_M
+        known = gain if apart else 0.0
         sum_ = max(0.0, _FORGET * self._gains[name] + known)
         count = self._counts[name] + 1 if sum_ > 0.0 else 0
         self._gains[name], self._counts[name] = sum_, count
         summed = known > 0.0 and sum_ >= LEAST_SUM and count >= LEAST_COMPARISONS
-        taken = gain >= least_gain or summed
+        taken = (apart and gain >= least_gain) or summed
         if taken:
             self._gains[name], self._counts[name] = 0.0, 0
         return taken

@@ -133,7 +133,6 @@ class Effort:
         # A refinement that moved the pose by little has converged.
         if swarms or float(np.abs(search.pose - begin).max()) > NEAR:
             search.run((contour_stage("polish", body, config, centre, sigma),))
-        self.end(search.cost)
 
     def judge(self, cost: float) -> None:
         """Grant all searches to a frame that is explained badly, unless the effort is 0.
@@ -153,7 +152,7 @@ class Effort:
             return False
         return self._badly or self._doubt or not self._needed_only
 
-    def end(self, cost: float) -> None:
-        """End a frame: add the cost of its result to the running mean."""
+    def tracked(self, cost: float) -> None:
+        """Add the cost of a frame in which the person was tracked to the running mean."""
         usual = self._usual_cost
         self._usual_cost = cost if usual is None else usual + _MEMORY * (cost - usual)

@@ -7,6 +7,7 @@ enough is in view.
 """
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +22,18 @@ ENOUGH_CAMERAS, LEAST_CAMERAS = 3, 2
 PATIENCE_NS = 2_000_000_000
 """Time that a person in view of two cameras has to come into view of a third one."""
 GAP_NS = 500_000_000
-"""The time of `PATIENCE_NS` starts again after a gap of this length with no person in view of two
-cameras."""
+"""The time of `PATIENCE_NS` starts again after a gap of this length in which two cameras do not see
+the person."""
+NEAR_M = 1.0
+"""What is farther than this from a place of the frame before is somebody or something else."""
+
+
+class _Visit(NamedTuple):
+    """Somebody in view of two cameras, or a thing: where, since when, and when last."""
+
+    place_m: FloatArray
+    since_ns: int
+    last_ns: int
 
 
 class InViewGate:
@@ -32,9 +43,8 @@ class InViewGate:
         self.reset()
 
     def reset(self) -> None:
-        """Forget since when a person is in view."""
-        self._since_ns: int | None = None
-        self._last_ns = 0
+        """Forget who is in view."""
+        self._visits: list[_Visit] = []
 
     def enough(
         self, body: BodyModel, pose: FloatArray, cameras: Iterable[CameraModel], stamp_ns: int
@@ -50,13 +60,21 @@ class InViewGate:
         with_image = list(cameras)
         if fraction_in_view(body, pose, with_image, LEAST_CAMERAS) < LEAST_IN_VIEW:
             return False
-        if self._since_ns is None or not 0 <= stamp_ns - self._last_ns <= GAP_NS:
-            self._since_ns = stamp_ns
-        self._last_ns = stamp_ns
-        if stamp_ns - self._since_ns >= PATIENCE_NS:
+        since_ns = self._seen_since_ns(markers(body, pose).mean(axis=0), stamp_ns)
+        if stamp_ns - since_ns >= PATIENCE_NS:
             return True
         required = min(ENOUGH_CAMERAS, len(with_image))
         return fraction_in_view(body, pose, with_image, required) >= LEAST_IN_VIEW
+
+    def _seen_since_ns(self, place_m: FloatArray, stamp_ns: int) -> int:
+        """Since when two cameras see what is at a place (3,) at a time, which is noted."""
+        visits = [v for v in self._visits if 0 <= stamp_ns - v.last_ns <= GAP_NS]
+        away_m = [float(np.linalg.norm(visit.place_m - place_m)) for visit in visits]
+        since_ns = stamp_ns
+        if away_m and min(away_m) <= NEAR_M:
+            since_ns = visits.pop(int(np.argmin(away_m))).since_ns
+        self._visits = [*visits, _Visit(place_m, since_ns, stamp_ns)]
+        return since_ns
 
 
 def fraction_in_view(

@@ -122,6 +122,9 @@ def test_when_an_exchange_is_taken() -> None:
     assert taken(0.9, 0.9, 0.9, least_gain=1.0) == [False, False, True]
     # An exchange that the refinement took back tells nothing.
     assert taken(some, some, some, some, moved_m=0.0) == [False] * 4
+    assert taken(0.9, least_gain=0.0, moved_m=0.0) == [False]
+    assert taken(0.0, least_gain=0.0, moved_m=0.0) == [False]
+    assert taken(0.0, least_gain=0.0) == [True]
     assert taken(0.9, 0.9, least_gain=1.0) == [False, False]
     assert not exchange.takes("arms", 0.9, 1.0, moved_m=0.0)
     assert exchange.takes("arms", 0.9, 1.0, far_m)

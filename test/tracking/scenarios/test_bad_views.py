@@ -45,6 +45,15 @@ class TestErrors:
         views = {**frames[0].images, "cam03": Observation.from_mask("cam03", 0, small, small)}
         refused(views, ImageError, "cam03: observation of a 128x96 px frame.* 256x192 px")
 
+    def test_an_observation_of_another_size_during_the_search(self, scene, frames, swarm_settings):
+        """Nobody would be found in it."""
+        config = TrackerConfig.from_mapping(swarm_settings)
+        tracker = Tracker(scene.rig, scene.body, config)
+        large = np.zeros((384, 512), np.uint8)
+        views = {**frames[0].observations, "cam03": Observation.from_mask("cam03", 0, large, large)}
+        with pytest.raises(ImageError, match=r"cam03: observation of a 512x384 px .* 256x192 px"):
+            tracker.step(views, 0)
+
     def test_an_image_without_a_background(self, scene, frames, backgrounds, swarm_settings):
         tracker = Tracker(
             scene.rig,

@@ -69,6 +69,23 @@ def test_sets_prepared_late_early_or_left_out(make_tracker, frames, swarm_settin
     assert [said(result) for result in results] == alone
 
 
+def test_sets_are_made_ahead_again_after_one_that_was_skipped(
+    make_tracker, frames, swarm_settings, alone
+) -> None:
+    """The skipped set was prepared during a step, as was the one after it."""
+    tracker = make_tracker(swarm_settings, **SMALL)
+    held, skipped, late = (tracker.prepare(f.images, f.stamp_ns) for f in frames[:3])
+    assert skipped.seen and not late.seen
+    tracker.step(held, frames[0].stamp_ns)
+    tracker.step(late, frames[2].stamp_ns)
+    for frame in frames[3:]:
+        prepared = tracker.prepare(frame.images, frame.stamp_ns)
+        assert prepared.seen
+        tracker.step(prepared, frame.stamp_ns)
+        made = tracker._lookahead.made(prepared, frame.stamp_ns, prepared.outlook)[1]
+        assert made is prepared.seen
+
+
 def test_after_a_reset_it_is_made_anew(make_tracker, frames, swarm_settings, alone) -> None:
     tracker = make_tracker(swarm_settings, **SMALL)
     for frame in frames[:4]:

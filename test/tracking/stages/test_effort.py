@@ -13,7 +13,7 @@ def _settled() -> Effort:
     effort = Effort(needed_only=True)
     for _ in range(50):
         effort.begin(1.0, doubt=False)
-        effort.end(0.05)
+        effort.tracked(0.05)
     effort.begin(1.0, doubt=False)
     return effort
 
@@ -48,7 +48,17 @@ def test_all_frames_are_searched_if_not_only_the_needed_ones_are() -> None:
     for _ in range(5):
         effort.begin(1.0, doubt=False)
         assert _wants_swarms(effort, 0.05)
-        effort.end(0.05)
+        effort.tracked(0.05)
+
+
+def test_frames_in_which_the_person_is_lost_are_not_usual() -> None:
+    effort, body = _settled(), load_body("person31", 1.75)
+    for _ in range(30):
+        effort.begin(1.0, doubt=False)
+        lost = Recorder(0.0, 0.5)
+        effort.search(lost, body, TrackerConfig(), body.neutral, body.sigma)  # type: ignore[arg-type]
+    effort.begin(1.0, doubt=False)
+    assert _wants_swarms(effort, 0.05 + 1.1 * WORSE)
 
 
 def test_reset_forgets_the_usual_cost() -> None:
@@ -62,7 +72,7 @@ def test_reset_forgets_the_usual_cost() -> None:
 def test_effort_is_the_fraction_of_frames_that_are_searched(fraction: float, granted: int) -> None:
     effort = Effort(needed_only=False)
     effort.begin(1.0, doubt=False)
-    effort.end(0.05)
+    effort.tracked(0.05)
     count = 0
     swarms = 0
     for _ in range(100):
@@ -152,7 +162,7 @@ def test_a_badly_explained_frame_gets_all_searches_even_of_who_is_late() -> None
         assert _searches(effort, 0.05 + 2.0 * WORSE) == (True, True)
         assert effort.badly and effort.late and not effort.reduced
         # With this frame the others have their turn again.
-        effort.end(0.05)
+        effort.tracked(0.05)
     effort.begin(0.0, doubt=False)
     assert _searches(effort, 0.05 + 2.0 * WORSE) == (False, False)
 

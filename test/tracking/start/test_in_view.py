@@ -79,6 +79,30 @@ def test_the_next_person_is_waited_for_as_the_first_was(body) -> None:
     assert gate.enough(body, aside, rig, later + PATIENCE_NS)
 
 
+def test_a_person_is_waited_for_however_long_a_thing_has_been_in_view(body) -> None:
+    rig, thing, person = ring_rig(4), standing(body, 2.6), standing(body, -2.6)
+    assert (
+        fraction_in_view(body, person, rig, 2) == 1.0 > 0.5 > fraction_in_view(body, person, rig, 3)
+    )
+    gate = InViewGate()
+    for stamp_ns in range(0, PATIENCE_NS + 1, GAP_NS):
+        gate.enough(body, thing, rig, stamp_ns)
+    for stamp_ns in range(PATIENCE_NS, 2 * PATIENCE_NS, GAP_NS):
+        assert gate.enough(body, thing, rig, stamp_ns)
+        assert not gate.enough(body, person, rig, stamp_ns)
+    assert gate.enough(body, person, rig, 2 * PATIENCE_NS)
+
+
+def test_a_person_who_walks_is_the_same_person(body) -> None:
+    rig, gate = ring_rig(4), InViewGate()
+    steps = range(0, PATIENCE_NS, GAP_NS // 4)
+    for stamp_ns in steps:
+        assert not gate.enough(
+            body, standing(body, 2.6 + 0.2 * (stamp_ns / PATIENCE_NS)), rig, stamp_ns
+        )
+    assert gate.enough(body, standing(body, 2.6), rig, PATIENCE_NS)
+
+
 def test_a_recording_that_begins_anew_is_another_visit(body) -> None:
     rig, aside = ring_rig(4), standing(body, 2.6)
     gate = InViewGate()

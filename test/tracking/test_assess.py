@@ -1,0 +1,35 @@
+"""Tests for `markerless_tracker.tracking.assess`."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import load_body
+from markerless_tracker.records import Observation, TrackState
+from markerless_tracker.synthesis.rig import ring_rig
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.assess import Assessor
+from markerless_tracker.tracking.evidence.seen import Seen
+from markerless_tracker.tracking.states import Phase, Track
+
+
+@pytest.mark.parametrize(
+    ("phase", "state", "lost"),
+    [
+        (Phase.SETTLING, TrackState.SEARCHING, ()),
+        (Phase.TRACKING, TrackState.LOST, ("l_arm", "r_arm", "l_leg", "r_leg")),
+    ],
+)
+def test_lost_limbs_are_those_of_the_tracked_person(phase, state, lost) -> None:
+    """The limbs of an abandoned start are not those of the next person."""
+    body, rig = load_body("person31", 1.75), ring_rig(4, (64, 48))
+    empty = np.zeros((48, 64), np.uint8)
+    seen = {c.name: Observation.from_mask(c.name, 0, empty, empty) for c in rig}
+    assessor = Assessor(rig, body, TrackerConfig())
+    pose = body.neutral.copy()
+    pose[body.index("pelvis_tz")] = 0.95
+    assessor.limbs.assess(body, pose, seen, np.ones(body.size))
+    assert set(assessor.limbs.lost) == {"l_arm", "r_arm", "l_leg", "r_leg"}
+    assessor.track = Track(phase)
+    result = assessor.without_person(Seen(0, seen, seen, seen))
+    assert result.state is state
+    assert set(assessor.limbs.lost) == set(lost)
