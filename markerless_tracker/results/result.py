@@ -25,7 +25,7 @@ from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.results.appended import not_written
 from markerless_tracker.results.journal import Journal
 from markerless_tracker.results.target import check_target as check_target
-from markerless_tracker.results.target import earlier_files, path_of
+from markerless_tracker.results.target import earlier_files, path_of, segments
 from markerless_tracker.results.trc_stream import TrcStream
 from markerless_tracker.tracking import TrackerConfig
 
@@ -44,7 +44,8 @@ class ResultWriter:
 
     If a stamp is not later than the one before, NAME.2.trc begins, then NAME.3.trc: the rows of a
     file are in the order of time, and no written row is ever removed. The frames in NAME.json then
-    have `segment`, the number of their file.
+    have `segment`, the number of their file. Numbers of files that are there already are passed
+    over.
 
     Args:
         name: path without suffix; the folder is made.
@@ -186,16 +187,16 @@ class ResultWriter:
             self._journal.add(self._summary())
             # From here on readers use the journal.
             self.json_path.unlink(missing_ok=True)
-            number = 2
-            while (path := path_of(self._name, f".{number}.trc")).exists():
+            for _, path in segments(self._name) if self._earlier else ():
                 path.unlink()
-                number += 1
         return self._journal, self._trc
 
     def _next_segment(self, trc: TrcStream) -> TrcStream:
-        path = path_of(self._name, f".{self._segment + 1}.trc")
+        number = self._segment + 1
+        while (path := path_of(self._name, f".{number}.trc")).exists():
+            number += 1
         self._trc = TrcStream(path, MARKER_NAMES, self._rate())
-        self._segment += 1
+        self._segment = number
         self._angles.reset()
         with suppress(DatasetError):
             # Its rows are written; only the final header has not been written.

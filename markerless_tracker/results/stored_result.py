@@ -14,6 +14,7 @@ from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.errors import BodyModelError, DatasetError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import TrackState, locked
+from markerless_tracker.results.target import segments
 
 _PER_FRAME = (
     "stamps_ns", "states", "filled", "fitness", "positions_m", "positions_sd_m", "parameters",
@@ -247,11 +248,4 @@ def result_names(name: Path) -> list[Path]:
     """
     if not name.with_name(name.name + ".trc").exists():
         raise DatasetError(f"{name}.trc: no such file, expected the name of a result")
-    found = [name]
-    while (
-        (more := name.with_name(f"{name.name}.{len(found) + 1}"))
-        .with_name(f"{more.name}.trc")
-        .exists()
-    ):
-        found.append(more)
-    return found
+    return [name, *(path.with_suffix("") for _, path in segments(name))]

@@ -6,6 +6,7 @@ from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.appended import make_folder_of
 
 _SUFFIXES = (".trc", ".json", ".jsonl")
+_HEADER_LINES = 5
 
 
 def earlier_files(name: Path) -> list[Path]:
@@ -23,13 +24,42 @@ def check_target(name: Path, *, overwrite: bool, allow: str = "`overwrite`") -> 
         allow: what allows it, for the message.
 
     Raises:
-        DatasetError: it cannot, or there is an earlier result and `overwrite` is not set.
+        DatasetError: it cannot, or there is an earlier result with frames and `overwrite` is not
+            set.
     """
     earlier = earlier_files(name)
-    if earlier and not overwrite:
+    if earlier and not overwrite and not _without_frames(path_of(name, ".trc")):
         raise DatasetError(f"{earlier[0]}: exists already, expected a new name or {allow}")
     for suffix in _SUFFIXES:
         make_folder_of(path_of(name, suffix))
+
+
+def is_result(name: Path) -> bool:
+    """Whether there is a result of that name, finished or not."""
+    return path_of(name, ".json").exists() or path_of(name, ".jsonl").exists()
+
+
+def segments(name: Path) -> list[tuple[int, Path]]:
+    """Number and path of the further marker files NAME.2.trc, NAME.3.trc, ... of a result.
+
+    Those of other results, which have a summary of their own, are left out.
+    """
+    found, number = [], 2
+    while (path := path_of(name, f".{number}.trc")).exists():
+        if not is_result(path.with_suffix("")):
+            found.append((number, path))
+        number += 1
+    return found
+
+
+def _without_frames(path: Path) -> bool:
+    """Whether a marker file has a header and no rows: its run ended before the first frame."""
+    try:
+        with path.open("rb") as file:
+            lines = [line.strip() for line, _ in zip(file, range(_HEADER_LINES + 2), strict=False)]
+    except OSError:
+        return False
+    return len(lines) >= _HEADER_LINES and not any(lines[_HEADER_LINES:])
 
 
 def path_of(name: Path, suffix: str) -> Path:

@@ -19,7 +19,9 @@ from markerless_tracker.datasets import MarkerTrack, format_trc, read_trc
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.results.journal import read_summary
+from markerless_tracker.results.read import read_result
 from markerless_tracker.results.result import ResultWriter
+from markerless_tracker.results.stored_result import result_names
 from markerless_tracker.tracking import TrackerConfig
 
 FRAME_NS = 16_666_667
@@ -245,3 +247,49 @@ def test_neither_summary_nor_journal(tmp_path):
     (tmp_path / "out.json").write_text("[]")
     with pytest.raises(DatasetError, match=r"out\.json: no result of a tracker"):
         read_summary(tmp_path / "out")
+
+
+@pytest.mark.parametrize("earlier", [False, True])
+def test_other_results_keep_their_files(tmp_path, body, config, earlier):
+    """Someone names the takes walk, walk.2 and walk.4."""
+    if earlier:
+        with ResultWriter(tmp_path / "walk", body, config, fps=60.0) as writer:
+            for stamp in (2, 1):
+                writer.add(result(stamp))
+        assert (tmp_path / "walk.2.trc").exists()
+        (tmp_path / "walk.2.trc").unlink()
+    others = [tmp_path / f"walk.{number}" for number in (2, 4)]
+    for name in others:
+        with ResultWriter(name, body, config, fps=60.0) as writer:
+            writer.add(result(10))
+    before = {path.name: path.read_bytes() for path in tmp_path.glob("walk.[24].*")}
+    assert len(before) == 6
+    ResultWriter(tmp_path / "walk", body, config, fps=60.0).close()
+    with ResultWriter(tmp_path / "walk", body, config, fps=60.0) as writer:
+        for stamp in (10, 20, 5, 15, 3):
+            writer.add(result(stamp))
+    assert {path.name: path.read_bytes() for path in tmp_path.glob("walk.[24].*")} == before
+    # Their numbers are passed over.
+    parts = [tmp_path / f"walk{part}.trc" for part in ("", ".3", ".5")]
+    assert [read_trc(part).stamps_ns.tolist() for part in parts] == [[10, 20], [5, 15], [3]]
+    assert [path.name for path in result_names(tmp_path / "walk")] == ["walk", "walk.3", "walk.5"]
+    frames = read_summary(tmp_path / "walk")["frames"]
+    assert [frame.get("segment", 1) for frame in frames] == [1, 1, 3, 3, 5]
+    assert [len(read_result(part).stamps_ns) for part in parts] == [2, 2, 1]
+
+
+def test_a_marker_file_that_is_no_part_of_a_result_is_kept(tmp_path, body, config):
+    (tmp_path / "walk.2.trc").write_text("reference")
+    with ResultWriter(tmp_path / "walk", body, config, fps=60.0) as writer:
+        writer.add(result(10))
+    assert (tmp_path / "walk.2.trc").read_text() == "reference"
+
+
+def test_a_result_without_frames_does_not_block_the_next_run(tmp_path, body, config):
+    """A node that was stopped before the first image is started again."""
+    name = tmp_path / "out"
+    ResultWriter(name, body, config, fps=60.0, overwrite=False).close()
+    with ResultWriter(name, body, config, fps=60.0, overwrite=False) as writer:
+        writer.add(result(10))
+    with pytest.raises(DatasetError, match="exists already"):
+        ResultWriter(name, body, config, fps=60.0, overwrite=False)
