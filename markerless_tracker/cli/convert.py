@@ -11,7 +11,7 @@ from rich.console import Console
 
 from markerless_tracker.bags import COMPRESSIONS, BagSummary, write_bag
 from markerless_tracker.cli.terminal.bars import progress_bars, warn
-from markerless_tracker.cli.track_arguments import add_format, add_world
+from markerless_tracker.cli.track_arguments import add_format, add_world, reading_options
 from markerless_tracker.datasets import FORMATS, Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.datasets.part import PartRecording
@@ -79,14 +79,7 @@ def run(args: argparse.Namespace) -> int:
     """Convert; returns the exit status."""
     started = time.monotonic()
     console = Console(stderr=True)
-    recording = open_recording(
-        args.source,
-        scale=args.scale,
-        format=args.format,
-        input_fps=args.input_fps,
-        up=args.up,
-        units=args.units,
-    )
+    recording = open_recording(args.source, scale=args.scale, **reading_options(args))
     start = 0
     if args.cameras is not None or args.start != 0.0 or args.end is not None:
         names = None if args.cameras is None else [n for n in args.cameras.split(",") if n]

@@ -21,7 +21,7 @@ from markerless_tracker.camera.doubts import calibration_doubts
 from markerless_tracker.cli.passes.first import set_up
 from markerless_tracker.cli.terminal.bars import tell, warn
 from markerless_tracker.cli.terminal.notices import COMPILING, Bars, Notices
-from markerless_tracker.cli.track_arguments import add_arguments
+from markerless_tracker.cli.track_arguments import add_arguments, reading_options
 from markerless_tracker.compiled import compilation
 from markerless_tracker.datasets import Recording, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
@@ -224,10 +224,7 @@ class Outcome:
 
 
 def _opened(args: argparse.Namespace, scale: float) -> Recording:
-    return open_recording(
-        args.source, scale=scale, format=args.format, input_fps=args.input_fps, up=args.up,
-        units=args.units,
-    )  # fmt: skip
+    return open_recording(args.source, scale=scale, **reading_options(args))
 
 
 def _track(
@@ -282,7 +279,7 @@ def _track(
             start_given=args.start is not None,
         )
         writer.note({"cameras": _cameras(shifts), "verdict": verdict.as_mapping()})
-        writer.note({"scale": args.scale})
+        writer.note({"scale": args.scale, "reading": reading_options(args)})
         if offsets_s is not None:
             writer.note({"time_offsets_s": dict(offsets_s)})
     if interrupted:

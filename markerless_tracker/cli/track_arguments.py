@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from markerless_tracker.datasets import FORMATS
 from markerless_tracker.datasets.upright.axes import AXES, UNITS
@@ -112,6 +113,11 @@ def add_format(group: "argparse._ActionsContainer") -> None:
         help=f"format of the recording: {', '.join(FORMATS)} (default: detected)",
     )
     group.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images, 1/s")
+
+
+def reading_options(args: argparse.Namespace) -> dict[str, Any]:
+    """The options of `add_format` and `add_world` as those of `open_recording`."""
+    return {name: getattr(args, name) for name in ("format", "input_fps", "up", "units")}
 
 
 def add_world(group: "argparse._ActionsContainer") -> None:

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.datasets import FrameSet, Recording, open_recording
+from markerless_tracker.datasets import FrameSet
 from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.in_step import InStepRecording
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.stored_result import StoredResult
+from markerless_tracker.viewing.reopened import reopened
 from markerless_tracker.viewing.windows import Window, windows
 
 
@@ -30,7 +31,7 @@ class ResultImages:
 
     Raises:
         DatasetError: the recording does not exist or cannot be read.
-        CalibrationError, ImageError, ConfigError: as `open_recording`.
+        CalibrationError, ImageError, ConfigError: as `reopened`.
     """
 
     def __init__(
@@ -49,12 +50,12 @@ class ResultImages:
                 else f"{path}: the images of the result are not there"
             )
             raise DatasetError(f"{found}, expected the recording's folder with --source")
-        rig = open_recording(path).rig
+        rig = reopened(result, path).rig
         self.windows: Mapping[str, Window] = (
             dict.fromkeys(rig.names, Window()) if whole else windows(result, rig)
         )
         widest = max(self.windows[camera.name].size * camera.size_px[0] for camera in rig)
-        recording: Recording = open_recording(path, scale=min(1.0, width_px / widest))
+        recording = reopened(result, path, scale=min(1.0, width_px / widest))
         # Bags may lack sets, so that every k-th set is not one set per k periods.
         self._regular = isinstance(recording, VideoRecording)
         offsets = result.summary.get("time_offsets_s")

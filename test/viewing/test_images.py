@@ -1,7 +1,10 @@
 """The images of a result, found by time."""
 
+import re
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from markerless_tracker.bags import write_bag
@@ -62,3 +65,28 @@ def test_a_bag_with_a_missing_set(make_result, walk: Path, tmp_path: Path) -> No
     assert {row: images.stamp_ns for row, images in shown.items()} == {
         row: int(result.stamps_ns[row]) for row in (0, 2, 4)
     }
+
+
+def test_the_recording_is_read_as_the_run_read_it(make_result, walk: Path, tmp_path: Path) -> None:
+    in_mm, bag = tmp_path / "mm", tmp_path / "bag"
+    shutil.copytree(walk, in_mm)
+    text = (in_mm / "calibration.toml").read_text()
+    numbers = re.compile(r"translation = \[([^\]]*)\]")
+    text = numbers.sub(
+        lambda m: f"translation = {[1000.0 * float(v) for v in m[1].split(',')]}", text
+    )
+    (in_mm / "calibration.toml").write_text(text)
+    options = {"format": None, "input_fps": None, "up": "z", "units": "mm"}
+    write_bag(open_recording(in_mm, units="mm"), bag)
+    result = read_result(make_result(source=in_mm, notes={"reading": options}))
+    expected = open_recording(walk).rig["cam02"].T_world_cam
+    for source in (None, in_mm, bag):
+        found = ResultImages(result, source).rig["cam02"].T_world_cam
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("reading", [7, {"units": 3}, {"scale": 0.5}])
+def test_impossible_options_of_the_run_are_refused(make_result, walk: Path, reading) -> None:
+    result = read_result(make_result(source=walk, notes={"reading": reading}))
+    with pytest.raises(DatasetError, match="`reading` is .*, expected some of format, input_fps"):
+        ResultImages(result)
