@@ -64,6 +64,13 @@ class Trial:
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
+    def done(self) -> "Record | None":
+        """The record of this very trial, if it is done and its files are there."""
+        found, folder = self.stored(), (self.out / self.name).parent
+        if found is None or found.key != self.key:
+            return None
+        return found if all((folder / name).exists() for name in found.files) else None
+
 
 class Record(NamedTuple):
     """A trial that was done: its key, its row, the names of its files."""
@@ -84,8 +91,8 @@ def do_trial(trial: Trial) -> dict[str, Any]:
     """
     clock = _Clock()
     stored = trial.stored()
-    if stored is not None and stored.key == trial.key:
-        return stored.row
+    if (done := trial.done()) is not None:
+        return done.row
     cv2.setNumThreads(1)
     try:
         finished, files = _track(trial, stored, clock)

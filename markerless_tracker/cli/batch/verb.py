@@ -72,9 +72,8 @@ def run(args: argparse.Namespace) -> int:
     with _alone(args.out):
         rows: dict[str, dict[str, Any]] = {}
         for trial in trials:
-            stored = trial.stored()
-            if stored is not None and stored.key == trial.key:
-                rows[trial.name] = {**stored.row, "earlier": True}
+            if (done := trial.done()) is not None:
+                rows[trial.name] = {**done.row, "earlier": True}
         missing = [trial for trial in trials if trial.name not in rows]
         if not args.force:
             _check_targets(missing)
@@ -139,8 +138,9 @@ def _check_targets(missing: Sequence[Trial]) -> None:
         if refined is not None and refined.exists() and not trial.record.exists():
             raise DatasetError(f"{refined}: exists already, expected a new name or --force")
         target = trial.out / trial.name
-        there = earlier_files(target)
-        if trial.stored() is not None or (there and not trial.record.exists()):
+        there, stored = earlier_files(target), trial.stored()
+        other = stored is not None and stored.key != trial.key
+        if other or (there and not trial.record.exists()):
             path = there[0] if there else path_of(target, ".json")
             raise DatasetError(
                 f"{path}: exists already and is of other settings, code or images, expected the "

@@ -15,7 +15,7 @@ from markerless_tracker.node.player.clock import BagClock
 from markerless_tracker.node.player.control import Control
 from markerless_tracker.node.player.encode import PlayedSet, played_sets
 from markerless_tracker.node.player.lockstep import Lockstep
-from markerless_tracker.node.player.others import OtherTopics
+from markerless_tracker.node.player.others import END_NS, OtherTopics
 from markerless_tracker.node.player.pace import Pace
 from markerless_tracker.node.player.parameters import (
     PlayerSettings,
@@ -35,7 +35,7 @@ _SERVE_S = 0.1
 """Interval at which due callbacks run, such as requests for parameters."""
 _PATIENCE_S = 5.0
 """Time for the discovery of a tracker in lockstep."""
-_ACKNOWLEDGE_S = 3.0
+_ACKNOWLEDGE_S, _SLICE_S = 10.0, 0.1
 _LATE_S = 0.05
 """Least delay of the last set that is reported."""
 # An acknowledged image may not have reached the subscriber's callback yet.
@@ -120,10 +120,14 @@ class PlayerNode(GivenNode):
             self.get_logger().warning(warning)
 
     def finish(self, spin: Spin) -> None:
-        """Wait up to `_ACKNOWLEDGE_S` per topic until subscribers have received the last set."""
+        """Wait up to `_ACKNOWLEDGE_S` until subscribers have received the last set."""
+        end_s = time.monotonic() + _ACKNOWLEDGE_S
         for publisher in (*self._images.values(), *self._infos.values()):
-            if publisher.get_subscription_count():
-                publisher.wait_for_all_acked(Duration(seconds=_ACKNOWLEDGE_S))
+            while publisher.get_subscription_count() and time.monotonic() < end_s:
+                if publisher.wait_for_all_acked(Duration(seconds=_SLICE_S)):
+                    break
+                if not spin(0.0):
+                    return
         spin(_LINGER_S)
 
     @property
@@ -156,6 +160,7 @@ class PlayerNode(GivenNode):
     def _pass(self, spin: Spin) -> bool:
         """Play once; returns whether to continue."""
         pace = Pace(self.settings.rate, clock=time.monotonic)
+        self._others_up_to = self._others.up_to(later=self._start > 0)
         try:
             return self._send_all(pace, spin)
         finally:
@@ -179,12 +184,12 @@ class PlayerNode(GivenNode):
                 self._publish(played)
                 if not self._until_dealt_with(played.stamp_ns, spin):
                     return False
+        self._others.publish(self._others_up_to(END_NS, END_NS))
         return True
 
     def _sets(self) -> Iterator[PlayedSet]:
         wanted = {*self._images, *self._infos}
-        others = self._others.up_to(later=self._start > 0)
-        return played_sets(self._recording, self._start, wanted, others)
+        return played_sets(self._recording, self._start, wanted, self._others_up_to)
 
     def _publish(self, played: PlayedSet) -> None:
         self._clock.publish(played.stamp_ns)

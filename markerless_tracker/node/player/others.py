@@ -9,6 +9,8 @@ from markerless_tracker.datasets.bag.stream import RawMessage
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.node.ros.qos import latched_qos, output_qos
 
+END_NS = 2**63 - 1
+"""A time after all messages."""
 LATCHED = ("tf_static", "robot_description")
 """Last parts of the names of latched topics, whose last message late subscribers receive."""
 
@@ -41,7 +43,8 @@ class OtherTopics:
     def up_to(self, *, later: bool) -> Callable[[int, int], list[RawMessage]]:
         """A function that gives the messages up to a set of images, each once, in order.
 
-        Its arguments are the times in ns at which the set's first and last image were recorded.
+        Its arguments are the times in ns at which the set's first and last image were recorded;
+        `END_NS` twice gives the messages after the last set.
 
         Args:
             later: whether the first set is not the bag's first: of the messages before it, only

@@ -114,6 +114,12 @@ def test_a_batch_that_is_killed_goes_on_where_it_was(trials, options, tmp_path, 
     assert [row["name"] for row in summary["trials"]] == GOOD
     assert summary["trials"][0]["earlier"] and summary["totals"]["done"] == 3
     assert record.stat().st_mtime_ns == first
+    # A result whose files are gone is not done.
+    for file in (out / "a").glob("one.*"):
+        file.unlink()
+    assert main([*words, "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert [row["earlier"] for row in summary["trials"]] == [False, True, True]
     assert {p.name for p in (out / "a").iterdir()} == {
         f"{name}.{suffix}" for name in ("one", "two") for suffix in ("trc", "json", "subject.yaml")
     }

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from markerless_tracker.datasets.bag.stream import Place, RawMessage
-from markerless_tracker.node.player.others import OtherTopics
+from markerless_tracker.node.player.others import END_NS, OtherTopics
 
 LOGGED_NS = 1_700_000_000_000_000_000
 PERIOD_NS = 20_000_000
@@ -40,6 +40,15 @@ def test_each_set_has_the_messages_recorded_until_then(up_to) -> None:
         take(LOGGED_NS + i * PERIOD_NS - 2_000_000, LOGGED_NS + i * PERIOD_NS) for i in range(5)
     ]
     assert taken == [[each] for each in stored]
+
+
+def test_what_was_recorded_after_the_last_set_comes_at_the_end(up_to) -> None:
+    """A tracker's results are recorded later than their images."""
+    stored = [message("/marker_poses", LOGGED_NS + i * PERIOD_NS) for i in range(5)]
+    take = up_to(stored)
+    assert take(LOGGED_NS, LOGGED_NS + PERIOD_NS) == stored[:2]
+    assert take(END_NS, END_NS) == stored[2:]
+    assert take(END_NS, END_NS) == []
 
 
 def test_a_later_first_set_comes_without_what_was_before(up_to) -> None:
