@@ -67,7 +67,7 @@ class BagWriter:
 
     def __init__(self, folder: Path, *, zstd: bool = False, chunk_bytes: int = CHUNK_BYTES) -> None:
         self._folder = folder
-        self._path = folder / f"{folder.name}.mcap"
+        self._path = folder / f"{folder.resolve().name}.mcap"
         self._file = self._path.open("xb")
         self._mcap = PieceWriter(self._file, zstd=zstd, chunk_bytes=chunk_bytes)
         self._mcap.start("ros2", "markerless_tracker")

@@ -18,6 +18,8 @@ SOCKET_BYTES = 2**21
 """Receive buffer below which images between machines get lost: two colour images of 656x490 px."""
 LOAD = 0.75
 """Load per core above which a live tracker skips sets."""
+MOST_DOMAIN = 232
+"""Largest `ROS_DOMAIN_ID`: further domains have no ports."""
 _ROS = (
     "rclpy",
     "sensor_msgs",
@@ -162,6 +164,11 @@ def _profile(environment: Mapping[str, str], names: tuple[str, ...], shipped: Pa
 def _discovery(environment: Mapping[str, str]) -> Finding:
     domain = environment.get("ROS_DOMAIN_ID") or "0"
     range_ = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or "SUBNET"
+    if not domain.isascii() or not domain.isdecimal() or int(domain) > MOST_DOMAIN:
+        return Finding(
+            "discovery", RED, "", f"ROS_DOMAIN_ID is {domain!r}",
+            f"set it to a whole number from 0 to {MOST_DOMAIN}",
+        )  # fmt: skip
     text = f"domain {domain}, range {range_}"
     if range_ in ("LOCALHOST", "OFF") or environment.get("ROS_LOCALHOST_ONLY") == "1":
         return Finding("discovery", GREEN, "", f"{text}: this machine only")

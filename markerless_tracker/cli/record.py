@@ -4,6 +4,8 @@ import argparse
 import json
 import shutil
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
@@ -11,7 +13,7 @@ from rich.progress import Progress, TextColumn, TimeElapsedColumn
 
 from markerless_tracker.bags.mcap_bag import BagWriter
 from markerless_tracker.camera import read_calibration
-from markerless_tracker.cli.terminal.arguments import positive
+from markerless_tracker.cli.terminal.arguments import list_of, positive
 from markerless_tracker.cli.terminal.bars import warn
 from markerless_tracker.errors import DatasetError
 
@@ -32,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--topics",
         metavar="A,B,...",
+        type=list_of(str),
         help="topics to record (default: all but debug/..., /rosout and /parameter_events)",
     )
     parser.add_argument("--seconds", type=positive, metavar="S", help="end after S seconds")
@@ -53,8 +56,6 @@ def run(args: argparse.Namespace) -> int:
     prepare()
     if args.calibration is not None:
         read_calibration(args.calibration)
-    topics = None if args.topics is None else [name for name in args.topics.split(",") if name]
-    _make(args.bag, args.calibration)
     console = Console(stderr=True)
     bars = Progress(
         TextColumn("{task.description}"),
@@ -63,16 +64,19 @@ def run(args: argparse.Namespace) -> int:
         console=console,
         disable=not console.is_terminal,
     )
-    with StopSignals() as stop, BagWriter(args.bag) as writer, bars:
+    with StopSignals() as stop, _new_bag(args.bag, args.calibration) as writer, bars:
         task = bars.add_task(f"recording {args.bag}", total=None)
         counts = record(
             writer,
             stop,
-            topics=topics,
+            topics=args.topics,
             seconds=args.seconds,
             progress=lambda messages: bars.update(task, completed=messages),
         )
     total = sum(counts.values())
+    silent = [name for name in args.topics or () if not counts.get(f"/{name.strip('/')}")]
+    if total and silent:
+        warn(console, f"no message came on {', '.join(silent)}")
     if args.json:
         json.dump({"bag": str(args.bag), "messages": total, "topics": counts}, sys.stdout, indent=2)
         sys.stdout.write("\n")
@@ -85,14 +89,27 @@ def run(args: argparse.Namespace) -> int:
     return 0 if total else NOTHING_ARRIVED
 
 
-def _make(folder: Path, calibration: Path | None) -> None:
-    """Make the bag's folder.
+@contextmanager
+def _new_bag(folder: Path, calibration: Path | None) -> Iterator[BagWriter]:
+    """A bag in a new or empty folder; an error before the first message leaves no files.
 
     Raises:
-        DatasetError: it exists already, or it cannot be made.
+        DatasetError: the folder is not empty.
     """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    existed = folder.exists()
+    if existed and (not folder.is_dir() or any(folder.iterdir())):
         raise DatasetError(f"{folder}: exists and is not empty, expected a new or an empty folder")
     folder.mkdir(parents=True, exist_ok=True)
     if calibration is not None:
         shutil.copy(calibration, folder / "calibration.toml")
+    writer = BagWriter(folder)
+    try:
+        with writer:
+            yield writer
+    except Exception:
+        if not writer.messages:
+            for path in folder.iterdir():
+                path.unlink()
+            if not existed:
+                folder.rmdir()
+        raise

@@ -7,7 +7,9 @@ from typing import Any
 from markerless_tracker.datasets import FORMATS
 from markerless_tracker.datasets.upright.axes import AXES, UNITS
 from markerless_tracker.datasets.upright.standing import PERSON
+from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.smooth import CUTOFF_HZ, LEAST_CUTOFF_HZ
+from markerless_tracker.results.target import result_name as name_of
 from markerless_tracker.tracking import OPTIMIZERS, PRESETS
 
 
@@ -225,16 +227,12 @@ def _files(group: argparse._ArgumentGroup) -> None:
 
 
 def result_name(text: str) -> Path:
-    """The NAME of NAME.trc and NAME.json, type of an argument: a path that names no folder.
-
-    NAME.trc gives NAME.
+    """The NAME of NAME.trc and NAME.json, type of an argument (`results.target.result_name`).
 
     Raises:
         argparse.ArgumentTypeError: it names a folder, or nothing.
     """
-    path = Path(text)
-    if path.name in ("", "..") or text.endswith("/"):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} names no file, expected a name such as {path / 'walk'}"
-        )
-    return path.with_suffix("") if path.suffix.lower() == ".trc" else path
+    try:
+        return name_of(text)
+    except DatasetError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error

@@ -9,6 +9,18 @@ _SUFFIXES = (".trc", ".json", ".jsonl")
 _HEADER_LINES = 5
 
 
+def result_name(text: str) -> Path:
+    """The NAME of a result's files from what a user gave: NAME, or the path of one of its files.
+
+    Raises:
+        DatasetError: it names a folder, or nothing.
+    """
+    path = Path(text)
+    if path.name in ("", "..") or text.endswith("/"):
+        raise DatasetError(f"{text!r} names no file, expected a name such as {path / 'walk'}")
+    return path.with_suffix("") if path.suffix.lower() in _SUFFIXES else path
+
+
 def earlier_files(name: Path) -> list[Path]:
     """Files of an earlier result of that name."""
     paths = (path_of(name, suffix) for suffix in _SUFFIXES)

@@ -97,6 +97,13 @@ def test_metadata_is_that_of_rosbag2(make_recording, tmp_path: Path) -> None:
     assert yaml.safe_load(record.metadata["serialized_metadata"]) == about
 
 
+def test_a_bag_in_the_working_folder_has_its_name(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with BagWriter(Path(".")):
+        pass
+    assert (tmp_path / f"{tmp_path.name}.mcap").is_file()
+
+
 def test_a_writer_that_fails_leaves_readable_chunks(tmp_path: Path) -> None:
     text = message_type("std_msgs/msg/String")(data="hello")
     with pytest.raises(KeyError), BagWriter(tmp_path) as writer:

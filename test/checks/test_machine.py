@@ -47,6 +47,15 @@ def test_shared_memory(
     assert found(tmp_path, shared_memory=tmp_path / "none")["shared memory"].state == "yellow"
 
 
+@pytest.mark.parametrize(
+    ("domain", "state"),
+    [("", "green"), ("0", "green"), ("232", "green"), ("233", "red"), ("-1", "red"), ("a", "red")],
+)
+def test_domains(tmp_path: Path, domain: str, state: str) -> None:
+    line = found(tmp_path, {"ROS_DOMAIN_ID": domain})["discovery"]
+    assert line.state == state and (state == "green" or "0 to 232" in line.advice)
+
+
 def test_small_socket_buffers(tmp_path: Path) -> None:
     (tmp_path / "rmem_max").write_text("212992\n")
     line = found(tmp_path)["socket buffers"]

@@ -11,12 +11,13 @@ from markerless_tracker.checks.finding import GREEN, RED, YELLOW, Finding
 from markerless_tracker.checks.machine import check_machine
 from markerless_tracker.checks.stream import CameraStream, check_streams
 from markerless_tracker.cli.check import print_findings
+from markerless_tracker.cli.terminal.arguments import list_of
 from markerless_tracker.cli.terminal.bars import seconds_bar
 from markerless_tracker.datasets.background import read_background, read_background_models
 from markerless_tracker.errors import ConfigError, TrackerError
 from markerless_tracker.imaging import Image
-from markerless_tracker.node.ros.process import RosMissingError, StopSignals
-from markerless_tracker.node.ros.profile import USERS_OWN, profile_file
+from markerless_tracker.node.ros.process import RosMissingError, StopSignals, require_ros
+from markerless_tracker.node.ros.profile import USERS_OWN, apply_profile, profile_file
 
 HELP = (
     "Check this machine and its cameras: shared memory, socket buffers, threads, ROS, profile of "
@@ -38,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--background", type=Path, metavar="DIR", help="the empty scene, with --calibration"
     )
     parser.add_argument(
-        "--cameras", metavar="A,B,...",
+        "--cameras", metavar="A,B,...", type=list_of(str), default=(),
         help="cameras to listen to (those of --calibration, else all that send)",
     )  # fmt: skip
     parser.add_argument(
@@ -62,7 +63,9 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"--seconds is {args.seconds:g}, expected 0 to {MOST_SECONDS:g}")
     if args.background is not None and args.calibration is None:
         raise ConfigError("--background needs --calibration, whose cameras it is compared with")
-    if args.image_topic != IMAGE_TOPIC and args.cameras is None and args.calibration is None:
+    if "NAME" not in args.image_topic:
+        raise ConfigError(f"--image-topic is {args.image_topic!r}, expected NAME in it")
+    if args.image_topic != IMAGE_TOPIC and not args.cameras and args.calibration is None:
         raise ConfigError(
             "--image-topic needs the names of the cameras, expected --cameras or --calibration"
         )
@@ -72,9 +75,9 @@ def run(args: argparse.Namespace) -> int:
     found += calibrated
     backgrounds, missing = _backgrounds(args.background, rig)
     found += missing
-    if args.seconds > 0.0:
-        chosen = [name for name in (args.cameras or "").split(",") if name]
-        found += _cameras(chosen or (rig.names if rig else ()), backgrounds, args)
+    joins = all(one.state != RED for one in found if one.check == "discovery")
+    if args.seconds > 0.0 and joins:
+        found += _cameras(args.cameras or (rig.names if rig else ()), backgrounds, args)
     return print_findings(found, "doctor", as_json=args.json)
 
 
@@ -123,6 +126,11 @@ def _cameras(
 
     bars = seconds_bar()
     try:
+        apply_profile()
+        require_ros()
+        from markerless_tracker.node.ros.declared import check_topics
+
+        check_topics("--image-topic", args.image_topic, names)
         with StopSignals() as stop, bars:
             names = names or image_topics(stop)
             if stop.received:
@@ -143,5 +151,7 @@ def _cameras(
                 raise KeyboardInterrupt
     except RosMissingError:
         return []  # `check_machine` reports it.
+    except ConfigError as error:
+        return [Finding("cameras", RED, "", str(error), "rename the camera, or the topic")]
     streams = {name: CameraStream(*received) for name, received in heard.items()}
     return check_streams(streams, backgrounds, listened_s=args.seconds)

@@ -72,7 +72,15 @@ class EvidenceInput(CameraInput):
             del self._held[message.stamp_ns]
             super()._store(Evidence(pair[SILHOUETTE], pair[EDGES]), now_s)
         elif len(self._held) > _HELD:
-            del self._held[next(iter(self._held))]
+            stamp_ns = next(iter(self._held))
+            came, missing = self.image_topic, self.edges_topic
+            if EDGES in self._held.pop(stamp_ns):
+                came, missing = self.edges_topic, self.image_topic
+            self._refuse(
+                f"{missing}: no message with the stamp {stamp_ns} of {came}: has the segmenter the "
+                "same `edge_weight` as this node?",
+                now_s,
+            )
 
     def _expected_size_px(self, camera: CameraModel) -> tuple[int, int]:
         return camera.scaled(self._scale).size_px

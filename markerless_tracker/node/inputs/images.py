@@ -139,9 +139,7 @@ class CameraInput:
             message = read(serialised, topic)
             self._check(message, topic)
         except ImageError as error:
-            self._status.refused(self.name)
-            self._refused_s, self._refusal = now_s, str(error)
-            self._say(self._refusal)
+            self._refuse(str(error), now_s)
             return
         self._refusal = ""
         if self._silent_since_s is not None:
@@ -151,6 +149,12 @@ class CameraInput:
             )
             self._silent_since_s = None
         self._store(message, now_s)
+
+    def _refuse(self, reason: str, now_s: float) -> None:
+        """Count and report an unusable message."""
+        self._status.refused(self.name)
+        self._refused_s, self._refusal = now_s, reason
+        self._say(reason)
 
     def _store(self, message: Any, now_s: float) -> None:
         self._sets.add(self.name, message.stamp_ns - self._offset_ns, message, now_s=now_s)

@@ -132,7 +132,7 @@ def check_topics(parameter: str, topic: str, cameras: Iterable[str]) -> None:
         try:
             validate_topic_name(topic.replace("NAME", camera))
         except InvalidTopicNameException as error:
-            reason = str(error).splitlines()[0].removeprefix("Invalid topic name: ")
+            reason = str(error).splitlines()[0].removeprefix("Invalid topic name: ").rstrip(":")
             raise ConfigError(
                 f"{parameter}: {topic!r} of camera {camera!r} cannot be a topic: {reason}"
             ) from error

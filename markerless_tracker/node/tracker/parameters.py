@@ -7,11 +7,12 @@ from typing import Any
 
 from markerless_tracker.body import STATURE_RANGE_M
 from markerless_tracker.datasets.background import MAX_FRAMES
-from markerless_tracker.errors import ConfigError
+from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.node.ros import declared
 from markerless_tracker.node.ros.qos import EVIDENCE, TRANSPORTS
 from markerless_tracker.node.ros.ros4hri import check_id
 from markerless_tracker.node.ros.transforms import TF_CHOICES
+from markerless_tracker.results.target import result_name
 from markerless_tracker.settings import Setting
 from markerless_tracker.tracking import TrackerConfig
 
@@ -142,6 +143,12 @@ def read_settings(given: Mapping[str, Any]) -> NodeSettings:
         for name in _FILES
         if name in values
     }
+    if "result_file" in own:
+        try:
+            own["result_file"] = result_name(str(values["result_file"]))
+        except DatasetError as error:
+            raise ConfigError(f"result_file: {error}") from error
+        own["result_file"] = own["result_file"].expanduser()
     if "stamp_offsets" in values:
         name = "stamp_offsets"
         own[name] = declared.numbers(name, values[name], -_OFFSET_MAX_S, _OFFSET_MAX_S)

@@ -112,6 +112,7 @@ def test_ctrl_c_ends_it(
     ("words", "expected"),
     [
         (["--image-topic", "/rig/NAME/image"], "--image-topic needs the names of the cameras"),
+        (["--cameras", "a", "--image-topic", "/image"], "is '/image', expected NAME in it"),
         (["--seconds", "-1"], "--seconds is -1, expected 0 to 3600"),
         (["--seconds", "nan"], "--seconds is nan, expected 0 to 3600"),
         (["--seconds", "0", "--background", "empty"], "--background needs --calibration"),
@@ -123,6 +124,46 @@ def test_arguments_that_would_check_nothing_are_refused(
     assert main(["doctor", *words]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert expected in line
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--cameras", "cam-01"], "'NAME/image_raw' of camera 'cam-01' cannot be a topic"),
+        (["--cameras", "a", "--image-topic", "/x y/NAME"], "'/x y/NAME' of camera 'a' cannot be"),
+    ],
+)
+def test_names_that_ros_refuses_are_a_red_line(
+    capsys: pytest.CaptureFixture[str], words: list[str], expected: str
+) -> None:
+    assert main(["doctor", *words]) == 3
+    lines = capsys.readouterr().out.splitlines()
+    (line,) = [line for line in lines if "cameras:" in line]
+    assert line.startswith("RED") and expected in line
+
+
+def test_blanks_after_commas_are_no_part_of_names(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked: list[str] = []
+
+    def listened(names: Any, **_: Any) -> dict[str, Any]:
+        asked.extend(names)
+        return {}
+
+    monkeypatch.setattr("markerless_tracker.node.doctor.listen.listen", listened)
+    main(["doctor", "--cameras", "cam01, cam02"])
+    assert asked == ["cam01", "cam02"] and "shared memory" in capsys.readouterr().out
+
+
+def test_a_domain_that_ros_refuses_is_a_red_line_and_ends_the_check(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "abc")
+    assert main(["doctor", "--cameras", "cam01"]) == 3
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("RED  discovery: ROS_DOMAIN_ID is 'abc'") for line in lines)
+    assert not any("cam01" in line for line in lines)
 
 
 def test_a_calibration_that_cannot_be_read_is_a_red_line(

@@ -23,6 +23,7 @@ from markerless_tracker.camera import write_calibration
 from markerless_tracker.cli.main import main
 from markerless_tracker.datasets import open_recording
 from markerless_tracker.datasets.bag.stream import McapFiles
+from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.ros.images import fill_image
 from markerless_tracker.node.ros.qos import image_qos, latched_qos, output_qos
 from markerless_tracker.node.ros.stamps import time_message
@@ -148,6 +149,35 @@ def test_mistakes_and_silence(recorder, tmp_path: Path) -> None:
     assert process.returncode == 3 and json.loads(out)["messages"] == 0
     process = recorder()
     assert process.wait(120) == 1
+
+
+def test_topics_that_never_came_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def recorded(writer: Any, stop: Any, *, topics: Any, **_: Any) -> dict[str, int]:
+        assert topics == ("cam01/image_raw", "cam02/image_raw", "/poses")
+        return {"/cam01/image_raw": 3, "/poses": 0}
+
+    monkeypatch.setattr("markerless_tracker.node.recorder.process.record", recorded)
+    words = ["--topics", "cam01/image_raw, cam02/image_raw,/poses"]
+    assert main(["record", str(tmp_path / "bag"), *words]) == 0
+    err = " ".join(capsys.readouterr().err.split())
+    assert "no message came on cam02/image_raw, /poses" in err
+
+
+def test_a_recording_that_did_not_begin_leaves_no_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: Any, **__: Any) -> dict[str, int]:
+        raise ConfigError("no such domain")
+
+    monkeypatch.setattr("markerless_tracker.node.recorder.process.record", refused)
+    write_calibration(tmp_path / "calibration.toml", RIG)
+    words = ["--calibration", str(tmp_path / "calibration.toml")]
+    (tmp_path / "empty").mkdir()
+    for name in ("new", "empty"):
+        assert main(["record", str(tmp_path / name), *words]) == 1
+    assert not (tmp_path / "new").exists() and not any((tmp_path / "empty").iterdir())
 
 
 @pytest.mark.parametrize("words", [["record", "bag"], ["view", "--node"]])

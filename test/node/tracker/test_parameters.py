@@ -64,6 +64,8 @@ def test_what_is_given_is_in_effect() -> None:
     assert values["cameras"] == ["cam02", "cam01"] and values["start_file"] is None
     assert values["calibration_file"] == str(Path.home() / "c.toml")
     assert effective_values(read_settings({}))["cameras"] is None
+    for given in ("out/walk", "out/walk.trc", "out/walk.json"):
+        assert read_settings({"result_file": given}).result_file == Path("out/walk")
 
 
 @pytest.mark.parametrize(
@@ -98,6 +100,8 @@ def test_what_is_given_is_in_effect() -> None:
         ({"stamp_offsets": [0.1, 11.0]}, "stamp_offsets: got 11.0"),
         ({"image_topic": "/camera/image"}, "image_topic: .* expected NAME"),
         ({"image_transport": "theora"}, "image_transport: got 'theora', expected one of auto"),
+        ({"result_file": "."}, "result_file: '.' names no file, expected a name such as"),
+        ({"result_file": "out/"}, "result_file: 'out/' names no file"),
         ({"human_id": "7"}, "human_id: got '7'"),
     ],
 )

@@ -79,6 +79,18 @@ def test_silhouette_and_edges_of_one_image_are_one_view() -> None:
     for stamp_ns in range(4, 100):
         bench.silhouette(stamp_ns)
     assert len(bench.input._held) < 20 and bench.sets.take() is None
+    assert bench.reports[0].startswith("cam01/edges: no message with the stamp 1 of")
+    assert bench.reports[1].startswith("cam01/silhouette: no message with the stamp 2 of")
+
+
+def test_silhouettes_without_their_edges_are_refused_with_the_reason() -> None:
+    bench = Bench(with_edges=True)
+    for stamp_ns in range(40):
+        bench.silhouette(stamp_ns)
+    assert bench.sets.take() is None
+    expected = "cam01/edges: no message with the stamp 31 of cam01/silhouette: has the segmenter"
+    assert bench.input.refusal.startswith(expected) and "`edge_weight`" in bench.input.refusal
+    assert bench.status._refused["cam01"] == 32
 
 
 def test_silhouettes_alone_where_edges_are_not_used() -> None:
