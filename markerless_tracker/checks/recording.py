@@ -142,6 +142,11 @@ def _steps(signals: Mapping[str, CameraSignals], fps: float) -> list[Finding]:
 
 def _background(name: str, signals: Mapping[str, CameraSignals]) -> Finding:
     signal = signals[name]
+    if len(signal.kinds) > 1:
+        return Finding(
+            "background", RED, name, "its images and its background are partly grey, partly in "
+            "colour", "store all of them in colour, or all as grey images",
+        )  # fmt: skip
     if signal.background is None:
         return Finding(
             "background", YELLOW, name, "no empty-scene image",

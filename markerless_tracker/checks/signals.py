@@ -30,6 +30,7 @@ class CameraSignals:
         height_px: (n,) height of the silhouette at the recording's scale, 0 without any.
         scene: (h, w) median over frames of the scene, grey, small.
         background: (h, w) empty scene, grey, small; None if the recording has none.
+        kinds: of the images and of the background, `grey` or `colour`, each once.
     """
 
     motion: FloatArray
@@ -37,6 +38,7 @@ class CameraSignals:
     height_px: FloatArray
     scene: FloatArray
     background: FloatArray | None
+    kinds: tuple[str, ...]
 
 
 def read_signals(
@@ -57,19 +59,22 @@ def read_signals(
     """
     most = min(MOST_FRAMES, recording.frame_count or MOST_FRAMES)
     small: dict[str, list[NDArray[np.uint8]]] = {name: [] for name in recording.rig.names}
+    kinds: dict[str, set[str]] = {name: set() for name in recording.rig.names}
     for number, frame in enumerate(recording.frames()):
         if number >= most:
             break
         for name, image in frame.images.items():
             small[name].append(_small(image))
+            kinds[name].add(_kind(image))
         if progress is not None:
             progress(number + 1, most)
-    backgrounds = _backgrounds(recording)
+    backgrounds = _backgrounds(recording, kinds)
     return {
         camera.name: _signals(
             small[camera.name],
             backgrounds.get(camera.name),
             camera.size_px[0],
+            tuple(sorted(kinds[camera.name])),
             apart=max(1, round(_MOTION_S * recording.fps)),
         )
         for camera in recording.rig
@@ -77,7 +82,12 @@ def read_signals(
 
 
 def _signals(
-    images: list[NDArray[np.uint8]], background: FloatArray | None, width_px: int, *, apart: int
+    images: list[NDArray[np.uint8]],
+    background: FloatArray | None,
+    width_px: int,
+    kinds: tuple[str, ...],
+    *,
+    apart: int,
 ) -> CameraSignals:
     step = max(1, len(images) // _STILLS)
     scene = np.median(np.array(images[::step], dtype=np.float32), axis=0).astype(np.float64)
@@ -97,7 +107,7 @@ def _signals(
         gain[number] = float(np.median(now[usable] / base[usable])) if usable.any() else 1.0
         differs = np.abs(now - gain[number] * base) > _DIFFERS
         height[number] = _blob_height(differs) * width_px / image.shape[1]
-    return CameraSignals(motion, gain, height, scene, background)
+    return CameraSignals(motion, gain, height, scene, background, kinds)
 
 
 def _blob_height(mask: NDArray[np.bool_]) -> int:
@@ -110,13 +120,22 @@ def _blob_height(mask: NDArray[np.bool_]) -> int:
     return int(table[best, cv2.CC_STAT_HEIGHT]) if table[best, cv2.CC_STAT_AREA] > 20 else 0
 
 
-def _backgrounds(recording: Recording) -> Mapping[str, FloatArray]:
+def _backgrounds(recording: Recording, kinds: Mapping[str, set[str]]) -> Mapping[str, FloatArray]:
+    """Empty scenes by camera; whether they are grey or in colour is added to `kinds`."""
     models = recording.background_models()
     found = {name: _small(model.image).astype(np.float64) for name, model in models.items()}
+    for name, model in models.items():
+        kinds[name].add(_kind(model.image))
     for name, images in recording.background_frames().items():
+        if name not in models:
+            kinds[name].update(map(_kind, images))
         stack = np.array([_small(image) for image in images], dtype=np.float64)
         found.setdefault(name, np.median(stack, axis=0))
     return found
+
+
+def _kind(image: Image) -> str:
+    return "grey" if image.ndim == 2 else "colour"
 
 
 def _small(image: Image) -> NDArray[np.uint8]:

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -54,6 +55,18 @@ def test_a_good_recording_has_no_red_line(tmp_path: Path, scene, frames, capsys)
     assert all(90 < int(f["text"].split()[1]) < 180 for f in tall) and len(tall) == 4
     assert main(["check", str(path)]) == 0
     assert "0 red" in capsys.readouterr().out
+
+
+def test_a_grey_background_of_colour_images_is_a_red_line(
+    tmp_path: Path, scene, frames, capsys
+) -> None:
+    path = written(tmp_path / "grey", scene, frames, scene.backgrounds(1))
+    (file,) = (path / "background").glob("cam02.*")
+    cv2.imwrite(str(file), cv2.imread(str(file), cv2.IMREAD_GRAYSCALE))
+    status, found = checked(path, capsys)
+    red = [f for f in found if f["state"] == "red"]
+    assert status == 3 and [(f["check"], f["camera"]) for f in red] == [("background", "cam02")]
+    assert "partly grey, partly in colour" in red[0]["text"]
 
 
 def test_red_lines_name_the_camera_and_say_what_to_do(
