@@ -60,6 +60,7 @@ class BagRecording(Recording):
         if self._files.counts is None:
             for _ in self._files:  # the topics of a damaged bag are known only after reading it
                 pass
+        self._namespaces = _namespaces(self._files.types)
         calibration = folder / "calibration.toml"
         if nominal:
             names = self._cameras_with_images(path)
@@ -206,27 +207,31 @@ class BagRecording(Recording):
             raise DatasetError(f"{where}: a message cannot be decoded as {message.type}") from error
 
     def _image_topic(self, path: Path, name: str) -> str:
+        namespace = self._namespaces.get(name, name)
         for suffix, kind in (("image_raw", RAW_TYPE), ("image_raw/compressed", COMPRESSED_TYPE)):
-            for topic, found in self._files.types.items():
-                if found == kind and f"/{topic.strip('/')}".endswith(f"/{name}/{suffix}"):
-                    return topic
+            topics = [
+                topic
+                for topic, found in self._files.types.items()
+                if found == kind and f"/{topic.strip('/')}".endswith(f"/{namespace}/{suffix}")
+            ]
+            if len(topics) > 1:
+                raise DatasetError(
+                    f"{path}: {' and '.join(topics)} may be images of {name}, expected one topic"
+                )
+            if topics:
+                return topics[0]
         raise DatasetError(
             f"{path}: no images of {name}, expected the topic /{name}/image_raw ({RAW_TYPE}) or "
             f"/{name}/image_raw/compressed; the bag has {self._listed()}"
         )
 
     def _cameras_with_images(self, path: Path) -> tuple[str, ...]:
-        names = []
-        for topic, kind in self._files.types.items():
-            parts = topic.strip("/").removesuffix("/compressed").split("/")
-            if kind in (RAW_TYPE, COMPRESSED_TYPE) and len(parts) > 1 and parts[-1] == "image_raw":
-                names.append(parts[-2])
-        if not names:
+        if not self._namespaces:
             raise DatasetError(
                 f"{path}: no images, expected topics NAME/image_raw ({RAW_TYPE}) or "
                 f"NAME/image_raw/compressed; the bag has {self._listed()}"
             )
-        return tuple(sorted(set(names)))
+        return tuple(sorted(self._namespaces))
 
     def _nominal_rig(self, path: Path, names: tuple[str, ...]) -> CameraRig:
         """Cameras of the sizes of the first images."""
@@ -247,13 +252,14 @@ class BagRecording(Recording):
     def _rig_from_topics(self, path: Path, names: tuple[str, ...]) -> CameraRig:
         infos: dict[str, Any] = {}
         transforms: list[Any] = []
+        cameras = {self._namespaces[name]: name for name in names}
         for message in self._files:
             parts = message.topic.strip("/").split("/")
             if message.type == TF_TYPE and parts[-1] == "tf_static":
                 transforms.extend(self._decoded(message).transforms)
-            elif message.type == INFO_TYPE and parts[-1] == "camera_info" and parts[-2:-1]:
-                if parts[-2] in names:
-                    infos.setdefault(parts[-2], self._decoded(message))
+            elif message.type == INFO_TYPE and parts[-1] == "camera_info":
+                if (name := cameras.get("/".join(parts[:-1]))) is not None:
+                    infos.setdefault(name, self._decoded(message))
         missing = [name for name in names if name not in infos]
         if missing:
             raise DatasetError(
@@ -271,6 +277,24 @@ class BagRecording(Recording):
         if self._files.counts is not None:
             return min(self._files.counts[topic] for topic in self._topics)
         return sum(1 for _ in self._stamped())
+
+
+def _namespaces(types: Mapping[str, str]) -> dict[str, str]:
+    """Camera -> namespace of its images.
+
+    A camera is named after the last part of its namespace, and after more parts where several
+    cameras have the same last one: front_camera and back_camera.
+    """
+    found: dict[str, list[str]] = {}
+    for topic, kind in types.items():
+        parts = topic.strip("/").removesuffix("/compressed").split("/")
+        if kind in (RAW_TYPE, COMPRESSED_TYPE) and len(parts) > 1 and parts[-1] == "image_raw":
+            found["/".join(parts[:-1])] = parts[:-1]
+    for count in range(1, max(map(len, found.values()), default=1) + 1):
+        named = {"_".join(parts[-count:]): space for space, parts in found.items()}
+        if len(named) == len(found):
+            return named
+    return {space.replace("/", "__"): space for space in found}
 
 
 def _mcap_files(path: Path) -> list[Path]:
