@@ -1,11 +1,22 @@
 """Reading of the YAML files of bodies, subjects and poses."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from markerless_tracker.errors import BodyModelError
+
+
+class _Loader(yaml.SafeLoader):
+    """Takes 9e-1 for a number, as YAML 1.2 does, and YAML 1.1 does not."""
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$"),
+    list("-+0123456789"),
+)  # fmt: skip
 
 
 def read_yaml(path: Path, what: str) -> Any:
@@ -19,7 +30,7 @@ def read_yaml(path: Path, what: str) -> Any:
         BodyModelError: the file cannot be read or is no YAML.
     """
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        return yaml.load(path.read_text(encoding="utf-8-sig"), _Loader)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         first = str(error).splitlines()[0]
         raise BodyModelError(f"{path}: cannot read the {what}: {first}") from error

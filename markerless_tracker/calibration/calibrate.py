@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -106,13 +106,11 @@ def calibrate(
         adjusting()
     lenses = {name: start_lens(views, name, k3=k3) for name in recording.rig.names}
     bundle = adjust(views, lenses, start_layout(views, lenses), k3=k3)
-    T_print_floor = transform(np.eye(3), [0.0, 0.0, -thickness_m])
-    rig = CameraRig(
-        tuple(replace(camera, T_cam_world=camera.T_cam_world @ T_print_floor)
-              for camera in bundle.rig)
-    )  # fmt: skip
+    rig = bundle.rig.moved(transform(np.eye(3), [0.0, 0.0, thickness_m]))
     cameras, pairs = camera_measures(bundle), pair_measures(bundle)
-    return Calibration(rig, views, bundle, cameras, pairs, board_doubts(rig, cameras, pairs))
+    return Calibration(
+        rig, views, bundle, cameras, pairs, board_doubts(views.board, rig, cameras, pairs)
+    )
 
 
 def _rounded(measures: CameraMeasures | PairMeasures) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from markerless_tracker.calibration.measures import CameraMeasures, PairMeasures
 from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.camera.board import Board
 from markerless_tracker.camera.doubts import calibration_doubts
 
 FOCAL_WIDTHS = (0.45, 3.5)
@@ -32,6 +33,7 @@ middle."""
 
 
 def board_doubts(
+    board: Board,
     rig: CameraRig,
     cameras: Mapping[str, CameraMeasures],
     pairs: Mapping[tuple[str, str], PairMeasures],
@@ -40,6 +42,11 @@ def board_doubts(
     found = [text for camera in rig for text in _camera(camera, cameras[camera.name])]
     found += _pairs(pairs)
     found += _heights(rig)
+    if len(board.symmetries) > 1:
+        found.append(
+            f"{board.describe()} looks the same upside down: the world may be turned by half a "
+            "turn; boards with an odd sum of columns and rows do not"
+        )
     return (*calibration_doubts(rig), *found)
 
 

@@ -1,7 +1,7 @@
 """A calibrated camera, and a rig of cameras (OpenCV convention: x right, y down, z forward)."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,6 +131,11 @@ class CameraRig:
     def scaled(self, scale: float) -> "CameraRig":
         """The rig of images scaled by one factor."""
         return CameraRig(tuple(camera.scaled(scale) for camera in self.cameras))
+
+    def moved(self, T_new_old: FloatArray) -> "CameraRig":
+        """The rig in another world, to which (4, 4) T_new_old takes the points of this one."""
+        back = inverse(T_new_old)
+        return CameraRig(tuple(replace(c, T_cam_world=c.T_cam_world @ back) for c in self))
 
     def selected(self, names: Sequence[str]) -> "CameraRig":
         """The rig with those cameras only, in the order given."""

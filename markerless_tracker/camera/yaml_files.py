@@ -142,7 +142,7 @@ def _fields(path: Path) -> _Fields:
     text = _text(path)
     if "opencv-matrix" in text or text.startswith(("%YAML", "<?xml")):
         try:
-            storage = cv2.FileStorage(str(path), cv2.FileStorage_READ)
+            storage = cv2.FileStorage(text, cv2.FileStorage_READ | cv2.FileStorage_MEMORY)
         except (cv2.error, SystemError) as error:
             raise CalibrationError(f"{path}: cannot be read by OpenCV") from error
         if not storage.isOpened():
@@ -183,20 +183,25 @@ def _of_node(path: Path, name: str, node: Any) -> Any:
 
 def _check_size(path: Path, name: str, node: Any) -> None:
     """Make sure that a matrix has the numbers that it states: other sizes crash OpenCV."""
-    sides = [node.getNode(side) for side in ("rows", "cols")]
-    rows, columns = (int(side.real()) if side.isInt() else 0 for side in sides)
+    sizes = node.getNode("sizes")
+    # OpenCV 5 writes vectors with `sizes`, matrices with `rows` and `cols`.
+    nodes = [node.getNode(side) for side in ("rows", "cols")]
+    if not sizes.isNone():
+        nodes = [sizes.at(n) for n in range(sizes.size())] if sizes.isSeq() else [sizes]
+    sides = [int(side.real()) if side.isInt() else 0 for side in nodes]
     data = node.getNode("data")
-    count = data.size() if data.isSeq() else rows * columns
-    if rows < 1 or columns < 1 or rows * columns != count:
+    count = data.size() if data.isSeq() else math.prod(sides)
+    if min(sides, default=0) < 1 or math.prod(sides) != count:
+        stated = "rows and cols are" if sizes.isNone() else "sizes are"
         raise CalibrationError(
-            f"{path}: {name}: rows and cols are {rows} and {columns}, data has {count} values, "
-            "expected rows x cols numbers"
+            f"{path}: {name}: {stated} {' and '.join(map(str, sides))}, data has {count} values, "
+            "expected their product"
         )
 
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise CalibrationError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:

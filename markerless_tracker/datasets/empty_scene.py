@@ -37,7 +37,8 @@ def backgrounds_of(recording: Recording, folder: Path | None = None) -> dict[str
 
 
 def _clips(recording: Recording, names: Sequence[str]) -> dict[str, list[Image]]:
-    """Camera name -> images of a recording, evenly spread over it, fewer than `2 * FRAMES`."""
+    """Camera name -> images, evenly spread over the whole recording, fewer than `2 * FRAMES`."""
+    recording = recording.source
     every = max(1, (recording.frame_count or 1) // FRAMES)
     clips: dict[str, list[Image]] = {name: [] for name in names}
     kept, step = 0, 1  # step doubles while a recording of unknown length is read

@@ -1,5 +1,6 @@
 """Synchronises cameras that began at different times, by whole frames."""
 
+import math
 from collections import deque
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -58,7 +59,8 @@ class InStepRecording(DerivedRecording):
                 f"{', '.join(recording.rig.names)}"
             )
         frames = {name: offsets_s.get(name, 0.0) * recording.fps for name in recording.rig.names}
-        if not max(frames.values()) - min(frames.values()) <= MOST_OFFSET_S * recording.fps:
+        range_s = (max(frames.values()) - min(frames.values())) / recording.fps
+        if not (all(map(math.isfinite, frames.values())) and range_s <= MOST_OFFSET_S):
             listed = ", ".join(f"{name} {offset:g}" for name, offset in offsets_s.items())
             raise ConfigError(
                 f"time offsets in s: {listed}; expected differences of at most {MOST_OFFSET_S:g}"

@@ -71,6 +71,11 @@ class PartRecording(DerivedRecording):
         """Index of the first set of the part."""
         return self._first
 
+    @property
+    def source(self) -> Recording:
+        """The whole."""
+        return self._inner.source
+
     def background_frames(self, folder: Path | None = None) -> dict[str, list[Image]]:
         """As of the whole, of the part's cameras."""
         return self._own(self._inner.background_frames(folder))

@@ -3,6 +3,7 @@
 In a batch session the trials, each with its own `videos/`, share the calibration beside them.
 """
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -100,13 +101,18 @@ def _read_rig(folder: Path) -> CameraRig:
 def match_videos(folder: Path, rig: CameraRig) -> tuple[Mapping[str, Path], list[str]]:
     """Camera -> its video in a folder, by name, else all in order with a note that says so.
 
+    Numbers in the videos' names count as numbers: cam2 comes before cam10.
+
     Raises:
         DatasetError: names differ, and so does the number of videos.
     """
     videos = sorted(
-        entry
-        for entry in (folder.iterdir() if folder.is_dir() else ())
-        if entry.suffix.lower() in VIDEO_SUFFIXES or (entry.is_dir() and numbered_files(entry))
+        (
+            entry
+            for entry in (folder.iterdir() if folder.is_dir() else ())
+            if entry.suffix.lower() in VIDEO_SUFFIXES or (entry.is_dir() and numbered_files(entry))
+        ),
+        key=_in_order,
     )
     by_stem = {video.stem: video for video in videos}
     if set(rig.names) <= set(by_stem):
@@ -120,6 +126,12 @@ def match_videos(folder: Path, rig: CameraRig) -> tuple[Mapping[str, Path], list
     pairs = dict(zip(rig.names, videos, strict=True))
     listed = ", ".join(f"{name} = {video.name}" for name, video in pairs.items())
     return pairs, [f"{folder}: names of videos and cameras differ, paired in order: {listed}"]
+
+
+def _in_order(path: Path) -> tuple[list[tuple[bool, int, str]], str]:
+    """Sorts names by their texts and numbers."""
+    parts = re.split("([0-9]+)", path.name)
+    return [(p.isdecimal(), int(p) if p.isdecimal() else 0, p) for p in parts], path.name
 
 
 def _stretched(camera: CameraModel, size_px: tuple[int, int]) -> CameraModel:

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -12,6 +12,7 @@ from markerless_tracker.datasets.markers.track import MarkerTrack
 from markerless_tracker.datasets.markers.trc import read_trc
 from markerless_tracker.datasets.truth import truth_path
 from markerless_tracker.errors import ConfigError, DatasetError
+from markerless_tracker.geometry import FloatArray, apply
 from markerless_tracker.imaging import BackgroundModel, Image
 
 BACKGROUND = "background"
@@ -66,6 +67,7 @@ class Recording(ABC):
         self.fps = fps
         self.frame_count = frame_count
         self._warnings: dict[str, str] = {}
+        self._T_new_old: FloatArray | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -145,8 +147,25 @@ class Recording(ABC):
         Raises:
             DatasetError: their file cannot be read.
         """
+        track = self._ground_truth()
+        if track is None or self._T_new_old is None:
+            return track
+        return replace(track, positions_m=apply(self._T_new_old, track.positions_m))
+
+    def _ground_truth(self) -> MarkerTrack | None:
+        """The reference markers as stored."""
         path = truth_path(self.path)
         return read_trc(path) if path.is_file() else None
+
+    def move(self, T_new_old: FloatArray) -> None:
+        """Place the cameras and the reference markers in another world."""
+        self.rig = self.rig.moved(T_new_old)
+        self._T_new_old = T_new_old
+
+    @property
+    def source(self) -> "Recording":
+        """The whole recording of which this one is a part; itself if it is no part."""
+        return self
 
     @abstractmethod
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:

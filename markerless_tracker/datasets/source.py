@@ -23,7 +23,7 @@ from markerless_tracker.datasets.pose2sim import (
 )
 from markerless_tracker.datasets.recording import Recording
 from markerless_tracker.datasets.upright.axes import upright
-from markerless_tracker.datasets.upright.standing import PERSON, standing
+from markerless_tracker.datasets.upright.standing import PERSON, stand_upright
 from markerless_tracker.datasets.video.images import VIDEO_SUFFIXES
 from markerless_tracker.errors import DatasetError, TrackerError
 
@@ -86,8 +86,9 @@ def open_recording(
         scale: factor for all images and cameras, in (0, 1].
         format: one of `FORMATS`; None detects it.
         input_fps: rate of numbered images (and, if given, of videos), 1/s.
-        up: axis of the calibration's world that is up, such as `-y`; it becomes z. `person` finds
-            it from the cameras and the person: see `standing`.
+        up: axis of the calibration's world that is up, such as `-y`; it becomes z. Reference
+            markers, whose files have an axis that is up, stay as they are. `person` finds up from
+            the cameras and the person, and moves the markers, too: see `stand_upright`.
         units: of the calibration's lengths: m, cm or mm.
 
     Raises:
@@ -121,7 +122,7 @@ def open_recording(
         )
     recording.rig = upright(recording.rig, up="z" if up == PERSON else up, units=units)
     if up == PERSON:
-        recording.rig = standing(recording)
+        stand_upright(recording)
     return recording
 
 

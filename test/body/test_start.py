@@ -150,7 +150,7 @@ ROOT = "\n".join(f"pelvis_{name}: 0.5" for name in ("rx", "ry", "rz", "tx", "ty"
 
 def test_parameters_that_are_not_named_are_neutral(tmp_path) -> None:
     file = tmp_path / "start.yaml"
-    file.write_text(ROOT + "\nl_knee: -1\n")
+    file.write_text(ROOT + "\nl_knee: -10e-1\n")
     expected = BODY.neutral.copy()
     expected[BODY.root] = 0.5
     expected[BODY.index("l_knee")] = -1.0

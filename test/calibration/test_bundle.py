@@ -19,6 +19,7 @@ from markerless_tracker.calibration.bundle import (
     projection,
 )
 from markerless_tracker.calibration.detect import Seen
+from markerless_tracker.calibration.doubts import board_doubts
 from markerless_tracker.calibration.intrinsics import start_lens
 from markerless_tracker.calibration.layout import start_layout
 from markerless_tracker.calibration.measures import camera_measures, pair_measures
@@ -201,6 +202,13 @@ def test_the_sd_of_the_position_is_the_error_of_calibrations(rig, board, make_vi
         ]
         reported = np.mean([camera_measures(run)[camera.name].position_sd_mm for run in runs])
         assert 0.5 < 1000.0 * np.sqrt(np.mean(np.square(away))) / reported < 1.7
+
+
+@pytest.mark.parametrize(("squares", "doubted"), [((10, 7), False), ((9, 7), True)])
+def test_a_board_that_looks_the_same_upside_down_is_doubted(rig, views, squares, doubted) -> None:
+    cameras = camera_measures(adjusted(views))
+    found = board_doubts(Board("checkerboard", *squares, 0.12), rig, cameras, {})
+    assert any("upside down: the world may be turned by half" in text for text in found) is doubted
 
 
 def test_a_camera_that_is_not_determined_has_an_infinite_sd() -> None:

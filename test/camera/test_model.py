@@ -10,7 +10,7 @@ from markerless_tracker.body import load_body
 from markerless_tracker.camera import CameraModel, CameraRig, project, project_camera, scaled_size
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.errors import CalibrationError
-from markerless_tracker.geometry import rotation_from_rodrigues, transform
+from markerless_tracker.geometry import apply, rotation_from_rodrigues, transform
 
 MATRIX = np.array([[1668.9, 0.0, 529.1], [0.0, 1681.1, 948.1], [0.0, 0.0, 1.0]])
 
@@ -98,6 +98,14 @@ def test_a_rig_projects_with_every_camera() -> None:
     pixels = project(points, rig)
     assert pixels.shape == (2, 2, 2)
     np.testing.assert_array_equal(pixels[1], project_camera(points, rig["cam02"]))
+
+
+def test_a_rig_in_another_world_sees_the_same() -> None:
+    rig = CameraRig((camera(), camera(name="cam02", translation=(0.5, 0.0, 4.0), lens=(0.1,) * 4)))
+    T_new_old = transform(rotation_from_rodrigues([0.4, -0.2, 1.1]), [3.0, -1.0, 0.5])
+    points = np.array([[0.1, 0.2, 0.3], [0.0, 0.4, 1.0]])
+    moved = project(apply(T_new_old, points), rig.moved(T_new_old))
+    np.testing.assert_allclose(moved, project(points, rig), atol=1e-9)
 
 
 @given(st.floats(0.05, 1.0))

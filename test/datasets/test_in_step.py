@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.datasets import open_recording
+from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
 from markerless_tracker.datasets.part import PartRecording
 from markerless_tracker.errors import ConfigError, DatasetError
@@ -55,9 +56,12 @@ def test_impossible_offsets(make_recording, tmp_path: Path) -> None:
     stored = open_recording(make_recording())
     with pytest.raises(ConfigError, match="no camera cam07, expected cam01, cam02"):
         InStepRecording(stored, {"cam07": 0.1})
-    for wrong in (100.0, float("nan")):
-        with pytest.raises(ConfigError, match=f"cam01 {wrong:g}; expected differences of at most"):
-            InStepRecording(stored, {"cam01": wrong})
+    for camera in ("cam01", "cam02"):
+        for wrong in (100.0, float("nan"), float("inf")):
+            with pytest.raises(
+                ConfigError, match=f"{camera} {wrong:g}; expected differences of at"
+            ):
+                InStepRecording(stored, {camera: wrong})
     for apart in (10.0, -10.0):
         with pytest.raises(ConfigError, match="share no time in .* of 0.1 s"):
             InStepRecording(stored, {"cam02": apart})
@@ -69,6 +73,15 @@ def test_impossible_offsets(make_recording, tmp_path: Path) -> None:
     for text in ("cam01", "cam01=x", str(path), str(tmp_path / "none.yaml")):
         with pytest.raises(ConfigError, match="time offsets"):
             read_time_offsets(text)
+
+
+def test_the_background_of_a_part_is_learned_from_the_whole(make_recording) -> None:
+    """At the end of a recording a person may stand where they stood nowhere else."""
+    stored = open_recording(make_recording(frames=60, backgrounds=0))
+    part = PartRecording(stored, cameras=["cam02"], from_s=50 / 60)
+    whole, own = backgrounds_of(stored), backgrounds_of(part)
+    assert list(own) == ["cam02"]
+    np.testing.assert_array_equal(own["cam02"], whole["cam02"])
 
 
 def test_a_part_begins_at_its_time(make_recording) -> None:

@@ -20,7 +20,8 @@ _UP = 4
 class AniposeRecording(VideoRecording):
     """A trial of an Anipose session.
 
-    The videos are in `videos-raw/` (or `videos/`). `triangulation.cam_regex` of the project's
+    The videos are in `videos-raw/`, or in `videos/` if the format is named: a session with that
+    folder is detected as a Pose2Sim project. `triangulation.cam_regex` of the project's
     `config.toml` matches the camera's name in a video's name; without it, the video's name ends
     with the camera's. The world is that of the calibration.
 

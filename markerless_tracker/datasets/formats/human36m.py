@@ -75,7 +75,7 @@ class Human36mRecording(VideoRecording):
         self.name = f"{subject.resolve().name}_{action}"
         self._action = action
 
-    def ground_truth(self) -> MarkerTrack | None:
+    def _ground_truth(self) -> MarkerTrack | None:
         """Joints of the action; None without their file.
 
         Raises:
@@ -83,7 +83,7 @@ class Human36mRecording(VideoRecording):
         """
         file = joints_file(self.path, self._action)
         if file is None:
-            return super().ground_truth()
+            return super()._ground_truth()
         positions = upright_points(read_joints(file), units=UNITS)
         if self.name in SHIFTED:
             self.warn(

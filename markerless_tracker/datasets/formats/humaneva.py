@@ -42,8 +42,8 @@ class HumanEvaRecording(VideoRecording):
     """A trial of HumanEva-II, at 60 frames per second, world in m with z up.
 
     Read are `Image_Data/TRIAL_(C1)` (a folder of numbered images, or a video),
-    `Calibration_Data/C1.cal`, and where they exist `Sync_Data/TRIAL_(C1).ofs` and
-    `Mocap_Data/TRIAL.c3d` or `.trc` for the reference markers, and for the empty scene
+    `Calibration_Data/C1.cal`, and where they exist `Mocap_Data/TRIAL.c3d` or `.trc` for the
+    reference markers, which need `Sync_Data/TRIAL_(C1).ofs`, and for the empty scene
     `Background/Background_*_(C1)` or the statistics `Background_(C1).mat`.
 
     Args:
@@ -70,7 +70,7 @@ class HumanEvaRecording(VideoRecording):
         self.name = f"{subject.resolve().name}_{trial}"
         self._trial = trial
 
-    def ground_truth(self) -> MarkerTrack | None:
+    def _ground_truth(self) -> MarkerTrack | None:
         """The joints that the mocap has, at the stamps of the images; None without mocap.
 
         Raises:
@@ -80,7 +80,7 @@ class HumanEvaRecording(VideoRecording):
             path = self.path / _MOCAP / f"{self._trial}{suffix}"
             if path.is_file():
                 return read_mocap(path, self._sync(), self.fps)
-        return super().ground_truth()
+        return super()._ground_truth()
 
     def background_frames(self, folder: Path | None = None) -> dict[str, list[Image]]:
         """Camera -> images of the empty scene: of its clips, evenly, else the means of its `.mat`.

@@ -69,7 +69,7 @@ class MpiInf3dhpRecording(VideoRecording):
         )
         self.name = "_".join(path.resolve().parts[-2:])
 
-    def ground_truth(self) -> MarkerTrack | None:
+    def _ground_truth(self) -> MarkerTrack | None:
         """The joints of `annot3`, those in the first camera's frame; None without `annot.mat`.
 
         Raises:
@@ -77,7 +77,7 @@ class MpiInf3dhpRecording(VideoRecording):
         """
         file = self.path / ANNOTATIONS
         if not file.is_file():
-            return super().ground_truth()
+            return super()._ground_truth()
         camera = next(iter(self._stored))
         joints_mm = _joints(file, int(camera.name.removeprefix("video_")))
         world = apply(inverse(camera.T_cam_world), joints_mm.reshape(-1, 3))

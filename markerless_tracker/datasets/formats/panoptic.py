@@ -75,7 +75,7 @@ class PanopticRecording(VideoRecording):
         rig = upright(CameraRig(tuple(cameras)), up=UP, units=UNITS)
         super().__init__(path, sources, rig, scale=scale, input_fps=input_fps)
 
-    def ground_truth(self) -> MarkerTrack | None:
+    def _ground_truth(self) -> MarkerTrack | None:
         """Joints of the person with the most frames; None without any.
 
         Raises:
@@ -88,7 +88,7 @@ class PanopticRecording(VideoRecording):
             for body, joints in _bodies(file) if frame >= 0 else []:
                 people.setdefault(body, {})[frame] = joints
         if not people:
-            return super().ground_truth()
+            return super()._ground_truth()
         counts = Counter({body: len(frames) for body, frames in people.items()})
         chosen, most = counts.most_common(1)[0]
         if len(counts) > 1:

@@ -78,7 +78,7 @@ class TotalCaptureRecording(VideoRecording):
         self.name = f"{match['subject']}_{match['take']}"
         self._take = (match["subject"], match["take"])
 
-    def ground_truth(self) -> MarkerTrack | None:
+    def _ground_truth(self) -> MarkerTrack | None:
         """Joints of the Vicon skeleton; None without their file.
 
         Raises:
@@ -91,7 +91,7 @@ class TotalCaptureRecording(VideoRecording):
         ]  # fmt: skip
         file = next((p / POSITIONS for p in places if (p / POSITIONS).is_file()), None)
         if file is None:
-            return super().ground_truth()
+            return super()._ground_truth()
         names, positions = read_positions(file)
         stamps = np.array([stamp_of(frame, self.fps) for frame in range(len(positions))])
         metres = upright_points(positions * METRES_PER_INCH, up=UP)

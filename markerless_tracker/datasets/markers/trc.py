@@ -133,7 +133,8 @@ class TrcRows:
         if len(lines) < 5:
             raise DatasetError(f"{path}: ends after line {len(lines)}, expected 5 lines of header")
         self.names = _names(path, lines[3])
-        header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
+        keys, values = ([cell.strip() for cell in line.split("\t")] for line in lines[1:3])
+        header = dict(zip(keys, values, strict=False))
         self._factor = METRES[_units(path, header)]
         stated = header.get("NumFrames", "").strip()
         self._rows = int(stated) if stated.isdecimal() else None
@@ -233,12 +234,12 @@ def _cells(point: FloatArray) -> tuple[str, ...]:
 
 
 def _units(path: Path, header: Mapping[str, str]) -> str:
-    units = header.get("Units", "").strip()
-    if units not in METRES:
+    units = header.get("Units", "")
+    if units.lower() not in METRES:
         raise DatasetError(
             f"{path}: line 3: Units is {units!r}, expected one of {', '.join(METRES)}"
         )
-    return units
+    return units.lower()
 
 
 def _names(path: Path, line: str) -> tuple[str, ...]:

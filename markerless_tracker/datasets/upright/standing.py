@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.camera import CameraModel, CameraRig, project_camera
+from markerless_tracker.camera import CameraRig, project_camera
 from markerless_tracker.datasets.recording import Recording
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray, transform
@@ -40,8 +40,8 @@ _FAR_M = 4.0
 _PULL = 0.02
 
 
-def standing(recording: Recording) -> CameraRig:
-    """The rig of a recording, whose lengths are in m, in a world that stands upright.
+def stand_upright(recording: Recording) -> None:
+    """Move a recording, whose lengths are in m, to a world that stands upright.
 
     z is up, the floor is z = 0, the origin is below the middle of what the cameras look at, and x
     is the horizontal direction of the view of one of them. Cameras that are rolled get a warning.
@@ -50,7 +50,7 @@ def standing(recording: Recording) -> CameraRig:
         DatasetError: the cameras do not tell up, or no person moves in the recording.
     """
     T_level_old = _above(recording.rig, _up(recording))
-    level = _moved(recording.rig, T_level_old)
+    level = recording.rig.moved(T_level_old)
     rolls = {c.name: float(np.rad2deg(np.arcsin(abs(c.T_world_cam[2, 0])))) for c in level}
     worst = max(rolls, key=rolls.__getitem__)
     if rolls[worst] > MOST_ROLL_DEG:
@@ -66,17 +66,7 @@ def standing(recording: Recording) -> CameraRig:
             "floor; expected --up with an axis"
         )
     floor = float(np.median(lowest)) + BELOW_SOLES_M
-    return _moved(level, transform(np.eye(3), [0.0, 0.0, -floor]))
-
-
-def _moved(rig: CameraRig, T_new_old: FloatArray) -> CameraRig:
-    back = np.linalg.inv(T_new_old)
-    return CameraRig(
-        tuple(
-            CameraModel(c.name, c.size_px, c.matrix, c.distortion, c.T_cam_world @ back)
-            for c in rig
-        )
-    )
+    recording.move(transform(np.eye(3), [0.0, 0.0, -floor]) @ T_level_old)
 
 
 def _up(recording: Recording) -> FloatArray:

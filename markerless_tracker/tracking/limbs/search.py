@@ -45,8 +45,9 @@ class LimbSearch:
 
     After a search of a limb the whole body is refined. The result is taken if it explains the frame
     better than the estimate, and better than the estimate after the same refinement: a gain of the
-    rest of the body is not due to the limb. Poses are compared by `costs_with_prior`; the gain of a
-    pose is how far its cost lies below the estimate's.
+    rest of the body is not due to the limb. Other whole poses are compared with the estimate alone.
+    Poses are compared by `costs_with_prior`; the gain of a pose is how far its cost lies below the
+    estimate's.
 
     Args:
         recombiner: draws limbs of the body.

@@ -149,6 +149,12 @@ def test_level_cameras_and_the_person_turn_the_world(walk, tmp_path: Path) -> No
         assert move[2, 2] > np.cos(np.deg2rad(1.0)) and abs(move[2, 3]) < 0.08
         np.testing.assert_allclose(move, moves[0], atol=1e-9)
     assert recording.warnings == ()
+    # The markers move with the cameras.
+    kept, moved = open_recording(folder, units="cm"), recording
+    back = moved.rig.cameras[0].T_world_cam @ kept.rig.cameras[0].T_cam_world
+    np.testing.assert_allclose(
+        moved.ground_truth().positions_m, apply(back, kept.ground_truth().positions_m), atol=1e-9
+    )
 
 
 def _stated(T_cam_world: np.ndarray) -> np.ndarray:

@@ -205,3 +205,30 @@ def test_a_camera_without_its_other_half_is_left_out_with_a_warning(
 def test_without_images(folder: Path) -> None:
     with pytest.raises(DatasetError, match="no images of any camera"):
         open_recording(folder, format="opencv")
+
+
+def test_vectors_as_opencv_5_writes_them(folder: Path, make_rig) -> None:
+    """One-dimensional arrays have `sizes` instead of `rows` and `cols`. With a byte order mark."""
+    rig = make_rig(*NAMES)
+    for model in rig:
+        numbers = of_opencv(model)
+        numbers |= {"T": model.T_cam_world[:3, 3], "distortion_coefficients": model.distortion}
+        file = folder / f"{model.name}.yml"
+        storage(file, numbers)
+        file.write_text(file.read_text(), encoding="utf-8-sig")
+    for read, true in zip(open_recording(folder).rig, rig, strict=True):
+        np.testing.assert_allclose(read.T_cam_world, true.T_cam_world, atol=1e-9)
+        np.testing.assert_allclose(read.distortion, true.distortion, atol=1e-9)
+
+
+@pytest.mark.parametrize("sizes", ["[ 4 ]", "[ 3, 2 ]", "[ 0 ]", "[ -1 ]", "3"])
+def test_vectors_of_another_size_are_refused(folder: Path, make_rig, sizes: str) -> None:
+    for model in make_rig(*NAMES):
+        file = folder / f"{model.name}.yml"
+        storage(file, of_opencv(model))
+        lines = file.read_text().splitlines()
+        vector = f"T: !!opencv-nd-matrix\n   sizes: {sizes}\n   dt: d\n   data: [ 0., 0. ]"
+        at = next(number for number, line in enumerate(lines) if line.startswith("T:"))
+        file.write_text("\n".join([*lines[:at], vector, ""]))
+    with pytest.raises(CalibrationError, match=r"left.yml: T: sizes are .*, data has 2 values"):
+        open_recording(folder)

@@ -8,6 +8,7 @@ import pytest
 
 from markerless_tracker.camera import CameraRig, write_calibration
 from markerless_tracker.datasets import detect_format, open_recording
+from markerless_tracker.datasets.pose2sim import match_videos
 from markerless_tracker.errors import CalibrationError, DatasetError
 from markerless_tracker.geometry import rodrigues_from_rotation
 
@@ -38,6 +39,15 @@ def test_freemocap_videos_in_order(freemocap: Path, make_rig, check) -> None:
     check(recording, make_rig(*NAMES))
     assert recording.fps == 30.0
     assert "paired in order: 0 = Camera_000_synchronized.avi, 1 = " in recording.warnings[0]
+
+
+def test_videos_in_order_of_their_numbers(make_rig, write_video, tmp_path: Path) -> None:
+    names = [f"cam_{number}" for number in range(1, 12)]
+    for number in range(1, 12):
+        write_video(tmp_path / f"cam{number}.avi", number)
+    found, notes = match_videos(tmp_path, make_rig(*names))
+    assert [video.name for video in found.values()] == [f"cam{n}.avi" for n in range(1, 12)]
+    assert len(notes) == 1 and "cam_2 = cam2.avi" in notes[0]
 
 
 def test_freemocap_videos_that_are_named(freemocap: Path, make_rig, check) -> None:

@@ -35,11 +35,15 @@ def test_the_file_is_y_up_and_the_world_z_up(tmp_path: Path) -> None:
     assert track.positions_m.tolist() == [[[3.0, 1.0, 2.0], [6.0, 4.0, 5.0]]]
 
 
-@pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001)])
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001), (" M ", 1.0), ("MM", 0.001)]
+)
 def test_units(tmp_path: Path, unit: str, factor: float) -> None:
     text = HEADER.replace("\tm\t", f"\t{unit}\t") + "1\t0\t1000\t2000\t3000\t0\t0\t0\n"
     position = read_trc(saved(tmp_path, text)).positions_m[0, 0]
     np.testing.assert_allclose(position, np.array([3000, 1000, 2000]) * factor)
+    padded = text.replace("Units", "Units ")
+    np.testing.assert_allclose(read_trc(saved(tmp_path, padded)).positions_m[0, 0], position)
 
 
 @pytest.mark.parametrize("row", ["1\t0\t\t\t\t4\t5\t6", "1\t0\t1\tnan\t3\t4\t5\t6\t"])
