@@ -10,10 +10,9 @@ from typing import Any, BinaryIO, NamedTuple
 from markerless_tracker.body import BodyModel
 from markerless_tracker.compiled import compiled_elsewhere
 from markerless_tracker.errors import ImageError, TrackerError
-from markerless_tracker.imaging import BackgroundModel, Segmenter
+from markerless_tracker.imaging import BackgroundModel, Image, Segmenter
 from markerless_tracker.records import Observation, TrackResult
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.evidence.prepared import Views
 from markerless_tracker.tracking.processes.child import Child
 from markerless_tracker.tracking.processes.images import Place, put, set_bytes
 from markerless_tracker.tracking.processes.wire import receive, send
@@ -24,6 +23,8 @@ _END_S = 1.0
 """Time that the step in progress has to end; a compilation takes longer and is aborted."""
 _SETS = 3
 """Sets of images in shared memory: the one that is tracked, the one prepared, and the next."""
+
+Views = Mapping[str, Image | Observation]
 
 
 class SetOfViews(NamedTuple):

@@ -1,7 +1,5 @@
 """Bags of other tools, and bags that are cut, damaged or incomplete."""
 
-import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -9,63 +7,25 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
 
-from markerless_tracker.camera import CameraRig, read_calibration
+from markerless_tracker.camera import read_calibration
 from markerless_tracker.datasets import open_recording
 from markerless_tracker.errors import CalibrationError, DatasetError, ImageError, TrackerError
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-IMAGE, INFO, TF = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo", "tf2_msgs/msg/TFMessage"
-COMPRESSED = "sensor_msgs/msg/CompressedImage"
-STEP_NS = 50_000_000
-FRAME = np.random.default_rng(5).integers(0, 256, (48, 64, 3), dtype=np.uint8)
-
-
-def make(kind: str, **fields):
-    return STORE.types[kind](**fields)
-
-
-def header(stamp_ns: int, frame: str = "x"):
-    time = make("builtin_interfaces/msg/Time", sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
-    return make("std_msgs/msg/Header", stamp=time, frame_id=frame)
-
-
-def image(stamp_ns: int, pixels: np.ndarray = FRAME, encoding: str = "bgr8"):
-    return make(
-        IMAGE,
-        header=header(stamp_ns),
-        height=pixels.shape[0],
-        width=pixels.shape[1],
-        encoding=encoding,
-        is_bigendian=0,
-        step=pixels[0].size,
-        data=np.ascontiguousarray(pixels).reshape(-1),
-    )
-
-
-def save(path: Path, messages, *, rig_of: Path | None = None) -> Path:
-    """Writes (topic, type, message) triples as a bag, with a calibration beside it if given."""
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections = {}
-        for number, (topic, kind, message) in enumerate(messages):
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
-            writer.write(connections[topic], number, STORE.serialize_cdr(message, kind))
-    if rig_of is not None:
-        shutil.copy(rig_of / "calibration.toml", path)
-    return path
-
-
-def both(stamp_ns: int, **kwargs):
-    return [(f"/{name}/image_raw", IMAGE, image(stamp_ns, **kwargs)) for name in ("cam01", "cam02")]
-
-
-@pytest.fixture
-def bag(make_recording, tmp_path: Path) -> Callable[..., Path]:
-    rig = make_recording()
-    return lambda messages, name="bag": save(tmp_path / name, messages, rig_of=rig)
+from .conftest import (
+    COMPRESSED,
+    FRAME,
+    IMAGE,
+    STEP_NS,
+    both,
+    frames_message,
+    header,
+    image,
+    info,
+    make,
+    save,
+    static,
+)
 
 
 def test_sets_are_grouped_by_header_stamp_not_by_order(bag) -> None:
@@ -140,50 +100,6 @@ def test_missing_topics_are_listed(bag) -> None:
         open_recording(bag(only))
 
 
-def info(name: str, rig: CameraRig, **changes):
-    camera = rig[name]
-    fields = {
-        "header": header(0, f"{name}_optical_frame"),
-        "height": camera.size_px[1],
-        "width": camera.size_px[0],
-        "distortion_model": "plumb_bob",
-        "d": camera.distortion.copy(),
-        "k": camera.matrix.reshape(-1).copy(),
-        "r": np.eye(3).reshape(-1),
-        "p": np.zeros(12),
-        "binning_x": 0,
-        "binning_y": 0,
-        "roi": make(
-            "sensor_msgs/msg/RegionOfInterest",
-            x_offset=0,
-            y_offset=0,
-            height=0,
-            width=0,
-            do_rectify=False,
-        ),
-    }
-    return (f"/{name}/camera_info", INFO, make(INFO, **{**fields, **changes}))
-
-
-def static(parent: str, child: str, translation, quaternion=(1.0, 0.0, 0.0, 0.0)):
-    w, x, y, z = quaternion
-    tx, ty, tz = translation
-    return make(
-        "geometry_msgs/msg/TransformStamped",
-        header=header(0, parent),
-        child_frame_id=child,
-        transform=make(
-            "geometry_msgs/msg/Transform",
-            translation=make("geometry_msgs/msg/Vector3", x=tx, y=ty, z=tz),
-            rotation=make("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
-        ),
-    )
-
-
-def frames_message(*transforms):
-    return ("/tf_static", TF, make(TF, transforms=list(transforms)))
-
-
 def test_without_calibration_file_the_rig_is_read_from_topics(
     make_recording, tmp_path: Path
 ) -> None:
@@ -202,40 +118,6 @@ def test_without_calibration_file_the_rig_is_read_from_topics(
     np.testing.assert_allclose(camera.T_world_cam[:3, 0], [0.0, 1.0, 0.0], atol=1e-12)
     np.testing.assert_array_equal(camera.matrix, rig["cam01"].matrix)
     np.testing.assert_array_equal(camera.distortion, rig["cam01"].distortion)
-
-
-def test_cameras_of_one_name_are_told_apart_by_their_namespaces(
-    make_recording, tmp_path: Path
-) -> None:
-    rig = read_calibration(make_recording() / "calibration.toml")
-    frames = frames_message(
-        static("map", "cam01_optical_frame", (1.0, 0.0, 0.0)),
-        static("map", "cam02_optical_frame", (0.0, 0.0, 1.0)),
-    )
-    spaces = {"cam01": "/rig/front/camera", "cam02": "/rig/back/camera"}
-    messages = [frames] + [
-        (topic.replace(f"/{name}", space), kind, message)
-        for name, space in spaces.items()
-        for topic, kind, message in (info(name, rig), *both(0), *both(STEP_NS))
-        if topic.startswith(f"/{name}/")
-    ]
-    recording = open_recording(save(tmp_path / "bag", messages))
-    assert recording.rig.names == ("back_camera", "front_camera") and recording.frame_count == 2
-    np.testing.assert_array_equal(recording.rig["front_camera"].matrix, rig["cam01"].matrix)
-    (first, _) = recording.frames()
-    np.testing.assert_array_equal(first.images["back_camera"], FRAME)
-
-
-def test_two_topics_for_one_calibrated_camera_are_refused(bag) -> None:
-    twice = [
-        (f"{space}{topic}", kind, message)
-        for space in ("/a", "/b")
-        for topic, kind, message in both(0)
-    ]
-    with pytest.raises(
-        DatasetError, match="/a/cam01/image_raw and /b/cam01/image_raw may be images of cam01"
-    ):
-        open_recording(bag(twice))
 
 
 def test_missing_or_unsupported_calibration_topics_are_named(
