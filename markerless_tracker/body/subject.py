@@ -185,6 +185,16 @@ def read_subject(path: Path) -> Subject:
         raise BodyModelError(f"{path}: {error}") from error
 
 
+def is_subject_file(path: Path) -> bool:
+    """Whether a YAML file has the lengths of a subject.
+
+    Raises:
+        BodyModelError: it cannot be read.
+    """
+    data = read_yaml(path, "file")
+    return isinstance(data, dict) and "lengths_m" in data
+
+
 def write_subject(path: Path, subject: Subject) -> None:
     """Write a subject file that `read_subject` reads back exactly."""
     data: dict[str, Any] = {

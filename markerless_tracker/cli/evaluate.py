@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from markerless_tracker.body import MARKER_NAMES
@@ -256,7 +257,7 @@ def _summary_table(paths: list[Path], several: list[_Figures]) -> Table:
             figures.offsets_off_mm, figures.offsets_off_limbs_mm, more.mpjpe_mm, more.pa_mpjpe_mm,
         )  # fmt: skip
         table.add_row(
-            str(path),
+            escape(str(path)),
             *(_text(value) for value in millimetres),
             _share(more.pck),
             _shares(figures),

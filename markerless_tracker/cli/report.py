@@ -15,7 +15,7 @@ from markerless_tracker.datasets.markers.c3d import read_markers
 from markerless_tracker.datasets.markers.sets import MARKER_SETS, read_marker_map, renamed
 from markerless_tracker.errors import ConfigError, DatasetError, TrackerError
 from markerless_tracker.results.read import read_result
-from markerless_tracker.results.stored_result import StoredResult
+from markerless_tracker.results.stored_result import StoredResult, result_names, set_back
 from markerless_tracker.viewing.images import ResultImages
 from markerless_tracker.viewing.page.charts import Level
 from markerless_tracker.viewing.page.embedded import IMAGE_PX, embedded_film
@@ -85,6 +85,8 @@ def run(args: argparse.Namespace) -> int:
     reports = []
     for name, source, reference in zip(names, sources, references, strict=True):
         result = read_result(name)
+        if more := [part for part in result_names(name)[1:] if part not in names]:
+            warn(console, set_back(name, more))
         film, why = None, "--no-film"
         if not args.no_film:
             film, why = _film(console, name, result, source, len(names))

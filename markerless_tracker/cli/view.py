@@ -9,14 +9,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
+from rich.console import Console
 
 from markerless_tracker.cli.terminal.arguments import count, positive
-from markerless_tracker.cli.terminal.bars import progress_bars
+from markerless_tracker.cli.terminal.bars import progress_bars, warn
 from markerless_tracker.cli.track_arguments import result_name
 from markerless_tracker.cli.view_node import has_display, run_node
 from markerless_tracker.errors import ConfigError, DatasetError
+from markerless_tracker.results.export.new_file import new_file
 from markerless_tracker.results.read import read_result
-from markerless_tracker.results.stored_result import StoredResult
+from markerless_tracker.results.stored_result import StoredResult, result_names, set_back
 from markerless_tracker.viewing.film import FORMATS, require_av, write_film
 from markerless_tracker.viewing.images import ResultImages
 from markerless_tracker.viewing.overlays import Overlays, chosen_rows, spread_rows
@@ -33,6 +35,7 @@ HELP = (
 EXAMPLE = "markerless_tracker view out/walk --film walk.webm --sheet walk.png"
 
 _FRAMES = 4
+_LEAST_WIDTH_PX = 64
 """Frames of a picture, if none are given."""
 MOST_RRD_PICTURES = 300
 """Largest number of frames with pictures in the file for the Rerun viewer."""
@@ -82,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--width",
         metavar="PX",
-        type=count,
+        type=_width,
         default=1280,
         help="width of film and picture (default 1280)",
     )
@@ -117,6 +120,8 @@ def run(args: argparse.Namespace) -> int:
         )
     name = args.name
     result = read_result(name)
+    if more := result_names(name)[1:]:
+        warn(Console(stderr=True), set_back(name, more))
     images = ResultImages(result, args.source, width_px=args.width // 2, whole=args.whole)
     for path in targets:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -168,12 +173,19 @@ def _write(
         if sheet is not None:
             begin(sheet)
             picture = overlays.contact_sheet(spread_rows(len(result), frames), width_px=width_px)
-            if not cv2.imwrite(str(sheet), picture):
-                raise DatasetError(f"{sheet}: cannot be written")
+            with new_file(sheet, binary=True) as sink:
+                sink.write(cv2.imencode(sheet.suffix, picture)[1].tobytes())
         if rrd is not None:
             begin(rrd)
             rows = chosen_rows(len(result), MOST_RRD_PICTURES)
             write_rrd(rrd, result, rig=images.rig, overlays=overlays, rows=rows)
+
+
+def _width(text: str) -> int:
+    width_px = count(text)
+    if width_px < _LEAST_WIDTH_PX:
+        raise argparse.ArgumentTypeError(f"{text!r}, expected at least {_LEAST_WIDTH_PX} px")
+    return width_px
 
 
 def _file(endings: Sequence[str]) -> Callable[[str], Path]:

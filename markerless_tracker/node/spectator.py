@@ -12,9 +12,10 @@ from geometry_msgs.msg import PoseArray
 from sensor_msgs.msg import Image as ImageMessage
 from sensor_msgs.msg import JointState
 
-from markerless_tracker.errors import ImageError
+from markerless_tracker.errors import ConfigError, ImageError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image
+from markerless_tracker.node.ros.declared import check_topics
 from markerless_tracker.node.ros.images import decode_image
 from markerless_tracker.node.ros.process import Listener
 from markerless_tracker.node.ros.qos import image_qos, latched_qos, output_qos
@@ -87,11 +88,15 @@ class Spectator(Listener):
 
     def _on_state(self, message: Any) -> None:
         values = {pair.key: pair.value for status in message.status for pair in status.values}
-        overlap = {
-            key.removeprefix(_OVERLAP): float(value)
-            for key, value in values.items()
-            if key.startswith(_OVERLAP)
-        }
+        try:
+            overlap = {
+                key.removeprefix(_OVERLAP): float(value)
+                for key, value in values.items()
+                if key.startswith(_OVERLAP)
+            }
+            check_topics("state", "debug/NAME/overlay", overlap)
+        except (ValueError, ConfigError):
+            return  # It is no tracker's.
         for name in overlap:
             if name not in self._overlays:
                 self._overlays[name] = self._subscribe(name)

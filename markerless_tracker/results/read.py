@@ -68,6 +68,10 @@ class ResultReader:
             raise DatasetError(f"{path}: DataRate is {self.fps}, expected a number above 0")
         body = self.summary.get("body")
         names = body.get("parameters", []) if isinstance(body, dict) else []
+        if not isinstance(names, list):
+            raise DatasetError(
+                f"{self._summary_name}.json: `body.parameters` is {names!r}, expected a list"
+            )
         self.parameter_names = tuple(str(parameter) for parameter in names)
         # All frames with a pose have the same angles, or none.
         posed = (frame for frame in frames if frame.get("parameters") is not None)

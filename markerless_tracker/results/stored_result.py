@@ -1,6 +1,6 @@
 """A result read back from its files: named arrays over time."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -205,11 +205,16 @@ def stored_body(summary: Mapping[str, Any]) -> BodyModel:
         raise DatasetError("`lengths_m` or `cones_m` of the result's `body` is no table of numbers")
     settings = summary.get("settings") or {}
     name = settings.get("body") or entry.get("name")
-    cones = {cone: np.array(shape) for cone, shape in cones_m.items()}
+    try:
+        cones = {cone: np.array(shape, dtype=np.float64) for cone, shape in cones_m.items()}
+        stored = tuple(entry.get("parameters", ()))
+    except (TypeError, ValueError) as error:
+        raise DatasetError(
+            "`cones_m` or `parameters` of the result's `body` is not as the tracker writes it"
+        ) from error
     subject = Subject(str(summary.get("source") or "tracked"), lengths_m, cones)
     body = build_body(load_description(str(name)), subject)
-    stored = entry.get("parameters", ())
-    if tuple(stored) != body.parameter_names:
+    if stored != body.parameter_names:
         raise BodyModelError(
             f"the result's `body.parameters` has {len(stored)} names, expected the {body.size} of "
             f"the body {name}: was the body's file changed?"
@@ -238,6 +243,14 @@ def _index(names: tuple[str, ...], name: str, kind: str) -> int:
     if name not in names:
         raise DatasetError(f"no {kind} {name!r}, expected one of {', '.join(names) or 'none'}")
     return names.index(name)
+
+
+def set_back(name: Path, more: Sequence[Path]) -> str:
+    """A line that says that a result has more parts than the one that is shown."""
+    return (
+        f"{name}: the time was set back during the run; shown until then, later frames are in "
+        f"{', '.join(map(str, more))}"
+    )
 
 
 def result_names(name: Path) -> list[Path]:

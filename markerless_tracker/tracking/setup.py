@@ -21,7 +21,7 @@ from markerless_tracker.body import (
 from markerless_tracker.body.build import build_body
 from markerless_tracker.body.description import BodyDescription
 from markerless_tracker.body.sizes import MEAN_STATURE_M, Sizes
-from markerless_tracker.body.subject import complete_markers, measured_lengths
+from markerless_tracker.body.subject import complete_markers, is_subject_file, measured_lengths
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import read_trc
 from markerless_tracker.errors import ConfigError
@@ -105,6 +105,8 @@ def build_tracker(
         raise ConfigError(
             f"{start_file}: no start pose, expected the markers (.trc) or a pose (.yaml)"
         )
+    if start_file is not None and start is None and is_subject_file(start_file):
+        raise ConfigError(f"{start_file}: a subject, no start pose; expected it as the subject")
     if start_file is not None and start is None and not named:
         raise ConfigError(
             f"{start_file} gives a pose but no subject: name one "

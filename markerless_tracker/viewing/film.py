@@ -1,5 +1,6 @@
 """Films that browsers play: VP9 in WebM, H.264 in MP4, written with PyAV."""
 
+import os
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
@@ -45,7 +46,7 @@ def write_film(
     container: str = "webm",
     bit_rate: int | None = None,
 ) -> int:
-    """Write pictures as a film; returns their number.
+    """Write pictures as a film; returns their number. A file is replaced when the film is complete.
 
     Args:
         target: path of a file, or a binary file open for writing.
@@ -61,11 +62,32 @@ def write_film(
     av = require_av()
     if container not in _CODECS:
         raise ConfigError(f"film {container!r}, expected one of {', '.join(FORMATS)}")
+    if isinstance(target, Path):
+        # The muxer of MP4 opens its file again, by its name.
+        partial = target.with_name(f"{target.name}.tmp")
+        try:
+            count = _encode(av, str(partial), str(target), pictures, fps, container, bit_rate)
+            os.replace(partial, target)
+        except OSError as error:
+            raise DatasetError(f"{target}: cannot be written: {error.strerror}") from error
+        finally:
+            partial.unlink(missing_ok=True)
+        return count
+    return _encode(av, target, "the film", pictures, fps, container, bit_rate)
+
+
+def _encode(
+    av: Any,
+    sink: str | IO[bytes],
+    where: str,
+    pictures: Iterable[Image],
+    fps: float,
+    container: str,
+    bit_rate: int | None,
+) -> int:
     codec, options, muxer = _CODECS[container]
     count = 0
-    where = str(target) if isinstance(target, Path) else "the film"
     try:
-        sink = str(target) if isinstance(target, Path) else target
         with av.open(sink, "w", format=container, options=muxer) as film:
             stream = film.add_stream(
                 codec, rate=Fraction(fps).limit_denominator(1000), options=options

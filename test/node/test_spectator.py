@@ -50,14 +50,22 @@ def test_all_outputs_are_heard(peer: Any) -> None:
          stamped(fill_image(Image(), PICTURE, "overlay"))),
     ]  # fmt: skip
     values = {"state": "TRACKING", "iou/cam01": "nan", "iou/cam02": "0.9"}
-    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
-    state.publish(stamped(DiagnosticArray(status=[DiagnosticStatus(values=pairs)])))
+
+    def publish_state(values: dict[str, str]) -> None:
+        pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+        state.publish(stamped(DiagnosticArray(status=[DiagnosticStatus(values=pairs)])))
+
+    publish_state(values)
     found: dict[str, TrackerMessage] = {}
 
     def complete() -> bool:
         return len(found) == 4
 
     def publish() -> None:
+        # Others use the topic, too.
+        publish_state({"iou/cam 1": "0.5"})
+        publish_state({"iou/cam01": "good"})
+        publish_state(values)
         for publisher, message in outputs:
             publisher.publish(message)
 

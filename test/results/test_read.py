@@ -187,6 +187,11 @@ def test_a_marker_file_without_a_rate(tmp_path: Path) -> None:
     [
         (lambda b: b["parameters"].pop(), "has 30 names, expected the 31 of the body person31"),
         (lambda b: b.update(lengths_m=[1.0]), "`lengths_m` or `cones_m` of the result's `body`"),
+        (
+            lambda b: b.update(cones_m={"torso": "wide"}),
+            "`cones_m` or `parameters` of the",
+        ),
+        (lambda b: b.update(cones_m={"torso": [[1], [2, 3]]}), "`cones_m` or `parameters` of the"),
     ],
 )
 def test_a_body_that_is_not_the_results(tmp_path: Path, change, expected: str) -> None:

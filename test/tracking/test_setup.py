@@ -99,6 +99,11 @@ def test_a_pose_file_alone_lacks_a_subject(scene, config, files):
         build_tracker(scene.rig, config, start_file=files / "start.yaml")
 
 
+def test_a_subject_is_no_start_pose(scene, config, files):
+    with pytest.raises(ConfigError, match=r"subject.yaml: a subject, no start pose"):
+        build_tracker(scene.rig, config, start_file=files / "subject.yaml")
+
+
 def test_a_marker_file_without_any_marker(scene, config, tmp_path):
     empty = MarkerTrack(MARKER_NAMES, np.array([0]), np.full((1, 15, 3), np.nan))
     write_trc(tmp_path / "empty.trc", empty, 60.0)

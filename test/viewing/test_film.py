@@ -38,6 +38,21 @@ def test_a_film_in_memory() -> None:
     assert buffer.getvalue()[:4] == b"\x1aE\xdf\xa3", "the beginning of WebM"
 
 
+@pytest.mark.parametrize("container", ["webm", "mp4"])
+def test_a_film_that_is_not_completed_replaces_nothing(tmp_path: Path, container: str) -> None:
+    path = tmp_path / f"a.{container}"
+    path.write_bytes(b"earlier")
+
+    def interrupted():
+        yield from pictures(3)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_film(path, interrupted(), fps=10.0, container=container)
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+    assert path.read_bytes() == b"earlier"
+
+
 def test_what_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(DatasetError, match="^the film: no image of the result"):
         write_film(io.BytesIO(), [], fps=10.0)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rich.markup import escape
 from rich.table import Table
 
 Row = Mapping[str, Any]
@@ -34,10 +35,11 @@ def text_table(rows: Sequence[Row]) -> Table:
         error_mm = "" if row["mean_mm"] is None else f"{row['mean_mm']:.1f}"
         errors = [error_mm] if measured else []
         if row["status"] != "done":
-            table.add_row(row["name"], "failed", "", "", *errors, row["error"], seconds)
+            name, reason = escape(row["name"]), escape(row["error"])
+            table.add_row(name, "failed", "", "", *errors, reason, seconds)
             continue
         table.add_row(
-            row["name"],
+            escape(row["name"]),
             "yes" if row["found"] else "no",
             f"{row['tracked']} of {row['frames']}",
             "" if row["overlap"] is None else f"{row['overlap']:.2f}",

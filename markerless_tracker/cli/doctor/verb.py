@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -143,6 +144,7 @@ def _cameras(
                     )
                 ]  # fmt: skip
             task = bars.add_task(f"listening to {', '.join(names)}", total=args.seconds)
+            began_s = time.monotonic()
             heard = listen(
                 names, seconds=args.seconds, image_topic=args.image_topic, stop=stop,
                 progress=lambda seconds: bars.update(task, completed=seconds),
@@ -154,4 +156,5 @@ def _cameras(
     except ConfigError as error:
         return [Finding("cameras", RED, "", str(error), "rename the camera, or the topic")]
     streams = {name: CameraStream(*received) for name, received in heard.items()}
-    return check_streams(streams, backgrounds, listened_s=args.seconds)
+    # It waits longer for a first image.
+    return check_streams(streams, backgrounds, listened_s=round(time.monotonic() - began_s, 1))

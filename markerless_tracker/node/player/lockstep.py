@@ -39,7 +39,10 @@ class Lockstep:
         if values.get("ready") != "true" or "dealt_with_ns" not in values:
             self._trackers.pop(name, None)
             return
-        dealt_ns = int(values["dealt_with_ns"] or -1)
+        try:
+            dealt_ns = int(values["dealt_with_ns"] or -1)
+        except ValueError:
+            return  # It is no tracker's.
         known = self._trackers.setdefault(name, _Tracker(dealt_ns, self._clock()))
         known.last_state_s = self._clock()
         if dealt_ns != known.dealt_ns:

@@ -62,14 +62,20 @@ class Notices:
         self._log(text)
         return True
 
-    def flush(self) -> None:
-        """Log repetitions counted for `HOLD_S`; to be called periodically."""
+    def flush(self, *, last: bool = False) -> None:
+        """Log repetitions counted for `HOLD_S`; to be called periodically.
+
+        Args:
+            last: whether to log all of them, since no further call follows.
+        """
         lines = []
         with self._lock:
             now_s = self._clock()
             for kind in self._kinds.values():
-                if kind.held and now_s - kind.logged_s >= HOLD_S:
-                    lines.append(f"{kind.text} ({kind.held} times in {HOLD_S:g} s)")
+                since_s = now_s - kind.logged_s
+                if kind.held and (last or since_s >= HOLD_S):
+                    seconds = since_s if last else HOLD_S
+                    lines.append(f"{kind.text} ({kind.held} times in {seconds:.2g} s)")
                     kind.held, kind.logged_s = 0, now_s
             self._drop_old()
         for line in lines:

@@ -122,7 +122,7 @@ class SegmenterNode(GivenNode):
     def close(self) -> None:
         """Stop the worker."""
         self._worker.stop()
-        self._notices.flush()
+        self._notices.flush(last=True)
 
     def _observe(self, waiting: Waiting) -> Observation:
         message = waiting.message

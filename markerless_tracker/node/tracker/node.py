@@ -139,8 +139,8 @@ class TrackerNode(GivenNode):
         """
         ended = self._worker.stop(timeout_s)
         self._end_process()
-        self._notices.flush()
-        self._news.flush()
+        self._notices.flush(last=True)
+        self._news.flush(last=True)
         counts = self._status.values(self._sets.counts, (), ())
         notes: dict[str, Any] = {"node": {key: counts[key] for key in NOTED}}
         verdict = self._report.verdict()

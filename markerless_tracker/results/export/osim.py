@@ -56,6 +56,8 @@ def write_osim(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None
     if extent.blank or names != reader.marker_names or path.parent != reader.name.parent:
         write_renamed_trc(marker_file, reader, names, blank_rows=False)
     else:
+        # One of an earlier result of that name is not part of this export.
+        marker_file.unlink(missing_ok=True)
         marker_file = reader.name.with_name(f"{reader.name.name}.trc")
     _write(path.with_suffix(".ik.xml"), _setup(path, marker_file.name, names, extent))
 

@@ -10,6 +10,7 @@ import numpy as np
 from markerless_tracker import __version__
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
+from markerless_tracker.results.export.new_file import new_file
 from markerless_tracker.results.gait import METHOD
 from markerless_tracker.viewing.page.charts import Curve, Level, Mark, line_chart
 from markerless_tracker.viewing.page.report import Report
@@ -48,7 +49,9 @@ def write_page(path: Path, reports: Sequence[Report], *, levels: Sequence[Level]
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(page(reports, levels=levels), encoding="utf-8")
+        text = page(reports, levels=levels)
+        with new_file(path) as sink:
+            sink.write(text)
     except OSError as error:
         raise DatasetError(f"{path}: cannot be written: {error.strerror}") from error
 

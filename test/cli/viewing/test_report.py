@@ -1,6 +1,7 @@
 """Verb `report`."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -64,3 +65,14 @@ def test_the_papers_levels() -> None:
         Level("SPPSO, Lee walk: 38 mm", 38.0),
         Level("H-MCPSO, S2 walk: 48 mm", 48),
     ]
+
+
+def test_frames_after_the_time_was_set_back_are_named(tracked, tmp_path, capsys) -> None:
+    later = tracked.with_name(f"{tracked.name}.2.trc")
+    shutil.copy(tracked.with_name(f"{tracked.name}.trc"), later)
+    try:
+        assert main(["report", str(tracked), "--no-film", "-o", str(tmp_path / "page.html")]) == 0
+        err = " ".join(capsys.readouterr().err.split())
+        assert "the time was set back during the run" in err and f"{tracked.name}.2" in err
+    finally:
+        later.unlink()

@@ -79,6 +79,7 @@ def test_what_cannot_be_shown_fails_in_one_line(
         (["--sheet", "a.gif"], "ends in .png or .jpg"),
         (["--rrd", "a"], "ends in .rrd"),
         (["--frames", "0"], "whole number from 1"),
+        (["--width", "1"], "expected at least 64 px"),
     ):
         with pytest.raises(SystemExit):
             main(["view", result, *words])

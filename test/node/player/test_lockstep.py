@@ -51,6 +51,7 @@ def test_without_a_ready_tracker_nothing_is_waited_for(lockstep: Any) -> None:
     assert lockstep.alone and lockstep.waiting_for() == []
     lockstep.update("a", state(None, ready=False))
     lockstep.update("other", {"level": "3"})
+    lockstep.update("other", {"ready": "true", "dealt_with_ns": "soon"})
     assert lockstep.alone and lockstep.waiting_for() == []
     lockstep.update("a", state(None))
     assert not lockstep.alone and lockstep.waiting_for() == ["a"]

@@ -26,6 +26,15 @@ def test_repetitions_are_counted_and_logged_later() -> None:
     ]
 
 
+def test_all_repetitions_are_logged_at_the_end() -> None:
+    log = Log()
+    for _ in range(5):
+        log.notices.say("cam01: too dark")
+        log.now_s += 0.5
+    log.notices.flush(last=True)
+    assert log.lines == ["cam01: too dark", "cam01: too dark (4 times in 2.5 s)"]
+
+
 def test_a_new_occurrence_after_a_pause_is_logged_again() -> None:
     log = Log()
     log.notices.say("cam01: too dark")

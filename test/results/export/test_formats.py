@@ -1,6 +1,7 @@
 """Exports read back by independent readers; made-up motions that move every joint."""
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
@@ -233,3 +234,13 @@ def test_a_result_is_not_exported_onto_itself(make_result, capsys) -> None:
     with pytest.raises(SystemExit):
         main(["export", str(name), "--to", ","])
     assert "',' names no format, expected some of bvh" in capsys.readouterr().err
+
+
+def test_the_markers_of_an_earlier_export_are_no_part_of_a_new_one(make_result, capsys) -> None:
+    """The earlier result had gaps."""
+    name = make_result()
+    stale = name.with_name(f"{name.name}.ik.trc")
+    stale.write_text("earlier")
+    assert main(["export", str(name), "--to", "osim", "--force", "--json"]) == 0
+    written = json.loads(capsys.readouterr().out)["files"]
+    assert not stale.exists() and str(stale) not in written
