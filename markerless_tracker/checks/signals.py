@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from markerless_tracker.checks.pictures import small_grey
 from markerless_tracker.datasets import Recording
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image
 
 MOST_FRAMES = 600
 """Largest number of frames that are read, consecutive from the first."""
-_WIDTH_PX = 320
 _STILLS = 31
 _DIFFERS = 28.0
 _MOTION_S = 0.05
@@ -64,7 +64,7 @@ def read_signals(
         if number >= most:
             break
         for name, image in frame.images.items():
-            small[name].append(_small(image))
+            small[name].append(small_grey(image))
             kinds[name].add(_kind(image))
         if progress is not None:
             progress(number + 1, most)
@@ -123,23 +123,16 @@ def _blob_height(mask: NDArray[np.bool_]) -> int:
 def _backgrounds(recording: Recording, kinds: Mapping[str, set[str]]) -> Mapping[str, FloatArray]:
     """Empty scenes by camera; whether they are grey or in colour is added to `kinds`."""
     models = recording.background_models()
-    found = {name: _small(model.image).astype(np.float64) for name, model in models.items()}
+    found = {name: small_grey(model.image).astype(np.float64) for name, model in models.items()}
     for name, model in models.items():
         kinds[name].add(_kind(model.image))
     for name, images in recording.background_frames().items():
         if name not in models:
             kinds[name].update(map(_kind, images))
-        stack = np.array([_small(image) for image in images], dtype=np.float64)
+        stack = np.array([small_grey(image) for image in images], dtype=np.float64)
         found.setdefault(name, np.median(stack, axis=0))
     return found
 
 
 def _kind(image: Image) -> str:
     return "grey" if image.ndim == 2 else "colour"
-
-
-def _small(image: Image) -> NDArray[np.uint8]:
-    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    factor = min(1.0, _WIDTH_PX / grey.shape[1])
-    size = (max(8, round(grey.shape[1] * factor)), max(8, round(grey.shape[0] * factor)))
-    return np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)

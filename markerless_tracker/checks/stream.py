@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.checks.finding import GREEN, RED, YELLOW, Finding, grade, worse
+from markerless_tracker.checks.pictures import small_grey
 from markerless_tracker.checks.recording import MOVED_PX, UNLIKE
 from markerless_tracker.checks.scene import moved_px, unlike_share
 from markerless_tracker.imaging import Image
-from markerless_tracker.imaging.images import grey_of
 
 JITTERS = (0.25, 1.0)
 """Limits (yellow, red) of the jitter of arrival, 95th percentile in periods. Above the second, sets
@@ -30,7 +30,6 @@ DARK = (40.0, 15.0)
 BLURRED = (0.6, 0.35)
 """Lower limits of the sharpness relative to the background. Below the second, the lens is out of
 focus."""
-_WIDTH_PX = 320
 _LEAST_IMAGES = 4
 
 
@@ -189,13 +188,13 @@ def _in_step(heard: Mapping[str, CameraStream]) -> list[Finding]:
 
 def _pictures(name: str, images: Sequence[Image], background: Image | None) -> list[Finding]:
     """Checks exposure, sharpness and background on some images."""
-    small = [_small(image) for image in images]
+    small = [small_grey(image) for image in images]
     scene = np.median(np.array(small, dtype=np.float32), axis=0).astype(np.float64)
     found = [_exposure(name, small)]
     if background is None:
         text = f"{_sharpness(small[-1]):.1f} (no background to compare with)"
         return [*found, Finding("sharpness", GREEN, name, text)]
-    empty = _small(background)
+    empty = small_grey(background)
     if empty.shape != scene.shape:
         return [
             *found,
@@ -249,10 +248,3 @@ def _background(name: str, scene: NDArray[np.float64], empty: NDArray[np.uint8])
         "learn it anew (~/learn_background, or new empty-scene images); if the camera was moved, "
         "calibrate anew, too",
     )  # fmt: skip
-
-
-def _small(image: Image) -> NDArray[np.uint8]:
-    grey = grey_of(image)
-    factor = min(1.0, _WIDTH_PX / grey.shape[1])
-    size = (max(8, round(grey.shape[1] * factor)), max(8, round(grey.shape[0] * factor)))
-    return np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)

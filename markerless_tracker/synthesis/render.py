@@ -86,7 +86,6 @@ class Renderer:
         width, height = self.camera.size_px
         size = (height * samples, width * samples)
         nearness, labels, shades = self._draw(vertices, shade, size)
-        cast = np.zeros((1, 1), dtype=np.float32)
         if self.look.shadow > 0.0:
             on_floor = vertices - vertices[:, 2:] / LIGHT[2] * LIGHT
             cast = self._draw(on_floor, shade, size)[0]

@@ -8,7 +8,7 @@ from markerless_tracker.calibration.views import BoardViews
 from markerless_tracker.camera import project_camera
 from markerless_tracker.camera.board import Board
 from markerless_tracker.geometry import apply
-from markerless_tracker.synthesis.boards.motion import BoardMotion, visible_side
+from markerless_tracker.synthesis.boards.motion import BoardMotion
 from markerless_tracker.synthesis.rig import ring_rig
 
 SIZE = (656, 490)
@@ -17,6 +17,11 @@ SIZE = (656, 490)
 @pytest.fixture(scope="session")
 def rig():
     return ring_rig(3, SIZE)
+
+
+def visible_side(pose, camera) -> bool:
+    """Whether a camera looks at the print of a board at `T_world_board` (4, 4)."""
+    return bool((np.linalg.inv(pose) @ camera.T_world_cam)[2, 3] > 0.0)
 
 
 def seen_by(rig, board, poses, *, noise=0.03, seed=0):

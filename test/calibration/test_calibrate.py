@@ -16,7 +16,8 @@ from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import apply
 from markerless_tracker.synthesis import ring_rig
 from markerless_tracker.synthesis.boards import BoardScene
-from markerless_tracker.synthesis.boards.motion import visible_side
+
+from .conftest import visible_side
 
 SIZE = (410, 306)
 BOARD = Board("checkerboard", 10, 7, 0.16)

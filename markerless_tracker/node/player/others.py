@@ -1,12 +1,12 @@
 """Topics of a bag other than images and camera infos; stored messages are played unchanged."""
 
 from collections.abc import Callable, Iterator, Sequence
-from importlib import import_module
 from typing import Any
 
 from markerless_tracker.datasets.bag.recording import BagRecording
 from markerless_tracker.datasets.bag.stream import RawMessage
 from markerless_tracker.errors import ConfigError, DatasetError
+from markerless_tracker.node.ros.messages import message_class
 from markerless_tracker.node.ros.qos import latched_qos, output_qos
 
 END_NS = 2**63 - 1
@@ -87,9 +87,8 @@ def _is_latched(topic: str) -> bool:
 
 def _type(topic: str, kind: str) -> Any:
     """The Python class of a message type such as geometry_msgs/msg/PoseArray."""
-    package, _, name = kind.replace("/msg/", "/").partition("/")
     try:
-        return getattr(import_module(f"{package}.msg"), name)
+        return message_class(kind)
     except (ImportError, AttributeError) as error:
         raise DatasetError(
             f"topics: {topic} has the type {kind}, whose package is not installed here"

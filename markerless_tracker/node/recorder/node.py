@@ -2,12 +2,12 @@
 
 import time
 from collections.abc import Sequence
-from importlib import import_module
 from typing import Any, Protocol
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from markerless_tracker.node.ros.declared import GivenNode
+from markerless_tracker.node.ros.messages import message_class
 
 _SEARCH_S = 0.5
 """Interval of the search for new topics."""
@@ -77,8 +77,7 @@ class RecorderNode(GivenNode):
         reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
         latched = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
         try:
-            package, _, own = kind.replace("/msg/", "/").partition("/")
-            message = getattr(import_module(f"{package}.msg"), own)
+            message = message_class(kind)
             topic = self._writer.topic(name, kind, latched=latched)
         except Exception as error:  # an unknown type raises any exception of its library
             self.get_logger().warning(

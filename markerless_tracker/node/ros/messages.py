@@ -1,6 +1,8 @@
 """Conversion of results to ROS messages. Fields hold plain Python numbers."""
 
 from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -25,6 +27,16 @@ _LEVELS = {
     Level.WARN: DiagnosticStatus.WARN,
     Level.STALE: DiagnosticStatus.STALE,
 }
+
+
+def message_class(kind: str) -> Any:
+    """The class of a message type such as geometry_msgs/msg/PoseArray.
+
+    Raises:
+        ImportError, AttributeError: its package is not installed, or has no such message.
+    """
+    package, _, name = kind.replace("/msg/", "/").partition("/")
+    return getattr(import_module(f"{package}.msg"), name)
 
 
 def header(stamp_ns: int, frame: str = WORLD_FRAME) -> Header:

@@ -6,7 +6,6 @@ from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.camera.board import Board
 from markerless_tracker.geometry import (
     FloatArray,
-    inverse,
     rodrigues_from_rotation,
     rotation_from_rodrigues,
     transform,
@@ -118,9 +117,3 @@ class BoardMotion:
 
     def _middle(self, pose: FloatArray) -> FloatArray:
         return np.asarray(pose[:3, :3] @ self._board.outline_m.mean(axis=0) + pose[:3, 3])
-
-
-def visible_side(pose: FloatArray, camera: CameraModel) -> bool:
-    """Whether a camera looks at the print of a board at `T_world_board` (4, 4)."""
-    seen_from = inverse(pose)[:3, :3] @ camera.T_world_cam[:3, 3] + inverse(pose)[:3, 3]
-    return bool(seen_from[2] > 0.0)

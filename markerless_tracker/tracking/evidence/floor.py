@@ -16,7 +16,7 @@ from markerless_tracker.camera.lens import pixel, without_lens
 from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.raster.mask_words import has
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import MaskWords
+from markerless_tracker.records import MaskWords, Observation, locked
 
 PENUMBRA_PX = 2
 """Background this near to person or undecided pixels may be half in shadow, so it is not lit."""
@@ -40,6 +40,14 @@ class FloorView(NamedTuple):
     person: MaskWords
     undecided: MaskWords
     hidden: MaskWords
+
+    @classmethod
+    def of(cls, seen: Observation, camera: CameraModel, hidden: MaskWords) -> "FloorView":
+        """That of an observation; `hidden` is of its region."""
+        undecided = seen.undecided_words
+        if undecided is None:
+            undecided = locked(np.zeros_like(seen.mask_words), np.uint64)
+        return cls(camera, seen.offset_px, seen.width, seen.mask_words, undecided, hidden)
 
 
 def floor_points(pixels: FloatArray, camera: CameraModel) -> FloatArray:

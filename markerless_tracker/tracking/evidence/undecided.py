@@ -24,7 +24,6 @@ from markerless_tracker.fitness.raster.mask_words import (
 )
 from markerless_tracker.fitness.raster.silhouette import body_words
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.observation import locked
 from markerless_tracker.records import MaskWords, Observation
 from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, lit_elsewhere
 from markerless_tracker.tracking.search import pixels_per_m, root_m
@@ -64,12 +63,9 @@ def decide(
 
 
 def _view(seen: Observation, camera: CameraModel, covered: MaskWords) -> FloorView:
-    undecided = seen.undecided_words
-    if undecided is None:
-        undecided = locked(np.zeros_like(seen.mask_words), np.uint64)
     near = np.empty(seen.mask_words.shape, dtype=np.uint64)
     _near(covered, *seen.offset_px, seen.width, np.empty_like(near), near)
-    return FloorView(camera, seen.offset_px, seen.width, seen.mask_words, undecided, near)
+    return FloorView.of(seen, camera, near)
 
 
 def _explained(view: FloorView, others: list[FloorView], where_m: FloatArray) -> MaskWords:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from markerless_tracker.camera import CameraModel, project_camera
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.observation import locked
 from markerless_tracker.records import Observation, pack_mask
 from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, lit_elsewhere
 from markerless_tracker.tracking.evidence.hull import FINE_M, TRUNK_DISTANCE_M, Hull
@@ -93,7 +92,8 @@ def decided_by_hull(
         for name, seen in observations.items()
     }
     views = {
-        name: _floor_view(seen, cameras[name], covered[name]) for name, seen in observations.items()
+        name: FloorView.of(seen, cameras[name], pack_mask(covered[name]))
+        for name, seen in observations.items()
     }
     middle = hull.trunk_m.mean(axis=0)
     decided = {}
@@ -129,15 +129,6 @@ def _maybe_shadows(
     out = np.zeros_like(asked)
     out[rows, columns] = maybe[blocks[1].reshape(-1)]
     return out
-
-
-def _floor_view(seen: Observation, camera: CameraModel, covered: NDArray[np.bool_]) -> FloorView:
-    undecided = seen.undecided_words
-    if undecided is None:
-        undecided = locked(np.zeros_like(seen.mask_words), np.uint64)
-    return FloorView(
-        camera, seen.offset_px, seen.width, seen.mask_words, undecided, pack_mask(covered)
-    )
 
 
 def _covered(
