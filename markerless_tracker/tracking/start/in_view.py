@@ -25,11 +25,11 @@ GAP_NS = 500_000_000
 """The time of `PATIENCE_NS` starts again after a gap of this length in which two cameras do not see
 the person."""
 NEAR_M = 1.0
-"""What is farther than this from a place of the frame before is somebody or something else."""
+"""A hull farther than this from the hulls of the last frames is another one."""
 
 
-class _Visit(NamedTuple):
-    """Somebody in view of two cameras, or a thing: where, since when, and when last."""
+class _InView(NamedTuple):
+    """A hull in view of two cameras: its last place, and the times since which and when last."""
 
     place_m: FloatArray
     since_ns: int
@@ -43,8 +43,8 @@ class InViewGate:
         self.reset()
 
     def reset(self) -> None:
-        """Forget who is in view."""
-        self._visits: list[_Visit] = []
+        """Forget which hulls are in view."""
+        self._hulls: list[_InView] = []
 
     def enough(
         self, body: BodyModel, pose: FloatArray, cameras: Iterable[CameraModel], stamp_ns: int
@@ -67,13 +67,13 @@ class InViewGate:
         return fraction_in_view(body, pose, with_image, required) >= LEAST_IN_VIEW
 
     def _seen_since_ns(self, place_m: FloatArray, stamp_ns: int) -> int:
-        """Since when two cameras see what is at a place (3,) at a time, which is noted."""
-        visits = [v for v in self._visits if 0 <= stamp_ns - v.last_ns <= GAP_NS]
-        away_m = [float(np.linalg.norm(visit.place_m - place_m)) for visit in visits]
+        """Time since which two cameras see the hull at a place (3,), which is noted."""
+        hulls = [v for v in self._hulls if 0 <= stamp_ns - v.last_ns <= GAP_NS]
+        away_m = [float(np.linalg.norm(hull.place_m - place_m)) for hull in hulls]
         since_ns = stamp_ns
         if away_m and min(away_m) <= NEAR_M:
-            since_ns = visits.pop(int(np.argmin(away_m))).since_ns
-        self._visits = [*visits, _Visit(place_m, since_ns, stamp_ns)]
+            since_ns = hulls.pop(int(np.argmin(away_m))).since_ns
+        self._hulls = [*hulls, _InView(place_m, since_ns, stamp_ns)]
         return since_ns
 
 
