@@ -21,6 +21,7 @@ from std_srvs.srv import Trigger
 from markerless_tracker.bags import write_bag
 from markerless_tracker.datasets import open_recording, read_trc
 from markerless_tracker.node.player.node import PlayerNode
+from markerless_tracker.node.player.others import END_NS
 from markerless_tracker.node.player.spin import never
 from markerless_tracker.node.ros.qos import image_qos, output_qos
 from markerless_tracker.node.ros.stamps import stamp_of
@@ -110,6 +111,27 @@ def test_in_lockstep_no_wait_goes_on_after_the_answer(
     node.play(spin)
     node.destroy_node()
     assert len(sent) == SETS and answered == [True] * SETS
+
+
+def test_what_was_recorded_after_the_last_set_is_published(
+    bag: Path, ros_context: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the messages that `up_to` gives before and after each set, none is left out."""
+    given = [Parameter("bag", value=str(bag)), Parameter("rate", value=5.0)]
+    node = PlayerNode(context=ros_context, parameter_overrides=given)
+    published: list[int] = []
+    stored = list(range(SETS + 3))
+
+    def take(first_ns: int, last_ns: int) -> list[int]:
+        count = len(stored) if last_ns == END_NS else 1
+        taken, stored[:count] = stored[:count], []
+        return taken
+
+    monkeypatch.setattr(node._others, "up_to", lambda later: take)
+    monkeypatch.setattr(node._others, "publish", published.extend)
+    node.play(lambda seconds, until=never: True)
+    node.destroy_node()
+    assert published == list(range(SETS + 3))
 
 
 def test_a_step_needs_a_pause(bag: Path, peer: Any, start: Callable[..., Any]) -> None:
