@@ -85,7 +85,7 @@ class Observation:
                     f"{self.mask_words.shape}, expected the same shape and no pixel in both"
                 )
         # An array with strides of 0 is `no_edges`, which stays as small as it is.
-        if any(self.edges.strides):
+        if any(self.edges.strides) or self.edges.dtype != np.uint8:
             object.__setattr__(self, "edges", locked(self.edges, np.uint8))
         if self.edges.ndim != 2 or self.mask_words.shape != (self.height, (self.width + 63) // 64):
             raise ImageError(
@@ -115,7 +115,9 @@ class Observation:
     @cached_property
     def has_edges(self) -> bool:
         """Whether the edge map holds any edge."""
-        return any(self.edges.strides) and bool(self.edges.any())
+        # With strides of 0 all values are the same.
+        edges = self.edges if any(self.edges.strides) else self.edges[:1, :1]
+        return bool(edges.any())
 
     @property
     def width(self) -> int:

@@ -289,6 +289,11 @@ def test_an_edge_map_without_edges_takes_no_memory() -> None:
     for one in (seen, part, back):
         assert not one.has_edges and not one.edges.any() and one.edges.strides == (0, 0)
         assert one.edges.shape == one.mask.shape
+    # Other maps of one value, and of another type.
+    same = Observation.from_mask("cam01", 0, mask, np.broadcast_to(np.uint8(9), mask.shape))
+    assert same.has_edges and (same.cut((0, 5, 600, 400)).edges == 9).all()
+    floats = Observation.from_mask("cam01", 0, mask, np.broadcast_to(0.0, mask.shape))
+    assert floats.edges.dtype == np.uint8 and not floats.has_edges
     # The part of a map whose edges are all elsewhere.
     edges = np.zeros(mask.shape, np.uint8)
     edges[0] = 9

@@ -35,8 +35,8 @@ HELP = (
 EXAMPLE = "markerless_tracker view out/walk --film walk.webm --sheet walk.png"
 
 _FRAMES = 4
-_LEAST_WIDTH_PX = 64
 """Frames of a picture, if none are given."""
+_LEAST_WIDTH_PX = 64
 MOST_RRD_PICTURES = 300
 """Largest number of frames with pictures in the file for the Rerun viewer."""
 

@@ -160,7 +160,8 @@ class Recording(ABC):
     def move(self, T_new_old: FloatArray) -> None:
         """Place the cameras and the reference markers in another world."""
         self.rig = self.rig.moved(T_new_old)
-        self._T_new_old = T_new_old
+        before = self._T_new_old
+        self._T_new_old = T_new_old if before is None else T_new_old @ before
 
     @property
     def source(self) -> "Recording":

@@ -187,7 +187,7 @@ class ResultWriter:
             self._journal.add(self._summary())
             # From here on readers use the journal.
             self.json_path.unlink(missing_ok=True)
-            for _, path in segments(self._name) if self._earlier else ():
+            for path in segments(self._name) if self._earlier else ():
                 path.unlink()
         return self._journal, self._trc
 

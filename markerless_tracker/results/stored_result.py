@@ -261,4 +261,4 @@ def result_names(name: Path) -> list[Path]:
     """
     if not name.with_name(name.name + ".trc").exists():
         raise DatasetError(f"{name}.trc: no such file, expected the name of a result")
-    return [name, *(path.with_suffix("") for _, path in segments(name))]
+    return [name, *(path.with_suffix("") for path in segments(name))]

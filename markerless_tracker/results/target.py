@@ -51,15 +51,15 @@ def is_result(name: Path) -> bool:
     return path_of(name, ".json").exists() or path_of(name, ".jsonl").exists()
 
 
-def segments(name: Path) -> list[tuple[int, Path]]:
-    """Number and path of the further marker files NAME.2.trc, NAME.3.trc, ... of a result.
+def segments(name: Path) -> list[Path]:
+    """The further marker files NAME.2.trc, NAME.3.trc, ... of a result.
 
     Those of other results, which have a summary of their own, are left out.
     """
     found, number = [], 2
     while (path := path_of(name, f".{number}.trc")).exists():
         if not is_result(path.with_suffix("")):
-            found.append((number, path))
+            found.append(path)
         number += 1
     return found
 

@@ -7,9 +7,10 @@ import pytest
 
 from markerless_tracker.camera import read_calibration
 from markerless_tracker.datasets import open_recording
+from markerless_tracker.datasets.bag.recording import _namespaces
 from markerless_tracker.errors import DatasetError
 
-from .conftest import FRAME, STEP_NS, both, frames_message, info, save, static
+from .conftest import FRAME, IMAGE, STEP_NS, both, frames_message, info, save, static
 
 
 def test_cameras_of_one_name_are_told_apart_by_their_namespaces(
@@ -32,6 +33,13 @@ def test_cameras_of_one_name_are_told_apart_by_their_namespaces(
     np.testing.assert_array_equal(recording.rig["front_camera"].matrix, rig["cam01"].matrix)
     (first, _) = recording.frames()
     np.testing.assert_array_equal(first.images["back_camera"], FRAME)
+
+
+def test_names_that_are_joined_alike_stay_apart() -> None:
+    topics = {"/a_b/c/image_raw": IMAGE, "/a/b_c/image_raw": IMAGE, "/x/b_c/image_raw": IMAGE,
+              "/y/c/image_raw": IMAGE}  # fmt: skip
+    named = _namespaces(topics)
+    assert sorted(named.values()) == ["a/b_c", "a_b/c", "x/b_c", "y/c"]
 
 
 def test_two_topics_for_one_calibrated_camera_are_refused(bag) -> None:
