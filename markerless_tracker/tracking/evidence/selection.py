@@ -1,5 +1,6 @@
 """Selects the components of a silhouette that belong to the tracked body: those near it."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
@@ -9,6 +10,13 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.camera import CameraModel, project_camera
 from markerless_tracker.compiled import kernel
+from markerless_tracker.fitness.raster.bits import count_bits
+from markerless_tracker.fitness.raster.components import (
+    Components,
+    clear_components,
+    components,
+    touch_components,
+)
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Region
 from markerless_tracker.records import Observation
@@ -85,13 +93,13 @@ def explained_part(
     Returns:
         The observation, the same object if nothing was left out, and the number of pixels left out.
     """
-    count, labels = _components(observation)
-    if count <= 2:
+    parts = _components(observation)
+    if parts.total <= 1:
         return observation, 0
-    kept = _near(labels, count, observation, lines, margin_px)
+    kept = _near(parts, observation, lines, margin_px)
     if not kept.any():
         return observation, 0
-    return _only(observation, labels, kept)
+    return _only(observation, parts, kept)
 
 
 def explained_in_region(
@@ -106,27 +114,27 @@ def explained_in_region(
     that are smaller than a hand. Components are those of the region: a component that is connected
     to the body's only through undecided pixels outside of the region is left out.
     """
-    count, labels = _components(observation)
-    kept = _near(labels, count, observation, lines, margin_px)
+    parts = _components(observation)
+    kept = _near(parts, observation, lines, margin_px)
     if not kept.any():
         return None
-    part, left_out = _only(observation, labels, kept)
-    mask = part.mask.view(np.uint8)
-    if not mask.any():
+    part, left_out = _only(observation, parts, kept)
+    person = components(part.mask_words)
+    if person.total == 0:
         return None
-    if _leaves_region(mask, observation, clear_px):
+    if _leaves_region(person.box(), observation, clear_px):
         hand_px = lines.focal_px * HAND_M / float(np.median(lines.depths_m))
-        if _leaves_region(_larger(mask, hand_px**2), observation, clear_px):
+        larger = person.box(person.areas_px >= hand_px**2)
+        if _leaves_region(larger, observation, clear_px):
             return None
     return part, left_out
 
 
-def _leaves_region(mask: NDArray[np.uint8], observation: Observation, clear_px: int) -> bool:
-    """Whether a mask (h, w) comes near a side of the region that is no side of the frame."""
-    left, top, width, height = cv2.boundingRect(mask)
-    if width == 0:
+def _leaves_region(box: Region | None, observation: Observation, clear_px: int) -> bool:
+    """Whether a box in the region comes near a side of it that is no side of the frame."""
+    if box is None:
         return False
-    box = Region(left, top, left + width, top + height).moved(*observation.offset_px)
+    box = box.moved(*observation.offset_px)
     u, v = observation.offset_px
     region = Region(u, v, u + observation.width, v + observation.height)
     # Grown by `clear_px`, and clipped to the frame, the box must lie inside the region.
@@ -137,14 +145,6 @@ def _leaves_region(mask: NDArray[np.uint8], observation: Observation, clear_px: 
         or wide.right > region.right
         or wide.bottom > region.bottom
     )
-
-
-def _larger(mask: NDArray[np.uint8], least: float) -> NDArray[np.uint8]:
-    """The components of a mask (h, w) with at least `least` pixels, 0 or 1."""
-    _, labels, table, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    large = table[:, cv2.CC_STAT_AREA] >= least
-    large[0] = False
-    return np.asarray(large[labels], dtype=np.uint8)
 
 
 def body_region(lines: BodyLines, margin_m: float, least_px: int) -> Region | None:
@@ -172,38 +172,32 @@ def body_region(lines: BodyLines, margin_m: float, least_px: int) -> Region | No
     return Region(int(left), int(top), int(right), int(bottom))
 
 
-def _components(observation: Observation) -> tuple[int, NDArray[np.int32]]:
-    """Components of person and undecided pixels: their count, and labels (h, w) of the pixels."""
-    mask = observation.not_background.view(np.uint8)
-    count, labels = cv2.connectedComponents(mask, connectivity=8, ltype=cv2.CV_32S)
-    return count, np.asarray(labels)
+def _components(observation: Observation) -> Components:
+    """Components of person and undecided pixels."""
+    words, undecided = observation.mask_words, observation.undecided_words
+    return components(words if undecided is None else words | undecided)
 
 
 def _near(
-    labels: NDArray[np.int32],
-    count: int,
-    observation: Observation,
-    lines: BodyLines,
-    margin_px: int,
+    parts: Components, observation: Observation, lines: BodyLines, margin_px: int
 ) -> NDArray[np.bool_]:
-    """(count,) which components are near the body; the first is the background, always False."""
-    kept = np.zeros(count, dtype=np.bool_)
+    """(total,) which components are near the body."""
+    kept = np.zeros(parts.total, dtype=np.bool_)
     # Mostly the lines' points lie in all components, and nothing needs to be drawn.
-    _meet(lines.pixels, observation.offset_px, labels, kept)
-    if not kept[1:].all():
-        kept[np.unique(labels[_thick_body(observation, lines, margin_px)])] = True
-    kept[0] = False
+    _meet(lines.pixels, observation.offset_px, parts, kept)
+    if not kept.all():
+        touch_components(parts, _thick_body(observation, lines, margin_px), kept)
     return kept
 
 
 @kernel
-def _meet(pixels, offset, labels, kept):  # type: ignore[no-untyped-def]
-    """Mark the components (count,) that the points (c, n, 2) of lines lie in, px of the frame.
+def _meet(pixels, offset, parts, kept):  # type: ignore[no-untyped-def]
+    """Mark the components (total,) that the points (c, n, 2) of lines lie in, px of the frame.
 
-    labels (h, w) are those of a region at `offset`. Lines with a point that is farther than
+    `parts` are the `Components` of a region at `offset`. Lines with a point that is farther than
     `_FAR_PX`, or not finite, are left out.
     """
-    height, width = labels.shape
+    height = parts.first.size - 1
     for c in range(pixels.shape[0]):
         drawn = True
         for n in range(pixels.shape[1]):
@@ -215,30 +209,33 @@ def _meet(pixels, offset, labels, kept):  # type: ignore[no-untyped-def]
         for n in range(pixels.shape[1]):
             u = np.int64(np.rint(pixels[c, n, 0] - offset[0]))
             v = np.int64(np.rint(pixels[c, n, 1] - offset[1]))
-            if 0 <= u < width and 0 <= v < height:
-                kept[labels[v, u]] = True
+            if not 0 <= v < height:
+                continue
+            for r in range(parts.first[v], parts.first[v + 1]):
+                if parts.begin[r] <= u < parts.end[r]:
+                    kept[parts.number[r]] = True
 
 
 def _only(
-    observation: Observation, labels: NDArray[np.int32], kept: NDArray[np.bool_]
+    observation: Observation, parts: Components, kept: NDArray[np.bool_]
 ) -> tuple[Observation, int]:
-    if kept[1:].all():
+    if kept.all():
         return observation, 0
-    selected = kept[labels]
-    mask = observation.mask
+    words = observation.mask_words.copy()
+    clear_components(parts, kept, words)
+    left_out = int(count_bits(observation.mask_words)) - int(count_bits(words))
     # A shadow away from the body remains undecided: it is no lit floor.
-    part = observation.with_masks(mask & selected, observation.undecided)
-    return part, int((mask & ~selected).sum())
+    return replace(observation, mask_words=words), left_out
 
 
-def _thick_body(observation: Observation, lines: BodyLines, margin_px: int) -> NDArray[np.bool_]:
-    """Mask (h, w) of the region's pixels within a margin of the body."""
+def _thick_body(observation: Observation, lines: BodyLines, margin_px: int) -> NDArray[np.uint8]:
+    """(h, w) 1 at the region's pixels within a margin of the body, else 0."""
     out = np.zeros((observation.height, observation.width), dtype=np.uint8)
     which, points = _drawn(observation, lines)
     for line, radius_px in zip(points, lines.radii_px[which], strict=True):
         thickness = max(1, min(2 * (round(float(radius_px)) + margin_px), _THICKEST_PX))
         cv2.polylines(out, [line.reshape(-1, 1, 2)], False, 1, thickness)
-    return out.view(np.bool_)
+    return out
 
 
 def _drawn(

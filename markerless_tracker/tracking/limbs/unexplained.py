@@ -13,6 +13,7 @@ from markerless_tracker.body.parts import cones_of
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.raster.bits import count_bits
+from markerless_tracker.fitness.raster.components import components
 from markerless_tracker.fitness.raster.mask_words import cut_words, grow_rows, paste_words
 from markerless_tracker.fitness.raster.silhouette import body_words
 from markerless_tracker.geometry import FloatArray
@@ -113,17 +114,14 @@ def _left_over(
     )
     if count < least_px:
         return None, []
-    part = unpack_mask(rest, observation.width)
-    left, top, width, height = cv2.boundingRect(part.view(np.uint8))
-    box = np.ascontiguousarray(part[top : top + height, left : left + width])
-    regions, _, stats, centres = cv2.connectedComponentsWithStats(box.view(np.uint8))
-    corner = np.add(observation.offset_px, (left, top))
-    found = [
-        (float(stats[n, cv2.CC_STAT_AREA]), centres[n] + corner)
-        for n in range(1, regions)
-        if stats[n, cv2.CC_STAT_AREA] >= least_px
-    ]
-    return (part, found) if found else (None, [])
+    parts = components(rest)
+    areas_px = parts.areas_px
+    found = np.flatnonzero(areas_px >= least_px)
+    if not found.size:
+        return None, []
+    centres = parts.centres_px + observation.offset_px
+    regions = [(float(areas_px[n]), np.asarray(centres[n])) for n in found]
+    return unpack_mask(rest, observation.width), regions
 
 
 @cache
