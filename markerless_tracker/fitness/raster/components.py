@@ -13,7 +13,7 @@ from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.raster.bits import ALL, popcount
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Region
-from markerless_tracker.observation import MaskWords
+from markerless_tracker.observation import MaskWords, locked
 
 _ONE, _LAST = np.uint64(1), np.uint64(63)
 
@@ -69,6 +69,8 @@ class Components(NamedTuple):
 
 def components(words: MaskWords) -> Components:
     """The 8-connected components of a packed mask (h, k)."""
+    # Read-only words and others would be two signatures, each compiled.
+    words = locked(words, np.uint64)
     count = int(count_runs(words))
     first = np.empty(len(words) + 1, dtype=np.int64)
     begin, end, parent, number = np.empty((4, count), dtype=np.int64)
