@@ -24,6 +24,7 @@ from markerless_tracker.datasets import (
     existing_truth,
     open_recording,
 )
+from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.setup import first_row
@@ -96,13 +97,19 @@ def make_table(
         Rows as `summarise` makes them.
 
     Raises:
+        ConfigError: the store is a recording.
         TrackerError: a recording has no truth or cannot be read, or a run failed.
     """
     progress = progress or Progress()
     for config in plan.configs:
         # Unknown bodies fail before the first long computation.
         load_description(config.body)
-    pieces = [_Piece(source, plan) for source in sources]
+    for source in sources:
+        if store is not None and store.resolve() == source.resolve():
+            raise ConfigError(
+                f"{store}: the recording itself, expected another folder for the runs"
+            )
+    pieces = [_Piece(source, plan, store) for source in sources]
     total = sum(len(piece.runs) for piece in pieces)
     rows: list[dict[str, Any]] = []
     done = 0
@@ -133,7 +140,7 @@ def make_table(
 class _Piece:
     """A plan's runs on one recording."""
 
-    def __init__(self, source: Path, plan: Plan) -> None:
+    def __init__(self, source: Path, plan: Plan, store: Path | None) -> None:
         self.plan = plan
         self.source = source
         self.recording: Recording = open_recording(source, scale=plan.scale)
@@ -153,12 +160,12 @@ class _Piece:
             for rate in self.rates
             for seed in range(plan.seeds)
         ]
-        known = recording_key(source)
+        self.key = recording_key(source, without=store)
         self.keys = [
             run_key(
                 {
                     **describe(run),
-                    "recording": known,
+                    "recording": self.key,
                     "reference": file_key(self.reference),
                     "body": file_key(Path(run.config.body)),
                     "scale": plan.scale,
@@ -188,6 +195,7 @@ class _Piece:
             self.start,
             math.gcd(*(run.every for run in runs)),
             self.plan.frames,
+            self.key,
         )
         if self.plan.scheduler is not None:
             yield from run_all_on(self.plan.scheduler, runs, order)

@@ -8,6 +8,8 @@ import socket
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +19,20 @@ from markerless_tracker.benchmarks.tables.runs import Run, execute
 from markerless_tracker.errors import DatasetError
 
 _KEPT = 2
-"""Recordings whose evidence a worker keeps."""
+"""Recordings whose evidence a worker keeps; more while runs use them."""
+
+
+@dataclass(eq=False)
+class _Kept:
+    """Evidence on a worker, the folder of its files, and the number of runs that use it."""
+
+    evidence: Evidence
+    folder: "tempfile.TemporaryDirectory[str]"
+    users: int = 0
+
 
 _lock = threading.Lock()
-_made: dict[EvidenceOrder, tuple[Evidence, "tempfile.TemporaryDirectory[str]"]] = {}
+_made: dict[EvidenceOrder, _Kept] = {}
 
 
 def run_all_on(
@@ -58,20 +70,33 @@ def execute_there(run: Run, order: EvidenceOrder, same: Mapping[str, str]) -> di
         TrackerError: the run failed.
     """
     check_same(same)
-    try:
-        evidence = _evidence(order)
-    except DatasetError as error:
-        raise DatasetError(f"worker {socket.gethostname()}: {error}") from error
-    return execute(run, evidence)
+    with _evidence(order) as evidence:
+        return execute(run, evidence)
 
 
-def _evidence(order: EvidenceOrder) -> Evidence:
-    """The evidence of an order, made at its first use; the latest ones are kept."""
+@contextmanager
+def _evidence(order: EvidenceOrder) -> Iterator[Evidence]:
+    """The evidence of an order, made at its first use; those in use and the latest are kept."""
     with _lock:
         if order not in _made:
             folder = tempfile.TemporaryDirectory(prefix="markerless_tracker_")
-            _made[order] = (order.make(Path(folder.name)), folder)
-            while len(_made) > _KEPT:
-                # Runs that read its files hold them open.
-                _made.pop(next(iter(_made)))[1].cleanup()
-        return _made[order][0]
+            try:
+                _made[order] = _Kept(order.make(Path(folder.name)), folder)
+            except DatasetError as error:
+                raise DatasetError(f"worker {socket.gethostname()}: {error}") from error
+        kept = _made[order]
+        kept.users += 1
+        _remove_unused()
+    try:
+        yield kept.evidence
+    finally:
+        with _lock:
+            kept.users -= 1
+            _remove_unused()
+
+
+def _remove_unused() -> None:
+    """Remove the oldest evidence that no run uses, until `_KEPT` are left."""
+    unused = [order for order, kept in _made.items() if not kept.users]
+    for order in unused[: max(0, len(_made) - _KEPT)]:
+        _made.pop(order).folder.cleanup()

@@ -86,6 +86,7 @@ class EvidenceOrder:
         scale: factor for its images.
         settings: settings of the imaging.
         start, every, frames: as for `make_evidence`.
+        key: of the recording, which distinguishes its states.
     """
 
     source: Path
@@ -94,6 +95,7 @@ class EvidenceOrder:
     start: int
     every: int
     frames: int | None
+    key: str
 
     def make(
         self,

@@ -5,12 +5,15 @@ Stored runs with the same key are not repeated, so that an interrupted table can
 
 import hashlib
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import markerless_tracker
+from markerless_tracker.datasets.folder import CALIBRATION
+from markerless_tracker.datasets.recording import BACKGROUND
 from markerless_tracker.resources import config_dir
 from markerless_tracker.results.result import versions
 
@@ -23,9 +26,20 @@ def run_key(parts: Mapping[str, Any]) -> str:
     return _digest(json.dumps(whole, sort_keys=True).encode())
 
 
-def recording_key(path: Path) -> str:
-    """Key of a recording: names, sizes and modification times of its files."""
-    files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+def recording_key(path: Path, *, without: Path | None = None) -> str:
+    """Key of a recording: names, sizes and modification times of its files.
+
+    Args:
+        path: the folder, links in it included, or a file: the calibration and the background
+            beside it belong to it.
+        without: a folder in it that is left out, such as that of the results.
+    """
+    if path.is_dir():
+        files = list(_files(path, without))
+    else:
+        beside = path.parent / CALIBRATION
+        files = [path, *([beside] if beside.is_file() else [])]
+        files += _files(path.parent / BACKGROUND, without)
     stated = []
     for file in files:
         status = file.stat()
@@ -49,6 +63,18 @@ def code_key() -> str:
 def code_files() -> list[Path]:
     """Files on which `code_key` depends."""
     return sorted(_PACKAGE.rglob("*.py")) + sorted((config_dir() / "bodies").glob("*.yaml"))
+
+
+def _files(folder: Path, without: Path | None) -> Iterator[Path]:
+    """The files in a folder, in a fixed order; linked folders are entered, each folder once."""
+    entered = {None if without is None else os.path.realpath(without)}
+    for place, folders, names in os.walk(folder, followlinks=True):
+        folders.sort()
+        if os.path.realpath(place) in entered:
+            folders.clear()
+            continue
+        entered.add(os.path.realpath(place))
+        yield from (file for name in sorted(names) if (file := Path(place, name)).is_file())
 
 
 def _digest(data: bytes) -> str:

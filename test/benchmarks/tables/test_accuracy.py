@@ -1,6 +1,7 @@
 """Tables of accuracy: evidence, continued runs, rows computed from known runs."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -225,6 +226,19 @@ def test_a_recording_that_cannot_be_scored_is_an_error(walk, make_recording) -> 
     for jobs in (1, 2):
         with pytest.raises(TrackerError, match="evaluations is 7"):
             make_table([walk], replace(impossible, jobs=jobs))
+
+
+def test_runs_can_be_stored_in_a_folder_of_the_recording_but_not_in_itself(
+    walk, tmp_path, monkeypatch
+) -> None:
+    recording = tmp_path / "walk"
+    shutil.copytree(walk, recording)
+    plan = Plan(configs=(SWARM,), rates=(60.0,), seeds=1, frames=1)
+    first = make_table([recording], plan, store=recording / "out")
+    monkeypatch.setattr(accuracy, "run_all", None)
+    assert make_table([recording], plan, store=recording / "out") == first
+    with pytest.raises(ConfigError, match="walk: the recording itself, expected another folder"):
+        make_table([recording], plan, store=recording)
 
 
 def test_keys_depend_on_their_content(walk, tmp_path) -> None:

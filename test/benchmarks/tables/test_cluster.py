@@ -92,7 +92,7 @@ def test_without_dask_the_message_names_the_extra(walk, monkeypatch) -> None:
 class TestAWorker:
     @pytest.fixture
     def order(self, walk) -> EvidenceOrder:
-        return EvidenceOrder(walk, 1.0, SWARM, 0, 1, None)
+        return EvidenceOrder(walk, 1.0, SWARM, 0, 1, None, "key")
 
     @pytest.fixture
     def run(self, walk) -> Run:
@@ -108,8 +108,29 @@ class TestAWorker:
 
     def test_keeps_the_latest_evidence_only(self, order, monkeypatch) -> None:
         monkeypatch.setattr(cluster, "_made", {})
-        folders = [cluster._evidence(replace(order, frames=count)).folder for count in (1, 2, 3)]
+        folders = []
+        for count in (1, 2, 3):
+            with cluster._evidence(replace(order, frames=count)) as evidence:
+                folders.append(evidence.folder)
         assert [folder.exists() for folder in folders] == [False, True, True]
+
+    def test_keeps_the_evidence_of_a_run_that_has_not_opened_it_yet(
+        self, order, monkeypatch
+    ) -> None:
+        monkeypatch.setattr(cluster, "_made", {})
+        with cluster._evidence(order) as evidence:
+            for count in (1, 2, 3):
+                with cluster._evidence(replace(order, frames=count)):
+                    pass
+            assert len(list(evidence.frames(every=1))) == 3
+        assert len(cluster._made) == 2
+
+    def test_makes_evidence_again_for_a_recording_that_has_changed(
+        self, order, monkeypatch
+    ) -> None:
+        monkeypatch.setattr(cluster, "_made", {})
+        with cluster._evidence(order) as first, cluster._evidence(replace(order, key="b")) as other:
+            assert first.folder != other.folder
 
     @pytest.mark.parametrize("name", ["code", "numpy"])
     def test_of_another_version_is_refused(self, order, run, name) -> None:

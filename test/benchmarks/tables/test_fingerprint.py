@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+import pytest
+
 from markerless_tracker.benchmarks.tables.fingerprint import (
     code_files,
     file_key,
@@ -36,6 +38,44 @@ def test_a_recording_key_depends_on_sizes_and_times(tmp_path: Path) -> None:
     assert recording_key(tmp_path / "walk") == key
     os.utime(file, ns=(10**18, 10**18 + 1))
     assert recording_key(tmp_path / "walk") != key
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Path:
+    """A folder with a file and a link to a folder with another."""
+    (tmp_path / "walk").mkdir()
+    (tmp_path / "walk" / "bag.mcap").write_text("images")
+    (tmp_path / "shared").mkdir()
+    (tmp_path / "shared" / "cam01.png").write_text("empty")
+    (tmp_path / "walk" / "background").symlink_to(tmp_path / "shared")
+    return tmp_path / "walk"
+
+
+def test_a_recording_key_depends_on_files_in_linked_folders(walk: Path) -> None:
+    key = recording_key(walk)
+    (walk.parent / "shared" / "cam01.png").write_text("another one")
+    assert recording_key(walk) != key
+
+
+def test_a_link_to_the_folder_around_it_is_followed_once(walk: Path) -> None:
+    (walk / "again").symlink_to(walk)
+    assert recording_key(walk) == recording_key(walk)
+
+
+@pytest.mark.parametrize("name", ["calibration.toml", "background/cam01.png"])
+def test_the_key_of_a_bags_file_depends_on_what_is_read_beside_it(walk: Path, name) -> None:
+    key = recording_key(walk / "bag.mcap")
+    assert recording_key(walk / "bag.mcap") == key
+    (walk / name).write_text("another one")
+    assert recording_key(walk / "bag.mcap") != key
+
+
+def test_a_recording_key_leaves_out_a_folder(walk: Path) -> None:
+    out = walk / "out"
+    key = recording_key(walk, without=out)
+    out.mkdir()
+    (out / "table.csv").write_text("figures")
+    assert recording_key(walk, without=out) == key != recording_key(walk)
 
 
 def test_a_file_key_depends_on_the_content(tmp_path: Path) -> None:
