@@ -179,7 +179,9 @@ class _Piece:
         """Numbers of the runs that use the same evidence."""
         groups: dict[tuple[Any, ...], list[int]] = {}
         for number, run in enumerate(self.runs):
-            groups.setdefault(_imaging(run.config), []).append(number)
+            # A background that follows the light depends on the images that it has seen.
+            followed = run.every if run.config.background.follow_s > 0.0 else None
+            groups.setdefault((followed, *_imaging(run.config)), []).append(number)
         return groups.values()
 
     def run(
@@ -239,7 +241,8 @@ def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """One row from the runs of its seeds.
 
     Means over the seeds: `mean_mm`, `limbs_mm` (with the sd between seeds, None for one seed),
-    `evaluations`, `refinements`, `truth_difference`, `joints`. Maxima over the seeds: `max_mm`
+    `evaluations`, `refinements`, `truth_difference`, `joints`; None, and joints that a seed lacks,
+    are left out. Maxima over the seeds: `max_mm`
     (largest frame mean), `worst_joint_mm`, `last_joint_mm`, `lost_run`, `lost_frames`.
     `frames_per_s` is the median over the seeds; `ms_per_evaluation` follows from it for runs
     without refinement (None with refinement). `runs` holds each seed's `mean_mm`, `curve` the error
@@ -259,9 +262,9 @@ def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     row["ms_per_evaluation"] = 1e3 / (row["frames_per_s"] * row["evaluations"]) if alone else None
     row["frames"] = min(run["frames"] for run in runs)
     row["joints"] = {
-        name: fmean(run["joints"][name] for run in runs)
-        for name, value in runs[0]["joints"].items()
-        if value is not None
+        name: fmean(values)
+        for name in dict.fromkeys(name for run in runs for name in run["joints"])
+        if (values := [run["joints"][name] for run in runs if run["joints"].get(name) is not None])
     }
     row["runs"] = [run["mean_mm"] for run in runs]
     row["curve"] = _curve(runs)
@@ -292,8 +295,16 @@ def write_table(folder: Path, table: Mapping[str, Any]) -> None:
 def _rates(fps: float, wanted: tuple[float, ...]) -> tuple[float, ...]:
     if wanted:
         return wanted
-    whole = tuple(rate for rate in (60.0, 20.0) if abs(fps / rate - round(fps / rate)) < 0.01)
-    return tuple(rate for rate in whole if rate <= fps * 1.001) or (fps,)
+    return tuple(rate for rate in (60.0, 20.0) if _allows(fps, rate)) or (fps,)
+
+
+def _allows(fps: float, rate: float) -> bool:
+    """Whether every k-th frame of a recording gives a rate."""
+    try:
+        every_for_fps(fps, rate)
+    except ConfigError:
+        return False
+    return True
 
 
 def _imaging(config: TrackerConfig) -> tuple[Any, ...]:

@@ -2,6 +2,9 @@
 
 from markerless_tracker.errors import ConfigError
 
+TOLERANCE = 0.01
+"""Accepted difference from a rate, as a share of it."""
+
 
 def stamp_of(index: int, fps: float) -> int:
     """Stamp (ns) of frame `index` of a video at `fps` (1/s): round(index * 1e9 / fps)."""
@@ -22,19 +25,19 @@ def tidy_fps(fps: float) -> float:
 
 
 def every_for_fps(source_fps: float, fps: float | None) -> int:
-    """k such that every k-th frame of a source gives `fps`; 1 for None.
+    """k such that every k-th frame of a source gives `fps` within `TOLERANCE`; 1 for None.
 
     Raises:
         ConfigError: no k gives it; names the nearest rates that one gives.
     """
     if fps is None:
         return 1
-    if not 0.0 < fps <= source_fps * 1.001:
+    if not 0.0 < fps * (1.0 - TOLERANCE) <= source_fps:
         raise ConfigError(
             f"fps {fps:g}: expected a rate above 0 and at most the source's {source_fps:g}"
         )
     every = max(1, round(source_fps / fps))
-    if abs(source_fps / every - fps) > 0.01 * fps:
+    if abs(source_fps / every - fps) > TOLERANCE * fps:
         below, above = int(source_fps // fps) + 1, max(1, int(source_fps // fps))
         raise ConfigError(
             f"fps {fps:g}: the source has {source_fps:g}, keeping every k-th frame gives "

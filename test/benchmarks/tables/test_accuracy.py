@@ -161,6 +161,21 @@ def test_a_row_of_known_runs() -> None:
     assert summarise([figures()])["sd_mm"] is None
 
 
+def test_joints_are_means_over_the_seeds_that_have_them() -> None:
+    joints = ({"Head": 5.0}, {"Head": None, "Nose": 3.0}, {"Head": 8.0, "Nose": 4.0, "Neck": None})
+    row = summarise([figures(joints=one) for one in joints])
+    assert row["joints"] == {"Head": 6.5, "Nose": 3.5}
+
+
+def test_a_background_that_follows_the_light_is_made_for_each_rate(walk) -> None:
+    rates = (60.0, 20.0)
+    groups = accuracy._Piece(walk, Plan(configs=(SWARM,), rates=rates, seeds=2), None).groups()
+    assert [*groups] == [[0, 1, 2, 3]]
+    following = TrackerConfig.from_mapping({"background.follow_s": 1.0})
+    groups = accuracy._Piece(walk, Plan(configs=(following,), rates=rates, seeds=2), None).groups()
+    assert [*groups] == [[0, 1], [2, 3]]
+
+
 def test_time_per_evaluation_is_stated_without_refinement_only() -> None:
     assert summarise([figures(refinements=0.0)])["ms_per_evaluation"] == pytest.approx(1 / 6)
     assert summarise([figures()])["ms_per_evaluation"] is None
@@ -209,6 +224,8 @@ def test_processes_do_not_change_the_figures(walk) -> None:
 def test_rates_a_recording_has(walk) -> None:
     assert accuracy._rates(60.0, ()) == (60.0, 20.0)
     assert accuracy._rates(120.0, ()) == (60.0, 20.0)
+    assert accuracy._rates(60000 / 1001, ()) == (60.0, 20.0)
+    assert accuracy._rates(240000 / 1001, ()) == (60.0, 20.0)
     assert accuracy._rates(25.0, ()) == (25.0,)
     assert accuracy._rates(20.0, ()) == (20.0,)
     with pytest.raises(ConfigError, match="keeping every k-th"):

@@ -42,9 +42,16 @@ def test_every_kth_frame(wanted: float | None, every: int) -> None:
     assert every_for_fps(60.0, wanted) == every
 
 
+@pytest.mark.parametrize(("wanted", "every"), [(60.0, 1), (30.0, 2), (20.0, 3)])
+def test_the_rates_of_television_give_the_whole_ones(wanted: float, every: int) -> None:
+    assert every_for_fps(60000 / 1001, wanted) == every
+    with pytest.raises(ConfigError, match="at most the source's 59"):
+        every_for_fps(59.0, 60.0)
+
+
 def test_impossible_rates_name_the_nearest_possible() -> None:
     with pytest.raises(ConfigError, match="20 or 30|30 or 20"):
         every_for_fps(60.0, 25.0)
-    for impossible in (0.0, -1.0, 120.0, float("nan")):
+    for impossible in (0.0, -1.0, 120.0, float("nan"), float("inf")):
         with pytest.raises(ConfigError, match="expected"):
             every_for_fps(60.0, impossible)
