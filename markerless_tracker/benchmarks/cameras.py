@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.benchmarks.tables.runs import LOST_LIMB_MM, longest_run
+from markerless_tracker.benchmarks.tables.runs import lost_run
 from markerless_tracker.benchmarks.with_truth import (
     Report,
     RunStart,
@@ -16,7 +16,7 @@ from markerless_tracker.benchmarks.with_truth import (
     open_with_truth,
     tracked_markers,
 )
-from markerless_tracker.errors import ConfigError
+from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.results.score import MM_PER_M
 from markerless_tracker.tracking import TrackerConfig
 
@@ -48,7 +48,8 @@ def measure_cameras(
         (names), the figures of `score_run`, and `ratio`: its mean error over that of all cameras.
 
     Raises:
-        TrackerError: the recording cannot be read, has no truth or too few cameras.
+        TrackerError: the recording cannot be read, has no truth, too few cameras, or no
+            frame that is scored after an automatic start.
     """
     runs: list[dict[str, Any]] = []
     with open_with_truth(source, config, scale=scale, report=report) as recording:
@@ -57,6 +58,12 @@ def measure_cameras(
             raise ConfigError(
                 f"{source}: {', '.join(map(str, counts))} of {len(names)} cameras, expected "
                 f"fewer than {len(names)}"
+            )
+        scored = np.isfinite(recording.truth_m[SETTLED_FRAMES:]).any()
+        if not scored and not all(start.measured for start in starts):
+            raise DatasetError(
+                f"{source}: {len(recording.truth_m)} frames, expected some with a truth after the "
+                f"first {SETTLED_FRAMES}, which are not scored after an automatic start"
             )
         subsets = [names, *(c for count in counts for c in combinations(names, count))]
         for start in starts:
@@ -79,20 +86,21 @@ def score_run(points_m: NDArray[np.float64], truth_m: NDArray[np.float64]) -> di
     """Errors of tracked markers (n, 15, 3) against reference markers, m; NaN where there is none.
 
     `mean_mm`, `max_mm`: mean and maximum of the frames' mean errors, None without any pose;
-    `worst_joint_mm`; `lost_run`: longest run of frames in which a joint is more than
-    `LOST_LIMB_MM` off; `found`: fraction of the frames with a reference that have a pose.
+    `worst_joint_mm`; `lost_run` (see `runs.lost_run`) of the frames with a reference; `found`:
+    fraction of them that have a pose.
     """
     apart_mm: NDArray[np.float64] = np.linalg.norm(points_m - truth_m, axis=2) * MM_PER_M
     known = np.asarray(np.isfinite(truth_m).all(axis=2)).any(axis=1)
     seen = np.asarray(np.isfinite(apart_mm).any(axis=1))
+    lost = lost_run(apart_mm[known])
     if not seen.any():
-        return {"mean_mm": None, "max_mm": None, "worst_joint_mm": None, "lost_run": 0,
+        return {"mean_mm": None, "max_mm": None, "worst_joint_mm": None, "lost_run": lost,
                 "found": 0.0}  # fmt: skip
     frame_mm = np.nanmean(apart_mm[seen], axis=1)
     return {
         "mean_mm": float(frame_mm.mean()),
         "max_mm": float(frame_mm.max()),
         "worst_joint_mm": float(np.nanmax(apart_mm)),
-        "lost_run": longest_run(np.asarray((apart_mm > LOST_LIMB_MM).any(axis=1))),
+        "lost_run": lost,
         "found": float(seen.sum() / known.sum()),
     }

@@ -42,7 +42,7 @@ def measure_jitter(
 ) -> dict[str, Any]:
     """Track a recording with a `ground_truth.trc` without and with the filter.
 
-    Only the longest run of consecutive frames with a pose is evaluated.
+    Only the longest run of consecutive frames with a pose and reference markers is evaluated.
 
     Returns:
         `recording`, `start`, `scale`, `fps`, `frames`, `speed_m_s` (mean of the reference markers)
@@ -51,8 +51,7 @@ def measure_jitter(
         (see `lag_frames`), `worst_lag_frames` (largest lag of a single joint).
 
     Raises:
-        TrackerError: the recording cannot be read, has no truth, or too few frames in a row were
-            tracked.
+        TrackerError: the recording cannot be read, has no truth, or `compared` finds nothing.
     """
     found: dict[str, Points] = {}
     with open_with_truth(source, config, scale=scale, report=report) as recording:
@@ -60,13 +59,7 @@ def measure_jitter(
             results, truth = recording.run(replace(config, smoothing=name), start)
             found[name] = tracked_markers(results)
             report(f"runs on {recording.name}", number + 1, len(FILTERS))
-    kept = longest_true_run(np.asarray(np.isfinite(found["none"]).all(axis=(1, 2))))
-    names = np.flatnonzero(np.isfinite(truth[kept]).all(axis=(0, 2)))
-    if kept.stop - kept.start < 4.0 * MAX_LAG_FRAMES or names.size == 0:
-        raise DatasetError(
-            f"{source}: tracked for {kept.stop - kept.start} frames in a row with "
-            f"{names.size} markers of the truth, expected {4.0 * MAX_LAG_FRAMES:g} frames or more"
-        )
+    kept, names = compared(found["none"], truth, source)
     true = truth[kept][:, names]
     tracks = {name: points[kept][:, names] for name, points in found.items()}
     window = max(3, round(SLOW_S * recording.fps))
@@ -83,6 +76,41 @@ def measure_jitter(
             for name, points in tracks.items()
         },
     }
+
+
+def compared(points: Points, truth: Points, source: Path) -> tuple[slice, NDArray[np.int64]]:
+    """The longest run of frames with a pose and a truth, and the markers known in all of them.
+
+    Args:
+        points: (n, 15, 3) tracked markers; NaN in frames without a pose.
+        truth: (n, 15, 3) reference markers; NaN where there are none.
+        source: the recording, for messages.
+
+    Raises:
+        DatasetError: the truth has no marker in these frames, the run is shorter than four times
+            `MAX_LAG_FRAMES`, or every marker is missing in a part of it.
+    """
+    known = np.asarray(np.isfinite(truth).all(axis=2))
+    if not known.any():
+        raise DatasetError(
+            f"{source}: the truth of {len(truth)} frames has none of the markers, expected some of "
+            f"{', '.join(MARKER_NAMES)}"
+        )
+    tracked = np.asarray(np.isfinite(points).all(axis=(1, 2)))
+    kept = longest_true_run(np.asarray(tracked & known.any(axis=1)))
+    count = kept.stop - kept.start
+    if count < 4.0 * MAX_LAG_FRAMES:
+        raise DatasetError(
+            f"{source}: tracked for {count} frames in a row with a truth, expected "
+            f"{4.0 * MAX_LAG_FRAMES:g} frames or more"
+        )
+    names = np.flatnonzero(known[kept].all(axis=0))
+    if names.size == 0:
+        raise DatasetError(
+            f"{source}: no marker has a truth in all of the {count} frames compared, expected one "
+            "or more"
+        )
+    return kept, names
 
 
 def _figures(

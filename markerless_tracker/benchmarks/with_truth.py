@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from markerless_tracker.benchmarks.tables.evidence import Evidence, make_evidence
 from markerless_tracker.body import MARKER_NAMES
-from markerless_tracker.datasets import MarkerTrack, existing_truth, open_recording, read_trc
+from markerless_tracker.datasets import (
+    MarkerTrack,
+    Recording,
+    existing_truth,
+    open_recording,
+    read_trc,
+)
 from markerless_tracker.records import TrackResult
 from markerless_tracker.results.score import MM_PER_M, match_rows
 from markerless_tracker.tracking import TrackerConfig, build_tracker
@@ -50,18 +56,26 @@ class RecordingWithTruth:
     """A recording's evidence and reference markers.
 
     Attributes:
-        name: name of the recording.
-        fps: frame rate, 1/s.
+        recording: the recording.
         evidence: observations of all cameras and frames.
         truth_m: (n, 15, 3) reference markers per frame, m, world frame; NaN where there are none.
         reference: the file that the markers were read from.
     """
 
-    name: str
-    fps: float
+    recording: Recording
     evidence: Evidence
     truth_m: NDArray[np.float64]
     reference: Path
+
+    @property
+    def name(self) -> str:
+        """Name of the recording."""
+        return self.recording.name
+
+    @property
+    def fps(self) -> float:
+        """Frame rate, 1/s."""
+        return self.recording.fps
 
     def run(
         self, config: TrackerConfig, start: RunStart, *, cameras: Sequence[str] | None = None
@@ -77,6 +91,7 @@ class RecordingWithTruth:
             The results, and the reference markers (n, 15, 3) of the same frames, m.
 
         Raises:
+            DatasetError: the recording has no frame within half a frame of the start.
             TrackerError: the start does not fit the body, or a camera is unknown.
         """
         rig = self.evidence.rig if cameras is None else self.evidence.rig.selected(cameras)
@@ -85,10 +100,12 @@ class RecordingWithTruth:
             if start.measured
             else build_tracker(rig, config, stature=start.stature_m)
         )
-        setup.tracker.warm_up()
         least_ns = None
         if setup.start_stamp_ns is not None:
+            # Raises where there is no such frame.
+            self.recording.start_index(setup.start_stamp_ns)
             least_ns = setup.start_stamp_ns - 0.5e9 / self.fps
+        setup.tracker.warm_up()
         results, rows = [], []
         for row, (stamp_ns, views) in enumerate(self.evidence.frames(every=1)):
             if least_ns is not None and stamp_ns < least_ns:
@@ -127,7 +144,7 @@ def open_with_truth(
             progress=lambda n: report(f"evidence of {recording.name}", n, recording.frame_count),
         )
         truth = true_markers(evidence, reference)
-        yield RecordingWithTruth(recording.name, recording.fps, evidence, truth, path)
+        yield RecordingWithTruth(recording, evidence, truth, path)
 
 
 def true_markers(evidence: Evidence, reference: MarkerTrack) -> NDArray[np.float64]:
@@ -146,7 +163,8 @@ def true_markers(evidence: Evidence, reference: MarkerTrack) -> NDArray[np.float
 def tracked_markers(results: Sequence[TrackResult]) -> NDArray[np.float64]:
     """Markers (n, 15, 3) of results, m; NaN in frames without a pose."""
     nothing = np.full((len(MARKER_NAMES), 3), np.nan)
-    return np.array([nothing if r.markers_m is None else r.markers_m for r in results])
+    found = [nothing if r.markers_m is None else r.markers_m for r in results]
+    return np.array(found).reshape(-1, len(MARKER_NAMES), 3)
 
 
 def error_mm(result: TrackResult, true: NDArray[np.float64]) -> float | None:

@@ -8,7 +8,7 @@ import pytest
 from markerless_tracker.benchmarks.cameras import measure_cameras, score_run
 from markerless_tracker.benchmarks.with_truth import RunStart
 from markerless_tracker.cli.synthesize import synthesize
-from markerless_tracker.errors import ConfigError
+from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 
@@ -55,10 +55,26 @@ def test_score_of_known_offsets() -> None:
     assert figures["max_mm"] == pytest.approx(40.0)
     assert figures["mean_mm"] == pytest.approx(25.0)
     assert figures["worst_joint_mm"] == pytest.approx(180.0)
-    assert figures["lost_run"] == 1 and figures["found"] == pytest.approx(2.0 / 3.0)
+    assert figures["lost_run"] == 2 and figures["found"] == pytest.approx(2.0 / 3.0)
+
+
+def test_frames_without_a_pose_are_lost_and_do_not_divide_a_run() -> None:
+    truth = np.zeros((10, 15, 3))
+    points = truth + 0.2
+    points[0] = 0.0
+    points[3] = np.nan
+    truth[6] = np.nan
+    assert score_run(points, truth)["lost_run"] == 8
+
+
+def test_an_automatic_start_of_too_few_frames_is_refused(walk) -> None:
+    with pytest.raises(DatasetError, match="4 frames, expected some with a truth after the first"):
+        measure_cameras(walk, CONFIG, starts=[RunStart(), RunStart(False)], counts=(2,))
 
 
 def test_score_without_any_pose() -> None:
     truth = np.zeros((4, 15, 3))
     figures = score_run(np.full_like(truth, np.nan), truth)
-    assert figures["mean_mm"] is None and figures["found"] == 0.0
+    assert figures["mean_mm"] is None and figures["found"] == 0.0 and figures["lost_run"] == 4
+    nothing = np.zeros((0, 15, 3))
+    assert score_run(nothing, nothing)["lost_run"] == 0

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.benchmarks.jitter import (
+    compared,
     jitter_mm,
     lag_frames,
     longest_true_run,
@@ -68,6 +69,38 @@ def test_the_longest_run() -> None:
     assert longest_true_run(flags) == slice(3, 6)
     assert longest_true_run(np.zeros(4, bool)) == slice(0, 0)
     assert longest_true_run(np.ones(4, bool)) == slice(0, 4)
+
+
+class TestTheFramesCompared:
+    points = np.zeros((60, 15, 3))
+
+    def test_are_those_with_a_pose_and_a_truth(self) -> None:
+        points, truth = self.points.copy(), self.points.copy()
+        points[:3] = np.nan
+        truth[10] = np.nan
+        truth[50:] = np.nan
+        truth[:, 4] = np.nan
+        kept, names = compared(points, truth, Path("walk"))
+        assert kept == slice(11, 50) and names.tolist() == [0, 1, 2, 3, *range(5, 15)]
+
+    def test_are_too_few(self) -> None:
+        truth = self.points.copy()
+        truth[30] = np.nan
+        with pytest.raises(DatasetError, match="walk: tracked for 30 frames in a row with a truth"):
+            compared(self.points, truth, Path("walk"))
+
+    def test_have_no_marker(self) -> None:
+        nothing = np.full_like(self.points, np.nan)
+        with pytest.raises(
+            DatasetError, match="60 frames has none of the markers, expected .*Neck"
+        ):
+            compared(self.points, nothing, Path("walk"))
+
+    def test_have_no_marker_in_common(self) -> None:
+        truth = self.points.copy()
+        truth[:30, :8] = truth[30:, 8:] = np.nan
+        with pytest.raises(DatasetError, match="no marker has a truth in all of the 60 frames"):
+            compared(self.points, truth, Path("walk"))
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from markerless_tracker.datasets import MarkerTrack, read_trc, write_trc
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import TrackResult, TrackState
-from markerless_tracker.results.score import MM_PER_M, Score, score
+from markerless_tracker.results.score import MM_PER_M, score
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 
 LOST_LIMB_MM = 150.0
@@ -48,8 +48,8 @@ def execute(run: Run, evidence: Evidence) -> dict[str, Any]:
     """Track and score; returns plain values for JSON.
 
     Keys: those of `Score.as_dict`, and `stamps_s` (of `frame_mm`), `last_joint_mm` (largest joint
-    error in the last frame), `lost_run` (longest run of frames with any joint more than
-    `LOST_LIMB_MM` off), `lost_frames` (frames in the state LOST), `evaluations` and `refinements`
+    error in the last frame), `lost_run` (of the frames compared, which have a pose),
+    `lost_frames` (frames in the state LOST), `evaluations` and `refinements`
     (means per frame), `frames_per_s` (of `Tracker.step` on given evidence, without the first frame,
     which fits the shape), `truth_difference` (None without `truth_score`).
 
@@ -82,7 +82,7 @@ def execute(run: Run, evidence: Evidence) -> dict[str, Any]:
         **figures.as_dict(),
         "stamps_s": (figures.stamps_ns * 1e-9).round(6).tolist(),
         "last_joint_mm": float(np.nanmax(figures.joint_mm[-1])),
-        "lost_run": lost_run(figures),
+        "lost_run": lost_run(figures.joint_mm),
         "lost_frames": sum(result.state is TrackState.LOST for result in results),
         "evaluations": float(np.mean([result.evaluations for result in results])),
         "refinements": float(np.mean([result.refinements for result in results])),
@@ -106,9 +106,15 @@ def disturbed_start(reference: MarkerTrack, noise_mm: float, seed: int) -> Marke
     return MarkerTrack(first.names, first.stamps_ns, first.positions_m + noise_m)
 
 
-def lost_run(figures: Score) -> int:
-    """Longest run of compared frames in which any joint is more than `LOST_LIMB_MM` off."""
-    return longest_run(np.nanmax(figures.joint_mm, axis=1) > LOST_LIMB_MM)
+def lost_run(joint_mm: NDArray[np.float64]) -> int:
+    """Longest run of frames without a pose, or with any joint more than `LOST_LIMB_MM` off.
+
+    Args:
+        joint_mm: (n, m) errors of the frames with a reference; NaN where a joint has no reference,
+            in all joints of a frame without a pose.
+    """
+    tracked = np.isfinite(joint_mm).any(axis=1)
+    return longest_run(np.asarray(~tracked | (joint_mm > LOST_LIMB_MM).any(axis=1)))
 
 
 def longest_run(flags: NDArray[np.bool_]) -> int:
