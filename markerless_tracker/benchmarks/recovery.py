@@ -15,6 +15,7 @@ from markerless_tracker.benchmarks.with_truth import (
     open_with_truth,
 )
 from markerless_tracker.errors import DatasetError
+from markerless_tracker.observation import no_edges
 from markerless_tracker.records import Observation, pack_mask
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 from markerless_tracker.tracking.tracker import Tracker
@@ -26,7 +27,7 @@ TOLERANCE_MM = 20.0
 SETTLED_S = 0.5
 """Time at the beginning of the undisturbed run that its mean error leaves out."""
 _STABLE_FRAMES = 5
-"""The error must stay low for this many frames."""
+"""The error must stay low for this many frames with a reference."""
 _FIRST_S, _LATER_S = 0.6, 0.15
 """Start of the disturbance with the first seed, and the delay from one seed to the next."""
 
@@ -74,7 +75,7 @@ def measure_recovery(
     """Track a recording with a `ground_truth.trc` from an automatic start, with disturbances.
 
     Each seed disturbs at another time, beginning with another camera. Disturbances for which the
-    recording is too short are left out.
+    recording is too short, and lower rates that it does not exceed, are left out.
 
     Args:
         source: the recording.
@@ -93,6 +94,7 @@ def measure_recovery(
         error afterwards).
 
     Raises:
+        DatasetError: the recording is too short for every disturbance.
         TrackerError: the recording cannot be read, has no truth, or the person was not found.
     """
     runs: list[dict[str, Any]] = []
@@ -101,29 +103,37 @@ def measure_recovery(
         truth, fps = recording.truth_m, recording.fps
         frames = list(recording.evidence.frames(every=1))
         part = f"runs on {recording.name}"
-        per_seed = 1 + len(DISTURBANCES)
+        known = np.asarray(np.isfinite(truth).any(axis=(1, 2)))
+        chosen = [d for d in DISTURBANCES if d.keep_hz is None or d.keep_hz < fps]
+        if all(_last(known, _times(one, fps, 0)[1]) is None for one in chosen):
+            needed = min(_times(one, fps, 0)[1] for one in chosen) + WITHIN_FRAMES
+            raise DatasetError(
+                f"{source}: {len(frames)} frames, expected {_STABLE_FRAMES} or more with a truth "
+                f"after the first {needed}, for the shortest disturbance"
+            )
+        per_seed = 1 + len(chosen)
         for seed in range(seeds):
             seeded = replace(config, seed=seed)
             tracker = build_tracker(recording.evidence.rig, seeded, stature=stature_m).tracker
             tracker.warm_up()
-            begins = round((_FIRST_S + _LATER_S * seed) * fps)
             errors = _errors(tracker, frames, truth)
             settled = min(round(SETTLED_S * fps), len(errors) // 2)
-            if not np.isfinite(errors[settled:]).any():
+            mean_mm = _mean(errors[settled:])
+            if mean_mm is None:
                 raise DatasetError(
                     f"{source}: the person was not found with seed {seed}, expected a track that "
                     "can be disturbed"
                 )
-            undisturbed.append(float(np.nanmean(errors[settled:])))
+            undisturbed.append(mean_mm)
             report(part, seed * per_seed + 1, seeds * per_seed)
-            for number, disturbance in enumerate(DISTURBANCES):
-                ends = begins + round(disturbance.seconds * fps)
-                last = ends + WITHIN_FRAMES + _STABLE_FRAMES
-                if last > len(frames):
+            for number, disturbance in enumerate(chosen):
+                begins, ends = _times(disturbance, fps, seed)
+                last = _last(known, ends)
+                if last is None:
                     continue
                 seen = disturbed(frames[:last], begins, ends, disturbance, fps, first=seed)
                 errors = _errors(tracker, seen, truth)
-                until = frames_until(errors[ends:], undisturbed[-1] + TOLERANCE_MM)
+                until = frames_until(errors[ends:], mean_mm + TOLERANCE_MM)
                 runs.append(
                     {
                         "disturbance": disturbance.name,
@@ -144,6 +154,26 @@ def measure_recovery(
     }
 
 
+def _times(disturbance: Disturbance, fps: float, seed: int) -> tuple[int, int]:
+    """Index of the first frame that a disturbance affects, and of the first one after it."""
+    begins = round((_FIRST_S + _LATER_S * seed) * fps)
+    return begins, begins + round(disturbance.seconds * fps)
+
+
+def _last(known: NDArray[np.bool_], ends: int) -> int | None:
+    """Number of frames to track to see whether the person is tracked again.
+
+    Args:
+        known: (n,) whether a frame has a reference.
+        ends: index of the first frame after the disturbance.
+
+    Returns:
+        The number; None if too few frames with a reference follow.
+    """
+    after = ends + WITHIN_FRAMES + np.flatnonzero(known[ends + WITHIN_FRAMES :])
+    return int(after[_STABLE_FRAMES - 1]) + 1 if len(after) >= _STABLE_FRAMES else None
+
+
 def disturbed(
     frames: Frames, begins: int, ends: int, disturbance: Disturbance, fps: float, *, first: int = 0
 ) -> list[tuple[int, Views] | None]:
@@ -151,12 +181,12 @@ def disturbed(
 
     The disturbed cameras are counted cyclically from camera number `first` on.
     """
-    every = 1 if disturbance.keep_hz is None else max(1, round(fps / disturbance.keep_hz))
+    share = 1.0 if disturbance.keep_hz is None else min(1.0, disturbance.keep_hz / fps)
     out: list[tuple[int, Views] | None] = []
     for index, (stamp_ns, views) in enumerate(frames):
         if not begins <= index < ends:
             out.append((stamp_ns, views))
-        elif (index - begins + 1) % every:
+        elif _arrived(index - begins + 1, share) == _arrived(index - begins, share):
             out.append(None)
         else:
             names = [*views][first % len(views) :] + [*views][: first % len(views)]
@@ -170,12 +200,22 @@ def disturbed(
     return out
 
 
+def _arrived(count: int, share: float) -> int:
+    """Number of frames that arrive, of the first `count`, if a share of them does."""
+    # Whole numbers are not missed by rounding.
+    return int(count * share + 1e-6)
+
+
 def frames_until(errors_mm: NDArray[np.float64], limit_mm: float) -> int | None:
-    """Number (from 1) of the frame from which the errors (n,) stay within a limit, or None."""
-    good = errors_mm <= limit_mm
+    """Number (from 1) of the frame from which the errors (n,) stay within a limit, or None.
+
+    Frames without a reference (NaN) are skipped; those without a pose (inf) exceed every limit.
+    """
+    rows = np.flatnonzero(~np.isnan(errors_mm))
+    good = errors_mm[rows] <= limit_mm
     for first in range(len(good) - _STABLE_FRAMES + 1):
         if good[first : first + _STABLE_FRAMES].all():
-            return first + 1
+            return int(rows[first]) + 1
     return None
 
 
@@ -192,7 +232,8 @@ def _worst(errors_mm: NDArray[np.float64]) -> float | None:
 def _black(view: Observation) -> Observation:
     """The observation of a black image: every pixel differs from the background."""
     everywhere = pack_mask(np.ones((view.height, view.width), dtype=np.uint8))
-    return replace(view, mask_words=everywhere, undecided_words=None)
+    edges = no_edges((view.height, view.width))
+    return replace(view, mask_words=everywhere, undecided_words=None, edges=edges)
 
 
 def _errors(
@@ -200,11 +241,13 @@ def _errors(
     frames: Sequence[tuple[int, Views] | None],
     truth: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Mean error (n,) of each frame, mm; NaN without a frame, pose or reference."""
+    """Mean error (n,) of each frame, mm; inf without a pose, NaN without a frame or reference."""
     tracker.reset()
     errors = np.full(len(frames), np.nan)
     for index, frame in enumerate(frames):
         if frame is not None:
-            value = error_mm(tracker.step(frame[1], frame[0]), truth[index])
-            errors[index] = np.nan if value is None else value
+            result = tracker.step(frame[1], frame[0])
+            value = error_mm(result, truth[index])
+            without = np.inf if result.markers_m is None else np.nan
+            errors[index] = without if value is None else value
     return errors

@@ -1,12 +1,27 @@
 """Disturbed frames, and the frame from which a track has recovered."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
-from markerless_tracker.benchmarks.recovery import Disturbance, disturbed, frames_until
+from markerless_tracker.benchmarks.recovery import (
+    Disturbance,
+    disturbed,
+    frames_until,
+    measure_recovery,
+)
+from markerless_tracker.cli.benchmark.recovery import _show
+from markerless_tracker.cli.main import main
+from markerless_tracker.cli.synthesize import synthesize
+from markerless_tracker.datasets import read_trc, write_trc
+from markerless_tracker.errors import DatasetError
 from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
 
 
 def frames(count: int):
@@ -30,6 +45,7 @@ def test_black_views_have_a_silhouette_of_all_pixels(blind, names) -> None:
         for name, view in frame[1].items():
             black = 3 <= index < 6 and name in names
             assert view.mask.sum() == (8 * 70 if black else 1)
+            assert view.has_edges == (not black)
 
 
 @pytest.mark.parametrize(("first", "left"), [(0, "bc"), (2, "ab"), (4, "ac")])
@@ -54,16 +70,64 @@ def test_a_lower_rate_leaves_out_frames() -> None:
     ]
 
 
+@pytest.mark.parametrize(("fps", "kept"), [(60.0, 10), (25.0, 10), (30000 / 1001, 10), (12.5, 10)])
+def test_a_lower_rate_is_kept_on_average(fps: float, kept: int) -> None:
+    count = round(fps)
+    out = disturbed(frames(2 * count), 0, 2 * count, Disturbance("x", 2.0, 0, 10.0), fps)
+    assert sum(frame is not None for frame in out[:count]) in (kept - 1, kept)
+    assert sum(frame is not None for frame in out) in (2 * kept - 1, 2 * kept)
+
+
 @pytest.mark.parametrize(
     ("errors", "expected"),
     [
         ([10.0] * 6, 1),
         ([90.0, 10.0, 10.0, 10.0, 10.0, 10.0], 2),
         ([10.0, 10.0, 90.0, 10.0, 10.0, 10.0, 10.0, 10.0], 4),
+        ([np.inf, 10.0, 10.0, 10.0, 10.0, 10.0], 2),
         ([np.nan, 10.0, 10.0, 10.0, 10.0, 10.0], 2),
+        ([10.0, np.nan] * 4 + [10.0], 1),
+        ([90.0, np.nan, 10.0, np.nan, 10.0, 10.0, np.nan, 10.0, 10.0], 3),
+        ([10.0, np.nan, 10.0, np.inf, 10.0, 10.0, 10.0], None),
         ([90.0] * 10, None),
         ([10.0] * 4, None),
     ],
 )
 def test_recovered_means_that_the_error_stays_low(errors, expected) -> None:
     assert frames_until(np.array(errors), 50.0) == expected
+
+
+@pytest.fixture(scope="module")
+def stand(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A made-up standing person at 10 frames/s, long enough for the shortest disturbance only."""
+    scene = SyntheticScene(
+        body="person31", motion="stand", cameras=3, size_px=(200, 152), fps=10.0, samples=1
+    )
+    folder = tmp_path_factory.mktemp("made") / "stand"
+    synthesize(folder, scene, frames=33, lossless=True)
+    return folder
+
+
+def test_a_person_is_found_again_after_black_views(stand: Path, capsys) -> None:
+    words = ["recovery", str(stand), "--stature", "1.72", "--seeds", "1", "--threads", "1"]
+    assert main(["benchmark", *words, "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    (run,) = row["runs"]
+    assert run["disturbance"] == "all views black, 0.5 s" and run["begins"] == 6
+    assert run["back"] and run["worst_mm"] < 150.0 and row["undisturbed_mm"][0] < 60.0
+    _show(Console(width=120), [row])
+    out = " ".join(capsys.readouterr().out.split())
+    assert "stand: too short, or its rate too low, for: all views black, 2 s;" in out
+
+
+def test_a_recording_too_short_for_every_disturbance_is_refused(stand: Path, tmp_path) -> None:
+    for file in stand.iterdir():
+        if file.name != "ground_truth.trc":
+            (tmp_path / file.name).symlink_to(file)
+    truth = read_trc(stand / "ground_truth.trc")
+    write_trc(tmp_path / "ground_truth.trc", truth.rows(slice(0, 30)), 10.0)
+    config = TrackerConfig.from_mapping({"threads": 1})
+    with pytest.raises(
+        DatasetError, match="33 frames, expected 5 or more with a truth after the first 26, for"
+    ):
+        measure_recovery(tmp_path, config, stature_m=1.72, seeds=1)

@@ -247,11 +247,11 @@ def test_values_for_each_recording(walk, capsys) -> None:
     assert "--stature: 2 values for 1 recordings" in capsys.readouterr().err
 
 
-def test_disturbances_longer_than_the_recording_are_left_out(walk, capsys) -> None:
+def test_a_recording_shorter_than_every_disturbance_is_an_error(walk, capsys) -> None:
     words = ["recovery", walk, "--stature", "1.72", "--seeds", "1", "--threads", "1", "--json"]
-    assert main(["benchmark", *words]) == 0
-    (row,) = json.loads(capsys.readouterr().out)["rows"]
-    assert row["runs"] == [] and len(row["undisturbed_mm"]) == 1
+    assert main(["benchmark", *words]) == 1
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "4 frames, expected 5 or more with a truth after the first 81" in last
 
 
 def test_fewer_cameras(walk, capsys) -> None:

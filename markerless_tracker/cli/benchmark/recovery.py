@@ -41,6 +41,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _show(console: Console, rows: list[Row]) -> None:
     console.print(_table(rows))
+    for row in rows:
+        measured = {run["disturbance"] for run in row["runs"]}
+        left = [one.name for one in recovery.DISTURBANCES if one.name not in measured]
+        if left:
+            text = f"{row['recording']}: too short, or its rate too low, for: {'; '.join(left)}."
+            console.print(text, highlight=False, markup=False)
     console.print(
         "Mean error, mm: undisturbed: of the undisturbed run; meanwhile: of the disturbed frames "
         "that have a pose. Back: the error is at most the undisturbed mean + "
