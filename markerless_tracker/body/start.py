@@ -13,6 +13,8 @@ from markerless_tracker.body.subject import complete_markers
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
+POSE_MARKERS = ("LHip", "RHip", "Neck")
+"""Markers that a start pose needs: they give position and heading."""
 _NEUTRAL_WEIGHT_M_PER_RAD = 0.004
 """Weight of the distance from neutral, for angles that the markers do not determine (the axial
 rotation of a straight limb): one radian costs as much as 4 mm at one marker."""
@@ -47,7 +49,7 @@ def pose_from_markers(
     from scipy.optimize import least_squares
 
     known = complete_markers(markers_m)
-    for needed in ("LHip", "RHip", "Neck"):
+    for needed in POSE_MARKERS:
         if needed not in known:
             raise BodyModelError(
                 f"start pose: marker {needed} is missing, expected at least LHip, RHip and Neck; "

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from markerless_tracker.benchmarks.machine import machine
 from markerless_tracker.benchmarks.silhouettes.scene import ImageSet, SilhouetteScene
 from markerless_tracker.body import BodyModel
+from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import Image, ImagingSettings, Segmenter, learn_background
 from markerless_tracker.imaging.segmentation import clean_mask
 from markerless_tracker.records import Observation
@@ -69,14 +70,16 @@ def mask_scores(mask: Mask, exact: Mask, undecided: Mask | None = None) -> MaskS
     both = int((mask & exact).sum())
     either = int((mask | exact).sum())
     found, true = int(mask.sum()), int(exact.sum())
-    away = cv2.distanceTransform((~exact).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    leak = 0.0
     # The distance to an empty mask is undefined.
-    leaked = int((mask & (np.asarray(away) > LEAK_PX)).sum()) if true else found
+    if true:
+        away = cv2.distanceTransform((~exact).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        leak = int((mask & (np.asarray(away) > LEAK_PX)).sum()) / true
     return MaskScores(
         iou=both / either if either else 1.0,
         precision=both / found if found else 1.0,
         recall=both / true if true else 1.0,
-        shadow_leak=leaked / true if true else 0.0,
+        shadow_leak=leak,
         undecided_share=share,
     )
 
@@ -137,9 +140,15 @@ def measure(
             false negatives blue, undecided yellow, the rest of the silhouette green.
 
     Raises:
+        ConfigError: `background.follow_s` is set.
         TrackerError: the recording cannot be read, or its images do not fit its background.
     """
     config = config or TrackerConfig()
+    if config.background.follow_s > 0.0:
+        raise ConfigError(
+            f"background.follow_s is {config.background.follow_s:g}, expected 0: silhouettes are "
+            "measured in single frames, which no background follows"
+        )
     methods = {name: _methods(name, frames, config) for name, frames in scene.empty.items()}
     tallies = {method: _Tally() for method in ("own", "mog2", "knn")}
     with _one_thread():

@@ -15,6 +15,7 @@ from markerless_tracker.body import (
     subject_from_markers,
 )
 from markerless_tracker.body.build import build_body
+from markerless_tracker.body.start import POSE_MARKERS
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.datasets import (
     FolderRecording,
@@ -171,15 +172,26 @@ def made_up_scene(
 
 
 def _posed(recording: Recording, truth: Path) -> tuple[BodyModel, dict[int, FloatArray]]:
-    """The body with lengths from the first row of markers, and its pose (p,) by frame."""
+    """The body with lengths from the first row of markers, and its pose (p,) by frame.
+
+    Raises:
+        DatasetError: the file lacks a marker that every pose needs.
+        TrackerError: it cannot be read, or does not give the lengths.
+    """
+    track = read_trc(truth).with_pelvis()
+    missing = [name for name in POSE_MARKERS if name not in track.names]
+    if missing:
+        raise DatasetError(
+            f"{truth}: no marker {', '.join(missing)}, expected {', '.join(POSE_MARKERS)} for the "
+            "reference poses"
+        )
     description = load_description(BODY)
     row = first_row(truth)
     body = build_body(description, subject_from_markers(description, row.markers_m))
-    track = read_trc(truth).with_pelvis()
     poses = {}
     for stamp_ns, positions in zip(track.stamps_ns.tolist(), track.positions_m, strict=True):
         named = dict(zip(track.names, positions, strict=True))
-        if not all(np.isfinite(named[name]).all() for name in ("LHip", "RHip", "Neck")):
+        if not all(np.isfinite(named[name]).all() for name in POSE_MARKERS):
             continue
         try:
             index = recording.start_index(stamp_ns)

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, pose_from_markers
+from markerless_tracker.body.start import POSE_MARKERS
 from markerless_tracker.datasets import MarkerTrack
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.geometry import FloatArray
@@ -25,6 +26,9 @@ class TruthScore:
         tracker: the tracker whose results are compared.
         reference: reference markers; rows are matched by time.
         stamps_ns: (n,) the stamps of all results to come, in order.
+
+    Raises:
+        DatasetError: the reference lacks a marker that every pose needs.
     """
 
     def __init__(
@@ -32,6 +36,8 @@ class TruthScore:
     ) -> None:
         self._tracker = tracker
         self._reference = reference.with_pelvis()
+        needed_m = self._reference.selected(POSE_MARKERS).positions_m
+        self._known = np.asarray(np.isfinite(needed_m).all(axis=(1, 2)))
         blank = np.full((len(stamps_ns), 1, 3), np.nan)
         rows, of = match_rows(MarkerTrack(("none",), stamps_ns, blank), self._reference)
         self._row = {int(stamps_ns[r]): int(k) for r, k in zip(rows, of, strict=True)}
@@ -41,11 +47,9 @@ class TruthScore:
     def add(self, result: TrackResult) -> None:
         """Add the next result; frames without a reference or a pose are left out."""
         row = self._row.get(result.stamp_ns)
-        if row is None or result.pose is None:
+        if row is None or result.pose is None or not self._known[row]:
             return
         markers_m = dict(zip(self._reference.names, self._reference.positions_m[row], strict=True))
-        if not all(np.isfinite(markers_m[name]).all() for name in ("LHip", "RHip", "Neck")):
-            return
         truth = pose_from_markers(self._tracker.body, markers_m)
         self.differences.append(self._f(truth, result) - self._f(result.pose, result))
 

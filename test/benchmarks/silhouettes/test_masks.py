@@ -9,7 +9,9 @@ from markerless_tracker.benchmarks.silhouettes.masks import (
     radii_mm,
 )
 from markerless_tracker.benchmarks.silhouettes.scene import made_up_scene, recorded_scene
-from markerless_tracker.errors import DatasetError
+from markerless_tracker.body import MARKER_NAMES
+from markerless_tracker.datasets import MarkerTrack, write_trc
+from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.tracking import TrackerConfig
 
 
@@ -117,6 +119,24 @@ def test_exact_masks_are_found_scaled(render_walk) -> None:
     assert first.masks(scene.rig)["cam01"].shape == (height, width)
     # The reference pose is known as well, and decides undecided pixels.
     assert first.pose is not None and set(first.exact) == set(first.masks(scene.rig))
+
+
+def test_a_background_that_follows_is_refused() -> None:
+    follows = TrackerConfig.from_mapping({"background.follow_s": 5.0})
+    scene = made_up_scene(frames=1, size_px=(64, 48))
+    with pytest.raises(ConfigError, match="background.follow_s is 5, expected 0"):
+        measure(scene, follows)
+
+
+@pytest.mark.parametrize("names", [("Neck",), ("LHip", "Pelvis"), ("LHip", "RHip", "Pelvis")])
+def test_markers_that_a_pose_needs_are_named(make_recording, names) -> None:
+    left = tuple(name for name in MARKER_NAMES if name not in names)
+    truth = MarkerTrack(left, np.arange(3) * 16_666_667, np.zeros((3, len(left), 3)))
+    folder = make_recording()
+    write_trc(folder / "ground_truth.trc", truth, 60.0)
+    missing = ", ".join(name for name in ("LHip", "RHip", "Neck") if name in names)
+    with pytest.raises(DatasetError, match=f"ground_truth.trc: no marker {missing}, expected LHip"):
+        recorded_scene(folder)
 
 
 def test_a_recording_without_any_truth_is_an_error(make_recording) -> None:

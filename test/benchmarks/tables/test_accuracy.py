@@ -102,6 +102,14 @@ def test_truth_score_is_zero_at_the_truth_and_positive_elsewhere(walk, evidence)
     assert len(compared.differences) == 2
 
 
+def test_truth_score_needs_hips_and_neck(walk, evidence) -> None:
+    reference = read_trc(walk / "ground_truth.trc")
+    tracker = build_tracker(evidence.rig, SWARM, start_file=walk / "ground_truth.trc").tracker
+    without = reference.selected([name for name in reference.names if name != "Neck"])
+    with pytest.raises(DatasetError, match="no marker Neck"):
+        TruthScore(tracker, without, np.array(evidence.stamps_ns))
+
+
 def test_start_noise_is_keyed_by_seed_and_scaled(walk) -> None:
     reference = read_trc(walk / "ground_truth.trc")
     a, b, other = (disturbed_start(reference, 10.0, seed) for seed in (1, 1, 2))
