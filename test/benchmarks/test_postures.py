@@ -38,7 +38,15 @@ def test_unknown_sets_are_refused() -> None:
         ([], "expected recordings or --postures N, and not both"),
         (["somewhere", "--postures", "2"], "expected recordings or --postures N, and not both"),
         (["somewhere", "--exact"], "--exact and --set need --postures"),
-        (["--postures", "2", "--scale", "0.5"], "expected no --stature and no --scale"),
+        (
+            ["--postures", "2", "--scale", "0.5"],
+            "expected no --stature, --scale, --every or --seeds",
+        ),
+        (
+            ["--postures", "2", "--every", "10"],
+            "expected no --stature, --scale, --every or --seeds",
+        ),
+        (["--postures", "2", "--seeds", "1"], "expected no --stature, --scale, --every or --seeds"),
     ],
 )
 def test_options_that_do_not_go_together_are_refused(words, message, capsys) -> None:

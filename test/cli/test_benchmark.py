@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -93,6 +94,33 @@ def test_stored_runs_are_not_repeated(walk, tmp_path: Path, capsys) -> None:
     ]  # fmt: skip
     assert kept == {path.name: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()}
     assert len(kept) == 3
+
+
+def test_a_recording_given_twice_is_measured_once(walk, capsys) -> None:
+    words = ["--preset", "tuned", "--seeds", "1", "--frames", "1", "--fps", "60", "--jobs", "1"]
+    assert main(["benchmark", "tables", walk, walk, *words, "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["rows"]) == 1
+
+
+def test_recordings_of_the_same_name_have_a_table_and_a_plot_each(
+    walk, tmp_path: Path, capsys
+) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed (extra [plots])")
+    copy = tmp_path / "copy" / "walk"
+    shutil.copytree(walk, copy)
+    words = ["--preset", "tuned", "--seeds", "1", "--frames", "1", "--fps", "60", "--jobs", "1"]
+    out = tmp_path / "out"
+    assert main(["benchmark", "tables", walk, str(copy), *words, "-o", str(out)]) == 0
+    shown = capsys.readouterr().out
+    assert f"{walk}, 1 seed" in shown and f"{copy}, 1 seed" in shown
+    found = sorted(path.name for path in (out / "plots").iterdir())
+    assert found == ["walk_60fps.png", "walk_60fps_2.png"]
+
+
+def test_a_stature_is_refused_where_every_start_is_given(walk, capsys) -> None:
+    assert main(["benchmark", "live", walk, "--stature", "1.7"]) == 1
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "--stature is given for starts with ground_truth.trc" in last
 
 
 def test_a_papers_table_with_its_figures_beside_ours(walk, tmp_path: Path, capsys) -> None:
@@ -201,7 +229,23 @@ def test_the_table_of_speed(capsys) -> None:
         (["tables", "x", "--vary", "a={"], "a value cannot be read", 2),
         (["tables", "x", "--vary", "partitions=soft"], "did you mean 'partition'?", 1),
         (["tables", "x", "--vary", "apf.layer=5"], "did you mean 'apf.layers'?", 1),
-        (["tables", "x", "--vary", "seed=1", "--vary", "seed=2"], "seed is given twice", 1),
+        (["tables", "x", "--vary", "body=a", "--vary", "body=b"], "body is given twice", 1),
+        (["tables", "x", "--vary", "seed=1,2"], "seed is given, but every row has the seeds", 1),
+        (["tables", "x", "--vary", "threads=1,2"], "threads is given, but every run has one", 1),
+        (
+            ["tables", "x", "--body", "person31", "--vary", "body=balan31"],
+            "body is given by --body, too, expected one of them",
+            1,
+        ),
+        (
+            ["start", "--postures", "1", "--every", "10"],
+            "expected no --stature, --scale, --every",
+            1,
+        ),
+        (["start", "--postures", "1", "--seeds", "1"], "--every or --seeds", 1),
+        (["silhouettes", "--scale", "0.5"], "--scale is given without a SOURCE", 1),
+        (["speed", "--scale", "0.5"], "--scale is given without a SOURCE", 1),
+        (["cameras", "x", "--start", "measured", "--stature", "1.7"], "--start automatic", 1),
         (["tables", "x", "--table", "hmcpso_1"], "table 'hmcpso_1' is unknown", 1),
         (["tables", "x", "--table", "all", "--optimizer", "apf"], "does not go with", 1),
         (["tables", "nowhere"], "nowhere: no such file or folder", 1),

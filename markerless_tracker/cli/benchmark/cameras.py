@@ -29,7 +29,7 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         help="error with every subset of the cameras, and its ratio to that of all cameras",
         description="Whole runs with all cameras and with every subset of the given sizes.",
     )
-    add_recordings(parser)
+    add_recordings(parser, without="unknown; only for automatic starts")
     parser.add_argument(
         "--each", type=list_of(count), default=(3, 2), metavar="LIST",
         help="sizes of the subsets (3,2)",
@@ -49,6 +49,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(
             f"--start: got {', '.join(unknown)}, expected some of {', '.join(_STARTS)}"
         )
+    if args.stature and "automatic" not in args.start:
+        raise ConfigError("--stature is given for measured starts, expected --start automatic")
     config = settings(args, "seed")
 
     def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:

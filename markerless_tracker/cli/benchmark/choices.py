@@ -14,6 +14,13 @@ from markerless_tracker.cli.track import read_config
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.tracking import PRESETS, TrackerConfig
 
+_NAMED = ("preset", "optimizer", "body", "refinement", "evaluations")
+"""Settings with an option of their own."""
+_NOT_VARIED = {
+    "seed": "every row has the seeds of --seeds",
+    "threads": "every run has one thread",
+}
+
 
 @dataclass(frozen=True)
 class Group:
@@ -51,22 +58,22 @@ def groups(args: argparse.Namespace, papers: Sequence[PaperTable]) -> tuple[Grou
     Options replace a table's own settings.
 
     Raises:
-        ConfigError: an unknown setting or an impossible value.
+        ConfigError: an unknown setting or an impossible value, a setting that is given twice, or
+            one that the table itself sets.
     """
     vary: dict[str, tuple[Any, ...]] = {}
     for key, values in args.vary:
         if key in vary:
             raise ConfigError(f"--vary: {key} is given twice")
         vary[key] = values
-    named: dict[str, Sequence[Any] | None] = {
-        "preset": args.preset,
-        "optimizer": args.optimizer,
-        "body": args.body,
-        "refinement": args.refinement,
-        "evaluations": args.evaluations,
-        **vary,
-    }
-    choices = {key: values for key, values in named.items() if values}
+    for key, reason in _NOT_VARIED.items():
+        if key in vary:
+            raise ConfigError(f"--vary: {key} is given, but {reason}")
+    named = {key: values for key in _NAMED if (values := getattr(args, key))}
+    for key in vary:
+        if key in named:
+            raise ConfigError(f"--vary: {key} is given by --{key}, too, expected one of them")
+    choices: dict[str, Sequence[Any]] = {**named, **vary}
     if not papers:
         if args.config is None:
             choices = {"preset": tuple(PRESETS), **choices}

@@ -15,6 +15,8 @@ from markerless_tracker.cli.benchmark.recordings import add_recordings, each, se
 from markerless_tracker.cli.replay.measure import LivePlan, measure_live
 from markerless_tracker.cli.terminal.arguments import list_of, positive
 from markerless_tracker.cli.terminal.bars import progress_bars
+from markerless_tracker.datasets.truth import truth_path
+from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.ros.process import require_ros
 from markerless_tracker.results.result import versions
 
@@ -33,7 +35,7 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
             "are processes of their own, connected by ROS 2."
         ),
     )
-    add_recordings(parser)
+    add_recordings(parser, without="unknown; only for automatic starts")
     parser.add_argument(
         "--rates", type=list_of(positive), default=(60.0, 30.0), metavar="LIST",
         help="sets per second at which the recordings are played (60,30)",
@@ -50,8 +52,14 @@ def run(args: argparse.Namespace) -> int:
     """Measure and print; returns the exit status.
 
     Raises:
+        ConfigError: a stature is given, but every recording has a start.
         RosMissingError: ROS 2 is not installed.
     """
+    started = not args.nothing_given and all(truth_path(s).is_file() for s in args.sources)
+    if args.stature and started:
+        raise ConfigError(
+            "--stature is given for starts with ground_truth.trc, expected --nothing-given"
+        )
     require_ros()
     plan = LivePlan(settings(args), args.rates, start_given=not args.nothing_given)
     statures = each(args.stature or (None,), args.sources, "--stature")

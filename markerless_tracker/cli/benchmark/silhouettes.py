@@ -45,7 +45,8 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
     )
     parser.add_argument(
         "--frames", type=count, metavar="N",
-        help="at most N frames, evenly spread (all with exact masks; 10 with markers; 3 generated)",
+        help="at most N frames, evenly spread (all with exact masks; 10 with markers); of made-up "
+        "scenes every sixth (10), of generated ones every 40th (3)",
     )  # fmt: skip
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings (YAML)")
     parser.add_argument(
@@ -73,6 +74,8 @@ def run(args: argparse.Namespace) -> int:
         return _run_generated(args, config)
     if args.scenes is not None:
         raise ConfigError("--scenes is given without --generated, expected both")
+    if not args.sources and args.scale != 1.0:
+        raise ConfigError("--scale is given without a SOURCE, expected both")
     results = []
     with progress_bars() as bars:
         for source in args.sources or (None,):

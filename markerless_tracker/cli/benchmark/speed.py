@@ -13,6 +13,7 @@ from rich.table import Table
 from markerless_tracker.cli.benchmark.arguments import add_kind
 from markerless_tracker.cli.terminal.arguments import count
 from markerless_tracker.cli.terminal.bars import progress_bars
+from markerless_tracker.errors import ConfigError
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
@@ -43,6 +44,8 @@ def run(args: argparse.Namespace) -> int:
     from markerless_tracker.benchmarks.speed.parts import measure
     from markerless_tracker.benchmarks.speed.scene import made_up_scene, recorded_scene
 
+    if args.source is None and args.scale != 1.0:
+        raise ConfigError("--scale is given without a SOURCE, expected both")
     # The first frame fits the shape and is not timed.
     frames = args.frames + 1
     with progress_bars() as bars:

@@ -35,15 +35,15 @@ def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
         help="with --postures: their scenes; nothing may be set by `test`",
     )  # fmt: skip
     parser.add_argument(
-        "--exact", action="store_true", help="with --postures: exact silhouettes, no images"
+        "--exact",
+        action="store_true",
+        help="with --postures: exact silhouettes instead of segmented ones",
     )
-    parser.add_argument(
-        "--every", type=count, default=10, metavar="N", help="start from every N-th frame (10)"
-    )
+    parser.add_argument("--every", type=count, metavar="N", help="start from every N-th frame (10)")
     parser.add_argument(
         "--frames", type=count, default=10, metavar="N", help="scored in the N-th frame (10)"
     )
-    parser.add_argument("--seeds", type=count, default=1, metavar="N", help="seeds 0..N-1 (1)")
+    parser.add_argument("--seeds", type=count, metavar="N", help="seeds 0..N-1 (1)")
     parser.add_argument("--preset", metavar="NAME", help="tuned (default) or paper")
     parser.add_argument("--body", metavar="NAME", help="default: the preset's")
 
@@ -59,10 +59,14 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError("expected recordings or --postures N, and not both")
     if args.postures is None and (args.exact or args.set != "development"):
         raise ConfigError("--exact and --set need --postures")
-    if args.postures is not None and (args.stature or args.scale != (1.0,)):
-        raise ConfigError("--postures makes its own scenes: expected no --stature and no --scale")
+    counts = {key: n for key in ("every", "seeds") if (n := getattr(args, key)) is not None}
+    if args.postures is not None and (args.stature or args.scale != (1.0,) or counts):
+        raise ConfigError(
+            "--postures makes its own scenes, each with one start: expected no --stature, --scale, "
+            "--every or --seeds"
+        )
     config = settings(args, "preset", "body")
-    plan = starts.StartPlan(config, every=args.every, frames=args.frames, seeds=args.seeds)
+    plan = starts.StartPlan(config, frames=args.frames, **counts)
 
     def measure(source: Path, stature_m: float | None, scale: float, report: Report) -> Row:
         if args.postures is not None:

@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -121,10 +122,12 @@ def run(args: argparse.Namespace) -> int:
         jobs=args.jobs,
         scheduler=args.scheduler,
     )
+    # A recording given twice is measured once.
+    sources = list({source.resolve(): source for source in args.sources}.values())
     if args.out is not None:
         args.out.mkdir(parents=True, exist_ok=True)
     with progress_bars() as bars:
-        rows = accuracy.make_table(args.sources, plan, store=args.out, progress=_Bars(bars))
+        rows = accuracy.make_table(sources, plan, store=args.out, progress=_Bars(bars))
     table = {
         "machine": machine(),
         "versions": versions(),
@@ -151,10 +154,17 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _plot(folder: Path, parts: Sequence[tuple[str, "_Part"]]) -> None:
-    """Write the plots; a warning if matplotlib is missing."""
+    """Write the plots; a warning if matplotlib is missing.
+
+    A number is appended to a file's name if another recording has the same name.
+    """
+    names: Counter[str] = Counter()
     try:
         for title, part in parts:
-            part.plot(folder, title)
+            for name, heading, lines in part.plots(title):
+                names[name] += 1
+                number = f"_{names[name]}" if names[name] > 1 else ""
+                write_plot(folder / f"{name}{number}.png", heading, lines)
     except ConfigError as error:
         print(f"warning: {error}", file=sys.stderr)
 
@@ -185,14 +195,14 @@ class _Part:
             return full_table(title, [row for _, row in self.rows], truth_score=truth_score)
         return paper_table(title, self.group.table, self.rows, truth_score=truth_score)
 
-    def plot(self, folder: Path, title: str) -> None:
-        """Write a plot per rate into a folder."""
+    def plots(self, title: str) -> Iterator[tuple[str, str, list[tuple[str, dict[str, Any]]]]]:
+        """Name, title and lines (legend and row) of a plot per rate."""
         table = self.group.table
         for rate in dict.fromkeys(row["fps"] for _, row in self.rows):
             own = [row for _, row in self.rows if row["fps"] == rate]
             words = [own[0]["recording"], table.name if table else "", f"{rate:g}fps"]
-            write_plot(
-                folder / f"{'_'.join(filter(None, words))}.png",
+            yield (
+                "_".join(filter(None, words)),
                 f"{table.title if table else title}\n{own[0]['recording']}, {rate:g} frames/s",
                 [(legend_of(row), row) for row in own],
             )
@@ -213,6 +223,8 @@ def _pieces(
         for row in rows:
             if row["source"] == source:
                 found.setdefault(row["configuration"], []).append(row)
+        if len({row["source"] for row in rows if row["recording"] == name}) > 1:
+            name = source
         size = "" if scale == 1.0 else f" at scale {scale:g}"
         noise = f", start disturbed by {args.start_noise:g} mm" if args.start_noise else ""
         seeds = f"{args.seeds} seed{'s' if args.seeds > 1 else ''}"
