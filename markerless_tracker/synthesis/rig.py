@@ -22,6 +22,15 @@ def check_range(name: str, value: float, least: float, most: float) -> None:
         raise ConfigError(f"{name} is {value:g}, expected {least:g} to {most:g}")
 
 
+def check_fps(fps: float) -> None:
+    """Check the frame rate of a scene, 1/s.
+
+    Raises:
+        ConfigError: it is impossible.
+    """
+    check_range("fps", fps, 0.1, 1000.0)
+
+
 def check_cameras(
     cameras: int, size_px: tuple[int, int], fps: float, seed: int, noise: float
 ) -> None:
@@ -33,7 +42,7 @@ def check_cameras(
     check_range("cameras", cameras, 1, MOST_CAMERAS)
     check_range("image width", size_px[0], 16, 8192)
     check_range("image height", size_px[1], 16, 8192)
-    check_range("fps", fps, 0.1, 1000.0)
+    check_fps(fps)
     check_range("noise", noise, 0.0, 100.0)
     check_range("seed", seed, 0, 2**63)
 

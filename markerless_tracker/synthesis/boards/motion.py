@@ -64,7 +64,7 @@ class BoardMotion:
         turned = rodrigues_from_rotation(before[:3, :3].T @ after[:3, :3])
         rotation = before[:3, :3] @ rotation_from_rodrigues(share * turned)
         middle = self._middle(before) + share * (self._middle(after) - self._middle(before))
-        return self._placed(rotation, middle)
+        return self._placed(rotation, middle, 0.0)
 
     def _near(self, camera: CameraModel, rng: np.random.Generator) -> list[FloatArray]:
         """Poses that fill the parts of a camera's image, tilted in several directions."""
@@ -108,11 +108,17 @@ class BoardMotion:
             poses.append(self._placed(rotation, np.array(_CENTRES_M[i % len(_CENTRES_M)])))
         return poses
 
-    def _placed(self, rotation: FloatArray, middle: FloatArray) -> FloatArray:
-        """The pose with the board's middle at a point, above the floor."""
+    def _placed(
+        self, rotation: FloatArray, middle: FloatArray, lowest_m: float = _LOWEST_M
+    ) -> FloatArray:
+        """The pose with the board's middle at a point, above the floor.
+
+        A board that would be in the floor is lifted until its lowest corner has the height
+        `lowest_m`; without a jump only for 0.
+        """
         pose = transform(rotation, middle - rotation @ self._board.outline_m.mean(axis=0))
         lowest = float((self._board.outline_m @ rotation.T + pose[:3, 3])[:, 2].min())
-        pose[2, 3] += max(_LOWEST_M - lowest, 0.0) if lowest < 0.0 else 0.0
+        pose[2, 3] += lowest_m - lowest if lowest < 0.0 else 0.0
         return pose
 
     def _middle(self, pose: FloatArray) -> FloatArray:

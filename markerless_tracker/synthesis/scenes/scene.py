@@ -19,6 +19,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.synthesis.people import Action, Person
 from markerless_tracker.synthesis.people.person import PARTS
+from markerless_tracker.synthesis.rig import check_fps
 from markerless_tracker.synthesis.rooms.chair import chair
 from markerless_tracker.synthesis.rooms.lighting import Lighting, Triangles
 from markerless_tracker.synthesis.rooms.surfaces import painted
@@ -51,12 +52,13 @@ class GeneratedScene:
         motion: what the person does.
 
     Raises:
-        ConfigError: the motion is unknown, or the seed is negative.
+        ConfigError: the motion is unknown, the seed is negative, or the rate is impossible.
     """
 
     def __init__(
         self, spec: SceneSpec | int, *, fps: float = 60.0, motion: str | None = None
     ) -> None:
+        check_fps(fps)
         self.spec = spec if isinstance(spec, SceneSpec) else sample_scene(spec)
         spec = self.spec
         self.fps = float(fps)

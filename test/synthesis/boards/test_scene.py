@@ -9,6 +9,8 @@ from markerless_tracker.camera.board import Board
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.geometry import apply
 from markerless_tracker.synthesis.boards import BoardScene
+from markerless_tracker.synthesis.boards.motion import BoardMotion
+from markerless_tracker.synthesis.rig import ring_rig
 
 BOARD = Board("checkerboard", 7, 4, 0.2)
 SMALL = (328, 246)
@@ -44,6 +46,14 @@ def test_the_board_lies_on_the_floor_first_and_is_held_between_moves(scene) -> N
     moved = [not np.allclose(a, b, atol=1e-9) for a, b in zip(poses, poses[1:], strict=False)]
     assert 20 < sum(moved) < 90
     assert min(apply(pose, BOARD.outline_m)[:, 2].min() for pose in poses) > -1e-9
+
+
+def test_the_board_moves_without_jumps() -> None:
+    motion = BoardMotion(BOARD, ring_rig(2, SMALL), 40.0, 0)
+    corners = [apply(motion.pose(time_s), BOARD.outline_m) for time_s in np.arange(0.0, 40.0, 4e-3)]
+    steps = np.linalg.norm(np.diff(corners, axis=0), axis=2)
+    assert steps.max() < 0.08
+    assert min(corner[:, 2].min() for corner in corners) > -1e-9
 
 
 def test_the_back_shows_no_squares(scene) -> None:

@@ -179,6 +179,12 @@ def test_a_start_is_near_the_truth_or_not_given() -> None:
             assert off.max() < 0.03
 
 
+@pytest.mark.parametrize("fps", [0.0, -60.0, np.nan, np.inf])
+def test_impossible_rates_are_refused(fps: float) -> None:
+    with pytest.raises(ConfigError, match="fps is .*, expected 0.1 to 1000"):
+        GeneratedScene(sample_scene(1, (64, 48)), fps=fps)
+
+
 def test_stamps_follow_the_rate_and_motions_are_known() -> None:
     scene = GeneratedScene(sample_scene(1, (64, 48)), fps=30.0)
     assert [scene.stamp_ns(i) for i in range(3)] == [0, 33333333, 66666667]
