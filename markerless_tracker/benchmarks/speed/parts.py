@@ -221,10 +221,10 @@ def _frames(
 ) -> dict[str, FloatArray]:
     """Time in ms per frame (n - 1,) of each part; without the first frame, which fits the shape.
 
-    background: labels, shadows and morphology; edges: the edge maps; imaging: both and their
-    packing. These three use the region around the previous frame's body, as in tracking. fitness:
-    evidence to pose; total: images to pose; thousand: 1000 evaluations of the same body on the same
-    threads.
+    background: labels, shadows and morphology; edges: the edge maps; imaging: images to packed
+    evidence, with edge maps only if `edge_weight` is above 0. These three use the region around the
+    previous frame's body, as in tracking. fitness: evidence to pose; total: images to pose;
+    thousand: 1000 evaluations of the same body on the same threads.
     """
     whole = _tracker(scene, config, backgrounds)
     fit = _tracker(scene, config, {})

@@ -18,7 +18,7 @@ STATURE_M = {"female": (1.64, 0.065), "male": (1.77, 0.070)}
 PROPORTIONS = 0.04
 """Standard deviation of a length among people of one stature, as a share of it."""
 ASYMMETRY = 0.008
-"""Standard deviation of the difference of left and right, as a share of the length."""
+"""Standard deviation of the factor of one side's length; left and right are drawn separately."""
 
 HAIR = ("none", "short", "full", "long", "bun")
 LOWER = ("trousers", "shorts", "skirt")
@@ -46,8 +46,10 @@ class PersonSpec:
         hair: one of `HAIR`; `hair_m`: its thickness.
         lower: one of `LOWER`; `lower_length`: its length, 1 reaches the ankle, 0.5 the knee.
         leg_ease_m, hem_ease_m: how far the cloth stands off the thigh, and off the leg at its hem.
-        upper: one of `UPPER`; `upper_length`: its hem below the hips' height, in trunk lengths.
-        trunk_ease_m: how far the cloth stands off the trunk at its hem.
+        upper: one of `UPPER`; `upper_length`: above 0.1 its hem below the hips' height, in trunk
+            lengths; from 0.05 to 0.1 the hem is 0.06 below it, under 0.05 it is 0.22 above it.
+        trunk_ease_m: how far the cloth stands off the trunk at its hem; less than 16 mm is drawn as
+            16 mm.
         sleeve: length of the sleeve, 1 reaches the wrist, 0 is none.
         sleeve_ease_m: how far the sleeve stands off the arm.
         wrinkle_m: standard deviation of the folds.

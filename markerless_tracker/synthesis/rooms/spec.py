@@ -97,7 +97,8 @@ class SensorSpec:
 
     Attributes:
         size_px: (width, height).
-        level: mean grey level of the empty room's images, which the exposure is set for.
+        level: mean grey level of the empty room, which the exposure is set for, before the tone
+            curve, clipping and greying.
         cast: factor of each channel.
         gamma: exponent of the tone curve, 1 for none.
         noise: standard deviation at a grey level of 128.
