@@ -237,12 +237,6 @@ def test_the_table_of_speed(capsys) -> None:
             "body is given by --body, too, expected one of them",
             1,
         ),
-        (
-            ["start", "--postures", "1", "--every", "10"],
-            "expected no --stature, --scale, --every",
-            1,
-        ),
-        (["start", "--postures", "1", "--seeds", "1"], "--every or --seeds", 1),
         (["silhouettes", "--scale", "0.5"], "--scale is given without a SOURCE", 1),
         (["speed", "--scale", "0.5"], "--scale is given without a SOURCE", 1),
         (["cameras", "x", "--start", "measured", "--stature", "1.7"], "--start automatic", 1),

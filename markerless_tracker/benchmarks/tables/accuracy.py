@@ -241,9 +241,9 @@ def summarise(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """One row from the runs of its seeds.
 
     Means over the seeds: `mean_mm`, `limbs_mm` (with the sd between seeds, None for one seed),
-    `evaluations`, `refinements`, `truth_difference`, `joints`; None, and joints that a seed lacks,
-    are left out. Maxima over the seeds: `max_mm`
-    (largest frame mean), `worst_joint_mm`, `last_joint_mm`, `lost_run`, `lost_frames`.
+    `evaluations`, `refinements`, `truth_difference`, `joints`; each over the seeds that have it.
+    Maxima over the seeds: `max_mm` (largest frame mean), `worst_joint_mm`, `last_joint_mm`,
+    `lost_run`, `lost_frames`.
     `frames_per_s` is the median over the seeds; `ms_per_evaluation` follows from it for runs
     without refinement (None with refinement). `runs` holds each seed's `mean_mm`, `curve` the error
     over time: the stamps common to all seeds (s) and the mean over the seeds (mm).
