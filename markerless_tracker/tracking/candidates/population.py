@@ -187,6 +187,19 @@ class FramePopulation:
             population = self.selected(np.concatenate([population.poses, branch.poses]))
         return population
 
+    def with_found(
+        self, population: Population, frame: "FramePopulation", found: Population
+    ) -> Population:
+        """A population, and what was found in the same images with a body of another size.
+
+        Args:
+            population: the poses.
+            frame, found: the other search; its poses are refined with this body.
+        """
+        others = scaled_to(frame._searcher.body, self._searcher.body, found.poses)
+        others = self.refined(others, *_PROPAGATE)
+        return self.selected(np.concatenate([population.poses, others]))
+
     def _promising(self, children: FloatArray, parents: FloatArray, count: int) -> FloatArray:
         """`count` of the children (n, p): the best, and the best of those that are novel."""
         order = np.argsort(self.total_costs(children), kind="stable")

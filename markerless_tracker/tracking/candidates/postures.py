@@ -1,4 +1,4 @@
-"""First guesses of the pose: generic postures, placed at a hull's trunk, in every heading."""
+"""First guesses of the pose: generic postures, placed in a hull, in every heading."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,6 +23,7 @@ VARIATION_FRACTION = 0.6
 """Standard deviation of the variations, as a fraction of the prior's."""
 _TILT_RAD = (0.35, 0.40)
 """Standard deviations of the variations' pelvis_rx and pelvis_ry."""
+_HEAD = MARKER_NAMES.index("Head")
 _ANKLES = [MARKER_NAMES.index("LAnkle"), MARKER_NAMES.index("RAnkle")]
 _LIKE_TRUNK = ("pelvis", "belly", "chest", "torso")
 
@@ -109,7 +110,8 @@ def first_guesses(
         body: the body.
         limits: (2, p) of the poses.
         hull: the trunk is placed at the hull's trunk. Its height is that of the hull's trunk, or
-            puts the lower ankle at one of `ankle_heights_m`.
+            puts the lower ankle at one of `ankle_heights_m`. The postures are also placed with the
+            head at the hull's top.
         rng: draws the variations.
     """
     known = postures(body)
@@ -117,12 +119,12 @@ def first_guesses(
     sd[[body.index("pelvis_rx"), body.index("pelvis_ry")]] = _TILT_RAD
     heights = ankle_heights_m(hull)
     places = 1 + len(heights)
-    count = places * len(known) + VARIATIONS
+    count = (places + 1) * len(known) + VARIATIONS
     out = np.empty((HEADINGS, count, body.size))
     for k in range(HEADINGS):
         varied = known[rng.integers(len(known), size=VARIATIONS)]
         varied = varied + sd * rng.standard_normal((VARIATIONS, body.size))
-        out[k] = np.concatenate([*[known] * places, varied])
+        out[k] = np.concatenate([*[known] * places, varied, known])
         out[k, :, body.index("pelvis_rz")] += 2.0 * np.pi * k / HEADINGS
     np.clip(out, limits[0], limits[1], out=out)
     at = body.root_position
@@ -137,8 +139,12 @@ def first_guesses(
         [np.repeat(np.arange(places), len(known)), np.arange(VARIATIONS) % places]
     )
     for number, height in enumerate(heights):
-        rows = place == 1 + number
+        rows = np.flatnonzero(place == 1 + number)
         out[:, rows, at[2]] += height - ankles[:, rows] - shift[:, rows]
+    # The lap of a seated person, or a skirt, may be thicker than the trunk.
+    last = out[:, -len(known) :]
+    heads = markers_of_many(body, last.reshape(-1, body.size))[:, _HEAD]
+    last[..., at] += hull.top_m - heads.reshape(HEADINGS, -1, 3)
     return out
 
 

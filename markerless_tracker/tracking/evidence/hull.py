@@ -56,6 +56,8 @@ _BRIDGED = 2
 _RADIUS_M = 5.0
 _UP_M = 2.5
 """Half the width and half the height of the grid."""
+TOP_M = 0.12
+"""The middle of this much of a hull's height is its top."""
 _FAR_M = 4.0
 """Distance of the scene from the cameras, assumed where their optical axes are parallel."""
 _TRUNK_SHARE = 0.5
@@ -87,6 +89,12 @@ class Hull:
     def high_m(self) -> float:
         """Height of its highest point."""
         return float(self.points_m[:, 2].max()) + 0.5 * FINE_M
+
+    @property
+    def top_m(self) -> FloatArray:
+        """(3,) its top: the head, unless the person bends or raises an arm."""
+        high = self.points_m[self.points_m[:, 2] > self.high_m - TOP_M]
+        return np.append(high[:, :2].mean(axis=0), self.high_m)
 
     @property
     def height_m(self) -> float:

@@ -51,7 +51,7 @@ _FITS = 0.85
 """If 1 - cost is at least this, a generation that gains less than `_GAIN` is the last one."""
 _GAIN = 0.002
 _DOUBTFUL = 0.12
-"""If the first search's best pose costs more, it is repeated with a cost of unusual postures."""
+"""If the first search's best pose costs more, a second one adds a cost of unusual postures."""
 _SURE_FIT, _SURE_GAP = 0.91, 0.025
 """No second search if 1 - cost of the first is at least this, and the opposite's lower by this."""
 
@@ -86,9 +86,9 @@ class Starter:
 
     First guesses are many postures and headings of a body of the person's stature (several are
     tried if it is unknown). The best ones are refined, recombined and refined again; if they fit
-    poorly, once more with a cost of unusual postures. Legs and arms are tried in each other's
-    place. The opposite heading is propagated, too, until one is kept (`two_headings`). Then the
-    sections are fitted with the poses held.
+    poorly, once more with a cost of unusual postures, by which the poses of both searches are
+    compared. Legs and arms are tried in each other's place. The opposite heading is propagated,
+    too, until one is kept (`two_headings`). Then the sections are fitted with the poses held.
 
     Args:
         rig: the cameras.
@@ -242,11 +242,12 @@ class Starter:
     ) -> tuple[FramePopulation, Population] | None:
         """The population found in a hull; None if it is no person."""
         self._usual = False
-        found = self._search_once(hull, observations, stamp_ns)
-        if found[0].best_cost(found[1]) > _DOUBTFUL:
+        frame, population = first = self._search_once(hull, observations, stamp_ns)
+        if frame.best_cost(population) > _DOUBTFUL:
             self._usual = True
-            found = self._search_once(hull, observations, stamp_ns)
-        return found if 1.0 - found[0].best_cost(found[1]) >= LEAST_FIT else None
+            frame, population = self._search_once(hull, observations, stamp_ns)
+            population = frame.with_found(population, *first)
+        return (frame, population) if 1.0 - frame.best_cost(population) >= LEAST_FIT else None
 
     def _search_once(
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
@@ -289,9 +290,8 @@ class Starter:
             near = body.neutral.copy()
             near[body.root_position] = hull.trunk_m.mean(axis=0)
             frame = FramePopulation(searcher, observations, stamp_ns, near, usual=self._usual)
-            hints = None
-            if self._last_pose is not None:
-                hints = np.array([self._last_pose, put_at(body, hull, self._last_pose)])
+            last = self._last_pose
+            hints = None if last is None else np.array([last, put_at(body, hull, last)])
             population = frame.initialised(hull, hints)
             tried.append((float(population.costs[0]) + cost, searcher, frame, population))
         _, self._searcher, frame, population = min(tried, key=lambda candidate: candidate[0])

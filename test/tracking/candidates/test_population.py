@@ -19,7 +19,7 @@ from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.candidates.crossed import PAIRS
 from markerless_tracker.tracking.candidates.mirror import mirror_of
-from markerless_tracker.tracking.candidates.population import FramePopulation
+from markerless_tracker.tracking.candidates.population import FramePopulation, scaled_to
 from markerless_tracker.tracking.candidates.postures import POSTURES, postures
 from markerless_tracker.tracking.search import make_searcher
 from markerless_tracker.tracking.start.starter import _improved
@@ -39,13 +39,19 @@ def made_up(
     pose = scene.motion.pose(0.0)
     for name, angle_rad in (change or {}).items():
         pose[scene.body.index(name)] += angle_rad
-    nothing = np.zeros((192, 256), np.uint8)
-    masks = {c.name: nothing > 0 if blank else silhouette(scene.body, pose, c) for c in scene.rig}
-    views = {name: Observation.from_mask(name, 0, mask, nothing) for name, mask in masks.items()}
+    views = scene_views(scene, pose, blank=blank)
     searcher = make_searcher(
         scene.body, rig=scene.rig, config=TrackerConfig(threads=threads), threads=threads
     )
     return FramePopulation(searcher, views, 0, pose), pose
+
+
+def scene_views(
+    scene: SyntheticScene, pose: np.ndarray, *, blank: bool = False
+) -> dict[str, Observation]:
+    nothing = np.zeros((192, 256), np.uint8)
+    masks = {c.name: nothing > 0 if blank else silhouette(scene.body, pose, c) for c in scene.rig}
+    return {name: Observation.from_mask(name, 0, mask, nothing) for name, mask in masks.items()}
 
 
 def refined(threads: int) -> np.ndarray:
@@ -116,6 +122,24 @@ def test_limbs_in_their_own_places_stay() -> None:
     population = frame.selected(frame.refined(pose[None], 5, (0.15, 0.05)))
     kept = frame.with_exchanged_pairs(population, 7)
     np.testing.assert_array_equal(kept.poses[0], population.poses[0])
+
+
+def test_what_another_search_found_with_another_size_is_compared() -> None:
+    """The better of two searches is kept, whichever it is."""
+    frame, pose = made_up(1)
+    scene = SyntheticScene(body="person31", size_px=(256, 192), seed=2)
+    body = load_body("person31", 1.6)
+    searcher = make_searcher(body, rig=scene.rig, config=TrackerConfig(threads=1), threads=1)
+    other = FramePopulation(searcher, scene_views(scene, pose), 0, pose)
+    wrong = pose.copy()
+    wrong[load_body("person31", 1.75).index("l_hip_y")] -= 0.9
+    poor = frame.selected(wrong[None])
+    found = other.selected(scaled_to(scene.body, body, pose[None]))
+    both = frame.with_found(poor, other, found)
+    assert both.costs[0] < poor.costs[0] - 0.02
+    gap = np.linalg.norm(markers(scene.body, both.poses[0]) - markers(scene.body, pose), axis=1)
+    assert gap.max() < 0.05
+    np.testing.assert_array_equal(both.poses[-1], wrong)
 
 
 class Improving:

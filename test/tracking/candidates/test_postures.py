@@ -1,4 +1,4 @@
-"""First guesses of a start: postures at the hull's trunk, and with the feet on the floor."""
+"""First guesses of a start: postures at the hull's trunk, feet on the floor, head at its top."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_feet_stand_on_the_floor_whatever_the_hulls_trunk_is(body) -> None:
     """A wide skirt draws it down by 0.3 m."""
     known, count = postures(body), len(POSTURES)
     low, high = (guesses(body, hull_from(0.0, [0.5, 0.2, z])) for z in (0.7, 1.0))
-    assert low.shape == (HEADINGS, 2 * count + VARIATIONS, body.size)
+    assert low.shape == (HEADINGS, 3 * count + VARIATIONS, body.size)
     heights = markers_of_many(body, low[:, count : 2 * count].reshape(-1, body.size))[:, ANKLES, 2]
     np.testing.assert_allclose(heights.min(axis=1), ANKLE_M, atol=1e-9)
     np.testing.assert_allclose(low[:, count : 2 * count], high[:, count : 2 * count], atol=1e-9)
@@ -51,8 +51,20 @@ def test_feet_stand_on_the_floor_whatever_the_hulls_trunk_is(body) -> None:
     assert known.shape == (count, body.size)
 
 
+def test_the_head_is_at_the_hulls_top_wherever_the_trunk_is(body) -> None:
+    """The lap of a seated person may be the thickest part."""
+    points = np.array([[0.0, 0.0, 0.0], [0.3, 0.1, 1.20], [0.4, 0.1, 1.25], [0.7, 0.7, 1.0]])
+    hull = Hull(points, np.array([[0.9, 0.9, 0.5]]), points)
+    last = guesses(body, hull)[:, -len(POSTURES) :]
+    assert last.shape[:2] == (HEADINGS, len(POSTURES))
+    heads = markers_of_many(body, last.reshape(-1, body.size))[:, MARKER_NAMES.index("Head")]
+    expected = np.tile([0.35, 0.1, 1.25 + 0.5 * FINE_M], (len(heads), 1))
+    np.testing.assert_allclose(heads, expected, atol=1e-9)
+
+
 def test_half_of_the_variations_stand_on_the_floor(body) -> None:
-    varied = guesses(body, hull_from(0.0, [0.5, 0.2, 0.7]))[0, -VARIATIONS:]
+    count = len(POSTURES)
+    varied = guesses(body, hull_from(0.0, [0.5, 0.2, 0.7]))[0, 2 * count :][:VARIATIONS]
     heights = markers_of_many(body, varied)[:, ANKLES, 2].min(axis=1)
     assert (np.abs(heights - ANKLE_M) < 1e-9).sum() == VARIATIONS // 2
 
