@@ -14,6 +14,7 @@ from typing import Any
 import markerless_tracker
 from markerless_tracker.datasets.folder import CALIBRATION
 from markerless_tracker.datasets.recording import BACKGROUND
+from markerless_tracker.datasets.source import calibration_beside
 from markerless_tracker.resources import config_dir
 from markerless_tracker.results.result import versions
 
@@ -31,8 +32,12 @@ def recording_key(path: Path, *, without: Path | None = None) -> str:
 
     Args:
         path: the folder, links in it included, or a file: the calibration and the background
-            beside it belong to it.
-        without: a folder in it that is left out, such as that of the results.
+            beside it belong to it. A calibration elsewhere that it uses counts as well.
+        without: a folder in it that is left out, such as that of the results; not the recording
+            itself.
+
+    Raises:
+        OSError: there is no such file, or it cannot be read.
     """
     if path.is_dir():
         files = list(_files(path, without))
@@ -40,12 +45,14 @@ def recording_key(path: Path, *, without: Path | None = None) -> str:
         beside = path.parent / CALIBRATION
         files = [path, *([beside] if beside.is_file() else [])]
         files += _files(path.parent / BACKGROUND, without)
+    shared = calibration_beside(path)
+    if shared is not None:
+        files += [shared] if shared.is_file() else _files(shared, without)
     stated = []
     for file in files:
         status = file.stat()
-        stated.append(
-            [file.relative_to(path.parent).as_posix(), status.st_size, status.st_mtime_ns]
-        )
+        place = Path(os.path.relpath(file, path.parent)).as_posix()
+        stated.append([place, status.st_size, status.st_mtime_ns])
     return _digest(json.dumps(stated).encode())
 
 
@@ -67,7 +74,8 @@ def code_files() -> list[Path]:
 
 def _files(folder: Path, without: Path | None) -> Iterator[Path]:
     """The files in a folder, in a fixed order; linked folders are entered, each folder once."""
-    entered = {None if without is None else os.path.realpath(without)}
+    entered = set() if without is None else {os.path.realpath(without)}
+    entered.discard(os.path.realpath(folder))
     for place, folders, names in os.walk(folder, followlinks=True):
         folders.sort()
         if os.path.realpath(place) in entered:

@@ -9,8 +9,6 @@ from typing import Any
 from markerless_tracker.benchmarks.tables.fingerprint import file_key, recording_key, run_key
 from markerless_tracker.cli.batch.trial import Trial
 from markerless_tracker.cli.track import given_settings, read_config
-from markerless_tracker.datasets.folder import CALIBRATION
-from markerless_tracker.datasets.source import calibration_beside
 from markerless_tracker.errors import ConfigError
 
 NOT_OF_TRACK = ("source", "out", "json", "force", "jobs", "scheduler")
@@ -60,7 +58,7 @@ def _trial(
         "settings": settings,
         "options": files,
         "body": file_key(Path(own["body"] or settings["body"])),
-        "recording": _recording(source),
+        "recording": _recording(source, out),
     }
     return Trial(name, source, out, run_key(parts), own)
 
@@ -83,12 +81,10 @@ def _content(option: str, value: Any) -> Any:
     return value
 
 
-def _recording(source: Path) -> list[str]:
-    """Keys of a recording and of the calibrations that may lie beside it."""
+def _recording(source: Path, out: Path) -> str:
+    """Key of a recording; the results may lie in its folder."""
     try:
-        keys = [recording_key(source), file_key(source.parent / CALIBRATION)]
-        shared = calibration_beside(source)
-        return [*keys, recording_key(shared)] if shared is not None else keys
+        return recording_key(source, without=out)
     except OSError:
         # Its trial will report the error.
-        return [str(source)]
+        return str(source)

@@ -78,6 +78,25 @@ def test_a_recording_key_leaves_out_a_folder(walk: Path) -> None:
     assert recording_key(walk, without=out) == key != recording_key(walk)
 
 
+def test_the_recording_itself_is_not_left_out(walk: Path) -> None:
+    key = recording_key(walk, without=walk)
+    (walk / "bag.mcap").write_text("other images")
+    assert recording_key(walk, without=walk) != key
+
+
+def test_a_recording_key_depends_on_a_calibration_elsewhere(tmp_path: Path) -> None:
+    """That of a session is shared by its trials."""
+    trial = tmp_path / "session" / "trial"
+    (trial / "videos").mkdir(parents=True)
+    (trial / "Config.toml").write_text("[project]\n")
+    shared = tmp_path / "session" / "calibration"
+    shared.mkdir()
+    (shared / "Calib.toml").write_text("before")
+    key = recording_key(trial)
+    (shared / "Calib.toml").write_text("afterwards")
+    assert recording_key(trial) != key
+
+
 def test_a_file_key_depends_on_the_content(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("same")
     (tmp_path / "b").write_text("same")

@@ -1,6 +1,7 @@
 """What the key of a trial's result depends on."""
 
 import argparse
+import shutil
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,18 @@ def test_not_on_what_the_outputs_hold(key, tmp_path: Path) -> None:
     (tmp_path / "walk" / "000000.png").write_bytes(b"a picture")
     (tmp_path / "walk.toml").write_text("refined", encoding="utf-8")
     assert key(*words) == before != key()
+
+
+def test_not_on_results_in_the_recordings_folder(walk, tmp_path: Path) -> None:
+    own = shutil.copytree(walk, tmp_path / "own")
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    arguments = parser.parse_args([str(own), "-o", str(own / "out")])
+    (before,) = plan(arguments, {"own": own}, threads=1)
+    (own / "out").mkdir()
+    (own / "out" / "own.trc").write_text("a result")
+    (after,) = plan(arguments, {"own": own}, threads=1)
+    assert after.key == before.key
 
 
 def test_on_the_content_of_a_file_of_offsets(key, tmp_path: Path) -> None:
