@@ -159,13 +159,14 @@ def _root(parent, r):  # type: ignore[no-untyped-def]
 
 @kernel
 def clear_components(parts, kept, words):  # type: ignore[no-untyped-def]
-    """Clear the bits of words (h, k) in the runs of components that are not kept.
+    """Clear the bits of words (h, k) in the runs of components that are not kept; count them.
 
     Args:
         parts: `Components` of a mask of that size.
         kept: (total,).
         words: changed in place.
     """
+    cleared = np.uint64(0)
     for v in range(words.shape[0]):
         for r in range(parts.first[v], parts.first[v + 1]):
             if kept[parts.number[r]]:
@@ -174,8 +175,10 @@ def clear_components(parts, kept, words):  # type: ignore[no-untyped-def]
             while u < end:
                 w, stop = u >> 6, min(end, ((u >> 6) + 1) << 6)
                 bits = (ALL >> np.uint64(64 - (stop - u))) << np.uint64(u & 63)
+                cleared += popcount(words[v, w] & bits)
                 words[v, w] &= ~bits
                 u = stop
+    return cleared
 
 
 @kernel

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from markerless_tracker.body import BodyModel, cone_transforms
 from markerless_tracker.camera import CameraModel, project_camera
 from markerless_tracker.compiled import kernel
-from markerless_tracker.fitness.raster.bits import count_bits
 from markerless_tracker.fitness.raster.components import (
     Components,
     clear_components,
@@ -222,8 +221,7 @@ def _only(
     if kept.all():
         return observation, 0
     words = observation.mask_words.copy()
-    clear_components(parts, kept, words)
-    left_out = int(count_bits(observation.mask_words)) - int(count_bits(words))
+    left_out = int(clear_components(parts, kept, words))
     # A shadow away from the body remains undecided: it is no lit floor.
     return replace(observation, mask_words=words), left_out
 

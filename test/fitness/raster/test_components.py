@@ -69,9 +69,10 @@ def test_only_kept_components_remain(mask, data) -> None:
     kept = data.draw(arrays(np.bool_, parts.total))
     other = data.draw(arrays(np.bool_, mask.shape))
     words = pack_mask(other)
-    clear_components(parts, kept, words)
+    count = clear_components(parts, kept, words)
     cleared = np.isin(labels(parts, mask.shape), 1 + np.flatnonzero(~kept))
     np.testing.assert_array_equal(unpack_mask(words, mask.shape[1]), other & ~cleared)
+    assert count == (other & cleared).sum()
 
 
 @given(masks, st.data())
