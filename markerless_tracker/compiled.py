@@ -21,6 +21,8 @@ from numba import njit
 from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
+from markerless_tracker.libraries import collect_new_objects
+
 PACKAGE = Path(__file__).resolve().parent
 _COMPILE = "numba:compile"
 _IMPORT = r"^\s*from {}\.([\w.]+) import (?:(\w.*)|\(([^)]*)\))"
@@ -166,7 +168,8 @@ def compilation(report: Progress) -> Iterator[Compilation]:
     event.register(_COMPILE, listener)
     _compilations.append(listener)
     try:
-        yield listener
+        with collect_new_objects():
+            yield listener
     finally:
         _compilations.remove(listener)
         event.unregister(_COMPILE, listener)

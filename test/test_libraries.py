@@ -1,13 +1,15 @@
 """The programs set threads and memory of the libraries, unless the user says otherwise."""
 
+import gc
 import os
 import platform
 import subprocess
 import sys
+import weakref
 
 import pytest
 
-from markerless_tracker.libraries import VARIABLES
+from markerless_tracker.libraries import VARIABLES, collect_new_objects
 
 PROGRAMS = {
     "cli": "from markerless_tracker.cli.main import main; main(['track', '--help'])",
@@ -112,3 +114,36 @@ def test_programs_keep_freed_memory(program) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stderr == "kept\n"
+
+
+def test_full_collections_look_at_new_objects_only() -> None:
+    before = gc.get_freeze_count()
+
+    class Ring:
+        """Refers to itself, so that only the collector frees it."""
+
+        def __init__(self) -> None:
+            self.itself = self
+
+    kept = Ring()
+    lost = weakref.ref(Ring())
+    gone: list[object] = []
+    weakref.finalize(kept, gone.append, 1)
+    with collect_new_objects():
+        gc.collect()
+        # What is garbage before a collection is freed by it; what is left is looked at no more.
+        assert lost() is None
+        assert gc.get_freeze_count() > before
+        del kept
+        gc.collect()
+        assert not gone
+        again = weakref.ref(Ring())
+        gc.collect()
+        assert again() is None
+    callbacks = len(gc.callbacks)
+    gc.unfreeze()
+    gc.collect()
+    assert gone
+    with collect_new_objects():
+        assert len(gc.callbacks) == callbacks + 1
+    assert len(gc.callbacks) == callbacks

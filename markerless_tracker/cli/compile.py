@@ -22,7 +22,7 @@ from markerless_tracker.tracking.config import OPTIMIZERS
 
 HELP = (
     "Compile for this machine, at install time for example. Without it each program compiles at "
-    "its first start what it needs, which takes about a minute. Repeated, it compiles only what "
+    "its first start what it needs, which takes half a minute. Repeated, it compiles only what "
     "is out of date."
 )
 EXAMPLE = "markerless_tracker compile --optimizer sppso,hmcpso"

@@ -151,6 +151,8 @@ class Tracker:
         seen = Seen(0, blank, decide(blank, self._cameras, self.body, pose), blank)
         search = self._searcher.frame(seen.used, 0, pose)
         search.run(swarm_stages(self.body, self.config, pose, self.body.sigma))
+        # What the segmenting process compiles is not compiled twice.
+        self.evidence.wait()
         self._starter, self._assessor.track = None, Track(Phase.TRACKING)
         self.step(blank, 0)
         if self.config.refinement != "none":
@@ -159,7 +161,6 @@ class Tracker:
         self.reset()
         self._body.warm_up(self._searcher_for, blank, self._motion.pose)
         self.reset()
-        self.evidence.wait()
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
         """Use other backgrounds from now on; then `warm_up`, which resets.

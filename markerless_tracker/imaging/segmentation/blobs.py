@@ -70,7 +70,10 @@ def _join_runs(mask, part, target, touch, begin, end, parent, first):  # type: i
     words = values.view(np.uint64)
     for i in range(rows):
         first[i] = n
-        values[:columns] = mask[part[1] + i, part[0] : part[2]]
+        row = mask[part[1] + i, part[0] : part[2]]
+        # An assignment of slices would take a second to compile, for the text of its error.
+        for u in range(columns):
+            values[u] = row[u]
         u = _same_until(values, words, 0, 255 - target)
         while u < columns:
             begin[n] = part[0] + u

@@ -48,7 +48,7 @@ class CompilingLines:
         self._next_s = now_s + PROGRESS_S
         if not self._long:
             self._inform(
-                f"{activity}, which takes about a minute at a first start "
+                f"{activity}, which takes about half a minute at a first start "
                 "(`markerless_tracker compile` does it at install time)"
             )
         elif self._terminal:

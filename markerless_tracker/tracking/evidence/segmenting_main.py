@@ -43,7 +43,7 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
     from markerless_tracker.compiled import compilation
     from markerless_tracker.tracking.evidence.gather import EvidenceMaker
     from markerless_tracker.tracking.evidence.segmenting import Ready, SegmentRequest
-    from markerless_tracker.tracking.processes.compiling import compile_refinement
+    from markerless_tracker.tracking.processes.compiling import compile_contours
     from markerless_tracker.tracking.processes.images import get
     from markerless_tracker.tracking.processes.wire import receive, send
 
@@ -58,9 +58,10 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
                 rig, config, backgrounds = message
                 maker = EvidenceMaker(rig, config, backgrounds, map)
                 with compilation(lambda *_: None) as kernels:
-                    # First what the parent needs soonest.
-                    compile_refinement(rig, config, maker.warm_up())
+                    blank = maker.warm_up()
                     maker.wait()
+                    # The parent has stored some of its kernels by now.
+                    compile_contours(rig, config, blank)
                 collect_for_good()
                 answer = Ready(kernels.done)
             elif maker is None:

@@ -126,7 +126,7 @@ def test_a_first_start_is_two_lines_and_progress_in_a_terminal(terminal: bool, m
         compiling.progress(f"compiling {done} of at most 120 kernels")
     first, long, *progress = lines
     assert first == "compiling what is not stored from an earlier start"
-    assert long.startswith("compiling 4 of at most 120 kernels, which takes about a minute")
+    assert long.startswith("compiling 4 of at most 120 kernels, which takes about half a minute")
     assert "`markerless_tracker compile`" in long
     assert progress == [
         f"compiling {done} of at most 120 kernels" for done in (24, 44, 64, 84)[:more]
