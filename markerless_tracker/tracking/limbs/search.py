@@ -3,8 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body.kinematics import markers_of_many
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
@@ -23,8 +25,8 @@ HOPELESS = 0.03
 """A limb whose cost exceeds the largest useful cost by more than this is not refined."""
 NEAR_M = 0.10
 """A drawn limb with every marker nearer than this to its place would return there when refined."""
-LEAST_GAIN = 0.003
-"""Least gain between two poses in their own evidence, which differs a little by chance."""
+LEAST_GAIN = 0.002
+"""Least gain of a limb elsewhere. Of limbs with smaller gains about as many are wrong as right."""
 LEAST_M = 0.05
 """A limb with every marker nearer than this to its place was not found elsewhere."""
 CLOSE = 0.01
@@ -54,9 +56,7 @@ class LimbSearch:
         frame: the evidence, decided near the predicted body.
         own: the evidence for poses that decide it themselves.
         pose: (p,) the estimate.
-        least_gain: least gain for which a limb is taken, in evidence decided with the predicted
-            pose. If pixels were undecided, a limb with that gain must not cost more in its own
-            evidence either, and one without it must gain `LEAST_GAIN` there.
+        thorough: as for `other_limb`.
 
     Attributes:
         pose: (p,) the estimate so far.
@@ -68,30 +68,27 @@ class LimbSearch:
         frame: FramePopulation,
         own: OwnEvidence,
         pose: FloatArray,
-        least_gain: float,
+        *,
+        thorough: bool = True,
     ) -> None:
+        self._thorough = thorough
         self._recombiner = recombiner
         self._frame = frame
         self._own = own
-        self._least_gain = least_gain
         self._take(pose, None)
 
     def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
         """Search a limb; return whether it was found elsewhere. Arguments as for `other_limb`."""
-        frame = self._own.undecided
+        frame, own = self._own.undecided, self._own
         cost = float(frame.costs_with_prior(self.pose[None])[0])
-        other, other_cost = other_limb(frame, self._recombiner, self.pose, limb, rng, aim, cost)
-        better = other_cost < cost - self._least_gain
-        if better:
-            refined = frame.refined(self.pose[None], *_REFINE)
-            better = other_cost < float(frame.costs_with_prior(refined)[0]) - self._least_gain
-        if self._own.differs:
-            if other_cost > cost + CLOSE or distance_m(self._own.body, other, self.pose) < LEAST_M:
-                return False
-            other, other_cost = self._own.refined(other, *_REFINE)
-            least_gain = 0.0 if better else LEAST_GAIN
-            better = other_cost < self.own_cost - least_gain
-            better = better and other_cost < self._own.refined(self.pose, *_REFINE)[1] - least_gain
+        other, other_cost = other_limb(
+            frame, self._recombiner, self.pose, limb, rng, aim, cost, thorough=self._thorough
+        )
+        if other_cost > cost + CLOSE or distance_m(own.body, other, self.pose) < LEAST_M:
+            return False
+        other, other_cost = own.refined(other, *_REFINE)
+        better = other_cost < self.own_cost - LEAST_GAIN
+        better = better and other_cost < own.refined(self.pose, *_REFINE)[1] - LEAST_GAIN
         if better:
             self._take(other, other_cost)
         return better
@@ -150,6 +147,8 @@ def other_limb(
     rng: np.random.Generator,
     aim: Aim | None = None,
     most_cost: float = np.inf,
+    *,
+    thorough: bool = True,
 ) -> tuple[FloatArray, float]:
     """The best pose (p,) with a limb elsewhere, and its cost (`FramePopulation.costs_with_prior`).
 
@@ -170,6 +169,8 @@ def other_limb(
         aim: selects, from poses (n, p), at most a given number whose limb lies in unexplained
             silhouette; None for no such draws.
         most_cost: largest useful cost; the result matters only below it.
+        thorough: whether draws near the former place are left out at once. Else they are often the
+            best ones, and the search ends, which takes less time.
     """
     body, half = recombiner.body, DRAWS // 2
     poses = np.concatenate(
@@ -184,6 +185,10 @@ def other_limb(
             recombiner.with_limb(pose, limb, AIMED_OF // 2, rng),
         ]
         poses = np.concatenate([poses, aim(np.concatenate(many), AIMED)])
+    if thorough:
+        poses = poses[_far(body, poses, pose)]
+    if not len(poses):
+        return pose, most_cost
     costs_of = frame.limb_costs(pose, limb)
     costs, priors = costs_of(poses[:, limb]), prior_costs(body, poses)
     best = _best(costs, priors, _PARENTS)
@@ -191,6 +196,8 @@ def other_limb(
         near = recombiner.with_limb_near(
             np.repeat(poses[best], _CHILDREN, axis=0), limb, fraction, rng
         )
+        if thorough:
+            near = near[_far(body, near, pose)]
         # Of the last layer only the best draws of both kinds are used, of the others the parents.
         count = 1 if fraction == LAYERS[-1] else _PARENTS
         cutoff = costs[_best(costs, priors, count)].max()
@@ -201,10 +208,10 @@ def other_limb(
         best = _best(costs, priors, count)
     if costs.min() > most_cost + HOPELESS:
         return pose, float(costs.min())
-    far = [other for other in poses[best] if distance_m(body, other, pose) >= NEAR_M]
-    if not far:
+    far = poses[best][_far(body, poses[best], pose)]
+    if not len(far):
         return pose, most_cost
-    refined = frame.refined(np.array(far), *_REFINE)
+    refined = frame.refined(far, *_REFINE)
     costs = frame.costs_with_prior(refined)
     return refined[int(costs.argmin())], float(costs.min())
 
@@ -216,6 +223,12 @@ def _best(costs: FloatArray, priors: FloatArray, count: int) -> IntArray:
     first = np.argsort(costs, kind="stable")[:count]
     second = np.argsort(costs + priors, kind="stable")[:count]
     return np.concatenate([first, second[~np.isin(second, first)]])
+
+
+def _far(body: BodyModel, poses: FloatArray, pose: FloatArray) -> NDArray[np.bool_]:
+    """Which of poses (n, p) have a marker at least `NEAR_M` from its place in a pose (p,)."""
+    apart = markers_of_many(body, poses) - markers(body, pose)
+    return np.asarray((np.linalg.norm(apart, axis=2) >= NEAR_M).any(axis=1))
 
 
 def distance_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:

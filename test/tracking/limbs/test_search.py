@@ -48,7 +48,7 @@ def test_a_leg_that_decided_its_evidence_is_found_elsewhere(bent) -> None:
     costs = frame.costs(np.array([true, wrong]))
     assert costs[0] > costs[1] + CLOSE
     assert own.cost_with_prior(true) < own.cost_with_prior(wrong)
-    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, wrong, 0.003)
+    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, wrong)
     leg = body.subspaces["l_leg"]
     assert any(search.elsewhere(leg, keyed_generator(0, 0, f"{i}"), None) for i in range(8))
     off_m = np.linalg.norm(markers(body, search.pose) - markers(body, true), axis=1)[ANKLE]
@@ -60,7 +60,7 @@ def test_a_leg_in_its_place_stays(bent) -> None:
     body = searcher.body
     frame = FramePopulation(searcher, decide(seen, searcher.cameras, body, true), 0, true)
     own = OwnEvidence(searcher, seen, 0, frame)
-    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, true, 0.003)
+    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, true)
     for name in body.limbs:
         assert not search.elsewhere(body.subspaces[name], keyed_generator(0, 0, name), None)
     assert search.pose is true
@@ -82,18 +82,19 @@ def test_what_the_rest_of_the_body_gains_is_no_merit_of_a_limb(
     # The whole body lies beside the person; the leg is right, or wrong by more than the other's.
     estimate = pose.copy()
     estimate[body.index("pelvis_tx")] += 0.04
-    estimate[knee] += 1.2 if taken else 0.0
+    estimate[knee] -= 1.2 if taken else 0.0
     other = pose.copy()
     other[knee] += knee_rad
     costs = frame.costs(np.array([estimate, other]))
     assert costs[1] < costs[0] - 0.003
-    monkeypatch.setattr(f"{SEARCH}.other_limb", lambda *_: (other, float(costs[1])))
+    monkeypatch.setattr(f"{SEARCH}.other_limb", lambda *_, **__: (other, float(costs[1])))
     own = OwnEvidence(searcher, seen, 0, frame)
-    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, estimate, 0.003)
+    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, estimate)
     assert search.elsewhere(leg, keyed_generator(0, 0, "leg"), None) is taken
 
 
-def test_a_draw_where_the_limb_is_is_not_refined(bent, monkeypatch) -> None:
+@pytest.mark.parametrize("thorough", [True, False])
+def test_a_draw_where_the_limb_is_is_not_refined(bent, monkeypatch, thorough) -> None:
     searcher, seen, true, wrong = bent
     body = searcher.body
     frame = FramePopulation(searcher, decide(seen, searcher.cameras, body, true), 0, true)
@@ -110,9 +111,53 @@ def test_a_draw_where_the_limb_is_is_not_refined(bent, monkeypatch) -> None:
         drawn[:, body.index("l_knee")] += knee_rad
         limb = body.subspaces["l_leg"]
         rng = keyed_generator(0, 0, "leg")
-        found, cost = other_limb(frame, Recombiner(body, searcher.limits), true, limb, rng)
+        found, cost = other_limb(
+            frame, Recombiner(body, searcher.limits), true, limb, rng, thorough=thorough
+        )
         assert len(refined) == times
         assert (found is true) == (times == 0) and (cost == np.inf) == (times == 0)
+
+
+@pytest.mark.parametrize("thorough", [True, False])
+def test_with_time_worse_draws_elsewhere_are_refined(bent, monkeypatch, thorough) -> None:
+    """Where the limb is, a draw costs less than any draw elsewhere that is not refined."""
+    searcher, seen, true, _ = bent
+    body = searcher.body
+    frame = FramePopulation(searcher, decide(seen, searcher.cameras, body, true), 0, true)
+    drawn = np.tile(true, (2, 1))
+    drawn[1, body.index("l_knee")] += 0.5
+    monkeypatch.setattr(f"{SEARCH}.DRAWS", 4)
+    monkeypatch.setattr(Recombiner, "with_prior_limb", lambda _, at, limb, n, rng: drawn)
+    monkeypatch.setattr(Recombiner, "with_limb", lambda _, at, limb, n, rng: drawn)
+    monkeypatch.setattr(Recombiner, "with_limb_near", lambda _, at, limb, f, rng: at.copy())
+    refined: list[np.ndarray] = []
+    monkeypatch.setattr(
+        FramePopulation, "refined", lambda _, poses, *args: refined.extend(poses) or poses
+    )
+    limb, rng = body.subspaces["l_leg"], keyed_generator(0, 0, "leg")
+    recombiner, cost = Recombiner(body, searcher.limits), float(frame.costs(true[None])[0])
+    assert cost < frame.costs(drawn[1:])[0]
+    monkeypatch.setattr(f"{SEARCH}.HOPELESS", 9.0)
+    other_limb(frame, recombiner, true, limb, rng, None, cost, thorough=thorough)
+    assert len(refined) == thorough
+    assert not thorough or np.array_equal(refined[0], drawn[1])
+
+
+@pytest.mark.parametrize(("gain", "taken"), [(0.0015, False), (0.0025, True)])
+def test_a_limb_must_gain(bent, monkeypatch, gain, taken) -> None:
+    searcher, seen, true, wrong = bent
+    body = searcher.body
+    frame = FramePopulation(searcher, decide(seen, searcher.cameras, body, true), 0, true)
+    own = OwnEvidence(searcher, seen, 0, frame)
+    monkeypatch.setattr(f"{SEARCH}.other_limb", lambda *_, **__: (true, 0.0))
+    monkeypatch.setattr(
+        OwnEvidence, "refined", lambda _, pose, *__: (pose, 0.2 - gain * (pose is true))
+    )
+    monkeypatch.setattr(OwnEvidence, "cost_with_prior", lambda *_: 0.2)
+    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, wrong)
+    leg = body.subspaces["l_leg"]
+    assert search.elsewhere(leg, keyed_generator(0, 0, "leg"), None) is taken
+    assert (search.pose is true) is taken
 
 
 def test_poses_are_compared_with_the_prior_of_their_limbs(bent, monkeypatch) -> None:
@@ -128,7 +173,7 @@ def test_poses_are_compared_with_the_prior_of_their_limbs(bent, monkeypatch) -> 
     prior = 0.25
     assert own.cost_with_prior(true) == pytest.approx(plain + 0.25)
     assert frame.total_costs(true[None])[0] >= frame.costs(true[None])[0] + 0.25
-    search = LimbSearch(Recombiner(searcher.body, searcher.limits), frame, own, true, 0.003)
+    search = LimbSearch(Recombiner(searcher.body, searcher.limits), frame, own, true)
     assert search.own_cost == pytest.approx(plain + 0.25)
     found, cost = own.refined(true, 3, (0.1, 0.03))
     prior = 0.0
@@ -155,7 +200,7 @@ def test_legs_of_which_little_shows_are_found_on_the_floor(bent_leg, floor_sd_m,
     searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
     frame = FramePopulation(searcher, seen, 0, folded)
     own = OwnEvidence(searcher, seen, 0, frame)
-    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, folded, 0.003)
+    search = LimbSearch(Recombiner(body, searcher.limits), frame, own, folded)
     for turn, name in enumerate(("l_leg", "r_leg") * 3):
         search.elsewhere(body.subspaces[name], keyed_generator(0, 0, f"turn {turn}"), None)
     assert (markers(body, search.pose)[ANKLES, 2].max() < 0.3) == found

@@ -183,7 +183,7 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
         ("watch.find_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})),
         (
             "search.other_limb",
-            lambda _f, _r, at, limb, *_: searched.append(limb.tobytes()) or (at, 9.0),
+            lambda _f, _r, at, limb, *_, **__: searched.append(limb.tobytes()) or (at, 9.0),
         ),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
@@ -210,7 +210,7 @@ def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_turns(
     def faces(*_):
         done.append("facing")
 
-    def elsewhere(_f, _r, at, limb, *_):
+    def elsewhere(_f, _r, at, limb, *_, **__):
         done.append(next(n for n in limbs if np.array_equal(scene.body.subspaces[n], limb)))
         return at, 9.0
 
@@ -235,7 +235,7 @@ def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monk
     searched: list[int] = []
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})),
-        ("search.other_limb", lambda _f, _r, at, limb, *_: searched.append(now) or (at, 9.0)),
+        ("search.other_limb", lambda _f, _r, at, limb, *_, **__: searched.append(now) or (at, 9.0)),
         ("turns.PER_LIMB_NS", 10**12),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
@@ -259,7 +259,7 @@ def test_a_limb_does_not_wait_where_more_silhouette_is_unexplained_than_before(
         ("watch.find_unexplained", lambda *_: Unexplained(dict(areas), {})),
         (
             "search.other_limb",
-            lambda _f, _r, at, limb, *_: searched.append((now, limb)) or (at, 9.0),
+            lambda _f, _r, at, limb, *_, **__: searched.append((now, limb)) or (at, 9.0),
         ),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
