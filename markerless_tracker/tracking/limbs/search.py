@@ -25,8 +25,8 @@ HOPELESS = 0.03
 """A limb whose cost exceeds the largest useful cost by more than this is not refined."""
 NEAR_M = 0.10
 """A drawn limb with every marker nearer than this to its place would return there when refined."""
-LEAST_GAIN = 0.002
-"""Least gain of a limb elsewhere. Of limbs with smaller gains about as many are wrong as right."""
+LEAST_GAIN = 0.003
+"""Least gain between two poses in their own evidence, which differs a little by chance."""
 LEAST_M = 0.05
 """A limb with every marker nearer than this to its place was not found elsewhere."""
 CLOSE = 0.01
@@ -56,6 +56,9 @@ class LimbSearch:
         frame: the evidence, decided near the predicted body.
         own: the evidence for poses that decide it themselves.
         pose: (p,) the estimate.
+        least_gain: least gain for which a limb is taken, in evidence decided with the predicted
+            pose. If pixels were undecided, a limb with that gain must not cost more in its own
+            evidence either, and one without it must gain `LEAST_GAIN` there.
         thorough: as for `other_limb`.
 
     Attributes:
@@ -68,10 +71,11 @@ class LimbSearch:
         frame: FramePopulation,
         own: OwnEvidence,
         pose: FloatArray,
+        least_gain: float,
         *,
         thorough: bool = True,
     ) -> None:
-        self._thorough = thorough
+        self._least_gain, self._thorough = least_gain, thorough
         self._recombiner = recombiner
         self._frame = frame
         self._own = own
@@ -79,16 +83,22 @@ class LimbSearch:
 
     def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
         """Search a limb; return whether it was found elsewhere. Arguments as for `other_limb`."""
-        frame, own = self._own.undecided, self._own
+        frame = self._own.undecided
         cost = float(frame.costs_with_prior(self.pose[None])[0])
         other, other_cost = other_limb(
             frame, self._recombiner, self.pose, limb, rng, aim, cost, thorough=self._thorough
         )
-        if other_cost > cost + CLOSE or distance_m(own.body, other, self.pose) < LEAST_M:
-            return False
-        other, other_cost = own.refined(other, *_REFINE)
-        better = other_cost < self.own_cost - LEAST_GAIN
-        better = better and other_cost < own.refined(self.pose, *_REFINE)[1] - LEAST_GAIN
+        better = other_cost < cost - self._least_gain
+        if better:
+            refined = frame.refined(self.pose[None], *_REFINE)
+            better = other_cost < float(frame.costs_with_prior(refined)[0]) - self._least_gain
+        if self._own.differs:
+            if other_cost > cost + CLOSE or distance_m(self._own.body, other, self.pose) < LEAST_M:
+                return False
+            other, other_cost = self._own.refined(other, *_REFINE)
+            least_gain = 0.0 if better else LEAST_GAIN
+            better = other_cost < self.own_cost - least_gain
+            better = better and other_cost < self._own.refined(self.pose, *_REFINE)[1] - least_gain
         if better:
             self._take(other, other_cost)
         return better

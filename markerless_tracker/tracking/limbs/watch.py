@@ -231,7 +231,9 @@ class LimbWatch:
         radius_m = searcher.tracked_radius_m
         own = OwnEvidence(searcher, seen.imaged, stamp_ns, frame, radius_m=radius_m)
         recombiner = Recombiner(body, searcher.limits)
-        search = LimbSearch(recombiner, frame, own, pose, thorough=not late)
+        search = LimbSearch(
+            recombiner, frame, own, pose, searcher.config.min_improvement, thorough=not late
+        )
         if facing:
             rotated = self._facing.compare(search, body, searcher.limits)
             if rotated is not None:

@@ -53,7 +53,7 @@ def compared(scene, pose_of, count):
         assert watch.due(stamp_ns) and not watch.due(stamp_ns + DOUBTED_EVERY_NS - 1)
         frame = FramePopulation(searcher, seen, stamp_ns, pose)
         own = OwnEvidence(searcher, seen, stamp_ns, frame)
-        search = LimbSearch(Recombiner(body, body.limits), frame, own, pose)
+        search = LimbSearch(Recombiner(body, body.limits), frame, own, pose, 0.001)
         found.append(watch.compare(search, body, body.limits))
     return found
 
