@@ -230,6 +230,26 @@ def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_turns(
     assert set(done) == {*limbs, "facing"}
 
 
+@pytest.mark.parametrize("late", [False, True])
+def test_draws_near_a_limb_are_left_out_unless_sets_are_late(balancing, monkeypatch, late) -> None:
+    scene, seen, pose, _ = balancing
+    thorough: list[bool] = []
+
+    def elsewhere(_f, _r, at, *_, **options):
+        thorough.append(options["thorough"])
+        return at, 9.0
+
+    package = "markerless_tracker.tracking.limbs"
+    monkeypatch.setattr(
+        f"{package}.watch.find_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})
+    )
+    monkeypatch.setattr(f"{package}.search.other_limb", elsewhere)
+    searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
+    contours = contours_of(searcher, seen, pose)
+    watch.recover(searcher, contours, Seen(0, seen, seen, seen), pose, late=late)
+    assert set(thorough) == {not late}
+
+
 def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monkeypatch) -> None:
     scene, seen, pose, _ = balancing
     searched: list[int] = []
