@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.body import BodyModel, markers
-from markerless_tracker.body.kinematics import markers_of_many
+from markerless_tracker.body import BodyModel, markers, markers_of_many
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
