@@ -18,6 +18,8 @@ from markerless_tracker.optim import (
     keyed_generator,
 )
 from markerless_tracker.records import CONTOUR, Comparison, Observation, SearchPlan, Stage
+from markerless_tracker.tracking.candidates.posture_costs import off_floor
+from markerless_tracker.tracking.candidates.prior_costs import prior_costs
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
@@ -205,9 +207,20 @@ class FrameSearch:
                 continue
             if found_cost is None:
                 found_cost = float(self._costs_of(found[None])[0])
-            if found_cost < self.cost - stage.plan.min_improvement:
+            gain = self.cost - found_cost
+            if gain > stage.plan.min_improvement and (
+                stage.plan.algorithm == CONTOUR or gain > self._less_usual(found)
+            ):
                 self.pose, self.cost = found, found_cost
         return self.pose
+
+    def _less_usual(self, found: FloatArray) -> float:
+        """How much less usual a pose (p,) is than the estimate, in units of f."""
+        body, poses = self.searcher.body, np.stack([self.pose, found])
+        costs = prior_costs(body, poses)
+        if self.searcher.config.refine.floor_sd_m > 0.0:
+            costs += off_floor(body, poses)
+        return float(costs[1] - costs[0])
 
     def terms(self) -> dict[str, ViewTerms]:
         """The terms of the fitness of the estimate in each view."""

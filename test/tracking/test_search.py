@@ -18,6 +18,7 @@ from markerless_tracker.tracking import TrackerConfig, search
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.stages.frame import contour_stage, frame_stages
 from markerless_tracker.tracking.stages.sppso import sppso_stages
+from markerless_tracker.tracking.stages.stage import swarm_stage
 from markerless_tracker.tracking.swarms import SWARMS
 
 BODY = load_body("person31", 1.75)
@@ -187,6 +188,36 @@ def test_a_refinement_that_hits_is_not_spoilt_by_the_swarm(person, monkeypatch) 
     config = settings(edge_weight=0.0)
     monkeypatch.setattr(ContourFrame, "refined", lambda *_, **__: person.pose.copy())
     np.testing.assert_array_equal(searched(person, config).pose, person.pose)
+
+
+@pytest.mark.parametrize("unusual", ["prior_costs", "off_floor"])
+@pytest.mark.parametrize("taken", [True, False])
+def test_a_swarm_must_gain_more_than_its_pose_is_unusual(
+    person, monkeypatch, unusual, taken
+) -> None:
+    config, body = settings(), person.body
+    gain = person.f(person.pose, config) - person.f(person.predicted, config)
+    cost = gain - 0.01 if taken else gain + 0.01
+    plain_run, everything = SWARMS["sppso"], np.arange(body.size)
+
+    def run(swarm, **options):
+        found_cost = np.array([np.nan])
+        return plain_run(swarm, **options)._replace(found=person.pose, found_cost=found_cost)
+
+    for name in ("prior_costs", "off_floor"):
+        charged = cost if name == unusual else 0.0
+        monkeypatch.setattr(
+            search, name,
+            lambda _, poses, charged=charged: charged * (poses == person.pose).all(axis=1),
+        )  # fmt: skip
+    monkeypatch.setattr(search, "SWARMS", {"sppso": run})
+    monkeypatch.setattr(ContourFrame, "refined", lambda *_, **__: person.predicted.copy())
+    contour = contour_stage("align", body, config, person.predicted, body.sigma)
+    swarm = swarm_stage(
+        body, config, "all", "sppso", everything, person.predicted, body.sigma, (4, 2)
+    )
+    frame = searched(person, config, (contour, swarm))
+    np.testing.assert_array_equal(frame.pose, person.pose if taken else person.predicted)
 
 
 def test_each_stage_starts_from_the_estimate_so_far(person, monkeypatch) -> None:

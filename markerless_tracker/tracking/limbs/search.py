@@ -28,6 +28,10 @@ LEAST_GAIN = 0.003
 """Least gain between two poses in their own evidence, which differs a little by chance."""
 LEAST_M = 0.05
 """A limb with every marker nearer than this to its place was not found elsewhere."""
+GAIN_PER_M, FREE_M = 0.01, 0.5
+"""The evidence alone, without the prior, must gain `GAIN_PER_M` for each m that a limb is moved
+farther than `FREE_M`; nearer, it may lose as much for each m. However unusual a limb's place is, a
+limb that was tracked there is seldom far from it."""
 CLOSE = 0.01
 """A pose that costs at most this much more in undecided evidence may be better in its own."""
 _PARENTS, _CHILDREN = 3, 10
@@ -48,7 +52,7 @@ class LimbSearch:
     better than the estimate, and better than the estimate after the same refinement: a gain of the
     rest of the body is not due to the limb. Other whole poses are compared with the estimate alone.
     Poses are compared by `costs_with_prior`; the gain of a pose is how far its cost lies below the
-    estimate's.
+    estimate's. The prior decides only where the evidence does not contradict (`GAIN_PER_M`).
 
     Args:
         recombiner: draws limbs of the body.
@@ -87,20 +91,28 @@ class LimbSearch:
         other, other_cost = other_limb(
             frame, self._recombiner, self.pose, limb, rng, aim, cost, thorough=self._thorough
         )
-        better = other_cost < cost - self._least_gain
-        if better:
+        gain, least_gain = cost - other_cost, self._least_gain
+        if gain > least_gain:
             refined = frame.refined(self.pose[None], *_REFINE)
-            better = other_cost < float(frame.costs_with_prior(refined)[0]) - self._least_gain
+            gain = min(gain, float(frame.costs_with_prior(refined)[0]) - other_cost)
         if self._own.differs:
             if other_cost > cost + CLOSE or distance_m(self._own.body, other, self.pose) < LEAST_M:
                 return False
+            least_gain = 0.0 if gain > least_gain else LEAST_GAIN
             other, other_cost = self._own.refined(other, *_REFINE)
-            least_gain = 0.0 if better else LEAST_GAIN
-            better = other_cost < self.own_cost - least_gain
-            better = better and other_cost < self._own.refined(self.pose, *_REFINE)[1] - least_gain
+            gain = self.own_cost - other_cost
+            if gain > least_gain:
+                gain = min(gain, self._own.refined(self.pose, *_REFINE)[1] - other_cost)
+        better = gain > least_gain and gain > self._least_gain_of(other)
         if better:
             self._take(other, other_cost)
         return better
+
+    def _least_gain_of(self, other: FloatArray) -> float:
+        """Least gain of a pose (p,): the prior's part, and the evidence's own at that distance."""
+        here, there = prior_costs(self._own.body, np.stack([self.pose, other]))
+        distance = distance_m(self._own.body, other, self.pose)
+        return float(here - there) + GAIN_PER_M * (distance - FREE_M)
 
     def takes(self, other: FloatArray, least_gain: float, close: float) -> bool:
         """Take another pose (p,) if it gains `least_gain`; return whether it was taken.

@@ -1,6 +1,7 @@
 """A limb is found where the evidence that was decided for a wrong pose speaks against it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -91,6 +92,39 @@ def test_what_the_rest_of_the_body_gains_is_no_merit_of_a_limb(
     own = OwnEvidence(searcher, seen, 0, frame)
     search = LimbSearch(Recombiner(body, searcher.limits), frame, own, estimate, 0.003)
     assert search.elsewhere(leg, keyed_generator(0, 0, "leg"), None) is taken
+
+
+@pytest.mark.parametrize(
+    "evidence, prior, moved_m, taken",
+    [(0.0, 0.006, 0.35, True), (-0.0025, 0.006, 0.35, False), (-0.001, 0.005, 0.1, True),
+     (0.004, 0.006, 1.0, False), (0.006, 0.0, 1.0, True)],
+)  # fmt: skip
+@pytest.mark.parametrize("undecided", [False, True])
+def test_the_prior_moves_a_limb_only_where_the_evidence_allows_it(
+    bent, monkeypatch, evidence, prior, moved_m, taken, undecided
+) -> None:
+    """The farther the limb is from its place, the more the evidence itself must gain."""
+    body, estimate, other = bent[0].body, bent[2], bent[3]
+
+    def priors(_, poses):
+        return np.where((poses == other).all(axis=1), 0.0, prior)
+
+    def costs(poses):
+        return priors(body, poses) + np.where((poses == other).all(axis=1), 0.2 - evidence, 0.2)
+
+    frame = SimpleNamespace(costs_with_prior=costs, refined=lambda poses, *_: poses)
+    own = SimpleNamespace(
+        undecided=frame, differs=undecided, body=body,
+        refined=lambda pose, *_: (pose, costs(pose[None])[0]),
+        cost_with_prior=lambda pose: costs(pose[None])[0],
+    )  # fmt: skip
+    monkeypatch.setattr(f"{SEARCH}.prior_costs", priors)
+    monkeypatch.setattr(f"{SEARCH}.distance_m", lambda *_: moved_m)
+    monkeypatch.setattr(f"{SEARCH}.other_limb", lambda *_, **__: (other, costs(other[None])[0]))
+    search = LimbSearch(Recombiner(body, body.limits), frame, own, estimate, 0.001)
+    leg = body.subspaces["l_leg"]
+    assert bool(search.elsewhere(leg, keyed_generator(0, 0, "leg"), None)) is taken
+    assert search.pose is (other if taken else estimate)
 
 
 @pytest.mark.parametrize("thorough", [True, False])
