@@ -1,4 +1,4 @@
-"""Publishes results as topics and frames."""
+"""Publishes results as topics and frames; nothing is made that nobody subscribes to."""
 
 from collections.abc import Callable
 from typing import Any
@@ -91,7 +91,7 @@ class ResultPublishers:
             self.describe(body)
 
     def publish(self, result: TrackResult, body: BodyModel) -> None:
-        """Publish a result; if it has no pose, delete the body from viewers, once."""
+        """Publish a result, if there are subscribers; without a pose, delete the body, once."""
         self._follow(body, result.stamp_ns)
         pose, points, stamp_ns = result.pose, result.markers_m, result.stamp_ns
         if pose is None or points is None:
@@ -100,17 +100,23 @@ class ResultPublishers:
             self._no_pose_shown = True
             return
         confidence = result.confidence
-        covariance = None if confidence is None else confidence.covariance
+        covariance = None
+        if confidence is not None and self._deviations.get_subscription_count():
+            covariance = confidence.covariance
         assert self._angles is not None
+        # Angles continue those of the last frame, so they are read without subscribers, too.
         angles = self._angles.read(pose, stamp_ns, covariance)
-        self._joint_states.publish(messages.joint_state(angles, stamp_ns))
+        if self._joint_states.get_subscription_count():
+            self._joint_states.publish(messages.joint_state(angles, stamp_ns))
         values = dict(zip(angles.names, angles.values_rad.tolist(), strict=True))
         self._frames.publish(root_transform(body, pose), values, stamp_ns)
         self._human.publish(pose, stamp_ns)
-        self._root_poses.publish(messages.root_pose(body, pose, stamp_ns, confidence))
-        if confidence is not None:
+        if self._root_poses.get_subscription_count():
+            self._root_poses.publish(messages.root_pose(body, pose, stamp_ns, confidence))
+        if covariance is not None:
             self._deviations.publish(messages.joint_deviations(angles, stamp_ns))
-        self._marker_poses.publish(messages.marker_poses(points, stamp_ns))
+        if self._marker_poses.get_subscription_count():
+            self._marker_poses.publish(messages.marker_poses(points, stamp_ns))
         if self._markers.get_subscription_count():
             self._markers.publish(messages.body_markers(body, pose, points, stamp_ns))
         self._no_pose_shown = False
