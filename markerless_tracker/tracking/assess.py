@@ -126,7 +126,10 @@ class Assessor:
         terms = search.terms()
         confidence = None
         if self._with_confidence:
-            confidence = confidence_of(body, search.pose, search.contours, measured=body.measured)
+            confidence = confidence_of(
+                body, search.pose, search.contours,
+                measured=body.measured, suspected_m=self.limbs.suspected_m,
+            )  # fmt: skip
         overlap = shared_overlap(terms.values())
         event = Event.FOUND if found.settling else event_of(overlap, self.track.mean_overlap)
         self.track = self.track.after(event, found.stamp_ns, overlap)

@@ -9,6 +9,7 @@ measured.
 A limb at a wrong optimum has a well-determined pose, so its covariance does not show the error. Its
 residuals do: they are larger than those of a limb that fits. An error proportional to their excess
 is added to the limb's markers; one proportional to the trunk's excess is added to all markers.
+Silhouette that the body leaves unexplained tells of a limb that is folded into the trunk.
 Undecided pixels give no residuals, hence no information.
 
 When a straight limb rotates about its own axis, its outline moves less than the model's error. Of
@@ -16,6 +17,7 @@ that rotation only the part that a bent knee or elbow shows is taken as observed
 """
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +47,10 @@ FITTING_M = 0.007
 """Root mean square of the residuals of a limb or trunk that fits, with generic sections."""
 LIMB_ERROR_FACTOR = 15.0
 """Error of a limb's end relative to the excess of its residuals over those of a limb that fits."""
+SUSPECTED_FACTOR = 0.5
+"""Error of a limb's end relative to the size of unexplained silhouette that it may belong to."""
 MOST_LIMB_M = 0.30
-"""Largest error that is inferred from the excess: about the length of a segment."""
+"""Largest error that is inferred from either: about the length of a segment."""
 TRUNK_ERROR_FACTOR = 2.0
 """Error of all markers relative to the excess of the trunk's residuals."""
 _LEVER_M = 0.25
@@ -56,7 +60,12 @@ _LEAST_SIGMA_M = 0.002
 
 
 def confidence_of(
-    body: BodyModel, pose: FloatArray, contours: ContourFrame, *, measured: bool
+    body: BodyModel,
+    pose: FloatArray,
+    contours: ContourFrame,
+    *,
+    measured: bool,
+    suspected_m: Mapping[str, float] = MappingProxyType({}),
 ) -> Confidence | None:
     """Standard deviations of a pose (p,); None if the contours do not determine it.
 
@@ -67,6 +76,7 @@ def confidence_of(
         pose: (p,) the estimate.
         contours: the frame's contour evidence.
         measured: whether the body's lengths are the person's own.
+        suspected_m: by limb, the size of unexplained silhouette that it may belong to.
     """
     sums = contours.equations(pose, _TRUNCATION_M)
     rows = outline_rows(contours)
@@ -91,7 +101,13 @@ def confidence_of(
     common_sd = float(np.linalg.norm([unseen, between, TRUNK_ERROR_FACTOR * of_trunk]))
     by_marker, by_root = jacobians(body, pose)
     of_markers = np.einsum("ij,jk,ik->i", by_marker, covariance, by_marker)
-    limbs_m = {name: min(LIMB_ERROR_FACTOR * value, MOST_LIMB_M) for name, value in by_limb.items()}
+    limbs_m = {
+        name: min(
+            max(LIMB_ERROR_FACTOR * excess, SUSPECTED_FACTOR * suspected_m.get(name, 0.0)),
+            MOST_LIMB_M,
+        )
+        for name, excess in by_limb.items()
+    }
     of_limbs, of_pose = _spread(body, by_marker, limbs_m)
     of_root = by_root @ covariance @ by_root.T
     of_root[np.diag_indices(6)] += np.repeat([common_sd**2, (common_sd / _LEVER_M) ** 2], 3)

@@ -111,6 +111,25 @@ def test_a_limb_beside_its_silhouettes_is_unsure_and_the_others_are_not(scene) -
     assert (unsure.pose_sd[arm] > sure.pose_sd[arm]).all()
 
 
+def test_a_limb_that_unexplained_silhouette_may_belong_to_is_unsure(scene) -> None:
+    """Its end is as unsure as half the silhouette's size, the joints above it less, others not."""
+    pose, contours = frame_of(scene, scene.rig.names)
+    sure = confidence_of(scene.body, pose, contours, measured=True)
+    unsure = confidence_of(scene.body, pose, contours, measured=True, suspected_m={"l_arm": 0.2})
+    assert sure is not None and unsure is not None
+    before, after = sure.markers_sd_m.max(axis=1), unsure.markers_sd_m.max(axis=1)
+    shoulder, elbow, wrist = (
+        MARKER_NAMES.index(f"L{name}") for name in ("Shoulder", "Elbow", "Wrist")
+    )
+    assert after[wrist] == pytest.approx(np.hypot(before[wrist], 0.1), rel=0.01)
+    assert 0.03 < after[elbow] < after[wrist]
+    assert after[shoulder] < after[elbow]
+    others = [i for i in range(len(before)) if i not in (shoulder, elbow, wrist)]
+    np.testing.assert_array_equal(after[others], before[others])
+    changed = unsure.pose_sd > sure.pose_sd
+    assert set(np.flatnonzero(changed)) == set(scene.body.subspaces["l_arm"])
+
+
 def test_a_limb_on_undecided_pixels_is_less_sure(scene) -> None:
     pose, contours = frame_of(scene, scene.rig.names)
     sure = confidence_of(scene.body, pose, contours, measured=True)

@@ -40,6 +40,8 @@ since sets that come too late are lost."""
 FIRST_WAIT_NS = 32_000_000
 """Time before a limb near unexplained silhouette is searched again, after one search without gain.
 It doubles with each further search without gain, at most `_DOUBLINGS` times."""
+SUSPECTED = 2
+"""Number of limbs whose error may be as large as the unexplained silhouette."""
 RECOVERED_M = 0.10
 """A limb that is found farther than this from its last place was wrong there."""
 _DOUBLINGS = 4
@@ -133,6 +135,7 @@ class LimbWatch:
         self._rounds = 0
         self._round_of: dict[str, int] = {}
         self._unexplained = 0
+        self._areas_m2: dict[str, float] = {}
         self._last_ns: int | None = None
         self._waits: dict[str, _Wait] = {}
         self._exchange = PairExchange()
@@ -143,6 +146,15 @@ class LimbWatch:
     def lost(self) -> tuple[str, ...]:
         """Limbs that were lost when last assessed."""
         return tuple(n for n, track in self._tracks.items() if track.state is TrackState.LOST)
+
+    @property
+    def suspected_m(self) -> dict[str, float]:
+        """Size of the unexplained silhouette that a limb may belong to, of the likeliest limbs.
+
+        It is the root of the area that was found when limbs were searched last.
+        """
+        likeliest = tuple(self._areas_m2.items())[:SUSPECTED]
+        return {name: float(np.sqrt(area_m2)) for name, area_m2 in likeliest}
 
     def assess(
         self,
@@ -201,6 +213,7 @@ class LimbWatch:
         if not body.limbs:
             return Recovered(pose)
         unexplained = find_unexplained(body, pose, observations, self._rig)
+        self._areas_m2 = dict(unexplained.areas_m2)
         if not unexplained.limbs:
             self._waits.clear()
         pair, facing, walking = None, False, []
@@ -264,6 +277,7 @@ class LimbWatch:
             if search.elsewhere(limb, rng, aim):
                 found.append(name)
                 self._waits.pop(name, None)
+                self._areas_m2.pop(name, None)
             else:
                 self._search_failed(name, stamp_ns, unexplained.areas_m2.get(name, 0.0))
         moved_m = distance_m(body, search.pose, pose)
