@@ -84,6 +84,13 @@ class Searcher:
         self.particle_sets: dict[str, ParticleSet] = {}
         """By stage, the particles of the last frame, if its algorithm continues from them."""
 
+    def unusual_costs(self, poses: FloatArray) -> FloatArray:
+        """Costs (n,) of unusual limbs and, with a floor, of feet off it, in units of f_s."""
+        costs = prior_costs(self.body, poses)
+        if self.config.refine.floor_sd_m > 0.0:
+            costs += off_floor(self.body, poses)
+        return costs
+
     def frame(
         self,
         observations: Mapping[str, Observation],
@@ -185,8 +192,9 @@ class FrameSearch:
 
         Without contour refinement the result is the best of the last swarm, as published. If there
         is contour refinement, in this call or an earlier one, a stage's result is taken only if it
-        explains the views better, by at least `min_improvement` of the stage. The swarm corrects a
-        refinement at a wrong optimum; the refinement improves the swarm's precision.
+        explains the views better, by at least `min_improvement` of the stage, and a swarm's only if
+        it also gains more than it is less usual. The swarm corrects a refinement at a wrong
+        optimum; the refinement improves the swarm's precision.
         """
         contour = next((stage for stage in stages if stage.plan.algorithm == CONTOUR), None)
         if contour is not None and self._whole is None:
@@ -207,20 +215,13 @@ class FrameSearch:
                 continue
             if found_cost is None:
                 found_cost = float(self._costs_of(found[None])[0])
-            gain = self.cost - found_cost
-            if gain > stage.plan.min_improvement and (
-                stage.plan.algorithm == CONTOUR or gain > self._less_usual(found)
-            ):
+            least = stage.plan.min_improvement
+            if stage.plan.algorithm != CONTOUR:
+                before, after = self.searcher.unusual_costs(np.stack([self.pose, found]))
+                least = max(least, float(after - before))
+            if found_cost < self.cost - least:
                 self.pose, self.cost = found, found_cost
         return self.pose
-
-    def _less_usual(self, found: FloatArray) -> float:
-        """How much less usual a pose (p,) is than the estimate, in units of f."""
-        body, poses = self.searcher.body, np.stack([self.pose, found])
-        costs = prior_costs(body, poses)
-        if self.searcher.config.refine.floor_sd_m > 0.0:
-            costs += off_floor(body, poses)
-        return float(costs[1] - costs[0])
 
     def terms(self) -> dict[str, ViewTerms]:
         """The terms of the fitness of the estimate in each view."""

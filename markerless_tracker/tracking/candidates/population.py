@@ -16,9 +16,8 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.tracking.candidates.crossed import PAIRS, in_each_others_place
-from markerless_tracker.tracking.candidates.posture_costs import off_floor, unlike_postures
+from markerless_tracker.tracking.candidates.posture_costs import unlike_postures
 from markerless_tracker.tracking.candidates.postures import first_guesses
-from markerless_tracker.tracking.candidates.prior_costs import prior_costs
 from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.evidence.hull import Hull
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
@@ -229,11 +228,8 @@ class FramePopulation:
         return np.where(np.isfinite(costs), costs, np.inf)
 
     def costs_with_prior(self, poses: FloatArray) -> FloatArray:
-        """`costs` plus `prior_costs` and, with a floor, feet off it; to compare poses."""
-        costs = self.costs(poses) + prior_costs(self._searcher.body, poses)
-        if self._searcher.config.refine.floor_sd_m > 0.0:
-            costs += off_floor(self._searcher.body, poses)
-        return np.asarray(costs)
+        """`costs` plus those of unusual limbs and feet (`Searcher.unusual_costs`)."""
+        return self.costs(poses) + self._searcher.unusual_costs(poses)
 
     def best_cost(self, population: Population) -> float:
         """1 - f_s of the best pose of a population."""

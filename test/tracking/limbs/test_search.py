@@ -183,7 +183,7 @@ def test_poses_are_compared_with_the_prior_of_their_limbs(bent, monkeypatch) -> 
     own = OwnEvidence(searcher, seen, 0, frame)
     prior = 0.0
     monkeypatch.setattr(
-        "markerless_tracker.tracking.candidates.population.prior_costs",
+        "markerless_tracker.tracking.search.prior_costs",
         lambda body, poses: np.full(len(poses), prior),
     )
     plain = own.cost_with_prior(true)

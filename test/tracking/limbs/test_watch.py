@@ -10,9 +10,8 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
-from markerless_tracker.tracking.limbs.search import LimbSearch
 from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS
-from markerless_tracker.tracking.limbs.unexplained import Unexplained, find_unexplained
+from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import (
     FIRST_WAIT_NS,
     RECOVERED_M,
@@ -174,29 +173,6 @@ def test_a_limb_near_unexplained_silhouette_is_searched_in_every_frame(balancing
     for stamp_ns in (0, 1, PER_LIMB_NS):
         names = recover(watch, searcher, contours, seen, stamp_ns, hidden)[1]
         assert "l_arm" in names
-
-
-def test_limbs_are_suspected_while_silhouette_is_unexplained(balancing, monkeypatch) -> None:
-    scene, seen, pose, hidden = balancing
-    searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
-    contours = contours_of(searcher, seen, hidden)
-    elsewhere = LimbSearch.elsewhere
-    monkeypatch.setattr(LimbSearch, "elsewhere", lambda *_: False)
-    assert watch.suspected_m == {}
-    recover(watch, searcher, contours, seen, 0, hidden)
-    suspected = watch.suspected_m
-    areas = find_unexplained(scene.body, hidden, seen, scene.rig).areas_m2
-    assert list(suspected) == list(areas)[:2] and "l_arm" in suspected
-    assert suspected["l_arm"] == pytest.approx(np.sqrt(areas["l_arm"]))
-    recover(watch, searcher, contours, seen, PER_LIMB_NS, pose)
-    assert watch.suspected_m == {}
-    recover(watch, searcher, contours, seen, 2 * PER_LIMB_NS, hidden)
-    assert watch.suspected_m == suspected
-    watch.reset()
-    assert watch.suspected_m == {}
-    monkeypatch.setattr(LimbSearch, "elsewhere", elsewhere)
-    assert "l_arm" in recover(watch, searcher, contours, seen, 0, hidden)[1]
-    assert "l_arm" not in watch.suspected_m
 
 
 def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monkeypatch) -> None:

@@ -86,7 +86,7 @@ def test_how_usual_the_limbs_are_counts_for_the_heading(walk, monkeypatch) -> No
         right = [heading_difference(heading(markers(body, p)), true_rad) < 1.5 for p in poses]
         return np.where(right, 0.2, 0.0)
 
-    monkeypatch.setattr("markerless_tracker.tracking.candidates.population.prior_costs", prior)
+    monkeypatch.setattr("markerless_tracker.tracking.search.prior_costs", prior)
     tracker = tracker_of(scene, stature=1.72)
     results = [tracker.step(seen, stamp) for stamp, seen, _ in taken[:SETTLING_FRAMES]]
     assert heading_difference(heading(results[-1].markers_m), true_rad) > 2.5

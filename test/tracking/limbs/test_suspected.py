@@ -1,0 +1,64 @@
+"""Which limbs the watch suspects after its searches, and for how long."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.evidence.seen import Seen
+from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS
+from markerless_tracker.tracking.limbs.unexplained import Unexplained
+from markerless_tracker.tracking.limbs.watch import LimbWatch
+from markerless_tracker.tracking.search import Searcher
+
+LIMBS = "markerless_tracker.tracking.limbs"
+
+
+@pytest.fixture
+def searched(monkeypatch):
+    """A watch, and its searches of a frame in which areas of silhouette are unexplained."""
+    scene = SyntheticScene(body="person31", motion="stand", size_px=(164, 123), seed=3)
+    _, masks, pose = scene.frame(0)
+    seen = {
+        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+    }
+    body, watch = scene.body, LimbWatch(scene.rig)
+    searcher = Searcher(scene.rig, body, TrackerConfig(threads=1), limits=body.limits, threads=1)
+    contours = searcher.frame(seen, 0, pose).contours
+    stamps = iter(range(0, 100 * PER_LIMB_NS, PER_LIMB_NS))
+
+    def search(areas_m2, found=()):
+        limbs = [body.subspaces[name] for name in found]
+        monkeypatch.setattr(f"{LIMBS}.watch.find_unexplained", lambda *_: Unexplained(areas_m2, {}))
+        monkeypatch.setattr(
+            f"{LIMBS}.search.LimbSearch.elsewhere",
+            lambda _, limb, *__: any(np.array_equal(limb, one) for one in limbs),
+        )
+        watch.recover(searcher, contours, Seen(next(stamps), seen, seen, seen), pose)
+
+    return watch, search
+
+
+def test_the_two_likeliest_limbs_are_suspected_with_the_size_of_the_silhouette(searched) -> None:
+    watch, search = searched
+    assert watch.suspected_m == {}
+    search({"r_leg": 0.04, "l_leg": 0.01, "l_arm": 0.004})
+    assert watch.suspected_m == pytest.approx({"r_leg": 0.2, "l_leg": 0.1})
+
+
+def test_limbs_are_suspected_until_the_silhouette_is_explained(searched) -> None:
+    watch, search = searched
+    search({"l_arm": 0.04})
+    search({})
+    assert watch.suspected_m == {}
+    search({"l_arm": 0.04})
+    watch.reset()
+    assert watch.suspected_m == {}
+
+
+def test_a_limb_that_was_found_is_not_suspected(searched) -> None:
+    watch, search = searched
+    search({"l_arm": 0.04, "r_arm": 0.02}, found=["l_arm"])
+    assert list(watch.suspected_m) == ["r_arm"]
