@@ -215,11 +215,12 @@ class FrameSearch:
                 continue
             if found_cost is None:
                 found_cost = float(self._costs_of(found[None])[0])
-            least = stage.plan.min_improvement
-            if stage.plan.algorithm != CONTOUR:
+            gain = self.cost - found_cost
+            better = gain > stage.plan.min_improvement
+            if better and stage.plan.algorithm != CONTOUR:
                 before, after = self.searcher.unusual_costs(np.stack([self.pose, found]))
-                least = max(least, float(after - before))
-            if found_cost < self.cost - least:
+                better = gain > float(after - before)
+            if better:
                 self.pose, self.cost = found, found_cost
         return self.pose
 

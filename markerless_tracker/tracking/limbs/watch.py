@@ -277,9 +277,11 @@ class LimbWatch:
             if search.elsewhere(limb, rng, aim):
                 found.append(name)
                 self._waits.pop(name, None)
-                self._areas_m2.pop(name, None)
             else:
                 self._search_failed(name, stamp_ns, unexplained.areas_m2.get(name, 0.0))
+        if found:
+            # They explain at least a part of the silhouette; the next search finds the rest.
+            self._areas_m2 = {}
         moved_m = distance_m(body, search.pose, pose)
         return Recovered(search.pose, tuple(found), moved_m=moved_m)
 

@@ -58,7 +58,10 @@ def test_limbs_are_suspected_until_the_silhouette_is_explained(searched) -> None
     assert watch.suspected_m == {}
 
 
-def test_a_limb_that_was_found_is_not_suspected(searched) -> None:
+def test_no_limb_is_suspected_once_one_was_found(searched) -> None:
+    """The silhouette that it left is explained."""
     watch, search = searched
     search({"l_arm": 0.04, "r_arm": 0.02}, found=["l_arm"])
+    assert watch.suspected_m == {}
+    search({"r_arm": 0.02})
     assert list(watch.suspected_m) == ["r_arm"]
