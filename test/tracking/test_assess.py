@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.body import load_body
+from markerless_tracker.body import MARKER_NAMES, load_body
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis.rig import ring_rig
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.assess import Assessor
 from markerless_tracker.tracking.evidence.seen import Seen
+from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.states import Phase, Track
 
 
@@ -33,3 +34,15 @@ def test_lost_limbs_are_those_of_the_tracked_person(phase, state, lost) -> None:
     result = assessor.without_person(Seen(0, seen, seen, seen))
     assert result.state is state
     assert set(assessor.limbs.lost) == set(lost)
+
+
+def test_a_suspected_limb_is_less_sure_in_the_result(
+    frames, make_tracker, refined_settings, monkeypatch
+) -> None:
+    wrist, deviations = MARKER_NAMES.index("LWrist"), []
+    for suspected_m in ({}, {"l_arm": 0.3}):
+        monkeypatch.setattr(LimbWatch, "suspected_m", suspected_m)
+        result = make_tracker(refined_settings).step(frames[0].observations, frames[0].stamp_ns)
+        assert result.confidence is not None
+        deviations.append(result.confidence.markers_sd_m[wrist].max())
+    assert deviations[1] == pytest.approx(np.hypot(deviations[0], 0.15), rel=0.01)
