@@ -52,7 +52,7 @@ class LimbSearch:
     better than the estimate, and better than the estimate after the same refinement: a gain of the
     rest of the body is not due to the limb. Other whole poses are compared with the estimate alone.
     Poses are compared by `costs_with_prior`; the gain of a pose is how far its cost lies below the
-    estimate's. The prior decides only where the evidence does not contradict (`GAIN_PER_M`).
+    estimate's. The evidence alone must gain enough, too (`GAIN_PER_M`).
 
     Args:
         recombiner: draws limbs of the body.

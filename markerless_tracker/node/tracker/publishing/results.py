@@ -1,4 +1,4 @@
-"""Publishes results as topics and frames; nothing is made that nobody subscribes to."""
+"""Publishes results as topics and frames; messages of a pose are made for subscribers only."""
 
 from collections.abc import Callable
 from typing import Any
