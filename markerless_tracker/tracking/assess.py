@@ -129,6 +129,7 @@ class Assessor:
             confidence = confidence_of(
                 body, search.pose, search.contours,
                 measured=body.measured, suspected_m=self.limbs.suspected_m,
+                rivals=self.limbs.rivals,
             )  # fmt: skip
         overlap = shared_overlap(terms.values())
         event = Event.FOUND if found.settling else event_of(overlap, self.track.mean_overlap)

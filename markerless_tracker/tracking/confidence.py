@@ -4,11 +4,13 @@ The inverse normal equations of the contour refinement, scaled by the variance o
 residuals, are the Gauss-Newton approximation of the posterior covariance. It accounts for noise
 only. Two errors are added to it. One is the disagreement between the views. The other is what
 images do not show: where the joint's centre lies inside the limb, and the lengths, if they were not
-measured.
+measured. Then a joint is less sure along its limb than across, since its outline is nearly the same
+there.
 
-A limb at a wrong optimum has a well-determined pose, so its covariance does not show the error. Its
-residuals do: they are larger than those of a limb that fits. An error proportional to their excess
-is added to the limb's markers; one proportional to the trunk's excess is added to all markers.
+A limb at a wrong optimum has a well-determined pose, so its covariance does not show the error.
+Three things do. If the search of a limb finds another place that costs nearly as much, the limb may
+as well be there (`limbs.rivals`). Its residuals are larger than those of a limb that fits: an error
+that grows with their excess is added to the limb's markers, one with the trunk's to all markers.
 Silhouette that the body leaves unexplained tells of a limb that is folded into the trunk.
 Undecided pixels give no residuals, hence no information.
 
@@ -22,7 +24,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.body import BodyModel, markers, transforms
+from markerless_tracker.body import MARKER_NAMES, BodyModel, markers, transforms
 from markerless_tracker.body.angles.swing import straightness, twists
 from markerless_tracker.body.kinematics import carried, move_axes
 from markerless_tracker.body.model import is_translation
@@ -32,30 +34,47 @@ from markerless_tracker.fitness.contour import ContourFrame, OutlineRows, outlin
 from markerless_tracker.fitness.shape import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Confidence
+from markerless_tracker.tracking.limbs.rivals import Rival
 
-MEASURED_M = 0.0025
+MEASURED_M = 0.002
 """Error, per axis, of a joint's centre in a body whose lengths were measured."""
-UNMEASURED_M = 0.013
+UNMEASURED_M = 0.010
 """The same with lengths that were fitted, or derived from a stature."""
-DISAGREEMENT_FACTOR = 2.0
+ALONG_M = 0.020
+"""Further error along the limb, or along the trunk, of such a body."""
+DISAGREEMENT_FACTOR = 1.4
 """Error of a pose relative to the disagreement of the views that remains after the fit."""
-CORRELATED = 9.0
+CORRELATED = 7.0
 """Factor of the residuals' correlation length. The error of a generic section extends along a whole
 limb, about half a metre, which is longer than the pieces of outline that the refinement treats as
 independent."""
-FITTING_M = 0.007
-"""Root mean square of the residuals of a limb or trunk that fits, with generic sections."""
-LIMB_ERROR_FACTOR = 15.0
+LIMB_FITTING_M, TRUNK_FITTING_M = 0.009, 0.008
+"""Root mean square of the residuals of a limb that fits, and of a trunk that fits."""
+LIMB_ERROR_FACTOR = 25.0
 """Error of a limb's end relative to the excess of its residuals over those of a limb that fits."""
-SUSPECTED_FACTOR = 0.5
+SUSPECTED_FACTOR = 0.25
 """Error of a limb's end relative to the size of unexplained silhouette that it may belong to."""
 MOST_LIMB_M = 0.30
 """Largest error that is inferred from either: about the length of a segment."""
-TRUNK_ERROR_FACTOR = 2.0
+TRUNK_ERROR_FACTOR = 3.0
 """Error of all markers relative to the excess of the trunk's residuals."""
 _LEVER_M = 0.25
 """Length of a limb, which converts an error of a joint's centre into an error of its angle."""
 _TRUNCATION_M = 0.06
+_SEGMENTS = {
+    **dict.fromkeys(("Pelvis", "Neck", "LShoulder", "RShoulder"), ("Pelvis", "Neck")),
+    "Head": ("Neck", "Head"),
+    **{
+        f"{side}{joint}": (f"{side}{start}", f"{side}{end}")
+        for side in "LR"
+        for joint, start, end in (
+            ("Elbow", "Shoulder", "Elbow"), ("Wrist", "Elbow", "Wrist"), ("Hip", "Hip", "Knee"),
+            ("Knee", "Hip", "Knee"), ("Ankle", "Knee", "Ankle"),
+        )
+    },
+}  # fmt: skip
+_ALONG = np.array([[MARKER_NAMES.index(end) for end in _SEGMENTS[n]] for n in MARKER_NAMES])
+"""Per marker: the markers at the ends of the segment along which it is less sure."""
 _LEAST_SIGMA_M = 0.002
 
 
@@ -66,6 +85,7 @@ def confidence_of(
     *,
     measured: bool,
     suspected_m: Mapping[str, float] = MappingProxyType({}),
+    rivals: Mapping[str, Rival] = MappingProxyType({}),
 ) -> Confidence | None:
     """Standard deviations of a pose (p,); None if the contours do not determine it.
 
@@ -77,6 +97,7 @@ def confidence_of(
         contours: the frame's contour evidence.
         measured: whether the body's lengths are the person's own.
         suspected_m: by limb, the size of unexplained silhouette that it may belong to.
+        rivals: by limb, another place that explains the images nearly as well.
     """
     sums = contours.equations(pose, _TRUNCATION_M)
     rows = outline_rows(contours)
@@ -109,6 +130,12 @@ def confidence_of(
         for name, excess in by_limb.items()
     }
     of_limbs, of_pose = _spread(body, by_marker, limbs_m)
+    of_model_m = of_limbs[:, None] + common_sd**2
+    if not measured:
+        of_model_m = of_model_m + (ALONG_M * directions(markers(body, pose))) ** 2
+    for rival in rivals.values():
+        of_model_m = of_model_m + rival.probability * rival.moved_m**2
+        of_pose += rival.probability * rival.moved**2
     of_root = by_root @ covariance @ by_root.T
     of_root[np.diag_indices(6)] += np.repeat([common_sd**2, (common_sd / _LEVER_M) ** 2], 3)
     common_sds = np.full(body.size, common_sd / _LEVER_M)
@@ -117,7 +144,7 @@ def confidence_of(
     return Confidence(
         pose_sd=np.sqrt(np.diag(covariance) + common_sds**2 + of_pose),
         pose_covariance=covariance + of_model,
-        markers_sd_m=np.sqrt((of_markers + common_sd**2).reshape(-1, 3) + of_limbs[:, None]),
+        markers_sd_m=np.sqrt(of_markers.reshape(-1, 3) + of_model_m),
         root_covariance=0.5 * (of_root + of_root.T),
     )
 
@@ -175,16 +202,24 @@ def excesses_m(body: BodyModel, rows: OutlineRows) -> tuple[dict[str, float], fl
     weight = np.bincount(rows.cone, rows.weight, count)
     square = np.bincount(rows.cone, rows.weight * rows.value**2, count)
 
-    def excess(cones: NDArray[np.bool_]) -> float:
+    def excess(cones: NDArray[np.bool_], fitting_m: float) -> float:
         total = float(weight[cones].sum())
         rms = float(np.sqrt(square[cones].sum() / total)) if total > 0.0 else 0.0
-        return max(rms - FITTING_M, 0.0)
+        return max(rms - fitting_m, 0.0)
 
     hangs = {name: cones_of(body, name) for name in (*body.limbs, "head") if name in body.subspaces}
     trunk = np.ones(count, dtype=np.bool_)
     for others in hangs.values():
         trunk &= ~others
-    return {name: excess(hangs[name]) for name in body.limbs}, excess(trunk)
+    limbs = {name: excess(hangs[name], LIMB_FITTING_M) for name in body.limbs}
+    return limbs, excess(trunk, TRUNK_FITTING_M)
+
+
+def directions(markers_m: FloatArray) -> FloatArray:
+    """Unit vectors (15, 3) along the limb or the trunk of each marker (15, 3); 0 if it has none."""
+    along = markers_m[_ALONG[:, 1]] - markers_m[_ALONG[:, 0]]
+    length_m = np.linalg.norm(along, axis=1, keepdims=True)
+    return np.asarray(along / np.maximum(length_m, 1e-9))
 
 
 def _spread(

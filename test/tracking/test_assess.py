@@ -9,6 +9,7 @@ from markerless_tracker.synthesis.rig import ring_rig
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.assess import Assessor
 from markerless_tracker.tracking.evidence.seen import Seen
+from markerless_tracker.tracking.limbs.rivals import Rival
 from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.states import Phase, Track
 
@@ -45,4 +46,19 @@ def test_a_suspected_limb_is_less_sure_in_the_result(
         result = make_tracker(refined_settings).step(frames[0].observations, frames[0].stamp_ns)
         assert result.confidence is not None
         deviations.append(result.confidence.markers_sd_m[wrist].max())
-    assert deviations[1] == pytest.approx(np.hypot(deviations[0], 0.15), rel=0.01)
+    assert deviations[1] == pytest.approx(np.hypot(deviations[0], 0.075), rel=0.01)
+
+
+def test_a_limb_with_a_rival_is_less_sure_in_the_result(
+    frames, make_tracker, refined_settings, monkeypatch
+) -> None:
+    wrist, deviations = MARKER_NAMES.index("LWrist"), []
+    moved_m = np.zeros((15, 3))
+    moved_m[wrist, 1] = 0.4
+    for rivals in ({}, {"l_arm": Rival(0.25, np.zeros(31), moved_m)}):
+        monkeypatch.setattr(LimbWatch, "rivals", rivals)
+        result = make_tracker(refined_settings).step(frames[0].observations, frames[0].stamp_ns)
+        assert result.confidence is not None
+        deviations.append(result.confidence.markers_sd_m[wrist])
+    added = deviations[1] ** 2 - deviations[0] ** 2
+    np.testing.assert_allclose(added, [0.0, 0.25 * 0.4**2, 0.0], atol=1e-12)

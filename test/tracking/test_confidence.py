@@ -13,12 +13,15 @@ from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.confidence import (
+    ALONG_M,
     MEASURED_M,
     UNMEASURED_M,
     confidence_of,
+    directions,
     disagreement_m,
     jacobians,
 )
+from markerless_tracker.tracking.limbs.rivals import rival_of
 from markerless_tracker.tracking.search import Searcher
 
 
@@ -112,10 +115,10 @@ def test_a_limb_beside_its_silhouettes_is_unsure_and_the_others_are_not(scene) -
 
 
 def test_a_limb_that_unexplained_silhouette_may_belong_to_is_unsure(scene) -> None:
-    """Its end is as unsure as half the silhouette's size, the joints above it less, others not."""
+    """Its end by a quarter of the silhouette's size, the joints above it by less, others not."""
     pose, contours = frame_of(scene, scene.rig.names)
     sure = confidence_of(scene.body, pose, contours, measured=True)
-    unsure = confidence_of(scene.body, pose, contours, measured=True, suspected_m={"l_arm": 0.2})
+    unsure = confidence_of(scene.body, pose, contours, measured=True, suspected_m={"l_arm": 0.4})
     assert sure is not None and unsure is not None
     before, after = sure.markers_sd_m.max(axis=1), unsure.markers_sd_m.max(axis=1)
     shoulder, elbow, wrist = (
@@ -128,6 +131,42 @@ def test_a_limb_that_unexplained_silhouette_may_belong_to_is_unsure(scene) -> No
     np.testing.assert_array_equal(after[others], before[others])
     changed = unsure.pose_sd > sure.pose_sd
     assert set(np.flatnonzero(changed)) == set(scene.body.subspaces["l_arm"])
+
+
+def test_a_limb_with_a_rival_is_unsure_along_the_way_to_it(scene) -> None:
+    pose, contours = frame_of(scene, scene.rig.names)
+    body, elbow = scene.body, scene.body.index("l_elbow")
+    other = pose.copy()
+    other[elbow] += 1.0
+    rival = rival_of(body, pose, other, 0.0)
+    assert rival is not None
+    sure = confidence_of(body, pose, contours, measured=True)
+    unsure = confidence_of(body, pose, contours, measured=True, rivals={"l_arm": rival})
+    assert sure is not None and unsure is not None
+    added = unsure.markers_sd_m**2 - sure.markers_sd_m**2
+    np.testing.assert_allclose(added, 0.5 * rival.moved_m**2, atol=1e-12)
+    assert added.max() > 0.1**2
+    added = unsure.pose_sd**2 - sure.pose_sd**2
+    np.testing.assert_allclose(added, 0.5 * (np.arange(body.size) == elbow), atol=1e-12)
+
+
+def test_a_body_with_fitted_lengths_is_less_sure_along_its_limbs(scene) -> None:
+    pose, contours = frame_of(scene, scene.rig.names)
+    lengths = confidence_of(scene.body, pose, contours, measured=False)
+    measured = confidence_of(scene.body, pose, contours, measured=True)
+    assert lengths is not None and measured is not None
+    along = directions(markers(scene.body, pose))
+    np.testing.assert_allclose(np.linalg.norm(along, axis=1), 1.0)
+    added = lengths.markers_sd_m**2 - measured.markers_sd_m**2
+    expected = UNMEASURED_M**2 - MEASURED_M**2 + (ALONG_M * along) ** 2
+    np.testing.assert_allclose(added, expected, atol=1e-12)
+    ankle, knee = MARKER_NAMES.index("LAnkle"), MARKER_NAMES.index("LKnee")
+    shank = markers(scene.body, pose)[ankle] - markers(scene.body, pose)[knee]
+    np.testing.assert_allclose(along[ankle], shank / np.linalg.norm(shank))
+
+
+def test_markers_in_one_place_have_no_direction() -> None:
+    np.testing.assert_array_equal(directions(np.ones((15, 3))), np.zeros((15, 3)))
 
 
 def test_a_limb_on_undecided_pixels_is_less_sure(scene) -> None:

@@ -12,6 +12,7 @@ from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
 from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.candidates.prior_costs import prior_costs
 from markerless_tracker.tracking.candidates.recombination import Recombiner
+from markerless_tracker.tracking.limbs.rivals import Rival, rival_of
 from markerless_tracker.tracking.search import LIMB_TRUNCATION_M
 
 DRAWS = 120
@@ -66,6 +67,8 @@ class LimbSearch:
 
     Attributes:
         pose: (p,) the estimate so far.
+        rival: the place that the last search of a limb did not take: the best other one, or the
+            former one; None if there is none.
     """
 
     def __init__(
@@ -82,10 +85,24 @@ class LimbSearch:
         self._recombiner = recombiner
         self._frame = frame
         self._own = own
+        self.rival: Rival | None = None
         self._take(pose, None)
 
     def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
         """Search a limb; return whether it was found elsewhere. Arguments as for `other_limb`."""
+        before = self.pose
+        other, gain, better = self._elsewhere(limb, rng, aim)
+        if better:
+            self._take(*other)
+            self.rival = rival_of(self._own.body, self.pose, before, gain)
+        else:
+            self.rival = rival_of(self._own.body, before, other[0], -gain)
+        return better
+
+    def _elsewhere(
+        self, limb: IntArray, rng: np.random.Generator, aim: Aim | None
+    ) -> tuple[tuple[FloatArray, float], float, bool]:
+        """The best other pose (p,) and its cost, its gain, and whether that is enough."""
         frame = self._own.undecided
         cost = float(frame.costs_with_prior(self.pose[None])[0])
         other, other_cost = other_limb(
@@ -97,16 +114,14 @@ class LimbSearch:
             gain = min(gain, float(frame.costs_with_prior(refined)[0]) - other_cost)
         if self._own.differs:
             if other_cost > cost + CLOSE or distance_m(self._own.body, other, self.pose) < LEAST_M:
-                return False
+                return (other, other_cost), gain, False
             least_gain = 0.0 if gain > least_gain else LEAST_GAIN
             other, other_cost = self._own.refined(other, *_REFINE)
             gain = self.own_cost - other_cost
             if gain > least_gain:
                 gain = min(gain, self._own.refined(self.pose, *_REFINE)[1] - other_cost)
         better = gain > least_gain and gain > self._least_gain_of(other)
-        if better:
-            self._take(other, other_cost)
-        return better
+        return (other, other_cost), gain, better
 
     def _least_gain_of(self, other: FloatArray) -> float:
         """Least gain of a pose (p,): the prior's part, and the evidence's own at that distance."""

@@ -25,6 +25,7 @@ from markerless_tracker.tracking.limbs.aimed import most_aimed
 from markerless_tracker.tracking.limbs.exchange import CLOSE, PairExchange
 from markerless_tracker.tracking.limbs.facing import FacingWatch
 from markerless_tracker.tracking.limbs.inside import inside_fractions
+from markerless_tracker.tracking.limbs.rivals import Rival
 from markerless_tracker.tracking.limbs.search import LimbSearch, distance_m
 from markerless_tracker.tracking.limbs.turns import LimbTurns
 from markerless_tracker.tracking.limbs.unexplained import find_unexplained
@@ -136,6 +137,7 @@ class LimbWatch:
         self._round_of: dict[str, int] = {}
         self._unexplained = 0
         self._areas_m2: dict[str, float] = {}
+        self._rivals: dict[str, Rival] = {}
         self._last_ns: int | None = None
         self._waits: dict[str, _Wait] = {}
         self._exchange = PairExchange()
@@ -155,6 +157,11 @@ class LimbWatch:
         """
         likeliest = tuple(self._areas_m2.items())[:SUSPECTED]
         return {name: float(np.sqrt(area_m2)) for name, area_m2 in likeliest}
+
+    @property
+    def rivals(self) -> dict[str, Rival]:
+        """Other places of limbs, each as of the limb's last search."""
+        return dict(self._rivals)
 
     def assess(
         self,
@@ -250,11 +257,13 @@ class LimbWatch:
         if facing:
             rotated = self._facing.compare(search, body, searcher.limits)
             if rotated is not None:
+                self._rivals = {}
                 self._exchange.forget_gains()
                 return Recovered(rotated, rotated=True)
         for other in walking:
             if search.takes(other, WALKING_GAIN, WALKING_CLOSE):
                 # The sums were of comparisons with the former heading.
+                self._rivals = {}
                 self._facing.reset()
                 self._exchange.forget_gains()
                 return Recovered(search.pose, rotated=True)
@@ -265,6 +274,7 @@ class LimbWatch:
             other_m = distance_m(body, other, pose)
             if self._exchange.takes(pair.name, gain, pair.least_gains[best], other_m):
                 search.take(other)
+                self._rivals = {}
                 found.append(pair.name)
         for name in due:
             rng = keyed_generator(searcher.config.seed, stamp_ns, f"{name} elsewhere")
@@ -274,7 +284,11 @@ class LimbWatch:
                 aim = partial(
                     most_aimed, body, limb=limb, regions=unexplained.regions, rig=self._rig
                 )
-            if search.elsewhere(limb, rng, aim):
+            taken = search.elsewhere(limb, rng, aim)
+            self._rivals.pop(name, None)
+            if search.rival is not None:
+                self._rivals[name] = search.rival
+            if taken:
                 found.append(name)
                 self._waits.pop(name, None)
             else:

@@ -17,6 +17,7 @@ from markerless_tracker.tracking.candidates.prior_costs import prior_costs
 from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.limbs import search as search_module
+from markerless_tracker.tracking.limbs.rivals import rival_of
 from markerless_tracker.tracking.limbs.search import CLOSE, LimbSearch, other_limb
 from markerless_tracker.tracking.search import Searcher
 
@@ -125,6 +126,12 @@ def test_the_prior_moves_a_limb_only_where_the_evidence_allows_it(
     leg = body.subspaces["l_leg"]
     assert bool(search.elsewhere(leg, keyed_generator(0, 0, "leg"), None)) is taken
     assert search.pose is (other if taken else estimate)
+    # The place that was not taken is the rival.
+    gain, moved = evidence + prior, other - estimate
+    expected = rival_of(body, estimate, other, gain if taken else -gain)
+    assert search.rival is not None and expected is not None
+    np.testing.assert_array_equal(search.rival.moved, -moved if taken else moved)
+    assert search.rival.probability == pytest.approx(expected.probability)
 
 
 @pytest.mark.parametrize("thorough", [True, False])

@@ -1,0 +1,82 @@
+"""Which other places of limbs are remembered, and until when."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.evidence.seen import Seen
+from markerless_tracker.tracking.limbs.rivals import Rival
+from markerless_tracker.tracking.limbs.watch import LimbWatch
+from markerless_tracker.tracking.search import Searcher
+
+PACKAGE = "markerless_tracker.tracking.limbs"
+APART_NS = 100_000_000
+"""Time between frames so far apart that all limbs are searched."""
+
+
+@pytest.fixture
+def watching(monkeypatch):
+    """A watch, a function that searches the next frame, and the rivals that searches find."""
+    scene = SyntheticScene(body="person31", motion="stand", size_px=(164, 123), seed=3)
+    _, masks, pose = scene.frame(0)
+    seen = {
+        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+    }
+    body, watch = scene.body, LimbWatch(scene.rig)
+    searcher = Searcher(scene.rig, body, TrackerConfig(threads=1), limits=body.limits, threads=1)
+    contours = searcher.frame(seen, 0, pose).contours
+    found: dict[str, Rival] = {}
+    stamps_ns = iter(range(0, 10**12, APART_NS))
+
+    def elsewhere(search, limb, *_):
+        name = next(n for n in body.limbs if np.array_equal(body.subspaces[n], limb))
+        search.rival = found.get(name)
+        return False
+
+    monkeypatch.setattr(f"{PACKAGE}.search.LimbSearch.elsewhere", elsewhere)
+    for due in ("facing.FacingWatch.due", "exchange.PairExchange.due"):
+        monkeypatch.setattr(f"{PACKAGE}.{due}", lambda *_: None)
+
+    def frame():
+        at = Seen(next(stamps_ns), seen, seen, seen)
+        return watch.recover(searcher, contours, at, pose, badly=True)
+
+    return watch, frame, found, pose
+
+
+def rival(size):
+    return Rival(0.5, np.zeros(size), np.zeros((15, 3)))
+
+
+def test_a_rival_is_remembered_until_the_limb_is_searched_again(watching) -> None:
+    watch, frame, found, pose = watching
+    arm, leg = rival(pose.size), rival(pose.size)
+    found.update(l_arm=arm, r_leg=leg)
+    frame()
+    assert watch.rivals == {"l_arm": arm, "r_leg": leg}
+    later = rival(pose.size)
+    found.clear()
+    found.update(l_arm=later)
+    frame()
+    assert watch.rivals == {"l_arm": later}
+
+
+def test_another_person_has_no_rivals(watching) -> None:
+    watch, frame, found, pose = watching
+    found.update(l_arm=rival(pose.size))
+    frame()
+    watch.reset()
+    assert watch.rivals == {}
+
+
+def test_after_a_rotation_limbs_have_no_rivals(watching, monkeypatch) -> None:
+    watch, frame, found, pose = watching
+    found.update(l_arm=rival(pose.size))
+    frame()
+    monkeypatch.setattr(f"{PACKAGE}.facing.FacingWatch.due", lambda *_: True)
+    monkeypatch.setattr(f"{PACKAGE}.facing.FacingWatch.compare", lambda *_: pose)
+    assert frame().rotated
+    assert watch.rivals == {}
