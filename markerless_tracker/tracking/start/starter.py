@@ -1,6 +1,6 @@
 """The automatic start: finds a person in one frame and confirms the heading over some more."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,9 @@ from markerless_tracker.tracking.evidence.hull import Hull, find_hulls
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.start.generations import improved
 from markerless_tracker.tracking.start.in_view import InViewGate
+from markerless_tracker.tracking.start.own_sections import better_with_own_sections
 from markerless_tracker.tracking.start.rejections import Rejections
 from markerless_tracker.tracking.start.silhouettes import hulls_silhouettes
 from markerless_tracker.tracking.start.sizing import (
@@ -47,9 +49,6 @@ GAP_NS = 150_000_000
 """After a longer gap, such as a live first search, a refinement may not reach the person."""
 _GAP_GENERATIONS = 2
 """Generations after such a gap."""
-_FITS = 0.85
-"""If 1 - cost is at least this, a generation that gains less than `_GAIN` is the last one."""
-_GAIN = 0.002
 _DOUBTFUL = 0.12
 """If the first search's best pose costs more, a second one adds a cost of unusual postures."""
 _SURE_FIT, _SURE_GAP = 0.91, 0.025
@@ -150,7 +149,7 @@ class Starter:
         population = frame.propagated(population, far=far)
         if far:
             self._headings.restart()
-            population = _improved(frame, population, range(1, 1 + _GAP_GENERATIONS))
+            population = improved(frame, population, range(1, 1 + _GAP_GENERATIONS))
         if len(self._headings) == 1 and not self._sure:
             population = self._second_search(frame, population, observations)
         elif len(self._headings) == 1 + _FINER_AFTER:
@@ -166,8 +165,14 @@ class Starter:
             notes += ("start: the person has the opposite heading, turned round",)
         settled = self._headings.over
         pose = self._best(population).poses[0]
-        if settled:
-            self._settle(frame, pose)
+        if settled and self._fit_shape:
+            body, make = self._searcher.body, self._searcher_for
+            found = better_with_own_sections(self._best(population), body, make, imaged, stamp_ns)
+            if found is None:
+                self._settle(frame, pose)
+            else:
+                self._searcher, pose = found.searcher, found.pose
+                observations = decide(imaged, self._cameras, self._searcher.body, pose)
         return StartEstimate(self._searcher, pose, observations, settled, notes)
 
     def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
@@ -234,7 +239,7 @@ class Starter:
         hull = next(find_hulls(self._cameras, observations), None)
         if hull is None:
             return population
-        fresh = _improved(frame, frame.initialised(hull), range(1, 1 + SECOND_GENERATIONS))
+        fresh = improved(frame, frame.initialised(hull), range(1, 1 + SECOND_GENERATIONS))
         return frame.selected(np.concatenate([population.poses, fresh.poses]))
 
     def _search(
@@ -254,9 +259,9 @@ class Starter:
     ) -> tuple[FramePopulation, Population]:
         self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
         frame, population = self._initialised(hull, observations, stamp_ns)
-        population = _improved(frame, population, range(1 + _RESIZED_AFTER))
+        population = improved(frame, population, range(1 + _RESIZED_AFTER))
         found = self._resized((frame, population), observations, stamp_ns, hull)
-        population = _improved(*found, range(1 + _RESIZED_AFTER, GENERATIONS))
+        population = improved(*found, range(1 + _RESIZED_AFTER, GENERATIONS))
         return found[0], found[0].with_exchanged_pairs(population, GENERATIONS)
 
     def _resized(
@@ -317,8 +322,6 @@ class Starter:
 
     def _settle(self, frame: FramePopulation, pose: FloatArray) -> None:
         assert self._searcher is not None
-        if not self._fit_shape:
-            return
         fits = self._headings.leading_fits
         good = min((fit.cost for fit in fits), default=0.0) + _SHAPE_SLACK
         used = [(fit.contours, fit.pose) for fit in fits if fit.cost <= good][-_SHAPE_FRAMES:]
@@ -335,16 +338,3 @@ def _is_sure(population: Population) -> bool:
     opposite = population.facing(float(population.headings[0]) + np.pi).costs[:1]
     gap = float(opposite[0] - population.costs[0]) if opposite.size else np.inf
     return 1.0 - float(population.costs[0]) >= _SURE_FIT and gap >= _SURE_GAP
-
-
-def _improved(
-    frame: FramePopulation, population: Population, generations: Iterable[int]
-) -> Population:
-    """A population after generations; fewer if the best pose fits well and hardly improves."""
-    for generation in generations:
-        before = population.costs[0]
-        population = frame.recombined(population, generation)
-        cost = population.costs[0]
-        if before - cost < _GAIN and 1.0 - cost >= _FITS:
-            break
-    return population
