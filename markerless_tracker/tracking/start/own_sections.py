@@ -21,7 +21,7 @@ from markerless_tracker.tracking.search import Searcher
 CLOSE, MOST = 0.025, 4
 """Poses that cost at most this much more than the best one, with its body, are compared; the number
 of poses at most."""
-LEAST_GAIN, LEAST_SHARE = 0.004, 0.75
+LEAST_GAIN, LEAST_SHARE = 0.006, 0.75
 """Least gain for which another pose than the best one is taken; also as a share of what it costs
 more with the common body. Sections can explain a part of any pose."""
 _ROUNDS = 2
