@@ -87,7 +87,9 @@ class Starter:
     tried if it is unknown). The best ones are refined, recombined and refined again; if they fit
     poorly, once more with a cost of unusual postures, by which the poses of both searches are
     compared. Legs and arms are tried in each other's place. The opposite heading is propagated,
-    too, until one is kept (`two_headings`). Then the sections are fitted with the poses held.
+    too, until one is kept (`two_headings`). Then poses that cost about as much as the best one are
+    compared with sections of their own (`own_sections`), and the sections are fitted with the poses
+    held.
 
     Args:
         rig: the cameras.
