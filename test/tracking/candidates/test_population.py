@@ -1,7 +1,6 @@
 """Populations of one frame: any number of threads, costs, generations, exchanged limbs."""
 
 from collections.abc import Mapping
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,7 +21,6 @@ from markerless_tracker.tracking.candidates.mirror import mirror_of
 from markerless_tracker.tracking.candidates.population import FramePopulation, scaled_to
 from markerless_tracker.tracking.candidates.postures import POSTURES, postures
 from markerless_tracker.tracking.search import make_searcher
-from markerless_tracker.tracking.start.starter import _improved
 
 
 def made_up(
@@ -140,27 +138,3 @@ def test_what_another_search_found_with_another_size_is_compared() -> None:
     gap = np.linalg.norm(markers(scene.body, both.poses[0]) - markers(scene.body, pose), axis=1)
     assert gap.max() < 0.05
     np.testing.assert_array_equal(both.poses[-1], wrong)
-
-
-class Improving:
-    """A frame in which every generation lowers the costs by the next of some gains."""
-
-    def __init__(self, *gains: float) -> None:
-        self.gains = gains
-        self.seen: list[int] = []
-
-    def recombined(self, population, generation):
-        self.seen.append(generation)
-        return SimpleNamespace(costs=population.costs - self.gains[generation])
-
-
-def test_a_good_fit_that_no_longer_improves_ends_the_generations() -> None:
-    frame = Improving(0.01, 0.0, 0.01, 0.0)
-    _improved(frame, SimpleNamespace(costs=np.array([0.10])), range(4))
-    assert frame.seen == [0, 1]
-
-
-def test_a_poor_fit_gets_all_generations() -> None:
-    frame = Improving(0.01, 0.0, 0.01, 0.0)
-    _improved(frame, SimpleNamespace(costs=np.array([0.30])), range(4))
-    assert frame.seen == [0, 1, 2, 3]

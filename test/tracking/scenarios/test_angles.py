@@ -125,8 +125,8 @@ def test_deviations_are_those_of_what_is_seen(still) -> None:
         assert np.abs(error).max() < 3.0 * deviation[name], name
     bent = dict(zip(still.names, still.true[0], strict=True))["elbow_flex_r"] > 20.0
     assert (deviation["arm_rot_r"] < 12.0) == bent
-    assert bent or deviation["arm_rot_r"] > 20.0
-    assert deviation["hip_rotation_r"] > 9.0
+    assert bent or deviation["arm_rot_r"] > 18.0
+    assert deviation["hip_rotation_r"] > 8.0
     assert deviation["knee_angle_r"] < 8.0
 
 
