@@ -13,8 +13,8 @@ from markerless_tracker.geometry import FloatArray
 
 COST_SCALE = 0.0035
 """Difference of costs, in units of f_s, by which a place is e times less probable: of the limbs
-whose best other place costs as much as their own, about a third are wrong, of those whose other
-place costs 0.01 more, one of thirty."""
+whose best other place costs as much as their own or less, a third are wrong, of those whose other
+place costs 0.006 to 0.01 more, one of twenty to thirty."""
 APART_M = 0.10
 """Least distance of a marker; a nearer place is the same optimum."""
 

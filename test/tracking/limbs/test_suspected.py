@@ -3,30 +3,16 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.records import Observation
-from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
-from markerless_tracker.tracking.limbs.watch import LimbWatch
-from markerless_tracker.tracking.search import Searcher
 
 LIMBS = "markerless_tracker.tracking.limbs"
 
 
 @pytest.fixture
-def searched(monkeypatch):
+def searched(stander, monkeypatch):
     """A watch, and its searches of a frame in which areas of silhouette are unexplained."""
-    scene = SyntheticScene(body="person31", motion="stand", size_px=(164, 123), seed=3)
-    _, masks, pose = scene.frame(0)
-    seen = {
-        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-        for name, mask in masks.items()
-    }
-    body, watch = scene.body, LimbWatch(scene.rig)
-    searcher = Searcher(scene.rig, body, TrackerConfig(threads=1), limits=body.limits, threads=1)
-    contours = searcher.frame(seen, 0, pose).contours
+    watch, body = stander.watch, stander.body
     stamps = iter(range(0, 100 * PER_LIMB_NS, PER_LIMB_NS))
 
     def search(areas_m2, found=()):
@@ -36,7 +22,7 @@ def searched(monkeypatch):
             f"{LIMBS}.search.LimbSearch.elsewhere",
             lambda _, limb, *__: any(np.array_equal(limb, one) for one in limbs),
         )
-        watch.recover(searcher, contours, Seen(next(stamps), seen, seen, seen), pose)
+        stander.recover(next(stamps))
 
     return watch, search
 

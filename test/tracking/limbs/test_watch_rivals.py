@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.records import Observation
-from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.limbs.rivals import Rival
-from markerless_tracker.tracking.limbs.watch import LimbWatch
-from markerless_tracker.tracking.search import Searcher
 
 PACKAGE = "markerless_tracker.tracking.limbs"
 APART_NS = 100_000_000
@@ -17,17 +11,9 @@ APART_NS = 100_000_000
 
 
 @pytest.fixture
-def watching(monkeypatch):
+def watching(stander, monkeypatch):
     """A watch, a function that searches the next frame, and the rivals that searches find."""
-    scene = SyntheticScene(body="person31", motion="stand", size_px=(164, 123), seed=3)
-    _, masks, pose = scene.frame(0)
-    seen = {
-        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-        for name, mask in masks.items()
-    }
-    body, watch = scene.body, LimbWatch(scene.rig)
-    searcher = Searcher(scene.rig, body, TrackerConfig(threads=1), limits=body.limits, threads=1)
-    contours = searcher.frame(seen, 0, pose).contours
+    watch, body = stander.watch, stander.body
     found: dict[str, Rival] = {}
     stamps_ns = iter(range(0, 10**12, APART_NS))
 
@@ -41,10 +27,9 @@ def watching(monkeypatch):
         monkeypatch.setattr(f"{PACKAGE}.{due}", lambda *_: None)
 
     def frame():
-        at = Seen(next(stamps_ns), seen, seen, seen)
-        return watch.recover(searcher, contours, at, pose, badly=True)
+        return stander.recover(next(stamps_ns), badly=True)
 
-    return watch, frame, found, pose
+    return watch, frame, found, stander.pose
 
 
 def rival(size):
