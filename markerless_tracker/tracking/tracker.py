@@ -54,8 +54,7 @@ class Tracker:
         config: every setting.
         start_pose: (p,) pose near which the first frame is searched; None = find a person
             automatically, which takes some frames.
-        backgrounds: the empty scene per camera; cameras without one take ready-made observations
-            only.
+        backgrounds: the empty scene per camera; cameras without one take observations only.
         shape_known: whether the body's sections are this person's; if not, and `fit_shape` is set,
             they are fitted to the first frame's silhouettes with the start pose held.
         start_markers: the markers that the start pose was computed from; noisy ones are refined on
@@ -346,5 +345,6 @@ class Tracker:
     def _new_starter(self, last_pose: FloatArray | None = None) -> Starter:
         return Starter(
             self.rig, self.body, self._start_searcher_for, self.evidence.select,
-            sized=self._body.sized, fit_shape=not self._body.sections_fitted, last_pose=last_pose,
+            sized=self._body.sized, fit_shape=not self._body.sections_fitted,
+            person=self._body.unfitted, last_pose=last_pose,
         )  # fmt: skip

@@ -40,12 +40,13 @@ MOST_RECOVERED = 6
 class BodyEstimate:
     """Estimate of the person's body: first its sections are fitted, then its lengths.
 
-    Sections are fitted in one frame with the pose held, lengths over several tracked frames. With a
-    given start, sections are revised when a tracked pose differs from those fitted to. A body that
-    was not measured is fitted again when poses have become more varied. Only frames whose
-    silhouettes agree with the body are used (f_s of at least `LEAST_FIT`). If a limb was in a wrong
-    place during a fit of the lengths, or shortly after it, they are fitted again. A fit in progress
-    is completed first: while the generic body fits badly, limbs are found elsewhere often.
+    Sections are fitted in one frame with the pose held, lengths over several tracked frames; an
+    automatic start fits both to its own frames before that (`take_found`). With a given start,
+    sections are revised when a tracked pose differs from those fitted to. A body that was not
+    measured is fitted again when poses have become more varied. Only frames whose silhouettes agree
+    with the body are used (f_s of at least `LEAST_FIT`). If a limb was in a wrong place during a
+    fit of the lengths, or shortly after it, they are fitted again. A fit in progress is completed
+    first: while the generic body fits badly, limbs are found elsewhere often.
 
     Args:
         body: with generic sections, and lengths that were measured or follow from a stature.
@@ -100,6 +101,12 @@ class BodyEstimate:
             self._begin_lengths(self._person)
 
     @property
+    def unfitted(self) -> Unmeasured | None:
+        """What is known of a person whose lengths are fitted from the start on, not yet fitted."""
+        fits = self._config.fit_lengths and not self.sections_fitted
+        return self._person if fits else None
+
+    @property
     def awaits_first_frame(self) -> bool:
         """Whether tracking from a given start waits for a frame to fit the sections to."""
         return not self.sections_fitted and self._disagreeing < START_FRAMES
@@ -144,7 +151,7 @@ class BodyEstimate:
         )
 
     def take_found(self, body: BodyModel, *, settled: bool) -> None:
-        """Take the body of an automatic start; with `settled` its sections have been fitted."""
+        """Take the body of an automatic start; with `settled` it has been fitted."""
         self.body = body
         if settled:
             self.sections_fitted, self.sized = True, None

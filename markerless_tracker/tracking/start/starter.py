@@ -7,7 +7,6 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel, markers
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.fitness.shape import fit_shape
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.candidates.mirror import TRUNK
@@ -17,6 +16,8 @@ from markerless_tracker.tracking.candidates.postures import put_at
 from markerless_tracker.tracking.evidence.hull import Hull, find_hulls
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.loss import LEAST_FIT
+from markerless_tracker.tracking.person.body_fitting import Unmeasured
+from markerless_tracker.tracking.person.start_fit import fitted_to_start
 from markerless_tracker.tracking.search import Searcher
 from markerless_tracker.tracking.start.generations import improved
 from markerless_tracker.tracking.start.in_view import InViewGate
@@ -88,8 +89,7 @@ class Starter:
     poorly, once more with a cost of unusual postures, by which the poses of both searches are
     compared. Legs and arms are tried in each other's place. The opposite heading is propagated,
     too, until one is kept (`two_headings`). Then poses that cost about as much as the best one are
-    compared with sections of their own (`own_sections`), and the sections are fitted with the poses
-    held.
+    compared with sections of their own (`own_sections`), and the body is fitted (`start_fit`).
 
     Args:
         rig: the cameras.
@@ -97,7 +97,8 @@ class Starter:
         searcher_for: makes a searcher of a body.
         select: keeps the parts of silhouettes that a pose explains.
         sized: makes the body of a stature; None if the stature is known.
-        fit_shape: whether to fit the sections in the end.
+        fit_shape: whether to fit the body in the end.
+        person: as in `fitted_to_start`.
         last_pose: (p,) pose at which the person was lost; None if there was none.
     """
 
@@ -110,6 +111,7 @@ class Starter:
         *,
         sized: Callable[[float], BodyModel] | None = None,
         fit_shape: bool = True,
+        person: Unmeasured | None = None,
         last_pose: FloatArray | None = None,
     ) -> None:
         self._cameras = {camera.name: camera for camera in rig}
@@ -118,6 +120,7 @@ class Starter:
         self._select = select
         self._sized = sized
         self._fit_shape = fit_shape
+        self._person = person
         self._last_pose = last_pose
         self._in_view = InViewGate()
         self._rejections = Rejections()
@@ -171,7 +174,7 @@ class Starter:
             body, make = self._searcher.body, self._searcher_for
             found = better_with_own_sections(self._best(population), body, make, imaged, stamp_ns)
             if found is None:
-                self._settle(frame, pose)
+                pose = self._settle(frame, pose)
             else:
                 self._searcher, pose = found.searcher, found.pose
                 observations = decide(imaged, self._cameras, self._searcher.body, pose)
@@ -322,13 +325,16 @@ class Starter:
         facing = population.facing(self._headings.leading_rad)
         return facing if len(facing) else population
 
-    def _settle(self, frame: FramePopulation, pose: FloatArray) -> None:
+    def _settle(self, frame: FramePopulation, pose: FloatArray) -> FloatArray:
+        """Fit the body; returns the pose (p,) of this frame with it."""
         assert self._searcher is not None
         fits = self._headings.leading_fits
         good = min((fit.cost for fit in fits), default=0.0) + _SHAPE_SLACK
         used = [(fit.contours, fit.pose) for fit in fits if fit.cost <= good][-_SHAPE_FRAMES:]
-        body = fit_shape(self._searcher.body, used or [(frame.contours, pose)])
+        used = used or [(frame.contours, pose)]
+        body, last = fitted_to_start(self._searcher, used, self._person)
         self._searcher = self._searcher_for(body)
+        return np.clip(pose + last - used[-1][1], *self._searcher.limits)
 
     def _trunk(self, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None
