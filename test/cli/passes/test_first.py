@@ -13,7 +13,7 @@ from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
 
 FRAMES = SETTLING_FRAMES + 3
-"""Too few for a fit of the lengths in one pass."""
+"""Too few for a fit of the lengths to tracked frames in one pass."""
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,8 @@ def test_the_second_pass_has_fitted_lengths_from_its_first_frame_on(walk, tmp_pa
     generic, true = subject_from_stature(description, 1.65), read_subject(walk / "subject.yaml")
     one, two = (read_subject(tmp_path / f"{name}.subject.yaml") for name in ("one", "two"))
     lengths = [np.log([s.lengths_m[n] for n in names]) for s in (generic, one, two, true)]
-    np.testing.assert_allclose(lengths[1], lengths[0], rtol=1e-9)
+    # Those of one pass are fitted to the frames of the start.
+    assert np.abs(lengths[2] - lengths[1]).max() > 1e-3
     off = [np.abs(each - lengths[3]).mean() for each in lengths[:3]]
     assert off[2] < off[0]
     assert not two.measured
