@@ -102,7 +102,7 @@ class BodyEstimate:
 
     @property
     def unfitted(self) -> Unmeasured | None:
-        """What is known of a person whose lengths are fitted from the start on, not yet fitted."""
+        """What is known of a person whose lengths an automatic start is to fit; else None."""
         fits = self._config.fit_lengths and not self.sections_fitted
         return self._person if fits else None
 

@@ -13,7 +13,7 @@ from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
 
 FRAMES = SETTLING_FRAMES + 3
-"""Too few for a fit of the lengths to tracked frames in one pass."""
+"""Too few for a fit of the lengths in one pass, other than that of the start."""
 
 
 @pytest.fixture(scope="module")
