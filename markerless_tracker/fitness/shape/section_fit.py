@@ -1,4 +1,4 @@
-"""Sections and offsets of the cones, fitted to silhouettes at known poses."""
+"""Sections, offsets and the length of the hands, fitted to silhouettes at known poses."""
 
 from collections.abc import Generator
 
@@ -25,23 +25,25 @@ def fit_shape(
     body: BodyModel,
     frames: list[tuple[ContourFrame, FloatArray]],
     *,
+    hands: bool = True,
     tightness: float = 1.0,
 ) -> BodyModel:
-    """The body with sections and offsets fitted to silhouettes, at known poses.
+    """The body with sections, offsets and hands fitted to silhouettes, at known poses.
 
     Bounded least squares on contour distances with a prior on the generic shape; left and right
     limbs are equal, trunk and head symmetric. Poses are fixed: fitting both together drifts.
 
     Args:
-        body: the body with generic sections (those of the subject's lengths).
+        body: the body with generic sections and hands (those of the subject's lengths).
         frames: contour evidence of some frames and the pose (p,) in each.
+        hands: whether the length of the hands is fitted, too.
         tightness: factor of the prior's precision.
     """
     weighted = [(contours, pose, 1.0) for contours, pose in frames]
     return at_once(
         shape_fitting(
-            body, weighted, start=body, tightness=tightness, iterations=ITERATIONS,
-            truncation_m=TRUNCATION_M,
+            body, weighted, start=body, hands=hands, tightness=tightness,
+            iterations=ITERATIONS, truncation_m=TRUNCATION_M,
         )
     )  # fmt: skip
 
@@ -53,22 +55,24 @@ def shape_fitting(
     start: BodyModel,
     iterations: int,
     truncation_m: tuple[float, float],
+    hands: bool = True,
     tightness: float = 1.0,
 ) -> Generator[None, None, BodyModel]:
     """As `fit_shape`, in pieces: yields after each frame of each iteration.
 
     Args:
-        body: the body with generic sections.
+        body: the body with generic sections and hands.
         frames: contour evidence of some frames, the pose (p,) in each, and its weight.
-        start: the body with the sections to begin with.
+        start: the body with the sections and hands to begin with.
         iterations: Gauss-Newton steps.
         truncation_m: residuals beyond it are outliers, in the first and in the last step.
+        hands: whether the length of the hands is fitted, too.
         tightness: factor of the prior's precision.
 
     Returns:
-        The body with the fitted sections.
+        The body with the fitted sections and hands.
     """
-    sections = Sections(body)
+    sections = Sections(body, hands=hands)
     prior = Prior(sections.generic, tightness / sections.prior_sd**2)
     scale = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * sum(weight for _, _, weight in frames))
     shape = sections.of(start)
@@ -93,3 +97,9 @@ def shape_fitting(
 def _sums(hessian: FloatArray, gradient: FloatArray) -> Equations:
     """Constant equations, for a refinement of one iteration."""
     return lambda _, __: (hessian, gradient)
+
+
+def unfitted(body: BodyModel, generic: BodyModel) -> BodyModel:
+    """A body with the sections and hands of the generic body, its other lengths unchanged."""
+    sections = Sections(generic, hands=True)
+    return sections.put(body, sections.generic)

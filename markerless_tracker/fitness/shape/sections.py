@@ -1,5 +1,8 @@
 """Free parameters of a body's sections: radii and offsets, equal on the left and on the right.
 
+The length of the hands may be one more. No marker measures it, and with hands that are too short
+the arms are too straight.
+
 A bent wrist puts the hand beside the line of the forearm, in a different direction on each side.
 This is posture, so the offsets of hands without a joint of their own are independent. Otherwise the
 forearm would follow the hand, and the elbow would be bent wrongly.
@@ -23,6 +26,12 @@ RADIUS_RANGE = (0.6, 2.0)
 """Radii stay within this multiple of the generic ones (bounds)."""
 OFFSET_RANGE_M = 0.06
 """Offsets stay within this distance of the generic ones (bounds)."""
+HAND_SD_RATIO = 0.10
+"""Standard deviation of hands' lengths, relative to the generic one (prior). Fingers are bent, more
+or less."""
+HAND_RANGE = (0.7, 1.3)
+"""Hands' lengths stay within this multiple of the generic one (bounds)."""
+_HANDS = ("hand", "l_hand", "r_hand")
 
 
 class Sections:
@@ -36,6 +45,7 @@ class Sections:
         limb_offset_sd_ratio: standard deviation of the limbs' offsets among people, relative to the
             generic radius; None: `OFFSET_SD_M`, as for trunk, head, and hands without a joint of
             their own.
+        hands: whether the length of hands is a parameter, too.
 
     Attributes:
         generic: (k,) prior mean.
@@ -43,8 +53,17 @@ class Sections:
         bounds: (2, k).
     """
 
-    def __init__(self, generic: BodyModel, limb_offset_sd_ratio: float | None = None) -> None:
+    def __init__(
+        self,
+        generic: BodyModel,
+        limb_offset_sd_ratio: float | None = None,
+        *,
+        hands: bool = False,
+    ) -> None:
         self._index, self._sign, self._size = _tie(generic)
+        is_hand = np.array([name in _HANDS for name in generic.cone_names]) & hands
+        self._length = np.where(is_hand, self._size, -1)
+        self._size += int(is_hand.any())
         self.generic = self.of(generic)
         radius = np.zeros(self._size, dtype=np.bool_)
         radius[self._index[:, :, :2].ravel()] = True
@@ -58,6 +77,9 @@ class Sections:
             np.outer(RADIUS_RANGE, self.generic),
             self.generic + np.array([[-OFFSET_RANGE_M], [OFFSET_RANGE_M]]),
         )
+        for k in np.unique(self._length[is_hand]):
+            self.prior_sd[k] = HAND_SD_RATIO * self.generic[k]
+            self.bounds[:, k] = self.generic[k] * np.array(HAND_RANGE)
 
     @property
     def size(self) -> int:
@@ -68,7 +90,10 @@ class Sections:
         """The parameters (k,) of a body; entries that share a parameter are averaged."""
         used = self._index >= 0
         index = self._index[used]
-        total = np.bincount(index, (self._sign * body.cone_shape)[used], self._size)
+        hands = self._length >= 0
+        index = np.append(index, self._length[hands])
+        values = np.append((self._sign * body.cone_shape)[used], body.cone_length[hands])
+        total = np.bincount(index, values, self._size)
         return np.asarray(total / np.bincount(index, minlength=self._size))
 
     def put(self, body: BodyModel, numbers: FloatArray) -> BodyModel:
@@ -76,26 +101,29 @@ class Sections:
         shape = body.cone_shape.copy()
         used = self._index >= 0
         shape[used] = self._sign[used] * numbers[self._index[used]]
-        return replace(body, cone_shape=shape)
+        sectioned = replace(body, cone_shape=shape)
+        hands = self._length >= 0
+        return _with_hands(sectioned, hands, float(numbers[-1])) if hands.any() else sectioned
 
     def jacobian(self, body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
         """Derivatives (n, k) of residuals by the parameters, for a body at a pose (p,)."""
         out = np.zeros((len(rows.cone), self._size))
         _fill_jacobian(
             cone_transforms(body, pose), rows.cone, rows.place, rows.gradient, self._index,
-            self._sign, out,
+            self._sign, self._length, out,
         )  # fmt: skip
         return out
 
 
 @kernel
-def _fill_jacobian(placed, cone, place, gradient, index, sign, out):  # type: ignore[no-untyped-def]
+def _fill_jacobian(placed, cone, place, gradient, index, sign, length, out):  # type: ignore[no-untyped-def]
     """Fill out (n, k), zeros, with the derivatives of n residuals by k parameters.
 
     Args:
         placed: (c, 3, 4) the cones' transforms.
         cone, place, gradient: of `OutlineRows`.
         index, sign: (c, 2, 4) parameter of each entry of the sections, or -1, and its sign.
+        length: (c,) parameter of each cone's length, or -1.
     """
     for n in range(cone.size):
         c = cone[n]
@@ -114,6 +142,18 @@ def _fill_jacobian(placed, cone, place, gradient, index, sign, out):  # type: ig
                     # Radii count by the cosine and the sine of the place's angle.
                     along *= place[n, 2 * end + entry]
                 out[n, k] += sign[c, end, entry] * along
+        if length[c] >= 0:
+            for i in range(3):
+                out[n, length[c]] += place[n, 4] * gradient[n, i] * placed[c, i, 2]
+
+
+def _with_hands(body: BodyModel, hands: NDArray[np.bool_], length_m: float) -> BodyModel:
+    """The body with cones of hands (c,) of this length; its named lengths follow."""
+    lengths = body.cone_length.copy()
+    ratio = length_m / float(lengths[hands].mean())
+    lengths[hands] = length_m
+    named = {n: v * ratio if n in _HANDS else v for n, v in body.lengths_m.items()}
+    return replace(body, cone_length=lengths, lengths_m=named)
 
 
 def _limbs(body: BodyModel) -> list[int]:

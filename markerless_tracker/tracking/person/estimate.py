@@ -7,7 +7,12 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.fitness.contour.frame import ContourFrame
-from markerless_tracker.fitness.shape.section_fit import TRUNCATION_M, fit_shape, shape_fitting
+from markerless_tracker.fitness.shape.section_fit import (
+    TRUNCATION_M,
+    fit_shape,
+    shape_fitting,
+    unfitted,
+)
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.config import TrackerConfig
@@ -185,7 +190,8 @@ class BodyEstimate:
             self._revise(search)
             return None
         if not self.sections_fitted:
-            self.body = fit_shape(self.body, [(search.contours, search.pose)])
+            frames = [(search.contours, search.pose)]
+            self.body = fit_shape(self.body, frames, hands=self._config.fit_lengths)
             self.sections_fitted = True
             return np.zeros(self.body.size)
         assert self._lengths is not None and self._person is not None
@@ -250,6 +256,7 @@ class BodyEstimate:
         self._revision = shape_fitting(
             self._varied.prior, self._varied.add(search.contours, search.pose), start=self.body,
             iterations=REVISION_STEPS, truncation_m=(TRUNCATION_M[1], TRUNCATION_M[1]),
+            hands=self._config.fit_lengths,
         )  # fmt: skip
 
     def _continue(self, revision: Generator[None, None, BodyModel]) -> FloatArray | None:
@@ -292,8 +299,8 @@ class BodyEstimate:
         # A body made with other lengths has the pose prior of all people, not this person's.
         known = self.generic
         self.body = replace(self.body, prior_mean=known.prior_mean, prior_sd=known.prior_sd)
-        # The generic sections with the lengths from the first frame.
-        prior = replace(self.body, cone_shape=self.generic.cone_shape)
+        # The lengths from the first frame, all else generic.
+        prior = unfitted(self.body, known)
         self.sections_fitted = True
         self._varied = VariedFrames(prior, contours(self.body, pose), pose)
         return pose

@@ -81,11 +81,12 @@ def shape_of_first_frame(
         config: settings of the refinement.
         limits: (2, p) joint limits.
     """
+    hands = config.fit_lengths
     if start is not None and start.noise_m > TRUSTED_M:
-        nearly = fit_shape(body, [(contours(body, pose), pose)], tightness=_TIGHT)
+        nearly = fit_shape(body, [(contours(body, pose), pose)], hands=hands, tightness=_TIGHT)
         lengths, pose = _settled(nearly, pose, start, contours(nearly, pose), config, limits)
         body = start.sizes.body(lengths, body)
-    return fit_shape(body, [(contours(body, pose), pose)]), pose
+    return fit_shape(body, [(contours(body, pose), pose)], hands=hands), pose
 
 
 def _settled(

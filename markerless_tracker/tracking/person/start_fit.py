@@ -34,7 +34,8 @@ def fitted_to_start(
     """
     body = searcher.body
     if person is None:
-        return fit_shape(body, list(frames)), frames[-1][1]
+        hands = searcher.config.fit_lengths
+        return fit_shape(body, list(frames), hands=hands), frames[-1][1]
     fit = BodyFit(
         person.sizes, body, person.sizes.prior(person.stature_m), searcher.limits,
         floor_precision=floor_precision(searcher.config),

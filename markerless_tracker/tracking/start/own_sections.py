@@ -87,6 +87,7 @@ def _fitted(
     searcher, cost = searcher_for(body), np.inf
     for _ in range(_ROUNDS):
         contours = evidence(searcher).contours(pose)
-        searcher = searcher_for(fit_shape(body, [(contours, pose)]))
+        shaped = fit_shape(body, [(contours, pose)], hands=searcher.config.fit_lengths)
+        searcher = searcher_for(shaped)
         pose, cost = evidence(searcher).refined(pose, *_REFINE)
     return Fitted(searcher, pose, float(cost))

@@ -120,8 +120,9 @@ def test_jacobian_by_the_lengths(frame) -> None:
     assert (np.abs(jacobian).max(axis=0) > 0.01).all()
 
 
-def test_jacobian_by_the_sections(frame) -> None:
-    rows, sections = outline_rows(frame), Sections(BODY)
+@pytest.mark.parametrize("hands", [False, True])
+def test_jacobian_by_the_sections(frame, hands) -> None:
+    rows, sections = outline_rows(frame), Sections(BODY, hands=hands)
     assert sections.size < BODY.cone_shape.size
     start = sections.of(BODY)
     np.testing.assert_array_equal(sections.put(BODY, start).cone_shape, BODY.cone_shape)
