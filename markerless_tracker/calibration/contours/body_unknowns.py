@@ -36,7 +36,7 @@ class BodyUnknowns:
         lengths = self._mean.size
         common = np.full((lengths, lengths), SIZE_SD**2)
         self._precision = np.linalg.inv(common + np.diag(np.full(lengths, PROPORTION_SD**2)))
-        self._lengths, self._numbers = self._mean, self._sections.generic
+        self._lengths, self._numbers = self._mean, self._sections.prior_mean
         self.size = lengths + self._sections.size
         self.body = self._made(self._lengths)
 
@@ -44,7 +44,7 @@ class BodyUnknowns:
     def strain(self) -> float:
         """-log p of the priors."""
         longer = self._lengths - self._mean
-        other = (self._numbers - self._sections.generic) / self._sections.prior_sd
+        other = (self._numbers - self._sections.prior_mean) / self._sections.prior_sd
         return 0.5 * float(longer @ self._precision @ longer + other @ other)
 
     def add_priors(self, hessian: FloatArray, gradient: FloatArray) -> None:
@@ -55,7 +55,7 @@ class BodyUnknowns:
         gradient[first:split] += self._precision @ (self._lengths - self._mean)
         rest = np.arange(split, gradient.size)
         hessian[rest, rest] += 1.0 / self._sections.prior_sd**2
-        gradient[rest] += (self._numbers - self._sections.generic) / self._sections.prior_sd**2
+        gradient[rest] += (self._numbers - self._sections.prior_mean) / self._sections.prior_sd**2
 
     def longer(self) -> list[BodyModel]:
         """The body with each length changed a little, for `jacobian`."""

@@ -88,7 +88,7 @@ class BodyFit:
         self._varied = varied
         self._floor_precision = floor_precision
         self._sections = Sections(self._like, LIMB_OFFSET_SD_RATIO if varied else None)
-        self._numbers = self._sections.generic
+        self._numbers = self._sections.prior_mean
         self._frames: list[_Frame] = []
         self._view_sd_m: dict[str, float] = {}
 
@@ -154,7 +154,7 @@ class BodyFit:
         gradient[:split] = self._belief.precision @ (self._lengths - self._belief.mean)
         rest = np.arange(split, size)
         hessian[rest, rest] = 1.0 / sections.prior_sd**2
-        gradient[split:] = (self._numbers - sections.generic) / sections.prior_sd**2
+        gradient[split:] = (self._numbers - sections.prior_mean) / sections.prior_sd**2
         return hessian, gradient
 
     def _equations(

@@ -73,7 +73,7 @@ def shape_fitting(
         The body with the fitted sections and hands.
     """
     sections = Sections(body, hands=hands)
-    prior = Prior(sections.generic, tightness / sections.prior_sd**2)
+    prior = Prior(sections.prior_mean, tightness / sections.prior_sd**2)
     scale = 1.0 / (CORRELATION_M * RESIDUAL_SIGMA_M**2 * sum(weight for _, _, weight in frames))
     shape = sections.of(start)
     for bound_m in truncations(*truncation_m, iterations):
@@ -102,4 +102,4 @@ def _sums(hessian: FloatArray, gradient: FloatArray) -> Equations:
 def unfitted(body: BodyModel, generic: BodyModel) -> BodyModel:
     """A body with the sections and hands of the generic body, its other lengths unchanged."""
     sections = Sections(generic, hands=True)
-    return sections.put(body, sections.generic)
+    return sections.put(body, sections.of(generic))

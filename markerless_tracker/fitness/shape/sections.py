@@ -18,8 +18,13 @@ from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contour import OutlineRows
 from markerless_tracker.geometry import FloatArray
 
+CLOTHED = 1.15
+"""Mean radius of clothed people, relative to the generic one, of the parts `CLOTHED_PARTS` (prior).
+The generic body is slim: while a person is searched for, a wide one makes wrong poses cost less."""
+CLOTHED_PARTS = ("pelvis", "belly", "chest", "face", "crown", "upper_arm", "thigh")
+"""Parts that hair and clothes make wider."""
 RADIUS_SD_RATIO = 0.30
-"""Standard deviation of radii among clothed people, relative to the generic ones (prior)."""
+"""Standard deviation of radii among clothed people, relative to the mean ones (prior)."""
 OFFSET_SD_M = 0.015
 """Standard deviation of offsets among people (prior)."""
 RADIUS_RANGE = (0.6, 2.0)
@@ -41,15 +46,15 @@ class Sections:
     hands without a joint of their own. Trunk and head are symmetric.
 
     Args:
-        generic: the body with the sections of the prior.
+        generic: the generic body.
         limb_offset_sd_ratio: standard deviation of the limbs' offsets among people, relative to the
             generic radius; None: `OFFSET_SD_M`, as for trunk, head, and hands without a joint of
             their own.
         hands: whether the length of hands is a parameter, too.
 
     Attributes:
-        generic: (k,) prior mean.
-        prior_sd: (k,) prior standard deviation.
+        prior_mean: (k,) mean of the prior.
+        prior_sd: (k,) standard deviation of the prior.
         bounds: (2, k).
     """
 
@@ -64,22 +69,31 @@ class Sections:
         is_hand = np.array([name in _HANDS for name in generic.cone_names]) & hands
         self._length = np.where(is_hand, self._size, -1)
         self._size += int(is_hand.any())
-        self.generic = self.of(generic)
+        numbers = self.of(generic)
+        self.prior_mean = self._clothed(generic) * numbers
         radius = np.zeros(self._size, dtype=np.bool_)
         radius[self._index[:, :, :2].ravel()] = True
-        self.prior_sd = np.where(radius, RADIUS_SD_RATIO * self.generic, OFFSET_SD_M)
+        self.prior_sd = np.where(radius, RADIUS_SD_RATIO * self.prior_mean, OFFSET_SD_M)
         if limb_offset_sd_ratio is not None:
             for c in _limbs(generic):
                 radii = generic.cone_shape[c, :, :2].mean(axis=1, keepdims=True)
                 self.prior_sd[self._index[c, :, 2:]] = limb_offset_sd_ratio * radii
         self.bounds = np.where(
             radius,
-            np.outer(RADIUS_RANGE, self.generic),
-            self.generic + np.array([[-OFFSET_RANGE_M], [OFFSET_RANGE_M]]),
+            np.outer(RADIUS_RANGE, numbers),
+            numbers + np.array([[-OFFSET_RANGE_M], [OFFSET_RANGE_M]]),
         )
         for k in np.unique(self._length[is_hand]):
-            self.prior_sd[k] = HAND_SD_RATIO * self.generic[k]
-            self.bounds[:, k] = self.generic[k] * np.array(HAND_RANGE)
+            self.prior_sd[k] = HAND_SD_RATIO * numbers[k]
+            self.bounds[:, k] = numbers[k] * np.array(HAND_RANGE)
+
+    def _clothed(self, generic: BodyModel) -> FloatArray:
+        """What the mean of the prior is relative to the generic parameters, (k,)."""
+        factors = np.ones(self._size)
+        for c, name in enumerate(generic.cone_names):
+            if name.endswith(CLOTHED_PARTS):
+                factors[self._index[c, :, :2]] = CLOTHED
+        return factors
 
     @property
     def size(self) -> int:

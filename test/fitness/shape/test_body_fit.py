@@ -97,12 +97,13 @@ def test_both_sides_stay_equal_and_all_bounds_are_kept(fit) -> None:
 
 
 def test_without_evidence_the_prior_remains(contours_of) -> None:
-    """Without evidence the lengths move to the prior mean, the sections stay generic."""
+    """Without evidence lengths and sections move to the prior mean."""
     fit = BodyFit(SIZES, SIZES.of_stature(1.9), SIZES.prior(None), LIMITS)
     list(fit.pieces(0.1))
     list(fit.pieces(0.1))
     np.testing.assert_allclose(SIZES.of(fit.body), SIZES.of(GENERIC), rtol=1e-3)
-    np.testing.assert_allclose(fit.body.cone_shape, SIZES.of_stature(1.9).cone_shape, rtol=1e-9)
+    sections = Sections(SIZES.of_stature(1.9))
+    np.testing.assert_allclose(sections.of(fit.body), sections.prior_mean, rtol=1e-9)
 
 
 def test_a_frame_without_silhouettes_changes_nothing(contours_of) -> None:

@@ -13,7 +13,12 @@ from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.fitness.shape.section_fit import fit_shape, shape_fitting, unfitted
-from markerless_tracker.fitness.shape.sections import OFFSET_RANGE_M, RADIUS_RANGE
+from markerless_tracker.fitness.shape.sections import (
+    CLOTHED,
+    CLOTHED_PARTS,
+    OFFSET_RANGE_M,
+    RADIUS_RANGE,
+)
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import ring_rig
@@ -200,10 +205,20 @@ def test_bounds_are_kept(grow) -> None:
     assert np.abs(moved).max() <= OFFSET_RANGE_M * (1 + 1e-12)
 
 
-def test_empty_silhouettes_leave_the_generic_shape() -> None:
+def clothed() -> FloatArray:
+    """Sections of the prior's mean: wider trunk, head, upper arms and thighs, else generic."""
+    shape = GENERIC.cone_shape.copy()
+    wider = [i for i, name in enumerate(NAMES) if name.endswith(CLOTHED_PARTS)]
+    shape[wider, :, :2] *= CLOTHED
+    assert len(wider) == 9
+    return shape
+
+
+def test_empty_silhouettes_give_the_sections_of_clothed_people() -> None:
     view = seen(GENERIC, open_pose(4), np.zeros_like)
     fitted = fit_shape(GENERIC, [(view.frame(), view.pose)])
-    np.testing.assert_allclose(fitted.cone_shape, GENERIC.cone_shape, atol=1e-12)
+    np.testing.assert_allclose(fitted.cone_shape, clothed(), atol=1e-12)
+    np.testing.assert_allclose(fitted.cone_length, GENERIC.cone_length)
 
 
 def test_one_black_camera_does_not_matter() -> None:
@@ -216,11 +231,11 @@ def test_one_black_camera_does_not_matter() -> None:
     assert view.f_s(fitted) > 0.97 > view.f_s(GENERIC)
 
 
-def test_a_tight_prior_keeps_the_generic_shape() -> None:
+def test_a_tight_prior_keeps_its_mean() -> None:
     view = seen(random_person(6), open_pose(6))
     frames = [(view.frame(), view.pose)]
     held, loose = (fit_shape(GENERIC, frames, tightness=t).cone_shape for t in (1e7, 1.0))
-    np.testing.assert_allclose(held, GENERIC.cone_shape, atol=1e-5)
+    np.testing.assert_allclose(held, clothed(), atol=1e-5)
     assert np.abs(loose - GENERIC.cone_shape).max() > 0.02
 
 
