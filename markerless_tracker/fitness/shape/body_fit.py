@@ -61,7 +61,7 @@ class BodyFit:
 
     Args:
         sizes: makes the body of other lengths.
-        body: the initial body; the prior of the sections is the generic one of its lengths.
+        body: the initial body; the prior of the sections (`Sections`) follows from its lengths.
         belief: prior of the lengths.
         limits: (2, p) of the poses.
         varied: whether the frames show many poses. The offsets of limbs then have a narrower prior

@@ -30,7 +30,7 @@ def fit_shape(
 ) -> BodyModel:
     """The body with sections, offsets and hands fitted to silhouettes, at known poses.
 
-    Bounded least squares on contour distances with a prior on the generic shape; left and right
+    Bounded least squares on contour distances with the prior of `Sections`; left and right
     limbs are equal, trunk and head symmetric. Poses are fixed: fitting both together drifts.
 
     Args:
