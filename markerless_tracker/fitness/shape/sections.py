@@ -111,7 +111,7 @@ class Sections:
         return np.asarray(total / np.bincount(index, minlength=self._size))
 
     def put(self, body: BodyModel, numbers: FloatArray) -> BodyModel:
-        """The body with sections of these parameters (k,)."""
+        """The body with these parameters (k,); `lengths_m` follows the hands."""
         shape = body.cone_shape.copy()
         used = self._index >= 0
         shape[used] = self._sign[used] * numbers[self._index[used]]
