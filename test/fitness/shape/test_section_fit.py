@@ -14,7 +14,6 @@ from markerless_tracker.fitness import Fitness
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.fitness.shape.section_fit import fit_shape, shape_fitting, unfitted
 from markerless_tracker.fitness.shape.sections import (
-    CLOTHED,
     CLOTHED_PARTS,
     OFFSET_RANGE_M,
     RADIUS_RANGE,
@@ -209,7 +208,7 @@ def clothed() -> FloatArray:
     """Sections of the prior's mean: wider trunk, head, upper arms and thighs, else generic."""
     shape = GENERIC.cone_shape.copy()
     wider = [i for i, name in enumerate(NAMES) if name.endswith(CLOTHED_PARTS)]
-    shape[wider, :, :2] *= CLOTHED
+    shape[wider, :, :2] *= 1.15
     assert len(wider) == 9
     return shape
 
