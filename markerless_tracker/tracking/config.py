@@ -136,7 +136,8 @@ class TrackerConfig(ImagingSettings):
     fit_lengths: bool = setting(
         True,
         "with fit_shape: fit lengths that were not measured, and the sections with them, to the "
-        "first tracked frames, and again while new postures come; the hands' length in any case",
+        "first tracked frames, and again while new postures come; if they were measured, only the "
+        "hands' length",
     )
     seed: int = setting(0, "seed of all random draws", least=0, most=2**63 - 1)
     threads: int = setting(

@@ -66,9 +66,9 @@ class Sections:
         hands: bool = False,
     ) -> None:
         self._index, self._sign, self._size = _tie(generic)
-        is_hand = np.array([name in _HANDS for name in generic.cone_names]) & hands
-        self._length = np.where(is_hand, self._size, -1)
-        self._size += int(is_hand.any())
+        # The hands' length is the last parameter.
+        self._hands = np.array([name in _HANDS for name in generic.cone_names]) & hands
+        self._size += int(self._hands.any())
         numbers = self.of(generic)
         self.prior_mean = self._clothed(generic) * numbers
         radius = np.zeros(self._size, dtype=np.bool_)
@@ -83,9 +83,9 @@ class Sections:
             np.outer(RADIUS_RANGE, numbers),
             numbers + np.array([[-OFFSET_RANGE_M], [OFFSET_RANGE_M]]),
         )
-        for k in np.unique(self._length[is_hand]):
-            self.prior_sd[k] = HAND_SD_RATIO * numbers[k]
-            self.bounds[:, k] = numbers[k] * np.array(HAND_RANGE)
+        if self._hands.any():
+            self.prior_sd[-1] = HAND_SD_RATIO * numbers[-1]
+            self.bounds[:, -1] = numbers[-1] * np.array(HAND_RANGE)
 
     def _clothed(self, generic: BodyModel) -> FloatArray:
         """What the mean of the prior is relative to the generic parameters, (k,)."""
@@ -103,10 +103,9 @@ class Sections:
     def of(self, body: BodyModel) -> FloatArray:
         """The parameters (k,) of a body; entries that share a parameter are averaged."""
         used = self._index >= 0
-        index = self._index[used]
-        hands = self._length >= 0
-        index = np.append(index, self._length[hands])
-        values = np.append((self._sign * body.cone_shape)[used], body.cone_length[hands])
+        lengths_m = body.cone_length[self._hands]
+        index = np.append(self._index[used], np.full(lengths_m.size, self._size - 1))
+        values = np.append((self._sign * body.cone_shape)[used], lengths_m)
         total = np.bincount(index, values, self._size)
         return np.asarray(total / np.bincount(index, minlength=self._size))
 
@@ -116,28 +115,29 @@ class Sections:
         used = self._index >= 0
         shape[used] = self._sign[used] * numbers[self._index[used]]
         sectioned = replace(body, cone_shape=shape)
-        hands = self._length >= 0
-        return _with_hands(sectioned, hands, float(numbers[-1])) if hands.any() else sectioned
+        if not self._hands.any():
+            return sectioned
+        return _with_hands(sectioned, self._hands, float(numbers[-1]))
 
     def jacobian(self, body: BodyModel, pose: FloatArray, rows: OutlineRows) -> FloatArray:
         """Derivatives (n, k) of residuals by the parameters, for a body at a pose (p,)."""
         out = np.zeros((len(rows.cone), self._size))
         _fill_jacobian(
             cone_transforms(body, pose), rows.cone, rows.place, rows.gradient, self._index,
-            self._sign, self._length, out,
+            self._sign, self._hands, out,
         )  # fmt: skip
         return out
 
 
 @kernel
-def _fill_jacobian(placed, cone, place, gradient, index, sign, length, out):  # type: ignore[no-untyped-def]
+def _fill_jacobian(placed, cone, place, gradient, index, sign, hand, out):  # type: ignore[no-untyped-def]
     """Fill out (n, k), zeros, with the derivatives of n residuals by k parameters.
 
     Args:
         placed: (c, 3, 4) the cones' transforms.
         cone, place, gradient: of `OutlineRows`.
         index, sign: (c, 2, 4) parameter of each entry of the sections, or -1, and its sign.
-        length: (c,) parameter of each cone's length, or -1.
+        hand: (c,) whether a cone's length is the last parameter.
     """
     for n in range(cone.size):
         c = cone[n]
@@ -156,9 +156,9 @@ def _fill_jacobian(placed, cone, place, gradient, index, sign, length, out):  # 
                     # Radii count by the cosine and the sine of the place's angle.
                     along *= place[n, 2 * end + entry]
                 out[n, k] += sign[c, end, entry] * along
-        if length[c] >= 0:
+        if hand[c]:
             for i in range(3):
-                out[n, length[c]] += place[n, 4] * gradient[n, i] * placed[c, i, 2]
+                out[n, -1] += place[n, 4] * gradient[n, i] * placed[c, i, 2]
 
 
 def _with_hands(body: BodyModel, hands: NDArray[np.bool_], length_m: float) -> BodyModel:
