@@ -1,6 +1,6 @@
 """A calibrated camera, and a rig of cameras (OpenCV convention: x right, y down, z forward)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,6 +94,12 @@ class CameraModel:
         """The camera of images scaled by one factor; see `scaled_size`."""
         return self if scale == 1.0 else self.resized(scaled_size(self.size_px, scale))
 
+    def shifted(self, px: tuple[float, float]) -> "CameraModel":
+        """The camera that sees everything (u, v) px to the right and farther down."""
+        matrix = self.matrix.copy()
+        matrix[:2, 2] += px
+        return replace(self, matrix=matrix)
+
 
 @dataclass(frozen=True)
 class CameraRig:
@@ -136,6 +142,12 @@ class CameraRig:
         """The rig in another world, to which (4, 4) T_new_old takes the points of this one."""
         back = inverse(T_new_old)
         return CameraRig(tuple(replace(c, T_cam_world=c.T_cam_world @ back) for c in self))
+
+    def shifted(self, shifts_px: Mapping[str, tuple[float, float]]) -> "CameraRig":
+        """The rig with the images of some cameras shifted; see `CameraModel.shifted`."""
+        return CameraRig(
+            tuple(c.shifted(shifts_px[c.name]) if c.name in shifts_px else c for c in self)
+        )
 
     def selected(self, names: Sequence[str]) -> "CameraRig":
         """The rig with those cameras only, in the order given."""

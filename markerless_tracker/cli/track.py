@@ -34,7 +34,7 @@ from markerless_tracker.results.smooth import Smoothing, smooth_result
 from markerless_tracker.results.verdict.record import RunRecord
 from markerless_tracker.results.verdict.verdict import Verdict, verdict_of
 from markerless_tracker.tracking import TrackerConfig, TrackerSetup
-from markerless_tracker.tracking.camera_check import CameraCheck, Shift, describe
+from markerless_tracker.tracking.cameras.check import Shift, describe
 from markerless_tracker.viewing.debug_images import DebugImages
 
 HELP = (
@@ -166,7 +166,7 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
         filled = smooth_result(args.name, smoothing)
     if choice is not None:
         notices.begin("refining the calibration", 1)
-        refined = _refined(args, setup, config, choice)
+        refined = _refined(args, recording, setup, choice)
         notices.step(1)
     late = [*recording.warnings, *describe(outcome.shifts)]
     if verdict.frames_with_warnings:
@@ -185,13 +185,13 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
 
 
 def _refined(
-    args: argparse.Namespace, setup: TrackerSetup, config: TrackerConfig, choice: FrameChoice
+    args: argparse.Namespace, recording: Recording, setup: TrackerSetup, choice: FrameChoice
 ) -> Refinement | CalibrationError:
     """Refine the calibration and write it; returns the error if the refinement failed."""
     tracker = setup.tracker
     try:
         refinement = refine_cameras(
-            tracker.rig, tracker.body, config, choice.chosen(), scale=args.scale
+            recording.rig, tracker.body, tracker.config, choice.chosen(), scale=args.scale
         )
     except CalibrationError as error:
         return error
@@ -240,7 +240,6 @@ def _track(
     """Track all frames and write the result and the debug images."""
     tracker, description = setup.tracker, load_description(config.body)
     debug = DebugImages(args.debug_images) if args.debug_images else None
-    check = CameraCheck(tracker.rig, config)
     record = RunRecord(tracker.rig)
     started = time.perf_counter()
     with ResultWriter(
@@ -258,7 +257,6 @@ def _track(
                 result, body = tracked.result, tracker.body
                 writer.add(result)
                 writer.body = body
-                check.add(result, body)
                 if choice is not None:
                     choice.add(result)
                 for kind in record.add(result, body, tracked.images.index):
@@ -271,7 +269,7 @@ def _track(
             interrupted = (f"interrupted after {record.frames} frames: the rest is missing",)
             notices.warn(interrupted[0])
         seconds = time.perf_counter() - started
-        shifts = check.shifts()
+        shifts = tracker.shifts
         verdict = verdict_of(
             record,
             description,
@@ -336,6 +334,7 @@ def _cameras(shifts: Mapping[str, Shift]) -> dict[str, Any]:
             "shift_mm": round(1000.0 * shift.length_m, 1),
             "checks": shift.checks,
             "disagrees": shift.disagrees,
+            "corrected": shift.corrected,
         }
         for name, shift in shifts.items()
     }

@@ -25,6 +25,7 @@ PRESETS: Mapping[str, Mapping[str, Any]] = {
     "tuned": {},
     "paper": {
         "body": "balan31",
+        "correct_cameras": False,
         "edges.form": "published",
         "edges.rule": "visible",
         "edge_weight": 1.0,
@@ -138,6 +139,11 @@ class TrackerConfig(ImagingSettings):
         "with fit_shape: fit lengths that were not measured, and the sections with them, to the "
         "first tracked frames, and again while new postures come; if they were measured, only the "
         "hands' length",
+    )
+    correct_cameras: bool = setting(
+        True,
+        "shift the image of a camera whose silhouettes lie at least 30 mm beside the body as three "
+        "or more other cameras see it",
     )
     seed: int = setting(0, "seed of all random draws", least=0, most=2**63 - 1)
     threads: int = setting(

@@ -2,7 +2,6 @@
 
 import copy
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -10,12 +9,12 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.errors import TrackerError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Region, Segmenter
-from markerless_tracker.libraries import usable_cores
 from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.tracking.assess import Assessor, Found
+from markerless_tracker.tracking.cameras.check import Shift
+from markerless_tracker.tracking.cameras.correction import CameraCorrection
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
 from markerless_tracker.tracking.evidence.prepared import (
@@ -35,7 +34,7 @@ from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.person.estimate import BodyEstimate
 from markerless_tracker.tracking.person.first_frame import StartMarkers
 from markerless_tracker.tracking.person.resting import at_rest
-from markerless_tracker.tracking.search import make_searcher
+from markerless_tracker.tracking.searchers import Searchers
 from markerless_tracker.tracking.stages.effort import Effort
 from markerless_tracker.tracking.stages.frame import frame_stages, swarm_stages
 from markerless_tracker.tracking.start.starter import Starter
@@ -79,8 +78,6 @@ class Tracker:
         start_markers: StartMarkers | None = None,
         person: Unmeasured | None = None,
     ) -> None:
-        self.rig = rig
-        self._cameras = {camera.name: camera for camera in rig}
         self.config = config
         self._given = start_pose is not None
         start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
@@ -92,19 +89,13 @@ class Tracker:
         check_pose(body, start, self._body.limits if self._given else None)
         # Raises now, not at the first frame, if the budget cannot be spent.
         frame_stages(body, config, start, body.sigma)
-        threads = config.threads or usable_cores()
-        # One thread is reserved for the evidence of the next set.
-        own = max(1, threads - 1)
-        mapper = ThreadPoolExecutor(min(own, len(rig))).map if own > 1 else map
-        self._searcher_for = partial(
-            make_searcher, rig=rig, config=config, mapper=mapper, threads=own
-        )
-        self._start_searcher_for = partial(self._searcher_for, threads=threads)
-        self._searcher = self._searcher_for(body)
-        self.evidence = EvidenceMaker(rig, config, backgrounds or {}, mapper)
+        self._searchers = Searchers(rig, config)
+        self.evidence = EvidenceMaker(rig, config, backgrounds or {}, self._searchers.mapper)
         self._views = ViewWatch(rig)
+        self._correction = CameraCorrection(rig, config)
         self._motion = MotionModel(start, config)
         self._assessor = Assessor(rig, body, config)
+        self._use_cameras(rig)
         self._effort = Effort(needed_only=config.refine.swarms == "needed")
         self._starter = None if self._given else self._new_starter()
         self._lookahead = Lookahead(self._outlook(-1), self._outlook(0))
@@ -113,6 +104,11 @@ class Tracker:
     def state(self) -> TrackState:
         """State after the last step."""
         return self._assessor.track.state
+
+    @property
+    def shifts(self) -> dict[str, Shift]:
+        """By camera, how far its silhouettes lie beside the body as the others see it."""
+        return self._correction.shifts()
 
     @property
     def body(self) -> BodyModel:
@@ -126,7 +122,8 @@ class Tracker:
         self._body.reset()
         self._assessor.reset()
         self._effort.reset()
-        self._searcher = self._searcher_for(self.body)
+        self._correction.reset()
+        self._use_cameras(self._correction.rig)
         self._starter = None if self._given else self._new_starter()
         self._lookahead.restart(self._outlook(-1), self._outlook(0))
 
@@ -140,14 +137,13 @@ class Tracker:
         self.config = config
         for part in (self._motion, self._body, self._assessor, self._effort):
             part.configure(config)
-        self._searcher_for = partial(self._searcher_for, config=config)
-        self._start_searcher_for = partial(self._start_searcher_for, config=config)
-        self._searcher = self._searcher_for(self.body)
+        self._searchers.config = config
+        self._searcher = self._searchers.near(self.body)
 
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
         blank, pose = self.evidence.warm_up(), self._motion.pose
-        seen = Seen(0, blank, decide(blank, self._cameras, self.body, pose), blank)
+        seen = Seen(0, blank, decide(blank, self._searcher.cameras, self.body, pose), blank)
         search = self._searcher.frame(seen.used, 0, pose)
         search.run(swarm_stages(self.body, self.config, pose, self.body.sigma))
         # What the segmenting process compiles is not compiled twice.
@@ -158,7 +154,7 @@ class Tracker:
             self._assessor.limbs.recover(self._searcher, search.contours, seen, pose)
         self._assessor.warm_up(Found(search, 0, seen.used), self.body, self._body.limits)
         self.reset()
-        self._body.warm_up(self._searcher_for, blank, self._motion.pose)
+        self._body.warm_up(self._searchers.near, blank, self._motion.pose)
         self.reset()
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
@@ -200,16 +196,9 @@ class Tracker:
             ImageError, CalibrationError: as `step`.
         """
         # A background that follows the images must get them in the order of the steps.
-        follows = self.config.background.follow_s > 0.0
-        number, outlook = (0, None) if follows else self._lookahead.take()
-        if outlook is None:
-            return Prepared(views, stamp_ns, None, {}, number)
-        try:
-            seen = self.evidence.segment(views, stamp_ns, outlook, ahead=True)
-        except TrackerError:
-            self._lookahead.drop()
-            raise
-        return Prepared(views, stamp_ns, outlook, seen, number)
+        if self.config.background.follow_s > 0.0:
+            return Prepared(views, stamp_ns, None, {}, 0)
+        return self._lookahead.prepare(partial(self.evidence.segment, ahead=True), views, stamp_ns)
 
     def step(self, views: Views | Prepared, stamp_ns: int, effort: float = 1.0) -> TrackResult:
         """Find the pose that explains the views of one time.
@@ -254,7 +243,7 @@ class Tracker:
             self._motion.lose()
         else:
             result = self._assessor.found(found, self.body, self._body.limits)
-            self._learn(found)
+            result = replace(result, warnings=result.warnings + self._learn(found, result))
         exposure = {n: v.exposure for n, v in evidence.items() if v.exposure is not None}
         return replace(result, exposure=exposure)
 
@@ -270,12 +259,12 @@ class Tracker:
         expected = predicted if self.state is TrackState.TRACKING else None
         imaged, notes = self._views.sort(observed, self.body, expected)
         lost = self.state is TrackState.LOST
-        used = imaged if lost else decide(imaged, self._cameras, self.body, predicted)
+        used = imaged if lost else decide(imaged, self._searcher.cameras, self.body, predicted)
         return Seen(stamp_ns, observed, used, imaged, notes, left_out)
 
     def _outlook(self, number: int) -> Outlook:
         searching, motion = self._starter is not None, copy.copy(self._motion)
-        return Outlook(number, self.body, motion, self._body.limits, searching=searching)
+        return Outlook(number, self.rig, self.body, motion, self._body.limits, searching)
 
     def _search_room(self, starter: Starter, seen: Seen) -> Found | None:
         """Search the whole views for a person; None if there is none."""
@@ -284,7 +273,7 @@ class Tracker:
             return None
         if (start := starter.step(seen.used, seen.stamp_ns)) is None:
             return None
-        self._searcher = self._searcher_for(start.searcher.body)
+        self._searcher = self._searchers.near(start.searcher.body)
         self._body.take_found(start.searcher.body, settled=start.settled)
         search = self._searcher.frame(start.observations, seen.stamp_ns, start.pose)
         if start.settled:
@@ -302,10 +291,10 @@ class Tracker:
             return None
         if self._body.awaits_first_frame:
             at, fit = self._motion.pose, self._body.fit_first_frame
-            if (start := fit(self._searcher_for, used, stamp_ns, at)) is None:
+            if (start := fit(self._searchers.near, used, stamp_ns, at)) is None:
                 return None
             predicted = start
-            self._searcher = self._searcher_for(self.body)
+            self._searcher = self._searchers.near(self.body)
         speeds = joint_speeds(self._searcher.body, self._motion.pose)
         limits = self._motion.reachable(stamp_ns, self._searcher.limits, speeds)
         search = self._searcher.frame(
@@ -328,23 +317,34 @@ class Tracker:
             rotated=recovered.rotated, jumped=jumped, recovered=recovered.moved_m > RECOVERED_M,
         )  # fmt: skip
 
-    def _learn(self, found: Found) -> None:
-        """Update the motion with a frame and, while the body is tracked, the fit of the body."""
+    def _learn(self, found: Found, result: TrackResult) -> tuple[str, ...]:
+        """Update what is known of motion, body and cameras with a frame; returns warnings."""
         pose, tracked = found.search.pose, self.state is TrackState.TRACKING
         self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
         if not tracked or found.restarted:
-            return
+            return ()
         self._effort.tracked(found.search.cost)
         moved = self._body.fit_tracked_frame(
             found.search, rotated=found.rotated, recovered=found.recovered
         )
         if moved is not None:
-            self._searcher = self._searcher_for(self.body)
+            self._searcher = self._searchers.near(self.body)
             self._motion.shift(moved, self._body.limits)
+        if corrected := self._correction.add(result, self.body):
+            self._searchers.rig = self._correction.rig
+            self._body.cameras_changed(self._searchers.near)
+            self._use_cameras(self._correction.rig)
+        return corrected
+
+    def _use_cameras(self, rig: CameraRig) -> None:
+        """Use cameras as they are corrected from now on."""
+        self.rig = self._searchers.rig = rig
+        self.evidence.rig = self._views.rig = self._assessor.limbs.rig = rig
+        self._searcher = self._searchers.near(self.body)
 
     def _new_starter(self, last_pose: FloatArray | None = None) -> Starter:
         return Starter(
-            self.rig, self.body, self._start_searcher_for, self.evidence.select,
+            self.rig, self.body, self._searchers.start, self.evidence.select,
             sized=self._body.sized, fit_shape=not self._body.sections_fitted,
             person=self._body.unfitted, last_pose=last_pose,
         )  # fmt: skip

@@ -11,6 +11,7 @@ from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.in_step import InStepRecording
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.stored_result import StoredResult
+from markerless_tracker.viewing.corrected import as_corrected
 from markerless_tracker.viewing.reopened import reopened
 from markerless_tracker.viewing.windows import Window, windows
 
@@ -50,7 +51,8 @@ class ResultImages:
                 else f"{path}: the images of the result are not there"
             )
             raise DatasetError(f"{found}, expected the recording's folder with --source")
-        rig = reopened(result, path).rig
+        full = reopened(result, path).rig
+        rig = as_corrected(full, full, result.summary)
         self.windows: Mapping[str, Window] = (
             dict.fromkeys(rig.names, Window()) if whole else windows(result, rig)
         )
@@ -63,7 +65,7 @@ class ResultImages:
             recording = InStepRecording(recording, offsets)
         self._recording = recording
         self._stamps_ns = result.stamps_ns
-        self.rig: CameraRig = recording.rig
+        self.rig: CameraRig = as_corrected(recording.rig, full, result.summary)
         self.fps = recording.fps
 
     def frames(self, rows: Sequence[int]) -> Iterator[tuple[int, FrameSet]]:

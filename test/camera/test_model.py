@@ -108,6 +108,16 @@ def test_a_rig_in_another_world_sees_the_same() -> None:
     np.testing.assert_allclose(moved, project(points, rig), atol=1e-9)
 
 
+def test_a_shifted_camera_sees_everything_so_far_away() -> None:
+    """After the lens, so by the same distance everywhere in the image."""
+    rig = CameraRig((camera(), camera(name="cam02", lens=(0.1, -0.2, 0.01, 0.02))))
+    points = np.array([[0.1, 0.2, 0.3], [0.0, 0.4, 1.0], [-0.5, 0.3, 0.2]])
+    shifted = rig.shifted({"cam02": (7.5, -3.0)})
+    assert shifted["cam01"] is rig["cam01"]
+    moved = project(points, shifted)[1] - project(points, rig)[1]
+    np.testing.assert_allclose(moved, np.tile([7.5, -3.0], (3, 1)), atol=1e-9)
+
+
 @given(st.floats(0.05, 1.0))
 def test_scaling_agrees_with_area_averaging(scale: float) -> None:
     view = camera(lens=(-0.05, 0.1, 0.001, 0.002, 0.0))

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel, load_body
-from markerless_tracker.camera import CameraModel
+from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image, learn_background
@@ -97,13 +97,16 @@ def refined_settings() -> dict[str, Any]:
 
 @pytest.fixture
 def make_tracker(scene, backgrounds) -> Callable[..., Tracker]:
-    """`make(settings=SWARM, start_pose=truth, **changes)`: a tracker that starts at the truth."""
+    """`make(settings=SWARM, start_pose=truth, rig=true, **changes)`: starts at the truth."""
 
     def make(
-        settings: Mapping[str, Any] = SWARM, start_pose: FloatArray | None = None, **changes: Any
+        settings: Mapping[str, Any] = SWARM,
+        start_pose: FloatArray | None = None,
+        rig: CameraRig | None = None,
+        **changes: Any,
     ) -> Tracker:
         return Tracker(
-            scene.rig,
+            scene.rig if rig is None else rig,
             scene.body,
             TrackerConfig.from_mapping({**settings, **changes}),
             start_pose=scene.pose(0) if start_pose is None else start_pose,

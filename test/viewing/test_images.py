@@ -55,6 +55,17 @@ def test_cameras_are_brought_into_step_as_the_run_did(make_result, walk: Path) -
     assert (late[2].images["cam01"] == plain[2].images["cam01"]).all()
 
 
+def test_cameras_are_shifted_as_the_run_shifted_them(make_result, walk: Path) -> None:
+    entry = {"shift_px": [4.0, -2.0], "corrected": True}
+    notes = {"scale": 0.5, "cameras": {"cam02": entry, "cam01": {**entry, "corrected": False}}}
+    shifted = ResultImages(read_result(make_result(source=walk, notes=notes)), width_px=96).rig
+    plain = ResultImages(read_result(make_result("plain", source=walk)), width_px=96).rig
+    full_px = open_recording(walk).rig["cam02"].size_px[0]
+    moved = shifted["cam02"].matrix[:2, 2] - plain["cam02"].matrix[:2, 2]
+    np.testing.assert_allclose(moved, np.array([8.0, -4.0]) * 96 / full_px)
+    np.testing.assert_array_equal(shifted["cam01"].matrix, plain["cam01"].matrix)
+
+
 def test_a_bag_with_a_missing_set(make_result, walk: Path, tmp_path: Path) -> None:
     recording = open_recording(walk)
     sets = [images for images in recording.frames() if images.index != 1]

@@ -17,7 +17,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.camera_check import DISAGREES_M
+from markerless_tracker.tracking.cameras.check import DISAGREES_M
 from markerless_tracker.tracking.limits import joint_limits
 
 LEAST_CAMERAS = 3

@@ -51,7 +51,7 @@ class EvidenceMaker:
         backgrounds: Mapping[str, BackgroundModel],
         mapper: Callable[..., Iterable[Any]],
     ) -> None:
-        self._rig = rig
+        self.rig = rig
         self._config = config
         self._margin_px = config.region.component_margin_px
         self._clear_px = edge_radius_px(config) + config.region.component_margin_px
@@ -70,7 +70,7 @@ class EvidenceMaker:
             ImageError: a background does not fit its camera; nothing has changed then.
         """
         segmenters: dict[str, Segmenter] = {}
-        for camera in self._rig:
+        for camera in self.rig:
             background = backgrounds.get(camera.name)
             if background is None:
                 continue
@@ -155,7 +155,7 @@ class EvidenceMaker:
         """
         several = (self._config.threads or usable_cores()) > 1
         if several and self.segmenters and not self._follows and self._process is None:
-            self._process = SegmentingProcess(self._rig, shared)
+            self._process = SegmentingProcess(self.rig, shared)
 
     @property
     def process_cpu_s(self) -> float:
@@ -200,7 +200,7 @@ class EvidenceMaker:
 
     def _whole_frame_is_due(self, name: str, number: int) -> bool:
         """Whether a camera's whole image is due; in rotation, so that frames take equally long."""
-        shift = self._rig.names.index(name) * self._every // len(self._rig)
+        shift = self.rig.names.index(name) * self._every // len(self.rig)
         return self._follows and (number + shift) % self._every == 0
 
     def warm_up(self) -> dict[str, Observation]:
@@ -213,7 +213,7 @@ class EvidenceMaker:
             # It compiles the imaging while this process compiles the other kernels.
             self._process.use(self._config, self._backgrounds)
         made_up: dict[str, Observation] = {}
-        for camera in self._rig:
+        for camera in self.rig:
             width, height = camera.size_px
             mask = np.zeros((height, width), dtype=np.uint8)
             mask[height // 4 : height // 2, width // 4 : width // 2] = 1
@@ -235,7 +235,7 @@ class EvidenceMaker:
 
         def part(item: tuple[str, Observation]) -> tuple[Observation, int]:
             name, observation = item
-            return explained_part(observation, body_lines(self._rig[name], cones), self._margin_px)
+            return explained_part(observation, body_lines(self.rig[name], cones), self._margin_px)
 
         return _kept(dict(zip(observed, self._mapper(part, observed.items()), strict=True)))
 
@@ -261,7 +261,7 @@ class EvidenceMaker:
         cones = place_cones(body, predicted)
 
         def evidence(name: str) -> tuple[Observation, int]:
-            lines, view = body_lines(self._rig[name], cones), seen[name]
+            lines, view = body_lines(self.rig[name], cones), seen[name]
             for part in self._parts(name, view, stamp_ns, lines):
                 found = explained_in_region(part, lines, self._margin_px, self._clear_px)
                 if found is not None:
@@ -295,18 +295,18 @@ class EvidenceMaker:
         """Region of each camera, None = whole frame; arguments as for `segment`."""
         predicted, margin_m = outlook.predicted(stamp_ns)
         if margin_m is None or self._every == 1:
-            return dict.fromkeys(self._rig.names)
+            return dict.fromkeys(outlook.rig.names)
         cones = place_cones(outlook.body, predicted)
         return {
             camera.name: body_region(body_lines(camera, cones), margin_m, self._clear_px)
-            for camera in self._rig
+            for camera in outlook.rig
         }
 
     def _check(self, views: Views) -> None:
         if not views:
-            raise ImageError(f"no view came, expected some of {', '.join(self._rig.names)}")
+            raise ImageError(f"no view came, expected some of {', '.join(self.rig.names)}")
         for name, view in views.items():
-            expected = self._rig[name].size_px
+            expected = self.rig[name].size_px
             if isinstance(view, Observation) and view.size_px != expected:
                 raise ImageError(
                     f"{name}: observation of a {view.size_px[0]}x{view.size_px[1]} px frame, "

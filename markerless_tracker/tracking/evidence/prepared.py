@@ -5,11 +5,13 @@ evidence is made ahead. They do so without this pipeline, too, so that results a
 """
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.errors import TrackerError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image, Region
 from markerless_tracker.records import Observation
@@ -25,6 +27,7 @@ class Outlook:
 
     Attributes:
         number: number of sets processed so far; -1 and 0 for the two outlooks before the first set.
+        rig: the cameras as corrected then.
         body: the tracked body.
         motion: a copy, which does not change.
         limits: (2, p) joint limits.
@@ -32,6 +35,7 @@ class Outlook:
     """
 
     number: int
+    rig: CameraRig
     body: BodyModel
     motion: MotionModel
     limits: FloatArray
@@ -78,6 +82,9 @@ class Prepared:
     number: int
 
 
+Segment = Callable[[Views, int, Outlook], Mapping[str, SeenView]]
+
+
 class Lookahead:
     """Assigns each set the outlook of its regions, whenever its evidence is made.
 
@@ -106,14 +113,35 @@ class Lookahead:
         """The outlook of the next step."""
         return self._previous
 
-    def take(self) -> tuple[int, Outlook | None]:
+    def prepare(self, segment: Segment, views: Views, stamp_ns: int) -> Prepared:
+        """The evidence of the next set; none if its outlook is not known yet.
+
+        Args:
+            segment: makes the evidence of views and their time with an outlook.
+            views: of the set.
+            stamp_ns: their time.
+
+        Raises:
+            TrackerError: as `segment`.
+        """
+        number, outlook = self._take()
+        if outlook is None:
+            return Prepared(views, stamp_ns, None, {}, number)
+        try:
+            seen = segment(views, stamp_ns, outlook)
+        except TrackerError:
+            self._drop()
+            raise
+        return Prepared(views, stamp_ns, outlook, seen, number)
+
+    def _take(self) -> tuple[int, Outlook | None]:
         """Number and outlook of the set that is prepared now; None if that is not known yet."""
         with self._lock:
             place = self._prepared - self._done + self._running
             self._prepared += 1
             return self._prepared, (self._previous, self._latest, None)[min(place, 2)]
 
-    def drop(self) -> None:
+    def _drop(self) -> None:
         """Note that the set whose outlook was taken last will not be tracked."""
         with self._lock:
             self._prepared = max(self._done, self._prepared - 1)

@@ -24,7 +24,7 @@ class ViewWatch:
     """
 
     def __init__(self, rig: CameraRig) -> None:
-        self._rig = rig
+        self.rig = rig
         self._out: dict[str, str] = {}
 
     def reset(self) -> None:
@@ -45,7 +45,7 @@ class ViewWatch:
             expected: (p,) predicted pose, None if unknown.
         """
         reasons: dict[str, str] = {}
-        for camera in self._rig:
+        for camera in self.rig:
             observation = observed.get(camera.name)
             if observation is None:
                 reasons[camera.name] = "no image"
@@ -66,7 +66,7 @@ class ViewWatch:
         return used, self._changes(reasons)
 
     def _in_frame(self, points: FloatArray, name: str) -> float:
-        camera = self._rig[name]
+        camera = self.rig[name]
         with np.errstate(invalid="ignore"):
             pixels = project_camera(points, camera)
             inside = (pixels >= 0.0).all(axis=1) & (pixels < camera.size_px).all(axis=1)

@@ -125,7 +125,7 @@ class LimbWatch:
     """
 
     def __init__(self, rig: CameraRig) -> None:
-        self._rig = rig
+        self.rig = rig
         self.reset()
 
     def reset(self) -> None:
@@ -178,7 +178,7 @@ class LimbWatch:
             observations: the silhouettes.
             particle_sd_ratio: (p,) as in `FrameSearch`.
         """
-        fractions = inside_fractions(body, pose, observations, self._rig)
+        fractions = inside_fractions(body, pose, observations, self.rig)
         states = {}
         for name in body.limbs:
             inside_fraction = fractions.get(name, float("nan"))
@@ -219,7 +219,7 @@ class LimbWatch:
         body, stamp_ns, observations = searcher.body, seen.stamp_ns, seen.used
         if not body.limbs:
             return Recovered(pose)
-        unexplained = find_unexplained(body, pose, observations, self._rig)
+        unexplained = find_unexplained(body, pose, observations, self.rig)
         self._areas_m2 = dict(unexplained.areas_m2)
         if not unexplained.limbs:
             self._waits.clear()
@@ -282,7 +282,7 @@ class LimbWatch:
             aim = None
             if unexplained.regions:
                 aim = partial(
-                    most_aimed, body, limb=limb, regions=unexplained.regions, rig=self._rig
+                    most_aimed, body, limb=limb, regions=unexplained.regions, rig=self.rig
                 )
             taken = search.elsewhere(limb, rng, aim)
             self._rivals.pop(name, None)

@@ -94,6 +94,7 @@ class BodyEstimate:
         self.body = self.generic
         self.sections_fitted = not self._fits_sections
         self.sized = None if self._person is None else self._person.sized
+        self._first: tuple[Mapping[str, Observation], int, FloatArray] | None = None
         self._disagreeing = 0
         self._varied: VariedFrames | None = None
         self._revision: Generator[None, None, BodyModel] | None = None
@@ -204,6 +205,18 @@ class BodyEstimate:
             self._fit_again(self._person)
         return fitted.moved
 
+    def cameras_changed(self, searcher_for: SearcherFor) -> None:
+        """Fit the body anew: sections in the same first frame, or lengths in the next frames.
+
+        Args:
+            searcher_for: makes a searcher of a body, with the new cameras.
+        """
+        if self._first is not None:
+            self._revision = None
+            self._fit_sections(searcher_for, *self._first)
+        elif self._person is not None and self._fits_sections and self._config.fit_lengths:
+            self._begin_lengths(self._person)
+
     def restart_lengths(self) -> FloatArray | None:
         """Restart the fit of an unmeasured body, which was fitted to poses with a wrong heading.
 
@@ -293,6 +306,7 @@ class BodyEstimate:
         def contours(body: BodyModel, at: FloatArray) -> ContourFrame:
             return searcher_for(body).frame(observations, stamp_ns, at).contours
 
+        self._first = observations, stamp_ns, pose
         self.body, pose = shape_of_first_frame(
             self.generic, pose, self._start_markers, contours, self._config, self.limits
         )

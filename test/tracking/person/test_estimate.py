@@ -134,3 +134,38 @@ def test_a_measured_body_stays_when_the_person_is_turned_round() -> None:
     before = estimate.body
     assert estimate.restart_lengths() is None
     assert estimate.body is before
+
+
+def fitted_with(tracker, scene, frames, rig) -> np.ndarray:
+    """Sections of a body whose first frame was seen by the tracker's cameras, then by a rig."""
+    tracker.step(frames[0].observations, 0)
+    tracker._searchers.rig = rig
+    tracker._body.cameras_changed(tracker._searchers.near)
+    return tracker.body.cone_shape
+
+
+def test_sections_are_fitted_to_the_same_first_frame_again_when_cameras_changed(
+    scene, make_tracker, frames, refined_settings
+) -> None:
+    wrong = scene.rig.shifted({"cam01": (6.0, 0.0)})
+    expected = make_tracker(refined_settings)
+    expected.step(frames[0].observations, 0)
+    corrected = make_tracker(refined_settings, rig=wrong)
+    shape = fitted_with(corrected, scene, frames, scene.rig)
+    np.testing.assert_array_equal(shape, expected.body.cone_shape)
+    assert (fitted_with(make_tracker(refined_settings), scene, frames, wrong) != shape).any()
+
+
+def test_lengths_are_fitted_anew_when_cameras_changed() -> None:
+    estimate = estimated(known=False)
+    estimate._begin_lengths(estimate._person)
+    begun, body = estimate._lengths, estimate.body
+    estimate.cameras_changed(lambda body: pytest.fail("no frame is searched"))
+    assert estimate._lengths is not begun and estimate.body is body
+
+
+def test_a_known_shape_stays_when_cameras_changed(scene) -> None:
+    config = TrackerConfig(threads=1)
+    estimate = BodyEstimate(scene.body, config, shape_known=True)
+    estimate.cameras_changed(lambda body: pytest.fail("no frame is searched"))
+    assert estimate.body is scene.body

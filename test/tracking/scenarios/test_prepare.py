@@ -58,6 +58,27 @@ def test_the_next_set_is_prepared_beside_the_step(
             assert said(tracker.step(prepared, frame.stamp_ns)) == alone[i]
 
 
+def test_a_camera_that_is_corrected_meanwhile(make_tracker, scene, frames, swarm_settings) -> None:
+    """The regions of a set that is prepared beside a step follow from the cameras before it."""
+    times = [(f.images, 100_000_000 * i) for i, f in enumerate([*frames, *frames[::-1]])]
+
+    def tracker():
+        wrong = scene.rig.shifted({"cam02": (2.0, -1.5)})
+        return make_tracker(swarm_settings, rig=wrong, **SMALL, correct_cameras=True)
+
+    alone, one = [], tracker()
+    for images, stamp_ns in times:
+        alone.append(said(one.step(images, stamp_ns)))
+    assert one.rig["cam02"].matrix[0, 2] != tracker().rig["cam02"].matrix[0, 2]
+    other = tracker()
+    with ThreadPoolExecutor(1) as pool:
+        ahead = pool.submit(other.prepare, *times[0])
+        for i, (_, stamp_ns) in enumerate(times):
+            prepared = ahead.result()
+            ahead = pool.submit(other.prepare, *times[min(i + 1, len(times) - 1)])
+            assert said(other.step(prepared, stamp_ns)) == alone[i]
+
+
 def test_sets_prepared_late_early_or_left_out(make_tracker, frames, swarm_settings, alone) -> None:
     tracker = make_tracker(swarm_settings, **SMALL)
     early = [tracker.prepare(f.images, f.stamp_ns) for f in frames[:4]]

@@ -1,0 +1,266 @@
+"""Detects a camera that disagrees with the others: its silhouettes are shifted from the body.
+
+At intervals, for each camera in turn, the pose is refined on the other cameras' silhouettes. Then
+the image shift is estimated that fits the body's outline best to this camera's silhouette. A shift
+that persists over a run is due neither to motion nor to segmentation: the calibration of a camera
+is wrong. The camera across shows about the opposite shift. The wrong one is that whose shift makes
+all silhouettes agree better with one pose.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraModel, CameraRig
+from markerless_tracker.fitness.arrays import lay_out_views
+from markerless_tracker.fitness.contour import ContourFrame
+from markerless_tracker.geometry import FloatArray
+from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
+from markerless_tracker.tracking.search import Searcher, pixels_per_m, root_m
+
+DISAGREES_M = 0.030
+"""Least persistent shift, at the body's distance, that is attributed to the calibration."""
+EVERY_NS = (80_000_000, 400_000_000, 2_000_000_000)
+"""Time between the first `FEW_CHECKS` checks, between those up to `MANY_CHECKS`, and later."""
+FEW_CHECKS, MANY_CHECKS = 3, 12
+"""Numbers of checks whose median tells whether a camera is wrong, and is precise."""
+LEAST_VIEWS = 3
+"""Least number of views: of two views that disagree, either may be wrong."""
+_ITERATIONS, _TRUNCATION_M = 4, (0.10, 0.035)
+"""Refinement without a camera: its iterations, and the first and last truncation."""
+_CANDIDATE_M, _GAIN_TRUNCATION_M = 0.020, 0.05
+"""Least shift whose gain is computed, and the truncation of the cost."""
+_LEAD = 0.1
+"""A camera is taken for the wrong one if its gain exceeds those of others by this fraction."""
+_SHIFT_STEPS, _SHIFT_TRUNCATION_M = 3, 0.10
+"""Estimate of a shift: its steps and their truncation."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """Shift of one camera's silhouettes from the body as the other cameras see it.
+
+    Attributes:
+        px: (u, v), medians over the checks, at the scale of the tracked images.
+        length_m: its length at the body's distance.
+        checks: number of frames in which it was estimated.
+        corrected: whether its image is shifted back.
+    """
+
+    px: tuple[float, float]
+    length_m: float
+    checks: int
+    corrected: bool = False
+
+    @property
+    def m_per_px(self) -> float:
+        """Size of a pixel at the body's distance, m."""
+        return self.length_m / max(float(np.hypot(*self.px)), 1e-9)
+
+    @property
+    def disagrees(self) -> bool:
+        """Whether the shift is too large to be chance."""
+        return self.checks >= FEW_CHECKS and self.length_m >= DISAGREES_M
+
+
+class CameraCheck:
+    """Compares each camera with the others over a run.
+
+    The cameras are compared in turn, so that no frame takes much longer than others.
+
+    Args:
+        rig: the cameras as calibrated.
+        config: the tracker's settings.
+
+    Attributes:
+        suspects: the cameras that disagree; the others are compared without them.
+    """
+
+    def __init__(self, rig: CameraRig, config: TrackerConfig) -> None:
+        self._rig = rig
+        self._config = config
+        self._searcher: Searcher | None = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all frames."""
+        self._due_ns: int | None = None
+        self._compared = self._checks = 0
+        self.suspects: frozenset[str] = frozenset()
+        self._found: dict[str, list[tuple[float, float, float]]] = {n: [] for n in self._rig.names}
+        self._gains: dict[str, list[float]] = {name: [] for name in self._rig.names}
+
+    def add(self, result: TrackResult, body: BodyModel) -> None:
+        """Take a tracked frame: compare the cameras whose turn has come; often there is none."""
+        if result.state is not TrackState.TRACKING or result.pose is None:
+            return
+        if self._due_ns is None:
+            self._due_ns = result.stamp_ns
+        count = len(self._rig)
+        for _ in range(count):
+            if result.stamp_ns < self._due_ns:
+                return
+            self._compare(self._rig.names[self._compared], result, result.pose, body)
+            self._compared = (self._compared + 1) % count
+            self._due_ns += self._every_ns // count
+            if self._compared == 0:
+                self._checks += 1
+                self._weigh(result, result.pose)
+                self._suspect()
+        # Frames come less often than checks are due.
+        self._due_ns = max(self._due_ns, result.stamp_ns)
+
+    @property
+    def _every_ns(self) -> int:
+        return EVERY_NS[(self._checks >= FEW_CHECKS) + (self._checks >= MANY_CHECKS)]
+
+    def _compare(self, name: str, result: TrackResult, pose: FloatArray, body: BodyModel) -> None:
+        """Estimate the shift of one camera from the body as the others see it."""
+        seen = {n: o for n, o in result.observations.items() if o.mask_words.any()}
+        others = {n: o for n, o in seen.items() if n != name and n not in self.suspects}
+        if name not in seen or len(others) < LEAST_VIEWS - 1:
+            return
+        if self._searcher is None or self._searcher.body is not body:
+            self._searcher = Searcher(self._rig, body, self._config, limits=body.limits, threads=1)
+        searcher, stamp_ns = self._searcher, result.stamp_ns
+        without = _refined(searcher, searcher.frame(others, stamp_ns, pose).contours, pose)
+        shift = _shift(searcher, seen[name], self._rig[name], without)
+        if shift is None:
+            return
+        self._found[name].append(shift)
+
+    def _weigh(self, result: TrackResult, pose: FloatArray) -> None:
+        """Estimate how much each camera that may be wrong explains, all in the same frame."""
+        seen = {n: o for n, o in result.observations.items() if o.mask_words.any()}
+        seen = {n: o for n, o in seen.items() if n not in self.suspects}
+        shifts = {
+            name: shift.px
+            for name, shift in self.shifts().items()
+            if name in seen and shift.length_m >= _CANDIDATE_M
+        }
+        if self._searcher is None or not shifts:
+            return
+        contours = self._searcher.frame(seen, result.stamp_ns, pose).contours
+        for name, gain in _gains(self._searcher, contours, pose, shifts).items():
+            self._gains[name].append(gain)
+
+    def shifts(self) -> dict[str, Shift]:
+        """The shift of every camera that could be compared, by name."""
+        out = {}
+        for name, found in self._found.items():
+            if found:
+                u, v, scale = np.median(np.array(found), axis=0)
+                length = float(np.hypot(u, v)) / float(scale)
+                out[name] = Shift((float(u), float(v)), length, len(found))
+        return out
+
+    def _suspect(self) -> None:
+        """Exclude the wrong camera from the others' checks, which begin anew."""
+        doubted = [
+            name
+            for name, shift in self.shifts().items()
+            if shift.disagrees and name not in self.suspects and self._gains[name]
+        ]
+        if not doubted or len(self._rig) - len(self.suspects) - 1 < LEAST_VIEWS:
+            return
+        gains = {name: float(np.mean(self._gains[name])) for name in doubted}
+        first, *others = sorted(gains, key=gains.__getitem__, reverse=True)
+        lead = gains[first] - max((gains[name] for name in others), default=0.0)
+        sure = lead >= _LEAD * gains[first] or self._checks >= MANY_CHECKS
+        if not sure or gains[first] <= 0.0:
+            return
+        self.suspects |= {first}
+        self._checks = 0
+        for name in set(self._found) - self.suspects:
+            self._found[name], self._gains[name] = [], []
+
+
+def describe(shifts: Mapping[str, Shift]) -> list[str]:
+    """A line for each camera that disagrees with the others."""
+    return [
+        f"{name}: silhouettes ({shift.px[0]:+.1f}, {shift.px[1]:+.1f}) px, "
+        f"{1000.0 * shift.length_m:.0f} mm, beside the body as the other cameras see it; "
+        + ("its image was shifted back, " if shift.corrected else "")
+        + "check its calibration"
+        for name, shift in shifts.items()
+        if shift.disagrees
+    ]
+
+
+def _refined(searcher: Searcher, contours: ContourFrame, pose: FloatArray) -> FloatArray:
+    """A pose (p,) refined on these views only."""
+    return refined_on_contours(
+        contours,
+        pose,
+        searcher.config,
+        priors=(pose_prior(searcher.body),),
+        limits=searcher.limits,
+        iterations=_ITERATIONS,
+        truncation_m=_TRUNCATION_M,
+    )
+
+
+def _gains(
+    searcher: Searcher,
+    contours: ContourFrame,
+    pose: FloatArray,
+    shifts_px: Mapping[str, tuple[float, float]],
+) -> dict[str, float]:
+    """How much less it costs to explain all views if one camera is shifted, m³, by camera."""
+    intrinsics = contours.views.arrays.intrinsics
+
+    def cost() -> float:
+        contours.collect(_refined(searcher, contours, pose), _GAIN_TRUNCATION_M)
+        return float(contours.residuals.cost.sum())
+
+    before, gains = cost(), {}
+    for name, shift_px in shifts_px.items():
+        view = contours.views.names.index(name)
+        centre = intrinsics[view, [2, 4]]
+        intrinsics[view, [2, 4]] = centre + shift_px
+        gains[name] = before - cost()
+        intrinsics[view, [2, 4]] = centre
+    return gains
+
+
+def _shift(
+    searcher: Searcher, observation: Observation, camera: CameraModel, pose: FloatArray
+) -> tuple[float, float, float] | None:
+    """Shift (u, v) px with which the body fits one view's silhouette, and px per metre.
+
+    Weighted least squares on the contours' residuals, repeated with the camera moved by the shift
+    so far, since larger residuals have less weight.
+    """
+    to_camera, name = camera.T_cam_world, camera.name
+    at = root_m(searcher.body, pose)
+    depth = float(to_camera[2, :3] @ at + to_camera[2, 3])
+    if depth <= 0.0:
+        return None
+    focal = np.array([camera.matrix[0, 0], camera.matrix[1, 1]])
+    views = lay_out_views([camera], {name: observation})
+    contours = ContourFrame(
+        searcher.body,
+        {name: camera},
+        {name: observation},
+        views,
+        pixels_per_m={name: pixels_per_m(camera, at)},
+        step_px=searcher.config.edges.step_px,
+    )
+    # The silhouette is fixed; the principal point is moved.
+    centre = views.arrays.intrinsics[0, [2, 4]]
+    shift = np.zeros(2)
+    for _ in range(_SHIFT_STEPS):
+        views.arrays.intrinsics[0, [2, 4]] = centre + shift
+        contours.collect(pose, _SHIFT_TRUNCATION_M)
+        rows = slice(int(contours.residuals.count[0]))
+        value, weight = contours.residuals.value[0, rows], contours.residuals.weight[0, rows]
+        jacobian = contours.residuals.gradient[0, rows] @ to_camera[:2, :3].T * (depth / focal)
+        normal = jacobian.T @ (weight[:, None] * jacobian)
+        if np.linalg.matrix_rank(normal) < 2:
+            return None
+        shift = shift - np.linalg.solve(normal, jacobian.T @ (weight * value))
+    return float(shift[0]), float(shift[1]), float(focal.mean()) / depth

@@ -1,0 +1,70 @@
+"""Corrects a camera whose silhouettes lie beside the body, as long as the person is tracked."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.records import TrackResult
+from markerless_tracker.tracking.cameras.check import CameraCheck, Shift
+from markerless_tracker.tracking.config import TrackerConfig
+
+_CHANGED_M = 0.010
+"""A correction is replaced when a later estimate differs from it by this much, at the body."""
+
+
+class CameraCorrection:
+    """Corrects cameras that `CameraCheck` suspects, by the shift of their images.
+
+    A camera that was touched after its calibration shows the person beside where the others see
+    it. A shift of the principal point explains most of that for a person who stays at about the
+    same distance; a rotation cannot be told from it.
+
+    Args:
+        rig: the cameras as calibrated.
+        config: `correct_cameras`, and what the check needs.
+
+    Attributes:
+        rig: the cameras as corrected so far.
+    """
+
+    def __init__(self, rig: CameraRig, config: TrackerConfig) -> None:
+        self._calibrated = rig
+        self._corrects = config.correct_cameras
+        self._check = CameraCheck(rig, config)
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the cameras as calibrated."""
+        self._check.reset()
+        self.rig = self._calibrated
+        self._shifts_px: dict[str, tuple[float, float]] = {}
+
+    def shifts(self) -> dict[str, Shift]:
+        """By camera, its shift from the body as the others see it, as calibrated."""
+        return {
+            name: replace(shift, corrected=name in self._shifts_px)
+            for name, shift in self._check.shifts().items()
+        }
+
+    def add(self, result: TrackResult, body: BodyModel) -> tuple[str, ...]:
+        """Take a frame; returns a line for each camera whose correction has changed in `rig`."""
+        self._check.add(result, body)
+        if not self._corrects:
+            return ()
+        changed = []
+        for name, shift in self._check.shifts().items():
+            if name not in self._check.suspects:
+                continue
+            change_px = float(np.hypot(*np.subtract(shift.px, self._shifts_px.get(name, (0, 0)))))
+            if change_px * shift.m_per_px < _CHANGED_M:
+                continue
+            self._shifts_px[name] = shift.px
+            changed.append(
+                f"{name}: silhouettes ({shift.px[0]:+.1f}, {shift.px[1]:+.1f}) px beside the body "
+                "as the other cameras see it: its image is shifted back from now on"
+            )
+        if changed:
+            self.rig = self._calibrated.shifted(self._shifts_px)
+        return tuple(changed)

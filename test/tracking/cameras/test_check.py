@@ -1,0 +1,135 @@
+"""A camera that disagrees with the others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import markers
+from markerless_tracker.camera import CameraRig
+from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.cameras.check import (
+    EVERY_NS,
+    FEW_CHECKS,
+    MANY_CHECKS,
+    CameraCheck,
+    Shift,
+    describe,
+)
+
+CONFIG = TrackerConfig(threads=1)
+FRAME_NS = 200_000_000
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=3)
+
+
+def checked(scene, rig, frames: int = 8, every_ns: int = FRAME_NS) -> CameraCheck:
+    check = CameraCheck(rig, CONFIG)
+    for result in tracked(scene, frames, every_ns):
+        check.add(result, scene.body)
+    return check
+
+
+def tracked(scene, frames: int, every_ns: int = FRAME_NS) -> list[TrackResult]:
+    """Results with the true poses and exact silhouettes."""
+    results = []
+    for index in range(frames):
+        _, masks, pose = scene.frame(12 * index)
+        seen = {
+            name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+            for name, mask in masks.items()
+        }
+        results.append(
+            TrackResult(
+                index * every_ns, TrackState.TRACKING, pose, markers(scene.body, pose), 1.8, {}, 0,
+                observations=seen,
+            )
+        )  # fmt: skip
+    return results
+
+
+def test_cameras_that_agree_are_not_named(scene) -> None:
+    check = checked(scene, scene.rig)
+    shifts = check.shifts()
+    assert not check.suspects
+    assert set(shifts) == set(scene.rig.names)
+    assert all(shift.length_m < 0.01 for shift in shifts.values())
+    assert describe(shifts) == []
+
+
+def test_the_camera_that_is_off_is_named(scene) -> None:
+    wrong = scene.rig.shifted({"cam03": (-5.0, 3.0)})
+    check = checked(scene, wrong)
+    shifts = check.shifts()
+    assert check.suspects == {"cam03"}
+    assert [name for name, shift in shifts.items() if shift.disagrees] == ["cam03"]
+    np.testing.assert_allclose(shifts["cam03"].px, (5.0, -3.0), atol=1.0)
+    (line,) = describe(shifts)
+    assert line.startswith("cam03: silhouettes (+")
+
+
+def test_few_checks_and_lost_frames_say_nothing(scene) -> None:
+    assert not Shift((9.0, 9.0), 0.1, 2).disagrees
+    check = CameraCheck(scene.rig, CONFIG)
+    check.add(TrackResult(0, TrackState.LOST, None, None, float("nan"), {}, 0), scene.body)
+    assert check.shifts() == {}
+
+
+@pytest.mark.parametrize("name", ["cam01", "cam02", "cam03", "cam04"])
+@pytest.mark.parametrize("shift_px", [(5.0, 0.0), (0.0, 5.0), (-4.0, 4.0)])
+def test_the_camera_across_is_not_blamed(scene, name, shift_px) -> None:
+    """Opposite cameras show about the same shift sideways, in opposite directions."""
+    check = checked(scene, scene.rig.shifted({name: shift_px}), FEW_CHECKS + 1)
+    assert check.suspects == {name}
+
+
+def test_of_three_cameras_none_is_suspected(scene) -> None:
+    three = scene.rig.shifted({"cam03": (-5.0, 3.0)}).selected(["cam01", "cam02", "cam03"])
+    check = checked(scene, three)
+    assert not check.suspects and check.shifts()["cam03"].disagrees
+
+
+def test_a_frame_compares_one_camera_and_checks_become_rarer(scene) -> None:
+    frame_ns = 16_666_667
+    check = CameraCheck(scene.rig, CONFIG)
+    (standing,) = tracked(scene, 1)
+    counts = [0]
+    for index in range(600):
+        check.add(replace(standing, stamp_ns=index * frame_ns), scene.body)
+        counts.append(sum(shift.checks for shift in check.shifts().values()))
+    assert max(np.diff(counts)) == 1
+    cameras = len(scene.rig)
+    few = 1 + (FEW_CHECKS * EVERY_NS[0]) // frame_ns
+    assert counts[few] == pytest.approx(cameras * FEW_CHECKS, abs=2)
+    many = few + ((MANY_CHECKS - FEW_CHECKS) * EVERY_NS[1]) // frame_ns
+    assert counts[many] == pytest.approx(cameras * MANY_CHECKS, abs=2)
+    later = (600 - many) * frame_ns / EVERY_NS[2]
+    assert counts[-1] - counts[many] == pytest.approx(cameras * later, abs=2)
+
+
+def test_a_second_camera_is_left_out_after_the_worst_one(scene) -> None:
+    check = CameraCheck(cameras_like(scene.rig, 6), CONFIG)
+    bad = {"cam01": (20.0, 0.0, 200.0), "cam02": (0.0, 16.0, 200.0), "cam03": (0.0, 30.0, 200.0)}
+    for left_out in (set(), {"cam01"}, {"cam01", "cam02"}):
+        assert check.suspects == left_out
+        for name in check._found:
+            check._found[name] = [bad.get(name, (0.0, 0.0, 200.0))] * 8
+        # The third disagrees most, and explains least.
+        check._gains.update(cam01=[3.0, 3.0], cam02=[1.0, 3.0], cam03=[0.5, 0.5])
+        check._suspect()
+
+
+def test_all_is_forgotten(scene) -> None:
+    check = checked(scene, scene.rig.shifted({"cam03": (-5.0, 3.0)}))
+    check.reset()
+    assert not check.suspects and check.shifts() == {}
+
+
+def cameras_like(rig: CameraRig, count: int) -> CameraRig:
+    """A rig of so many cameras, all where the first one is."""
+    return CameraRig(tuple(replace(rig["cam01"], name=f"cam{i + 1:02d}") for i in range(count)))
