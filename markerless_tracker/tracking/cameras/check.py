@@ -33,9 +33,9 @@ LEAST_VIEWS = 3
 _ITERATIONS, _TRUNCATION_M = 4, (0.10, 0.035)
 """Refinement without a camera: its iterations, and the first and last truncation."""
 _CANDIDATE_M, _GAIN_TRUNCATION_M = 0.020, 0.05
-"""Least shift whose gain is computed, and the truncation of the cost."""
+"""Least shift whose gain is computed and of a camera that was doubted; truncation of the cost."""
 _LEAD = 0.1
-"""A camera is taken for the wrong one if its gain exceeds those of others by this fraction."""
+"""A camera is the wrong one if its gain exceeds those of others by this fraction."""
 _SHIFT_STEPS, _SHIFT_TRUNCATION_M = 3, 0.10
 """Estimate of a shift: its steps and their truncation."""
 
@@ -77,7 +77,8 @@ class CameraCheck:
         config: the tracker's settings.
 
     Attributes:
-        suspects: the cameras that disagree; the others are compared without them.
+        suspects: the cameras that are wrong; the others are compared without them.
+        shares: probability that a camera is wrong, of those that may be.
     """
 
     def __init__(self, rig: CameraRig, config: TrackerConfig) -> None:
@@ -91,6 +92,7 @@ class CameraCheck:
         self._due_ns: int | None = None
         self._compared = self._checks = 0
         self.suspects: frozenset[str] = frozenset()
+        self.shares: dict[str, float] = {}
         self._found: dict[str, list[tuple[float, float, float]]] = {n: [] for n in self._rig.names}
         self._gains: dict[str, list[float]] = {name: [] for name in self._rig.names}
 
@@ -159,19 +161,26 @@ class CameraCheck:
         return out
 
     def _suspect(self) -> None:
-        """Exclude the wrong camera from the others' checks, which begin anew."""
+        """Find the wrong camera; it is excluded from the others' checks, which begin anew."""
+        before, self.shares = self.shares, dict.fromkeys(self.suspects, 1.0)
         doubted = [
             name
             for name, shift in self.shifts().items()
-            if shift.disagrees and name not in self.suspects and self._gains[name]
+            if name not in self.suspects
+            and self._gains[name]
+            and (shift.disagrees or (name in before and shift.length_m >= _CANDIDATE_M))
         ]
         if not doubted or len(self._rig) - len(self.suspects) - 1 < LEAST_VIEWS:
             return
         gains = {name: float(np.mean(self._gains[name])) for name in doubted}
         first, *others = sorted(gains, key=gains.__getitem__, reverse=True)
-        lead = gains[first] - max((gains[name] for name in others), default=0.0)
-        sure = lead >= _LEAD * gains[first] or self._checks >= MANY_CHECKS
-        if not sure or gains[first] <= 0.0:
+        if gains[first] <= 0.0:
+            return
+        lead = 1.0 - max((gains[name] for name in others[:1]), default=0.0) / gains[first]
+        sure = lead >= _LEAD or self._checks >= MANY_CHECKS
+        self.shares[first] = 1.0 if sure else 0.5 + 0.5 * lead / _LEAD
+        if not sure:
+            self.shares[others[0]] = 1.0 - self.shares[first]
             return
         self.suspects |= {first}
         self._checks = 0

@@ -17,6 +17,9 @@ _CHANGED_M = 0.010
 class CameraCorrection:
     """Corrects cameras that `CameraCheck` suspects, by the shift of their images.
 
+    While either of two cameras may be the wrong one, each image is shifted by its share: the
+    silhouettes agree, and the body is at most half as far off as with the wrong choice.
+
     A camera that was touched after its calibration shows the person beside where the others see
     it. A shift of the principal point explains most of that for a person who stays at about the
     same distance; a rotation cannot be told from it.
@@ -53,17 +56,23 @@ class CameraCorrection:
         self._check.add(result, body)
         if not self._corrects:
             return ()
-        changed = []
-        for name, shift in self._check.shifts().items():
-            if name not in self._check.suspects:
-                continue
-            change_px = float(np.hypot(*np.subtract(shift.px, self._shifts_px.get(name, (0, 0)))))
+        shares, shifts = self._check.shares, self._check.shifts()
+        changed = [
+            f"{name}: its image is as calibrated again"
+            for name in self._shifts_px
+            if name not in shares
+        ]
+        self._shifts_px = {n: shift for n, shift in self._shifts_px.items() if n in shares}
+        for name, share in shares.items():
+            shift = shifts[name]
+            u, v = share * shift.px[0], share * shift.px[1]
+            change_px = float(np.hypot(*np.subtract((u, v), self._shifts_px.get(name, (0.0, 0.0)))))
             if change_px * shift.m_per_px < _CHANGED_M:
                 continue
-            self._shifts_px[name] = shift.px
+            self._shifts_px[name] = (u, v)
             changed.append(
                 f"{name}: silhouettes ({shift.px[0]:+.1f}, {shift.px[1]:+.1f}) px beside the body "
-                "as the other cameras see it: its image is shifted back from now on"
+                f"as the other cameras see it: its image is shifted by ({u:+.1f}, {v:+.1f}) px"
             )
         if changed:
             self.rig = self._calibrated.shifted(self._shifts_px)

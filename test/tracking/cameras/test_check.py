@@ -124,6 +124,36 @@ def test_a_second_camera_is_left_out_after_the_worst_one(scene) -> None:
         check._suspect()
 
 
+@pytest.mark.parametrize(
+    ("gains", "shares"),
+    [
+        ((2.0, 1.0), {"cam01": 1.0}),
+        ((2.0, 2.0), {"cam01": 0.5, "cam02": 0.5}),
+        ((1.9, 2.0), {"cam01": 0.25, "cam02": 0.75}),
+        ((-1.0, -2.0), {}),
+    ],
+)
+def test_while_either_of_two_may_be_wrong_each_has_a_share(scene, gains, shares) -> None:
+    check = CameraCheck(scene.rig, CONFIG)
+    for name, gain in zip(("cam01", "cam02"), gains, strict=True):
+        check._found[name], check._gains[name] = [(20.0, 0.0, 200.0)] * 4, [gain]
+    check._suspect()
+    assert check.shares == pytest.approx(shares)
+    assert check.suspects == {name for name, share in shares.items() if share == 1.0}
+    check._checks = MANY_CHECKS
+    check._suspect()
+    assert len(check.suspects) == (1 if shares else 0)
+
+
+def test_a_doubt_at_the_limit_does_not_come_and_go(scene) -> None:
+    check = CameraCheck(scene.rig, CONFIG)
+    check._gains.update(cam01=[1.0], cam02=[1.0])
+    for shift_px, doubted in ((5.9, False), (6.1, True), (5.9, True), (3.9, False)):
+        check._found["cam01"] = check._found["cam02"] = [(shift_px, 0.0, 200.0)] * 4
+        check._suspect()
+        assert bool(check.shares) == doubted
+
+
 def test_all_is_forgotten(scene) -> None:
     check = checked(scene, scene.rig.shifted({"cam03": (-5.0, 3.0)}))
     check.reset()

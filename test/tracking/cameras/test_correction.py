@@ -40,7 +40,7 @@ def test_the_image_is_shifted_back_and_the_camera_named(scene) -> None:
     notes = [correction.add(result(scene, index), scene.body) for index in range(FEW_CHECKS + 1)]
     assert notes[:-1] == [()] * FEW_CHECKS
     (line,) = notes[-1]
-    assert line.startswith("cam03: silhouettes (+") and "shifted back" in line
+    assert line.startswith("cam03: silhouettes (+") and "is shifted by" in line
     for name in scene.rig.names:
         true = scene.rig[name].matrix
         np.testing.assert_allclose(correction.rig[name].matrix, true, atol=1.0)
@@ -71,6 +71,25 @@ def test_a_correction_that_was_imprecise_is_replaced(scene) -> None:
     (line,) = correction.add(result(scene, FEW_CHECKS + 1), scene.body)
     assert line.startswith("cam03")
     assert correction.rig["cam03"].matrix[0, 2] == pytest.approx(before + 0.02 * scale, abs=0.5)
+
+
+def test_either_of_two_cameras_is_shifted_in_part_until_one_is_the_wrong_one(scene) -> None:
+    correction = CameraCorrection(scene.rig, CONFIG)
+    check = correction._check
+    for name in scene.rig.names:
+        check._found[name] = [(20.0 if name in ("cam01", "cam03") else 0.0, 0.0, 200.0)] * 4
+    check._gains.update(cam01=[2.0], cam03=[1.9])
+    check._suspect()
+    lost = replace(result(scene, 0), state=TrackState.LOST)
+    assert len(correction.add(lost, scene.body)) == 2
+    moved = {c.name: c.matrix[0, 2] - scene.rig[c.name].matrix[0, 2] for c in correction.rig}
+    assert moved == pytest.approx({"cam01": 15.0, "cam02": 0.0, "cam03": 5.0, "cam04": 0.0})
+    check._gains.update(cam01=[2.0], cam03=[1.0])
+    check._suspect()
+    again, shifted = correction.add(lost, scene.body)
+    assert again.startswith("cam03") and shifted.startswith("cam01")
+    assert correction.rig["cam03"] is scene.rig["cam03"]
+    assert correction.rig["cam01"].matrix[0, 2] == scene.rig["cam01"].matrix[0, 2] + 20.0
 
 
 def test_without_corrections_the_shift_is_known_only(scene) -> None:
@@ -104,7 +123,7 @@ def test_a_tracker_corrects_and_is_reset(scene) -> None:
                 for name, mask in masks.items()
             }
             found = tracker.step(seen, index * 100_000_000)
-            warnings += [line for line in found.warnings if "shifted back" in line]
+            warnings += [line for line in found.warnings if "is shifted by" in line]
         errors[corrects] = np.linalg.norm(found.markers_m - scene.markers(11), axis=1).mean()
         assert (tracker.rig is wrong) == (not corrects) == (not warnings)
     assert tracker.shifts["cam03"].disagrees
