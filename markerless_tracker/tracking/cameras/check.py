@@ -100,7 +100,8 @@ class CameraCheck:
         """Take a tracked frame: compare the cameras whose turn has come; often there is none."""
         if result.state is not TrackState.TRACKING or result.pose is None:
             return
-        if self._due_ns is None:
+        if self._due_ns is None or self._due_ns - result.stamp_ns > EVERY_NS[-1]:
+            # The first frame, or time was set back.
             self._due_ns = result.stamp_ns
         count = len(self._rig)
         for _ in range(count):

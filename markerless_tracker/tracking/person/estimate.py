@@ -206,16 +206,16 @@ class BodyEstimate:
         return fitted.moved
 
     def cameras_changed(self, searcher_for: SearcherFor) -> None:
-        """Fit the body anew: sections in the same first frame, or lengths in the next frames.
+        """Fit the body anew: lengths in the next frames, or sections in the same first frame.
 
         Args:
             searcher_for: makes a searcher of a body, with the new cameras.
         """
-        if self._first is not None:
+        if self._person is not None and self._fits_sections and self._config.fit_lengths:
+            self._begin_lengths(self._person)
+        elif self._first is not None:
             self._revision = None
             self._fit_sections(searcher_for, *self._first)
-        elif self._person is not None and self._fits_sections and self._config.fit_lengths:
-            self._begin_lengths(self._person)
 
     def restart_lengths(self) -> FloatArray | None:
         """Restart the fit of an unmeasured body, which was fitted to poses with a wrong heading.

@@ -112,6 +112,15 @@ def test_a_frame_compares_one_camera_and_checks_become_rarer(scene) -> None:
     assert counts[-1] - counts[many] == pytest.approx(cameras * later, abs=2)
 
 
+def test_checks_go_on_after_time_was_set_back(scene) -> None:
+    check = CameraCheck(scene.rig, CONFIG)
+    (standing,) = tracked(scene, 1)
+    check.add(replace(standing, stamp_ns=10**15), scene.body)
+    for index in range(3):
+        check.add(replace(standing, stamp_ns=index * FRAME_NS), scene.body)
+    assert len(check.shifts()) == len(scene.rig)
+
+
 def test_a_second_camera_is_left_out_after_the_worst_one(scene) -> None:
     check = CameraCheck(cameras_like(scene.rig, 6), CONFIG)
     bad = {"cam01": (20.0, 0.0, 200.0), "cam02": (0.0, 16.0, 200.0), "cam03": (0.0, 30.0, 200.0)}

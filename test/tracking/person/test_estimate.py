@@ -164,6 +164,18 @@ def test_lengths_are_fitted_anew_when_cameras_changed() -> None:
     assert estimate._lengths is not begun and estimate.body is body
 
 
+def test_fitted_lengths_stay_when_cameras_changed_after_a_given_start(
+    scene, frames, refined_settings
+) -> None:
+    """Sections fitted to the first frame have the generic lengths."""
+    config = TrackerConfig.from_mapping({**refined_settings, "body": "person31"})
+    sizes = Sizes(load_description("person31"))
+    estimate = BodyEstimate(sizes.of_stature(1.7), config, person=Unmeasured(sizes, 1.7))
+    estimate._first = (frames[0].observations, 0, estimate.body.neutral)
+    estimate.cameras_changed(lambda body: pytest.fail("no frame is searched"))
+    assert estimate._lengths is not None
+
+
 def test_a_known_shape_stays_when_cameras_changed(scene) -> None:
     config = TrackerConfig(threads=1)
     estimate = BodyEstimate(scene.body, config, shape_known=True)
