@@ -7,6 +7,7 @@ is wrong. The camera across shows about the opposite shift. The wrong one is tha
 all silhouettes agree better with one pose.
 """
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -28,6 +29,8 @@ EVERY_NS = (80_000_000, 400_000_000, 2_000_000_000)
 """Time between the first `FEW_CHECKS` checks, between those up to `MANY_CHECKS`, and later."""
 FEW_CHECKS, MANY_CHECKS = 3, 12
 """Numbers of checks whose median tells whether a camera is wrong, and is precise."""
+REMEMBERED = 30
+"""Number of a camera's latest checks that count, so that a camera may be touched during a run."""
 LEAST_VIEWS = 3
 """Least number of views: of two views that disagree, either may be wrong."""
 _ITERATIONS, _TRUNCATION_M = 4, (0.10, 0.035)
@@ -90,32 +93,45 @@ class CameraCheck:
     def reset(self) -> None:
         """Forget all frames."""
         self._due_ns: int | None = None
-        self._compared = self._checks = 0
+        self._compared = 0
         self.suspects: frozenset[str] = frozenset()
         self.shares: dict[str, float] = {}
-        self._found: dict[str, list[tuple[float, float, float]]] = {n: [] for n in self._rig.names}
-        self._gains: dict[str, list[float]] = {name: [] for name in self._rig.names}
+        self._found: dict[str, deque[tuple[float, float, float]]] = {}
+        self._begin()
 
-    def add(self, result: TrackResult, body: BodyModel) -> None:
-        """Take a tracked frame: compare the cameras whose turn has come; often there is none."""
+    def _begin(self) -> None:
+        """Begin the checks of the cameras that are not suspected."""
+        self._checks = 0
+        self._gains: deque[dict[str, float]] = deque(maxlen=REMEMBERED)
+        for name in set(self._rig.names) - self.suspects:
+            self._found[name] = deque(maxlen=REMEMBERED)
+
+    def add(self, result: TrackResult, body: BodyModel) -> bool:
+        """Take a tracked frame: compare the cameras whose turn has come; often there is none.
+
+        Returns:
+            Whether all have been compared once more, so that `shares` may have changed.
+        """
         if result.state is not TrackState.TRACKING or result.pose is None:
-            return
+            return False
         if self._due_ns is None or self._due_ns - result.stamp_ns > EVERY_NS[-1]:
             # The first frame, or time was set back.
             self._due_ns = result.stamp_ns
-        count = len(self._rig)
+        count, checks = len(self._rig), 0
         for _ in range(count):
             if result.stamp_ns < self._due_ns:
-                return
+                return checks > 0
             self._compare(self._rig.names[self._compared], result, result.pose, body)
             self._compared = (self._compared + 1) % count
             self._due_ns += self._every_ns // count
             if self._compared == 0:
+                checks += 1
                 self._checks += 1
                 self._weigh(result, result.pose)
                 self._suspect()
         # Frames come less often than checks are due.
         self._due_ns = max(self._due_ns, result.stamp_ns)
+        return checks > 0
 
     @property
     def _every_ns(self) -> int:
@@ -148,8 +164,7 @@ class CameraCheck:
         if self._searcher is None or not shifts:
             return
         contours = self._searcher.frame(seen, result.stamp_ns, pose).contours
-        for name, gain in _gains(self._searcher, contours, pose, shifts).items():
-            self._gains[name].append(gain)
+        self._gains.append(_gains(self._searcher, contours, pose, shifts))
 
     def shifts(self) -> dict[str, Shift]:
         """The shift of every camera that could be compared, by name."""
@@ -168,25 +183,27 @@ class CameraCheck:
             name
             for name, shift in self.shifts().items()
             if name not in self.suspects
-            and self._gains[name]
             and (shift.disagrees or (name in before and shift.length_m >= _CANDIDATE_M))
         ]
         if not doubted or len(self._rig) - len(self.suspects) - 1 < LEAST_VIEWS:
             return
-        gains = {name: float(np.mean(self._gains[name])) for name in doubted}
+        # Only gains in the same frames are comparable.
+        weighed = [gains for gains in self._gains if all(name in gains for name in doubted)]
+        if len(weighed) < FEW_CHECKS:
+            self.shares = before
+            return
+        gains = {name: float(np.mean([each[name] for each in weighed])) for name in doubted}
         first, *others = sorted(gains, key=gains.__getitem__, reverse=True)
         if gains[first] <= 0.0:
             return
         lead = 1.0 - max((gains[name] for name in others[:1]), default=0.0) / gains[first]
-        sure = lead >= _LEAD or self._checks >= MANY_CHECKS
+        sure = lead >= _LEAD or len(weighed) >= MANY_CHECKS
         self.shares[first] = 1.0 if sure else 0.5 + 0.5 * lead / _LEAD
         if not sure:
             self.shares[others[0]] = 1.0 - self.shares[first]
             return
         self.suspects |= {first}
-        self._checks = 0
-        for name in set(self._found) - self.suspects:
-            self._found[name], self._gains[name] = [], []
+        self._begin()
 
 
 def describe(shifts: Mapping[str, Shift]) -> list[str]:

@@ -53,8 +53,7 @@ class CameraCorrection:
 
     def add(self, result: TrackResult, body: BodyModel) -> tuple[str, ...]:
         """Take a frame; returns a line for each camera whose correction has changed in `rig`."""
-        self._check.add(result, body)
-        if not self._corrects:
+        if not self._check.add(result, body) or not self._corrects:
             return ()
         shares, shifts = self._check.shares, self._check.shifts()
         changed = [

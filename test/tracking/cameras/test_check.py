@@ -14,6 +14,7 @@ from markerless_tracker.tracking.cameras.check import (
     EVERY_NS,
     FEW_CHECKS,
     MANY_CHECKS,
+    REMEMBERED,
     CameraCheck,
     Shift,
     describe,
@@ -112,6 +113,25 @@ def test_a_frame_compares_one_camera_and_checks_become_rarer(scene) -> None:
     assert counts[-1] - counts[many] == pytest.approx(cameras * later, abs=2)
 
 
+def test_a_camera_that_is_touched_during_a_long_run_is_found(scene) -> None:
+    (standing,) = tracked(scene, 1)
+    check = CameraCheck(scene.rig.shifted({"cam03": (-5.0, 3.0)}), CONFIG)
+    for name in check._found:
+        check._found[name].extend([(0.0, 0.0, 200.0)] * 1000)
+    check._checks = 1000
+    for index in range(REMEMBERED // 2 + 4 + MANY_CHECKS):
+        check.add(replace(standing, stamp_ns=4 * index * EVERY_NS[2]), scene.body)
+    assert check.suspects == {"cam03"}
+
+
+def test_it_is_told_when_all_were_compared(scene) -> None:
+    check = CameraCheck(scene.rig, CONFIG)
+    (standing,) = tracked(scene, 1)
+    step_ns = EVERY_NS[0] // len(scene.rig)
+    told = [check.add(replace(standing, stamp_ns=i * step_ns), scene.body) for i in range(9)]
+    assert told == [False, False, False, True] * 2 + [False]
+
+
 def test_checks_go_on_after_time_was_set_back(scene) -> None:
     check = CameraCheck(scene.rig, CONFIG)
     (standing,) = tracked(scene, 1)
@@ -129,7 +149,8 @@ def test_a_second_camera_is_left_out_after_the_worst_one(scene) -> None:
         for name in check._found:
             check._found[name] = [bad.get(name, (0.0, 0.0, 200.0))] * 8
         # The third disagrees most, and explains least.
-        check._gains.update(cam01=[3.0, 3.0], cam02=[1.0, 3.0], cam03=[0.5, 0.5])
+        gains = {"cam01": 3.0, "cam02": 2.0, "cam03": 0.5}
+        check._gains.extend([{n: gain for n, gain in gains.items() if n not in left_out}] * 3)
         check._suspect()
 
 
@@ -144,23 +165,36 @@ def test_a_second_camera_is_left_out_after_the_worst_one(scene) -> None:
 )
 def test_while_either_of_two_may_be_wrong_each_has_a_share(scene, gains, shares) -> None:
     check = CameraCheck(scene.rig, CONFIG)
-    for name, gain in zip(("cam01", "cam02"), gains, strict=True):
-        check._found[name], check._gains[name] = [(20.0, 0.0, 200.0)] * 4, [gain]
+    for name in ("cam01", "cam02"):
+        check._found[name] = [(20.0, 0.0, 200.0)] * 4
+    check._gains.extend([dict(zip(("cam01", "cam02"), gains, strict=True))] * FEW_CHECKS)
     check._suspect()
     assert check.shares == pytest.approx(shares)
     assert check.suspects == {name for name, share in shares.items() if share == 1.0}
-    check._checks = MANY_CHECKS
+    check._gains.extend([*check._gains] * (MANY_CHECKS // FEW_CHECKS))
     check._suspect()
     assert len(check.suspects) == (1 if shares else 0)
 
 
 def test_a_doubt_at_the_limit_does_not_come_and_go(scene) -> None:
     check = CameraCheck(scene.rig, CONFIG)
-    check._gains.update(cam01=[1.0], cam02=[1.0])
+    check._gains.extend([{"cam01": 1.0, "cam02": 1.0}] * FEW_CHECKS)
     for shift_px, doubted in ((5.9, False), (6.1, True), (5.9, True), (3.9, False)):
         check._found["cam01"] = check._found["cam02"] = [(shift_px, 0.0, 200.0)] * 4
         check._suspect()
         assert bool(check.shares) == doubted
+
+
+def test_gains_count_in_frames_in_which_all_doubted_cameras_have_one(scene) -> None:
+    """A gain that was found with a part of the shift is smaller."""
+    check = CameraCheck(scene.rig, CONFIG)
+    check._found["cam01"] = check._found["cam03"] = [(20.0, 0.0, 200.0)] * 4
+    check._gains.extend([{"cam01": 9.0}] * FEW_CHECKS)
+    check._suspect()
+    assert not check.shares
+    check._gains.extend([{"cam01": 1.0, "cam03": 2.0}] * FEW_CHECKS)
+    check._suspect()
+    assert check.suspects == {"cam03"}
 
 
 def test_all_is_forgotten(scene) -> None:
