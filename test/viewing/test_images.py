@@ -66,6 +66,21 @@ def test_cameras_are_shifted_as_the_run_shifted_them(make_result, walk: Path) ->
     np.testing.assert_array_equal(shifted["cam01"].matrix, plain["cam01"].matrix)
 
 
+@pytest.mark.parametrize(
+    "notes",
+    [
+        {"cameras": {"cam02": {"corrected": True}}},
+        {"cameras": {"cam02": {"corrected": True, "shift_px": [1.0]}}},
+        {"cameras": {"cam02": {"corrected": True, "shift_px": "ab"}}},
+        {"cameras": ["cam02"]},
+        {"scale": "half"},
+    ],
+)
+def test_impossible_shifts_are_refused(make_result, walk: Path, notes) -> None:
+    with pytest.raises(DatasetError, match="expected a factor, and `shift_px`"):
+        ResultImages(read_result(make_result(source=walk, notes=notes)))
+
+
 def test_a_bag_with_a_missing_set(make_result, walk: Path, tmp_path: Path) -> None:
     recording = open_recording(walk)
     sets = [images for images in recording.frames() if images.index != 1]

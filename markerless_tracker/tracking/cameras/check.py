@@ -161,7 +161,8 @@ class CameraCheck:
             for name, shift in self.shifts().items()
             if name in seen and shift.length_m >= _CANDIDATE_M
         }
-        if self._searcher is None or not shifts:
+        # As many views as a suspicion needs.
+        if self._searcher is None or not shifts or len(seen) <= LEAST_VIEWS:
             return
         contours = self._searcher.frame(seen, result.stamp_ns, pose).contours
         self._gains.append(_gains(self._searcher, contours, pose, shifts))

@@ -35,7 +35,7 @@ class EvidenceMaker:
     """Makes observations of views, and keeps the parts of silhouettes that the prediction explains.
 
     Args:
-        rig: the cameras.
+        rig: the cameras; an attribute, which may be replaced between steps.
         config: settings of the imaging and the selection.
         backgrounds: the empty scene per camera; cameras without one take observations only.
         mapper: `map`, or that of a thread pool; applied to the cameras.

@@ -20,7 +20,7 @@ class ViewWatch:
     """Leaves out unusable views, and reports when a camera is left out or used again.
 
     Args:
-        rig: the cameras.
+        rig: the cameras; an attribute, which may be replaced between frames.
     """
 
     def __init__(self, rig: CameraRig) -> None:

@@ -121,7 +121,7 @@ class LimbWatch:
     It also schedules the exchanges of legs or arms and the comparisons of headings.
 
     Args:
-        rig: the cameras.
+        rig: the cameras; an attribute, which may be replaced between frames.
     """
 
     def __init__(self, rig: CameraRig) -> None:

@@ -1,14 +1,13 @@
 """A camera that disagrees with the others."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from markerless_tracker.body import markers
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.records import Observation, TrackResult, TrackState
-from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.cameras.check import (
     EVERY_NS,
@@ -24,38 +23,21 @@ CONFIG = TrackerConfig(threads=1)
 FRAME_NS = 200_000_000
 
 
-@pytest.fixture(scope="module")
-def scene():
-    return SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=3)
+@pytest.fixture
+def checked(scene, tracked) -> Callable[..., CameraCheck]:
+    """Checks a rig's cameras over some frames."""
+
+    def made(rig: CameraRig, frames: int = 8) -> CameraCheck:
+        check = CameraCheck(rig, CONFIG)
+        for index in range(frames):
+            check.add(tracked(index), scene.body)
+        return check
+
+    return made
 
 
-def checked(scene, rig, frames: int = 8, every_ns: int = FRAME_NS) -> CameraCheck:
-    check = CameraCheck(rig, CONFIG)
-    for result in tracked(scene, frames, every_ns):
-        check.add(result, scene.body)
-    return check
-
-
-def tracked(scene, frames: int, every_ns: int = FRAME_NS) -> list[TrackResult]:
-    """Results with the true poses and exact silhouettes."""
-    results = []
-    for index in range(frames):
-        _, masks, pose = scene.frame(12 * index)
-        seen = {
-            name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-            for name, mask in masks.items()
-        }
-        results.append(
-            TrackResult(
-                index * every_ns, TrackState.TRACKING, pose, markers(scene.body, pose), 1.8, {}, 0,
-                observations=seen,
-            )
-        )  # fmt: skip
-    return results
-
-
-def test_cameras_that_agree_are_not_named(scene) -> None:
-    check = checked(scene, scene.rig)
+def test_cameras_that_agree_are_not_named(scene, checked) -> None:
+    check = checked(scene.rig)
     shifts = check.shifts()
     assert not check.suspects
     assert set(shifts) == set(scene.rig.names)
@@ -63,9 +45,9 @@ def test_cameras_that_agree_are_not_named(scene) -> None:
     assert describe(shifts) == []
 
 
-def test_the_camera_that_is_off_is_named(scene) -> None:
+def test_the_camera_that_is_off_is_named(scene, checked) -> None:
     wrong = scene.rig.shifted({"cam03": (-5.0, 3.0)})
-    check = checked(scene, wrong)
+    check = checked(wrong)
     shifts = check.shifts()
     assert check.suspects == {"cam03"}
     assert [name for name, shift in shifts.items() if shift.disagrees] == ["cam03"]
@@ -83,22 +65,22 @@ def test_few_checks_and_lost_frames_say_nothing(scene) -> None:
 
 @pytest.mark.parametrize("name", ["cam01", "cam02", "cam03", "cam04"])
 @pytest.mark.parametrize("shift_px", [(5.0, 0.0), (0.0, 5.0), (-4.0, 4.0)])
-def test_the_camera_across_is_not_blamed(scene, name, shift_px) -> None:
+def test_the_camera_across_is_not_blamed(scene, name, shift_px, checked) -> None:
     """Opposite cameras show about the same shift sideways, in opposite directions."""
-    check = checked(scene, scene.rig.shifted({name: shift_px}), FEW_CHECKS + 1)
+    check = checked(scene.rig.shifted({name: shift_px}), FEW_CHECKS + 1)
     assert check.suspects == {name}
 
 
-def test_of_three_cameras_none_is_suspected(scene) -> None:
+def test_of_three_cameras_none_is_suspected(scene, checked) -> None:
     three = scene.rig.shifted({"cam03": (-5.0, 3.0)}).selected(["cam01", "cam02", "cam03"])
-    check = checked(scene, three)
+    check = checked(three)
     assert not check.suspects and check.shifts()["cam03"].disagrees
 
 
-def test_a_frame_compares_one_camera_and_checks_become_rarer(scene) -> None:
+def test_a_frame_compares_one_camera_and_checks_become_rarer(scene, tracked) -> None:
     frame_ns = 16_666_667
     check = CameraCheck(scene.rig, CONFIG)
-    (standing,) = tracked(scene, 1)
+    standing = tracked(0)
     counts = [0]
     for index in range(600):
         check.add(replace(standing, stamp_ns=index * frame_ns), scene.body)
@@ -113,8 +95,8 @@ def test_a_frame_compares_one_camera_and_checks_become_rarer(scene) -> None:
     assert counts[-1] - counts[many] == pytest.approx(cameras * later, abs=2)
 
 
-def test_a_camera_that_is_touched_during_a_long_run_is_found(scene) -> None:
-    (standing,) = tracked(scene, 1)
+def test_a_camera_that_is_touched_during_a_long_run_is_found(scene, tracked) -> None:
+    standing = tracked(0)
     check = CameraCheck(scene.rig.shifted({"cam03": (-5.0, 3.0)}), CONFIG)
     for name in check._found:
         check._found[name].extend([(0.0, 0.0, 200.0)] * 1000)
@@ -124,17 +106,17 @@ def test_a_camera_that_is_touched_during_a_long_run_is_found(scene) -> None:
     assert check.suspects == {"cam03"}
 
 
-def test_it_is_told_when_all_were_compared(scene) -> None:
+def test_it_is_told_when_all_were_compared(scene, tracked) -> None:
     check = CameraCheck(scene.rig, CONFIG)
-    (standing,) = tracked(scene, 1)
+    standing = tracked(0)
     step_ns = EVERY_NS[0] // len(scene.rig)
     told = [check.add(replace(standing, stamp_ns=i * step_ns), scene.body) for i in range(9)]
     assert told == [False, False, False, True] * 2 + [False]
 
 
-def test_checks_go_on_after_time_was_set_back(scene) -> None:
+def test_checks_go_on_after_time_was_set_back(scene, tracked) -> None:
     check = CameraCheck(scene.rig, CONFIG)
-    (standing,) = tracked(scene, 1)
+    standing = tracked(0)
     check.add(replace(standing, stamp_ns=10**15), scene.body)
     for index in range(3):
         check.add(replace(standing, stamp_ns=index * FRAME_NS), scene.body)
@@ -197,8 +179,8 @@ def test_gains_count_in_frames_in_which_all_doubted_cameras_have_one(scene) -> N
     assert check.suspects == {"cam03"}
 
 
-def test_all_is_forgotten(scene) -> None:
-    check = checked(scene, scene.rig.shifted({"cam03": (-5.0, 3.0)}))
+def test_all_is_forgotten(scene, checked) -> None:
+    check = checked(scene.rig.shifted({"cam03": (-5.0, 3.0)}))
     check.reset()
     assert not check.suspects and check.shifts() == {}
 

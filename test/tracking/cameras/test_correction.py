@@ -5,39 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from markerless_tracker.body import markers
-from markerless_tracker.records import Observation, TrackResult, TrackState
-from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.records import Observation
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.cameras.check import FEW_CHECKS
 from markerless_tracker.tracking.cameras.correction import CameraCorrection
 
 CONFIG = TrackerConfig(threads=1)
-FRAME_NS = 200_000_000
 OFF_PX = (-5.0, 3.0)
 
 
-@pytest.fixture(scope="module")
-def scene():
-    return SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=3)
-
-
-def result(scene, index: int) -> TrackResult:
-    _, masks, pose = scene.frame(12 * index)
-    seen = {
-        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-        for name, mask in masks.items()
-    }
-    return TrackResult(
-        index * FRAME_NS, TrackState.TRACKING, pose, markers(scene.body, pose), 1.8, {}, 0,
-        observations=seen,
-    )  # fmt: skip
-
-
-def test_the_image_is_shifted_back_and_the_camera_named(scene) -> None:
+def test_the_image_is_shifted_back_and_the_camera_named(scene, tracked) -> None:
     wrong = scene.rig.shifted({"cam03": OFF_PX})
     correction = CameraCorrection(wrong, CONFIG)
-    notes = [correction.add(result(scene, index), scene.body) for index in range(FEW_CHECKS + 1)]
+    notes = [correction.add(tracked(index), scene.body) for index in range(FEW_CHECKS + 1)]
     assert notes[:-1] == [()] * FEW_CHECKS
     (line,) = notes[-1]
     assert line.startswith("cam03: silhouettes (+") and "is shifted by" in line
@@ -49,32 +29,32 @@ def test_the_image_is_shifted_back_and_the_camera_named(scene) -> None:
     assert correction.rig is wrong
 
 
-def test_a_correction_that_stays_is_not_reported_again(scene) -> None:
+def test_a_correction_that_stays_is_not_reported_again(scene, tracked) -> None:
     correction = CameraCorrection(scene.rig.shifted({"cam03": OFF_PX}), CONFIG)
     for index in range(FEW_CHECKS + 1):
-        correction.add(result(scene, index), scene.body)
+        correction.add(tracked(index), scene.body)
     corrected = correction.rig
-    assert correction.add(result(scene, FEW_CHECKS + 1), scene.body) == ()
+    assert correction.add(tracked(FEW_CHECKS + 1), scene.body) == ()
     assert correction.rig is corrected
 
 
-def test_a_correction_that_was_imprecise_is_replaced(scene) -> None:
+def test_a_correction_that_was_imprecise_is_replaced(scene, tracked) -> None:
     correction = CameraCorrection(scene.rig.shifted({"cam03": OFF_PX}), CONFIG)
     for index in range(FEW_CHECKS + 1):
-        correction.add(result(scene, index), scene.body)
+        correction.add(tracked(index), scene.body)
     before = correction.rig["cam03"].matrix[0, 2]
     scale = correction._check._found["cam03"][0][2]
     # 20 mm more to the right in all checks, so in their median.
     correction._check._found["cam03"] = [
         (u + 0.02 * scale, v, s) for u, v, s in correction._check._found["cam03"]
     ]
-    (line,) = correction.add(result(scene, FEW_CHECKS + 1), scene.body)
+    (line,) = correction.add(tracked(FEW_CHECKS + 1), scene.body)
     assert line.startswith("cam03")
     assert correction.rig["cam03"].matrix[0, 2] == pytest.approx(before + 0.02 * scale, abs=0.5)
 
 
 def test_either_of_two_cameras_is_shifted_in_part_until_one_is_the_wrong_one(
-    scene, monkeypatch
+    scene, monkeypatch, tracked
 ) -> None:
     correction = CameraCorrection(scene.rig, CONFIG)
     check = correction._check
@@ -83,22 +63,22 @@ def test_either_of_two_cameras_is_shifted_in_part_until_one_is_the_wrong_one(
     check._gains.extend([{"cam01": 2.0, "cam03": 1.9}] * FEW_CHECKS)
     check._suspect()
     monkeypatch.setattr(check, "add", lambda result, body: True)
-    assert len(correction.add(result(scene, 0), scene.body)) == 2
+    assert len(correction.add(tracked(0), scene.body)) == 2
     moved = {c.name: c.matrix[0, 2] - scene.rig[c.name].matrix[0, 2] for c in correction.rig}
     assert moved == pytest.approx({"cam01": 15.0, "cam02": 0.0, "cam03": 5.0, "cam04": 0.0})
     check._gains.extend([{"cam01": 2.0, "cam03": 1.0}] * FEW_CHECKS)
     check._suspect()
-    again, shifted = correction.add(result(scene, 0), scene.body)
+    again, shifted = correction.add(tracked(0), scene.body)
     assert again.startswith("cam03") and shifted.startswith("cam01")
     assert correction.rig["cam03"] is scene.rig["cam03"]
     assert correction.rig["cam01"].matrix[0, 2] == scene.rig["cam01"].matrix[0, 2] + 20.0
 
 
-def test_without_corrections_the_shift_is_known_only(scene) -> None:
+def test_without_corrections_the_shift_is_known_only(scene, tracked) -> None:
     wrong = scene.rig.shifted({"cam03": OFF_PX})
     correction = CameraCorrection(wrong, replace(CONFIG, correct_cameras=False))
     for index in range(FEW_CHECKS + 1):
-        assert correction.add(result(scene, index), scene.body) == ()
+        assert correction.add(tracked(index), scene.body) == ()
     assert correction.rig is wrong
     shift = correction.shifts()["cam03"]
     assert shift.disagrees and not shift.corrected
