@@ -17,11 +17,11 @@ from markerless_tracker.tracking.cameras.check import Shift
 from markerless_tracker.tracking.cameras.correction import CameraCorrection
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
+from markerless_tracker.tracking.evidence.observer import Observer
 from markerless_tracker.tracking.evidence.prepared import (
     Lookahead,
     Outlook,
     Prepared,
-    SeenView,
     Views,
 )
 from markerless_tracker.tracking.evidence.seen import Seen
@@ -37,6 +37,7 @@ from markerless_tracker.tracking.person.resting import at_rest
 from markerless_tracker.tracking.searchers import Searchers
 from markerless_tracker.tracking.stages.effort import Effort
 from markerless_tracker.tracking.stages.frame import frame_stages, swarm_stages
+from markerless_tracker.tracking.start.automatic import AutomaticStart, stages_of
 from markerless_tracker.tracking.start.starter import Starter
 from markerless_tracker.tracking.states import Phase, Track
 
@@ -92,12 +93,13 @@ class Tracker:
         self._searchers = Searchers(rig, config)
         self.evidence = EvidenceMaker(rig, config, backgrounds or {}, self._searchers.mapper)
         self._views = ViewWatch(rig)
+        self._observer = Observer(self.evidence, self._views)
         self._correction = CameraCorrection(rig, config)
         self._motion = MotionModel(start, config)
         self._assessor = Assessor(rig, body, config)
         self._use_cameras(rig)
         self._effort = Effort(needed_only=config.refine.swarms == "needed")
-        self._starter = None if self._given else self._new_starter()
+        self._start = None if self._given else self._new_start()
         self._lookahead = Lookahead(self._outlook(-1), self._outlook(0))
 
     @property
@@ -124,7 +126,7 @@ class Tracker:
         self._effort.reset()
         self._correction.reset()
         self._use_cameras(self._correction.rig)
-        self._starter = None if self._given else self._new_starter()
+        self._start = None if self._given else self._new_start()
         self._lookahead.restart(self._outlook(-1), self._outlook(0))
 
     def configure(self, config: TrackerConfig) -> None:
@@ -134,6 +136,8 @@ class Tracker:
             ConfigError: the budget cannot be spent; nothing has changed then.
         """
         frame_stages(self.body, config, self._motion.pose, self.body.sigma)
+        if self._start is not None:
+            self._start.wait()
         self.config = config
         for part in (self._motion, self._body, self._assessor, self._effort):
             part.configure(config)
@@ -148,7 +152,7 @@ class Tracker:
         search.run(swarm_stages(self.body, self.config, pose, self.body.sigma))
         # What the segmenting process compiles is not compiled twice.
         self.evidence.wait()
-        self._starter, self._assessor.track = None, Track(Phase.TRACKING)
+        self._start, self._assessor.track = None, Track(Phase.TRACKING)
         self.step(blank, 0)
         if self.config.refinement != "none":
             self._assessor.limbs.recover(self._searcher, search.contours, seen, pose)
@@ -208,6 +212,7 @@ class Tracker:
                 to a ready-made observation; cameras may be missing. Or the result of `prepare`.
             stamp_ns: time of the images; the search widens with the time since the last step.
             effort: fraction, 0 to 1, of the frames explained as usual that are searched further.
+                Below 1, an automatic start searches beside the steps once it has found a person.
 
         Raises:
             ConfigError: the effort is not between 0 and 1.
@@ -229,13 +234,17 @@ class Tracker:
         if self.config.search_again and self._assessor.track.given_up:
             self._assessor.give_up()
             self._effort.reset()
-            self._starter = self._new_starter(self._motion.pose)
+            self._start = self._new_start(self._motion.pose)
         views, made = self._lookahead.made(views, stamp_ns, outlook)
         evidence = made or self.evidence.segment(views, stamp_ns, outlook)
         predicted = self._motion.predict(stamp_ns, self._body.limits)
-        seen = self._observe(evidence, stamp_ns, predicted)
-        if self._starter is not None:
-            found = self._search_room(self._starter, seen)
+        body, cameras = self.body, self._searcher.cameras
+        if self._start is not None and not self._start.follows(late=self._effort.late):
+            seen = self._observer.whole(evidence, stamp_ns, body)
+        else:
+            seen = self._observer.near(evidence, stamp_ns, body, predicted, cameras, self.state)
+        if self._start is not None:
+            found = self._search_room(self._start, predicted, seen)
         else:
             found = self._search_near(predicted, seen)
         if found is None:
@@ -247,41 +256,29 @@ class Tracker:
         exposure = {n: v.exposure for n, v in evidence.items() if v.exposure is not None}
         return replace(result, exposure=exposure)
 
-    def _observe(
-        self, evidence: Mapping[str, SeenView], stamp_ns: int, predicted: FloatArray
-    ) -> Seen:
-        """The evidence near the predicted pose (p,); without a track, that of the whole views."""
-        if self._starter is not None:
-            observed = self.evidence.whole(evidence, stamp_ns)
-            used, notes = self._views.sort(observed, self.body, None)
-            return Seen(stamp_ns, observed, used, used, notes)
-        observed, left_out = self.evidence.gather(evidence, stamp_ns, self.body, predicted)
-        expected = predicted if self.state is TrackState.TRACKING else None
-        imaged, notes = self._views.sort(observed, self.body, expected)
-        lost = self.state is TrackState.LOST
-        used = imaged if lost else decide(imaged, self._searcher.cameras, self.body, predicted)
-        return Seen(stamp_ns, observed, used, imaged, notes, left_out)
-
     def _outlook(self, number: int) -> Outlook:
-        searching, motion = self._starter is not None, copy.copy(self._motion)
+        searching = self._start is not None and not self._start.followed
+        motion = copy.copy(self._motion)
         return Outlook(number, self.rig, self.body, motion, self._body.limits, searching)
 
-    def _search_room(self, starter: Starter, seen: Seen) -> Found | None:
-        """Search the whole views for a person; None if there is none."""
-        if not anybody(seen.used):
-            starter.reset()
+    def _search_room(
+        self, start: AutomaticStart, predicted: FloatArray, seen: Seen
+    ) -> Found | None:
+        """Search for a person, or follow the person found so far; None if there is none."""
+        found = start.step(seen, predicted, late=self._effort.late)
+        if found is None:
             return None
-        if (start := starter.step(seen.used, seen.stamp_ns)) is None:
-            return None
-        self._searcher = self._searchers.near(start.searcher.body)
-        self._body.take_found(start.searcher.body, settled=start.settled)
-        search = self._searcher.frame(start.observations, seen.stamp_ns, start.pose)
-        if start.settled:
-            self._starter = None
-            search.run(frame_stages(self.body, self.config, start.pose, self.body.sigma))
+        if not found.continued:
+            self._searcher = self._searchers.near(found.searcher.body)
+            self._body.take_found(found.searcher.body, settled=found.settled)
+        search = self._searcher.frame(found.observations, seen.stamp_ns, found.pose)
+        if found.settled:
+            self._start = None
+        start.tracked(search.run(stages_of(found, self.body, self.config)))
         return Found(
-            search, seen.stamp_ns, start.observations, seen.notes + start.notes,
-            restarted=True, settling=not start.settled, jumped=np.arange(self.body.size),
+            search, seen.stamp_ns, found.observations, seen.notes + found.notes,
+            restarted=not found.continued, settling=not found.settled,
+            jumped=None if found.continued else np.arange(self.body.size),
         )  # fmt: skip
 
     def _search_near(self, predicted: FloatArray, seen: Seen) -> Found | None:
@@ -321,7 +318,7 @@ class Tracker:
         """Update what is known of motion, body and cameras with a frame; returns warnings."""
         pose, tracked = found.search.pose, self.state is TrackState.TRACKING
         self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
-        if not tracked or found.restarted:
+        if not tracked or found.restarted or found.settling:
             return ()
         self._effort.tracked(found.search.cost)
         moved = self._body.fit_tracked_frame(
@@ -342,9 +339,10 @@ class Tracker:
         self.evidence.rig = self._views.rig = self._assessor.limbs.rig = rig
         self._searcher = self._searchers.near(self.body)
 
-    def _new_starter(self, last_pose: FloatArray | None = None) -> Starter:
-        return Starter(
+    def _new_start(self, last_pose: FloatArray | None = None) -> AutomaticStart:
+        starter = Starter(
             self.rig, self.body, self._searchers.start, self.evidence.select,
             sized=self._body.sized, fit_shape=not self._body.sections_fitted,
             person=self._body.unfitted, last_pose=last_pose,
         )  # fmt: skip
+        return AutomaticStart(starter, beside=self.config.refinement != "none")

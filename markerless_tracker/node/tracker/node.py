@@ -24,6 +24,7 @@ from markerless_tracker.node.tracker import parameters
 from markerless_tracker.node.tracker.announcer import Announcer
 from markerless_tracker.node.tracker.cameras.build import make_inputs, view_reader
 from markerless_tracker.node.tracker.changes import LIVE, LiveSettings
+from markerless_tracker.node.tracker.handle import TrackedSet, TrackerHandle
 from markerless_tracker.node.tracker.pace.skipping import SkippedShare
 from markerless_tracker.node.tracker.pace.states import StatePace
 from markerless_tracker.node.tracker.pace.waiting import kept_sets
@@ -34,7 +35,7 @@ from markerless_tracker.node.tracker.services import Services
 from markerless_tracker.node.tracker.setup import RigSource, build
 from markerless_tracker.node.tracker.status import NOTED, TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
-from markerless_tracker.node.tracker.worker import TrackedSet, TrackerHandle, TrackWorker
+from markerless_tracker.node.tracker.worker import TrackWorker
 from markerless_tracker.records import TrackState
 from markerless_tracker.tracking import Tracker
 from markerless_tracker.tracking.processes.images import set_bytes

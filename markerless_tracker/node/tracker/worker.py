@@ -1,94 +1,31 @@
 """The tracking thread: takes the newest complete set, tracks it, passes on the result."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import partial
 from threading import Event, Thread
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.body import BodyModel
 from markerless_tracker.compiled import compilation
 from markerless_tracker.errors import ImageError, one_line
-from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.libraries import collect_for_good
 from markerless_tracker.node.health import PROCESSING
 from markerless_tracker.node.tracker.announcer import CompilingLines, ready_line
+from markerless_tracker.node.tracker.handle import Images, TrackedSet, TrackerHandle
 from markerless_tracker.node.tracker.learning import Learning, OpenRequest
 from markerless_tracker.node.tracker.pace.ahead import Ahead, Taken
 from markerless_tracker.node.tracker.pace.effort import EffortRule, Lateness
 from markerless_tracker.node.tracker.pace.start_time import StartTimeGate
-from markerless_tracker.node.tracker.pace.waiting import AT_MOST, MatchedSet
+from markerless_tracker.node.tracker.pace.waiting import MatchedSet
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.records import Observation, TrackResult, TrackState
 
-Images = Mapping[str, NDArray[np.uint8] | Observation]
-
 _POLL_S = 0.2
-
-
-class Stepper(Protocol):
-    """The part of `tracking.Tracker` that the worker uses."""
-
-    @property
-    def body(self) -> BodyModel:
-        """The tracked body."""
-
-    def warm_up(self) -> None:
-        """Compile all kernels of a step."""
-
-    def prepare(self, views: Mapping[str, Any], stamp_ns: int) -> Any:
-        """Make the evidence of the next set while one is tracked."""
-
-    def step(self, views: Any, stamp_ns: int, effort: float = 1.0) -> TrackResult:
-        """Track one set of images, or a prepared set."""
-
-    def reset(self) -> None:
-        """Forget the person."""
-
-    def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:
-        """Use other backgrounds from now on, and forget the person."""
-
-
-@dataclass(frozen=True)
-class TrackedSet:
-    """A result, and the scaled images or evidence that it was made from.
-
-    Attributes:
-        body: the estimate of the body at that time.
-    """
-
-    result: TrackResult
-    images: Images
-    body: BodyModel
-
-
-@dataclass(frozen=True)
-class TrackerHandle:
-    """The worker's tracker, and how to use it.
-
-    Attributes:
-        tracker: the tracker.
-        start_ns: see `StartTimeGate`.
-        decode: makes the tracker's image or observation of a camera's view.
-        waits: whether the tracker has no backgrounds; sets are dropped until they are learned.
-        warm_up: compiles what the node uses besides the tracker.
-        kept: number of sets that are kept during the search for a person.
-        searches: whether the tracker begins with a search, without a start pose.
-    """
-
-    tracker: Stepper
-    start_ns: int | None
-    decode: Callable[[str, Any], NDArray[np.uint8] | Observation]
-    waits: bool = False
-    warm_up: Callable[[], None] = lambda: None
-    kept: int = AT_MOST
-    searches: bool = True
 
 
 class TrackWorker:
@@ -284,6 +221,7 @@ class TrackWorker:
             self._status.record_failed_set(one_line(error))
             self._trouble(matched.stamp_ns, error)
             return None
+        self._effort.settling = result.settling
         self._keep_for(result, handle.kept)
         self._status.tracked(result, arrived_s=matched.arrived_s, finished_s=finished_s)
         tracked = TrackedSet(result, images, handle.tracker.body)
@@ -297,9 +235,13 @@ class TrackWorker:
         self._sets.keep(handle.kept if handle.searches else 0)
 
     def _keep_for(self, result: TrackResult, kept: int) -> None:
-        """Keep the sets that come during the search for a person; without a person, the newest."""
+        """Keep the sets that come during the search for a person; without a person, the newest.
+
+        If the person is followed during the search, the worker catches up.
+        """
         searching = result.state is TrackState.SEARCHING
-        self._sets.keep(kept if searching or result.settling else 0)
+        in_steps = result.settling and result.effort == 1.0
+        self._sets.keep(kept if searching or in_steps else 0)
         if searching:
             self._sets.drop_older()
 

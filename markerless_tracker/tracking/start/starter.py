@@ -1,7 +1,7 @@
 """The automatic start: finds a person in one frame and confirms the heading over some more."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,12 +17,12 @@ from markerless_tracker.tracking.evidence.hull import Hull, find_hulls
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
-from markerless_tracker.tracking.person.start_fit import fitted_to_start
 from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.start.estimate import StartEstimate
 from markerless_tracker.tracking.start.generations import improved
 from markerless_tracker.tracking.start.in_view import InViewGate
-from markerless_tracker.tracking.start.own_sections import better_with_own_sections
 from markerless_tracker.tracking.start.rejections import Rejections
+from markerless_tracker.tracking.start.settling import Settling
 from markerless_tracker.tracking.start.silhouettes import hulls_silhouettes
 from markerless_tracker.tracking.start.sizing import (
     Sized,
@@ -38,16 +38,14 @@ SECOND_GENERATIONS = 5
 """Generations of the search of the second frame."""
 _GENERATION_FRACTION = 0.5
 """Size of the one generation in each later frame, as a fraction of the full size."""
-_SHAPE_FRAMES = 5
-"""Most frames that the sections are fitted to."""
-_SHAPE_SLACK = 0.01
-"""Frames that the sections are fitted to cost at most this much more than the best."""
 _RESIZED_AFTER = 3
 """Generation after which the sizes are tried in the first frame."""
 _FINER_AFTER = 1
 """Frames between the second search and the finer sizes, so that no frame has to do both."""
 GAP_NS = 150_000_000
 """After a longer gap, such as a live first search, a refinement may not reach the person."""
+FOLLOWED_GAP_NS = 200_000_000
+"""The same if the person was followed across the gap."""
 _GAP_GENERATIONS = 2
 """Generations after such a gap."""
 _DOUBTFUL = 0.12
@@ -62,25 +60,6 @@ Select = Callable[
 SearcherFor = Callable[[BodyModel], Searcher]
 
 
-@dataclass(frozen=True, eq=False)
-class StartEstimate:
-    """What the automatic start found in one frame.
-
-    Attributes:
-        searcher: searches with the body found so far.
-        pose: (p,).
-        observations: the parts of the silhouettes that belong to this person.
-        settled: whether the start is complete.
-        notes: messages for the user, one line each.
-    """
-
-    searcher: Searcher
-    pose: FloatArray
-    observations: Mapping[str, Observation]
-    settled: bool
-    notes: tuple[str, ...] = ()
-
-
 class Starter:
     """Finds a person in the views, without a start pose.
 
@@ -88,8 +67,9 @@ class Starter:
     tried if it is unknown). The best ones are refined, recombined and refined again; if they fit
     poorly, once more with a cost of unusual postures, by which the poses of both searches are
     compared. Legs and arms are tried in each other's place. The opposite heading is propagated,
-    too, until one is kept (`two_headings`). Then poses that cost about as much as the best one are
-    compared with sections of their own (`own_sections`), and the body is fitted (`start_fit`).
+    too, until one is kept (`two_headings`). What remains then is left to the caller (`settling`):
+    poses that cost about as much as the best one are compared with sections of their own, and the
+    body is fitted.
 
     Args:
         rig: the cameras.
@@ -136,12 +116,29 @@ class Starter:
         self._sure = self._usual = False
         self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
 
-    def step(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
-        """Search one frame; None without a person."""
+    @property
+    def searches_again(self) -> bool:
+        """Whether the next frame is searched independently, too, which takes long."""
+        return len(self._headings) == 1 and not self._sure
+
+    def step(
+        self,
+        observed: Mapping[str, Observation],
+        stamp_ns: int,
+        tracked: FloatArray | None = None,
+    ) -> StartEstimate | None:
+        """Search one frame; None without a person.
+
+        Args:
+            observed: the observations of the usable cameras.
+            stamp_ns: their time.
+            tracked: (p,) pose that was tracked up to this frame; None if none was.
+        """
         if self._population is None or self._searcher is None:
             return self._begin(observed, stamp_ns)
         population = self._population
-        far = not 0 <= stamp_ns - self._stamp_ns <= GAP_NS
+        most_ns = GAP_NS if tracked is None else FOLLOWED_GAP_NS
+        far = not 0 <= stamp_ns - self._stamp_ns <= most_ns
         if far:
             population = self._moved(population, observed)
         best = self._best(population).poses[0]
@@ -152,10 +149,12 @@ class Starter:
         near = population.poses[0]
         frame = FramePopulation(self._searcher, observations, stamp_ns, near, usual=self._usual)
         population = frame.propagated(population, far=far)
+        if tracked is not None:
+            population = frame.with_tracked(population, tracked)
         if far:
             self._headings.restart()
             population = improved(frame, population, range(1, 1 + _GAP_GENERATIONS))
-        if len(self._headings) == 1 and not self._sure:
+        if self.searches_again:
             population = self._second_search(frame, population, observations)
         elif len(self._headings) == 1 + _FINER_AFTER:
             frame, population = self._resized((frame, population), observations, stamp_ns)
@@ -168,17 +167,15 @@ class Starter:
         self._note(own, frame, population, stamp_ns)
         if self._headings.change():
             notes += ("start: the person has the opposite heading, turned round",)
-        settled = self._headings.over
-        pose = self._best(population).poses[0]
-        if settled and self._fit_shape:
-            body, make = self._searcher.body, self._searcher_for
-            found = better_with_own_sections(self._best(population), body, make, imaged, stamp_ns)
-            if found is None:
-                pose = self._settle(frame, pose)
-            else:
-                self._searcher, pose = found.searcher, found.pose
-                observations = decide(imaged, self._cameras, self._searcher.body, pose)
-        return StartEstimate(self._searcher, pose, observations, settled, notes)
+        leading, over = self._best(population), self._headings.over
+        rest = None
+        if over and self._fit_shape:
+            rest = Settling(
+                self._searcher, self._searcher_for, self._cameras, self._person,
+                self._headings.leading_fits, frame, leading, observations, imaged, stamp_ns,
+            ).run  # fmt: skip
+        settled, pose = over and rest is None, leading.poses[0]
+        return StartEstimate(self._searcher, pose, observations, settled, notes, rest)
 
     def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
         cameras = [self._cameras[name] for name in observed]
@@ -228,7 +225,7 @@ class Starter:
         If this is a second frame that is searched independently, the hull decides before the body.
         """
         assert self._searcher is not None
-        if len(self._headings) == 1 and not self._sure:
+        if self.searches_again:
             hull = next(find_hulls(self._cameras, observations), None)
             if hull is not None:
                 observations = hulls_silhouettes(observations, self._cameras, hull)
@@ -324,17 +321,6 @@ class Starter:
         """The poses of a population with the leading heading; all poses if none has it."""
         facing = population.facing(self._headings.leading_rad)
         return facing if len(facing) else population
-
-    def _settle(self, frame: FramePopulation, pose: FloatArray) -> FloatArray:
-        """Fit the body; returns the pose (p,) of this frame with it."""
-        assert self._searcher is not None
-        fits = self._headings.leading_fits
-        good = min((fit.cost for fit in fits), default=0.0) + _SHAPE_SLACK
-        used = [(fit.contours, fit.pose) for fit in fits if fit.cost <= good][-_SHAPE_FRAMES:]
-        used = used or [(frame.contours, pose)]
-        body, last = fitted_to_start(self._searcher, used, self._person)
-        self._searcher = self._searcher_for(body)
-        return np.clip(pose + last - used[-1][1], *self._searcher.limits)
 
     def _trunk(self, pose: FloatArray) -> FloatArray:
         assert self._searcher is not None

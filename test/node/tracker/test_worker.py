@@ -9,15 +9,11 @@ import pytest
 
 from markerless_tracker.errors import ConfigError, ImageError
 from markerless_tracker.imaging import ImagingSettings
+from markerless_tracker.node.tracker.handle import TrackedSet, TrackerHandle
 from markerless_tracker.node.tracker.learning import Learning
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
-from markerless_tracker.node.tracker.worker import (
-    TrackedSet,
-    TrackerHandle,
-    TrackWorker,
-    one_line,
-)
+from markerless_tracker.node.tracker.worker import TrackWorker, one_line
 from markerless_tracker.records import LimbState, TrackResult, TrackState
 
 FRAME_NS = 16_666_667

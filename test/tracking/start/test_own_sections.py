@@ -112,7 +112,7 @@ def test_a_start_ends_with_the_better_pose_and_its_body(monkeypatch, fit_shape) 
         return taken[-1]
 
     monkeypatch.setattr(
-        "markerless_tracker.tracking.start.starter.better_with_own_sections", better
+        "markerless_tracker.tracking.start.settling.better_with_own_sections", better
     )
     searching = dict(rig=scene.rig, config=TrackerConfig(threads=1), threads=1)
     starter = Starter(
@@ -122,8 +122,10 @@ def test_a_start_ends_with_the_better_pose_and_its_body(monkeypatch, fit_shape) 
     for number in range(MOST_FRAMES):
         start = starter.step(seen, number * 16_000_000)
         assert start is not None
-        if start.settled:
+        if start.settled or start.rest:
             break
+    assert (start.rest is not None) is fit_shape
+    start = start.rest() if start.rest else start
     assert start.settled
     assert len(taken) == fit_shape
     assert (start.searcher.body.name == "its own") is fit_shape

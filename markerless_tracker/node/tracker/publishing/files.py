@@ -19,7 +19,7 @@ from markerless_tracker.imaging import Segmenter
 from markerless_tracker.node.ros.images import fill_image
 from markerless_tracker.node.ros.messages import header
 from markerless_tracker.node.ros.qos import output_qos
-from markerless_tracker.node.tracker.worker import TrackedSet
+from markerless_tracker.node.tracker.handle import TrackedSet
 from markerless_tracker.records import Observation, TrackResult
 from markerless_tracker.results.result import ResultWriter, check_target
 from markerless_tracker.tracking import Tracker
