@@ -235,13 +235,9 @@ class TrackWorker:
         self._sets.keep(handle.kept if handle.searches else 0)
 
     def _keep_for(self, result: TrackResult, kept: int) -> None:
-        """Keep the sets that come during the search for a person; without a person, the newest.
-
-        If the person is followed during the search, the worker catches up.
-        """
+        """Keep the sets that come during the search for a person; without a person, the newest."""
         searching = result.state is TrackState.SEARCHING
-        in_steps = result.settling and result.effort == 1.0
-        self._sets.keep(kept if searching or in_steps else 0)
+        self._sets.keep(kept if searching or result.settling else 0)
         if searching:
             self._sets.drop_older()
 

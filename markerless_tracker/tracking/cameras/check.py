@@ -106,8 +106,14 @@ class CameraCheck:
         for name in set(self._rig.names) - self.suspects:
             self._found[name] = deque(maxlen=REMEMBERED)
 
-    def add(self, result: TrackResult, body: BodyModel) -> bool:
+    def add(self, result: TrackResult, body: BodyModel, *, late: bool = False) -> bool:
         """Take a tracked frame: compare the cameras whose turn has come; often there is none.
+
+        Args:
+            result: of the frame.
+            body: the tracked body.
+            late: whether sets come faster than they are tracked. Then at most one camera is
+                compared, and after the first `FEW_CHECKS` checks they come as seldom as later ones.
 
         Returns:
             Whether all have been compared once more, so that `shares` may have changed.
@@ -118,12 +124,12 @@ class CameraCheck:
             # The first frame, or time was set back.
             self._due_ns = result.stamp_ns
         count, checks = len(self._rig), 0
-        for _ in range(count):
+        for _ in range(1 if late else count):
             if result.stamp_ns < self._due_ns:
                 return checks > 0
             self._compare(self._rig.names[self._compared], result, result.pose, body)
             self._compared = (self._compared + 1) % count
-            self._due_ns += self._every_ns // count
+            self._due_ns += self._every_ns(late) // count
             if self._compared == 0:
                 checks += 1
                 self._checks += 1
@@ -133,9 +139,9 @@ class CameraCheck:
         self._due_ns = max(self._due_ns, result.stamp_ns)
         return checks > 0
 
-    @property
-    def _every_ns(self) -> int:
-        return EVERY_NS[(self._checks >= FEW_CHECKS) + (self._checks >= MANY_CHECKS)]
+    def _every_ns(self, late: bool) -> int:
+        phase = (self._checks >= FEW_CHECKS) + (self._checks >= MANY_CHECKS)
+        return EVERY_NS[-1 if late and phase else phase]
 
     def _compare(self, name: str, result: TrackResult, pose: FloatArray, body: BodyModel) -> None:
         """Estimate the shift of one camera from the body as the others see it."""

@@ -51,9 +51,12 @@ class CameraCorrection:
             for name, shift in self._check.shifts().items()
         }
 
-    def add(self, result: TrackResult, body: BodyModel) -> tuple[str, ...]:
-        """Take a frame; returns a line for each camera whose correction has changed in `rig`."""
-        if not self._check.add(result, body) or not self._corrects:
+    def add(self, result: TrackResult, body: BodyModel, *, late: bool = False) -> tuple[str, ...]:
+        """Take a frame; returns a line for each camera whose correction has changed in `rig`.
+
+        Arguments as of `CameraCheck.add`.
+        """
+        if not self._check.add(result, body, late=late) or not self._corrects:
             return ()
         shares, shifts = self._check.shares, self._check.shifts()
         changed = [

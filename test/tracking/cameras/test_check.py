@@ -95,6 +95,20 @@ def test_a_frame_compares_one_camera_and_checks_become_rarer(scene, tracked) -> 
     assert counts[-1] - counts[many] == pytest.approx(cameras * later, abs=2)
 
 
+def test_a_late_tracker_compares_one_camera_a_frame_and_seldom(scene, tracked) -> None:
+    """First each camera `FEW_CHECKS` times, as ever, since that may find a wrong one."""
+    check = CameraCheck(scene.rig, CONFIG)
+    standing, cameras = tracked(0), len(scene.rig)
+    counts = []
+    for index in range(60):
+        check.add(replace(standing, stamp_ns=index * EVERY_NS[0]), scene.body, late=True)
+        counts.append(sum(shift.checks for shift in check.shifts().values()))
+    few = FEW_CHECKS * cameras
+    assert counts[:few] == [*range(1, few + 1)]
+    later = (60 - few) * EVERY_NS[0] * cameras / EVERY_NS[2]
+    assert counts[-1] - few == pytest.approx(later, abs=2)
+
+
 def test_a_camera_that_is_touched_during_a_long_run_is_found(scene, tracked) -> None:
     standing = tracked(0)
     check = CameraCheck(scene.rig.shifted({"cam03": (-5.0, 3.0)}), CONFIG)

@@ -62,7 +62,7 @@ def test_either_of_two_cameras_is_shifted_in_part_until_one_is_the_wrong_one(
         check._found[name] = [(20.0 if name in ("cam01", "cam03") else 0.0, 0.0, 200.0)] * 4
     check._gains.extend([{"cam01": 2.0, "cam03": 1.9}] * FEW_CHECKS)
     check._suspect()
-    monkeypatch.setattr(check, "add", lambda result, body: True)
+    monkeypatch.setattr(check, "add", lambda result, body, **_: True)
     assert len(correction.add(tracked(0), scene.body)) == 2
     moved = {c.name: c.matrix[0, 2] - scene.rig[c.name].matrix[0, 2] for c in correction.rig}
     assert moved == pytest.approx({"cam01": 15.0, "cam02": 0.0, "cam03": 5.0, "cam04": 0.0})

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.node.tracker.handle import TrackedSet, TrackerHandle
-from markerless_tracker.node.tracker.pace.waiting import PLACE_NS, SPACING_NS
+from markerless_tracker.node.tracker.pace.waiting import SPACING_NS
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.node.tracker.worker import TrackWorker
@@ -22,7 +22,7 @@ class SearchingTracker:
     """A tracker whose steps wait until they may end."""
 
     def __init__(self) -> None:
-        self.state, self.settling, self.effort = TrackState.TRACKING, False, 1.0
+        self.state, self.settling = TrackState.TRACKING, False
         self.free = threading.Event()
         self.body: Any = object()
 
@@ -36,9 +36,8 @@ class SearchingTracker:
         assert self.free.wait(60)
         pose = None if self.state is TrackState.SEARCHING else np.zeros(3)
         return TrackResult(
-            stamp_ns, self.state, pose, None, 1.5, {"a": 0.5}, 7, settling=self.settling,
-            effort=self.effort if self.settling else effort,
-        )  # fmt: skip
+            stamp_ns, self.state, pose, None, 1.5, {"a": 0.5}, 7, settling=self.settling
+        )
 
     def reset(self) -> None:
         pass
@@ -107,24 +106,6 @@ def test_sets_that_come_during_the_start_are_kept(make_worker: Callable[..., Wor
     worker.take_during_a_step(*STAMPS)
     until(lambda: len(worker.published) == len(STAMPS))
     assert worker.published == STAMPS and worker.sets.counts.skipped == 0
-
-
-def test_sets_that_come_while_the_person_is_followed_are_skipped_in_time(
-    make_worker: Callable[..., Worker],
-) -> None:
-    """Those that came during the first search are tracked: the person is found again in them."""
-    worker = make_worker(10)
-    worker.tracker.settling, worker.tracker.effort = True, 0.5
-    worker.take_during_a_step(*STAMPS)
-    until(lambda: len(worker.published) == len(STAMPS))
-    assert worker.published == STAMPS
-    worker.tracker.free.clear()
-    later = [STAMPS[-1] + number * PLACE_NS for number in range(len(STAMPS) + 3)]
-    for stamp in later[1:]:
-        worker.sets.add("a", stamp, 7, now_s=time.monotonic())
-    worker.tracker.free.set()
-    until(lambda: worker.published[-1] == later[-1])
-    assert worker.sets.counts.skipped > 0
 
 
 def test_no_more_are_kept_than_the_memory_holds(make_worker: Callable[..., Worker]) -> None:
