@@ -164,10 +164,10 @@ class Synchronizer(Generic[View]):
                 self._changed.wait(timeout_s)
             return self._waiting.take()
 
-    def keep(self, at_most: int) -> None:
-        """Keep at most `at_most` complete sets from now on; see `WaitingSets`."""
+    def keep(self, at_most: int, *, followed: bool = False) -> None:
+        """Keep at most `at_most` complete sets from now on; as `WaitingSets.keep`."""
         with self._changed:
-            self._waiting.keep(at_most)
+            self._waiting.keep(at_most, followed=followed)
 
     def drop_older(self) -> None:
         """Drop all waiting complete sets but the newest."""

@@ -237,7 +237,7 @@ class TrackWorker:
     def _keep_for(self, result: TrackResult, kept: int) -> None:
         """Keep the sets that come during the search for a person; without a person, the newest."""
         searching = result.state is TrackState.SEARCHING
-        self._sets.keep(kept if searching or result.settling else 0)
+        self._sets.keep(kept if searching or result.settling else 0, followed=result.settling)
         if searching:
             self._sets.drop_older()
 

@@ -7,8 +7,9 @@ from typing import Generic, TypeVar
 
 View = TypeVar("View")
 
-SPACING_NS = 80_000_000
-"""Time between two kept sets, across which a pose is refined without a wider search."""
+SPACING_NS, FOLLOWED_SPACING_NS = 45_000_000, 80_000_000
+"""Time between two kept sets, across which a pose is refined without a wider search: of those that
+come before the person is found, and of later ones, so that the worker catches up."""
 AT_MOST, MOST_BYTES = 48, 400_000_000
 """Largest number of kept sets, and of the bytes of their images, so that a long search does not
 fill the memory."""
@@ -55,10 +56,10 @@ def kept_sets(set_bytes: int) -> int:
 
 
 class WaitingSets(Generic[View]):
-    """The newest set; while sets are kept, also earlier sets at intervals of `SPACING_NS`.
+    """The newest set; while sets are kept, also earlier sets at intervals.
 
-    An automatic start searches its first set for about a second, and then needs sets near in time
-    to the first and to each other. So sets are kept meanwhile and returned in their order. If there
+    An automatic start searches its first set for some time, and then needs sets near in time to
+    the first and to each other. So sets are kept meanwhile and returned in their order. If there
     are too many, every second of the later sets is dropped, and the interval doubles. Afterwards
     the worker catches up: the number of places falls until only the newest set waits.
     """
@@ -80,12 +81,19 @@ class WaitingSets(Generic[View]):
     def __len__(self) -> int:
         return len(self._sets)
 
-    def keep(self, at_most: int) -> None:
-        """Keep at most `at_most` sets from now on; 0: let the worker catch up, then keep none."""
+    def keep(self, at_most: int, *, followed: bool = False) -> None:
+        """Keep at most `at_most` sets from now on; 0: let the worker catch up, then keep none.
+
+        Args:
+            at_most: number of sets.
+            followed: whether the person was found, and sets are tracked in turn.
+        """
         if at_most:
             self._places = at_most
             if not self._keeping:
                 self._spacing_ns = SPACING_NS
+            if followed:
+                self._spacing_ns = max(self._spacing_ns, FOLLOWED_SPACING_NS)
         elif self._keeping:
             self._places = min(self._places, len(self._sets) + _SPARE)
             self._caught_up_ns = self._newest_ns + self._places * PLACE_NS

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from markerless_tracker.node.tracker.handle import TrackedSet, TrackerHandle
-from markerless_tracker.node.tracker.pace.waiting import SPACING_NS
+from markerless_tracker.node.tracker.pace.waiting import FOLLOWED_SPACING_NS
 from markerless_tracker.node.tracker.status import TrackerStatus
 from markerless_tracker.node.tracker.synchronizer import Synchronizer
 from markerless_tracker.node.tracker.worker import TrackWorker
 from markerless_tracker.records import TrackResult, TrackState
 
-STAMPS = [number * SPACING_NS for number in range(1, 7)]
+STAMPS = [number * FOLLOWED_SPACING_NS for number in range(1, 7)]
 
 
 class SearchingTracker:

@@ -1,5 +1,6 @@
 """Which sets wait, by their stamps in milliseconds."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -38,22 +39,27 @@ def test_the_newest_set_alone_waits() -> None:
     assert waiting.take() is None
 
 
-def test_kept_sets_lie_apart_and_come_in_order() -> None:
+@pytest.mark.parametrize(
+    "followed, expected",
+    [(False, [60, 120, 180, 240, 300]), (True, [80, 160, 240, 300])],
+)
+def test_kept_sets_lie_apart_and_come_in_order(followed: bool, expected: list[int]) -> None:
     waiting: WaitingSets[str] = WaitingSets()
     waiting.keep(AT_MOST)
+    waiting.keep(AT_MOST, followed=followed)
     waiting.put(a_set(0))
     assert drained(waiting) == [0]
     replaced = [waiting.put(a_set(stamp)) for stamp in range(FRAME_MS, 320, FRAME_MS)]
     assert waiting.views == len(waiting)
     stamps = drained(waiting)
     # The newest may lie nearer.
-    assert stamps == [80, 160, 240, 300]
+    assert stamps == expected
     assert sum(replaced) == len(replaced) - len(stamps)
 
 
 def test_of_too_many_every_other_of_the_later_ones_is_dropped() -> None:
     waiting: WaitingSets[str] = WaitingSets()
-    waiting.keep(CLOSE + 4)
+    waiting.keep(CLOSE + 4, followed=True)
     replaced = [waiting.put(a_set(stamp)) for stamp in range(0, 1700, 100)]
     assert sum(replaced) == 17 - len(waiting) == 6
     taken = list(iter(waiting.take, None))
