@@ -87,11 +87,10 @@ class AutomaticStart:
         Args:
             late: whether the effort is below 1.
         """
-        if self._found is None:
-            return False
+        if self._found is None or self._beside is not None:
+            return self._found is not None
         # A doubtful first pose is not worth following.
-        may = self._may and not self._starter.searches_again
-        return self._beside is not None or (late and may)
+        return late and self._may and not self._starter.searches_again
 
     def reset(self) -> None:
         """Forget the person; rejected hulls are remembered."""
