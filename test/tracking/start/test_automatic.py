@@ -31,18 +31,10 @@ SETS = 31
 
 
 @pytest.fixture(scope="module")
-def walk():
+def walk(take_frames):
     """Stamps, observations and true markers of a walking person."""
     scene = SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=2)
-    taken = []
-    for index in range(0, STEP * SETS, STEP):
-        _, masks, _ = scene.frame(index)
-        seen = {
-            name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-            for name, mask in masks.items()
-        }
-        taken.append((scene.stamp_ns(index), seen, scene.markers(index)))
-    return scene, taken
+    return scene, take_frames(scene, range(0, STEP * SETS, STEP))
 
 
 def tracker_of(scene):

@@ -19,18 +19,10 @@ STARTER = "markerless_tracker.tracking.start.starter"
 
 
 @pytest.fixture(scope="module")
-def walk():
-    """Observations and true markers of a walking person."""
+def walk(take_frames):
+    """Stamps, observations and true markers of a walking person."""
     scene = SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=2)
-    taken = []
-    for index in range(FRAMES):
-        _, masks, _ = scene.frame(index)
-        seen = {
-            name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-            for name, mask in masks.items()
-        }
-        taken.append((scene.stamp_ns(index), seen, scene.markers(index)))
-    return scene, taken
+    return scene, take_frames(scene, range(FRAMES))
 
 
 def tracker_of(scene, **subject):
@@ -168,7 +160,7 @@ def blind(seen):
     }
 
 
-def test_a_person_lost_sight_of_is_found_again_elsewhere(walk) -> None:
+def test_a_person_lost_sight_of_is_found_again_elsewhere(walk, take_frames) -> None:
     """Blind for a quarter of a second, then the person stands half a metre further on."""
     scene, taken = walk
     tracker = tracker_of(scene, stature=1.72)
@@ -182,12 +174,7 @@ def test_a_person_lost_sight_of_is_found_again_elsewhere(walk) -> None:
         assert result.pose is None
         states.append(result.state)
     assert states[0] is TrackState.LOST and states[-1] is TrackState.SEARCHING
-    _, masks, _ = scene.frame(60)
-    seen = {
-        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-        for name, mask in masks.items()
-    }
-    points = scene.markers(60)
+    ((_, seen, points),) = take_frames(scene, [60])
     assert np.linalg.norm(points[0] - taken[-1][2][0]) > 0.5
     result = tracker.step(seen, stamp + 16_666_667)
     assert result.state is TrackState.TRACKING
@@ -206,19 +193,13 @@ def test_some_blind_cameras_are_left_out_and_said(walk) -> None:
     assert any(w.startswith("cam01: left out") for w in result.warnings)
 
 
-def test_who_walks_on_during_the_first_search_is_found_again() -> None:
+def test_who_walks_on_during_the_first_search_is_found_again(take_frames) -> None:
     """Live the first search takes the time of some dozen sets."""
     scene = SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=2)
     tracker = tracker_of(scene)
-    for frame in (0, 1, 28, 30, 32, 34, 36, 38, 40, 42):
-        _, masks, _ = scene.frame(frame)
-        seen = {
-            name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-            for name, mask in masks.items()
-        }
-        result = tracker.step(seen, scene.stamp_ns(frame))
+    for stamp, seen, true in take_frames(scene, (0, 1, 28, 30, 32, 34, 36, 38, 40, 42)):
+        result = tracker.step(seen, stamp)
         assert result.state is TrackState.TRACKING
-        true = scene.markers(frame)
         assert error_mm(result, true) < 120.0
         assert heading_difference(heading(result.markers_m), heading(true)) < 0.5
     moved_m = np.linalg.norm(scene.markers(28) - scene.markers(1), axis=1).mean()
