@@ -120,6 +120,16 @@ def test_with_full_effort_again_the_search_is_taken_at_once(walk, monkeypatch) -
     assert searched == [taken[i][0] for i in (0, 1, 3, 4)]
 
 
+def test_without_refinement_every_frame_is_searched_in_its_step(walk) -> None:
+    scene, taken = walk
+    config = TrackerConfig(threads=1, refinement="none")
+    trackers = [build_tracker(scene.rig, config, stature=1.72).tracker for _ in range(2)]
+    for stamp, seen, _ in taken[:4]:
+        late, other = (t.step(seen, stamp, e) for t, e in zip(trackers, (0.5, 1.0), strict=True))
+        assert late.settling
+        np.testing.assert_array_equal(late.pose, other.pose)
+
+
 def test_who_leaves_meanwhile_is_forgotten(walk) -> None:
     scene, taken = walk
     tracker = tracker_of(scene)
@@ -135,7 +145,7 @@ def test_who_leaves_meanwhile_is_forgotten(walk) -> None:
     assert error_mm(tracker.step(seen, stamp, 0.5), points) < 120.0
 
 
-def test_a_reset_and_other_settings_wait_for_what_runs(walk, monkeypatch) -> None:
+def test_other_settings_wait_for_what_runs_and_a_reset_forgets_it(walk, monkeypatch) -> None:
     scene, taken = walk
     ended: list[int] = []
     step = Starter.step
