@@ -20,7 +20,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.ros.process import require_ros
 from markerless_tracker.results.result import versions
 
-_WIDTH = 150
+_WIDTH = 175
 
 
 def add_parser(kinds: "argparse._SubParsersAction[Any]") -> None:
@@ -84,6 +84,8 @@ def run(args: argparse.Namespace) -> int:
         console.print(
             "Tracked: sets with a pose; a second: of playing time. Latency: from the arrival of a "
             "set's last image to its result. CPU: tracker per tracked set, player per set sent. "
+            "Before each run: time of a view-evaluation of the reference on one core, and what all "
+            "cores do at once, as a multiple of what one does. "
             f"Load of the machine: {'-' if load is None else load}.",
             highlight=False,
         )
@@ -96,7 +98,7 @@ def _table(rows: Sequence[Mapping[str, Any]]) -> Table:
         table.add_column(title)
     for title in (
         "sets/s", "sets", "played s", "tracked", "a second", "first pose s", "latency ms", "p95",
-        "CPU tracker", "CPU player", "mean mm",
+        "CPU tracker", "CPU player", "mean mm", "reference µs", "cores at once",
     ):  # fmt: skip
         table.add_column(title, justify="right")
     for row in rows:
@@ -114,6 +116,8 @@ def _table(rows: Sequence[Mapping[str, Any]]) -> Table:
             _number(row["cpu_ms"]["tracker"], 1),
             _number(row["cpu_ms"]["player"], 1),
             _number(row["mean_mm"], 1),
+            _number(row["reference_us"], 0),
+            _number(row["cores_at_once"], 2),
         )
     return table
 

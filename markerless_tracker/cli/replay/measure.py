@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from markerless_tracker.bags import write_bag
+from markerless_tracker.benchmarks.speed.cores import core_meter
 from markerless_tracker.cli.replay.replay import Replay, replay
 from markerless_tracker.datasets import MarkerTrack, Recording, open_recording, read_trc
 from markerless_tracker.datasets.empty_scene import backgrounds_of
@@ -55,8 +56,9 @@ def measure_live(
         Per rate: `source`, `rate` (sets/s), `start` (`given` or `nothing given`), `sets` sent,
         `played_s` (time the player took), `tracked` (sets with a pose), `per_second` (of them),
         `skipped`, `lost`, `first_pose_s`, `latency_ms` {median, p95} from the arrival of a set's
-        last image to its result, `cpu_ms` {tracker, player} per tracked and per sent set, and
-        `mean_mm`, the error of the tracked sets. Unknown values are None.
+        last image to its result, `cpu_ms` {tracker, player} per tracked and per sent set,
+        `mean_mm`, the error of the tracked sets, and `reference_us` and `cores_at_once`, the speed
+        of the cores just before (`CoreSpeed`). Unknown values are None.
 
     Raises:
         NodeError: a process failed.
@@ -66,7 +68,7 @@ def measure_live(
     reference = truth_path(source)
     truth = read_trc(reference) if reference.is_file() else None
     given = plan.start_given and truth is not None
-    with tempfile.TemporaryDirectory(prefix="markerless_tracker_") as name:
+    with tempfile.TemporaryDirectory(prefix="markerless_tracker_") as name, core_meter() as meter:
         folder = Path(name)
         sets = _convert(recording, folder / "bag", report)
         tracker: dict[str, object] = {
@@ -83,6 +85,7 @@ def measure_live(
             def tell(doing: str, done: int, title: str = title) -> None:
                 report(f"{title}: {doing}", done, sets)
 
+            cores = meter()
             run = replay(
                 folder / "bag",
                 sets=sets,
@@ -94,7 +97,8 @@ def measure_live(
                 report=tell,
             )
             start = "given" if given else "nothing given"
-            rows.append({"source": str(source), "rate": rate, "start": start, **_row(run, truth)})
+            row = {"source": str(source), "rate": rate, "start": start, **_row(run, truth)}
+            rows.append({**row, "reference_us": cores.reference_us, "cores_at_once": cores.at_once})
     return rows
 
 

@@ -28,6 +28,7 @@ def test_figures_of_a_recording(walk: Path, capsys: pytest.CaptureFixture[str]) 
     assert row["cpu_ms"]["tracker"] > 0.0 and row["cpu_ms"]["player"] > 0.0
     assert row["first_pose_s"] > 0.0
     assert 0.0 < row["mean_mm"] < 40.0
+    assert row["reference_us"] > 0.0 and row["cores_at_once"] > 0.0
 
 
 def test_without_ros_it_is_one_line(
