@@ -27,7 +27,7 @@ from markerless_tracker.tracking.evidence.prepared import (
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
-from markerless_tracker.tracking.limbs.watch import RECOVERED_M, Recovered
+from markerless_tracker.tracking.limbs.recovered import RECOVERED_M, Recovered
 from markerless_tracker.tracking.limits import LIMB_RAD_S, check_pose, joint_speeds
 from markerless_tracker.tracking.motion import MotionModel
 from markerless_tracker.tracking.person.body_fitting import Unmeasured

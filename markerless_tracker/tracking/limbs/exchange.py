@@ -17,6 +17,7 @@ from markerless_tracker.tracking.candidates.crossed import (
     is_crossed,
     mirrored,
 )
+from markerless_tracker.tracking.limbs.gains import GainSum
 from markerless_tracker.tracking.limbs.search import distance_m
 
 EVERY_NS = 50_000_000
@@ -28,12 +29,10 @@ LEAST_GAIN, LEAST_GAIN_PLACED = 0.004, 0.008
 """Least gain of exchanged angles, and of limbs in each other's place. While the limbs pass each
 other, both poses fit alike, and in each other's place more so."""
 LEAST_SUM, LEAST_COMPARISONS = 0.008, 3
-"""Least sum of smaller gains for which an exchange is taken, and of its comparisons. If arms reach
-through the trunk into each other's place, the silhouettes hardly show it."""
+"""Least sum of smaller gains for which an exchange is taken, and least number of comparisons in it.
+If arms reach through the trunk into each other's place, the silhouettes hardly show it."""
 CLOSE = 0.018
 """Argument of `LimbSearch.compared`. Exchanging limbs that are right costs more than this."""
-_FORGET = 0.9
-"""Factor of the earlier sum in each comparison."""
 
 
 class Exchange(NamedTuple):
@@ -53,8 +52,7 @@ class Exchange(NamedTuple):
 class PairExchange:
     """Proposes the exchange of the legs or of the arms at intervals, and decides on it.
 
-    A single frame decides if the gain is clear. Smaller gains are summed, as those of headings are
-    (`facing`): a comparison in which the exchange fits worse lowers the sum.
+    A single frame decides if the gain is clear. Smaller gains are summed.
     """
 
     def __init__(self) -> None:
@@ -68,13 +66,15 @@ class PairExchange:
 
     def forget_gains(self) -> None:
         """Forget all gains: left and right are no longer what they were."""
-        self._gains = dict.fromkeys(PAIRS, 0.0)
-        self._counts = dict.fromkeys(PAIRS, 0)
+        self._gains = {name: GainSum() for name in PAIRS}
 
-    def due(
+    def take_turn(
         self, body: BodyModel, pose: FloatArray, limits: FloatArray, stamp_ns: int
     ) -> Exchange | None:
-        """The exchange of a pair in a pose (p,), within limits (2, p), if one is due."""
+        """The exchange of a pair in a pose (p,), within limits (2, p), if one is due.
+
+        The time is noted as that of a trial.
+        """
         if self._tried_ns is not None and 0 <= stamp_ns - self._tried_ns < EVERY_NS:
             return None
         for offset in range(len(PAIRS)):
@@ -86,8 +86,8 @@ class PairExchange:
                 return other
         return None
 
-    def takes(self, name: str, gain: float, least_gain: float, moved_m: float) -> bool:
-        """Whether to take an exchange that was compared with the estimate; its gain is noted.
+    def add_comparison(self, name: str, gain: float, least_gain: float, moved_m: float) -> bool:
+        """Note the gain of an exchange over the estimate; return whether to take the exchange.
 
         Args:
             name: of the pair.
@@ -98,13 +98,12 @@ class PairExchange:
         """
         apart = moved_m >= LEAST_M
         known = gain if apart else 0.0
-        sum_ = max(0.0, _FORGET * self._gains[name] + known)
-        count = self._counts[name] + 1 if sum_ > 0.0 else 0
-        self._gains[name], self._counts[name] = sum_, count
-        summed = known > 0.0 and sum_ >= LEAST_SUM and count >= LEAST_COMPARISONS
+        gains = self._gains[name]
+        gains.add(known)
+        summed = known > 0.0 and gains.total >= LEAST_SUM and gains.count >= LEAST_COMPARISONS
         taken = (apart and gain >= least_gain) or summed
         if taken:
-            self._gains[name], self._counts[name] = 0.0, 0
+            self._gains[name] = GainSum()
         return taken
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.mirror import opposite_heading, rotated_by
+from markerless_tracker.tracking.limbs.gains import GainSum
 from markerless_tracker.tracking.limbs.search import LimbSearch
 
 EVERY_NS, FIRST_EVERY_NS, DOUBTED_EVERY_NS = 600_000_000, 250_000_000, 80_000_000
@@ -24,8 +25,6 @@ LEAST_COMPARISONS = 3
 """Least number of comparisons in this sum."""
 CLOSE = 0.03
 """Argument of `LimbSearch.compared`."""
-_FORGET = 0.9
-"""Factor of the earlier sum in each comparison."""
 
 
 def _reversed(body: BodyModel, pose: FloatArray) -> FloatArray:
@@ -48,7 +47,6 @@ _ROTATIONS: tuple[Callable[[BodyModel, FloatArray], FloatArray], ...] = (
 class FacingWatch:
     """Sums the gains of three other headings: the opposite one, and a quarter to each side.
 
-    A comparison in which a heading fits worse lowers its sum, so that a few frames do not decide.
     Each comparison tests one heading, in rotation; the heading with the best mean is taken.
     """
 
@@ -63,16 +61,15 @@ class FacingWatch:
     def _begin(self) -> None:
         self._compared_ns: int | None = None
         self._next = 0
-        self._gains = [0.0] * len(_ROTATIONS)
-        self._counts = [0] * len(_ROTATIONS)
+        self._gains = [GainSum() for _ in _ROTATIONS]
 
-    def due(self, stamp_ns: int) -> bool:
+    def take_turn(self, stamp_ns: int) -> bool:
         """Whether to compare at this time; if so, the time is noted as that of a comparison."""
         if self._began_ns is None:
             self._began_ns = stamp_ns
         since = self._compared_ns
         every_ns = FIRST_EVERY_NS if 0 <= stamp_ns - self._began_ns < FIRST_NS else EVERY_NS
-        if max(self._gains) > 0.0:
+        if any(gains.total > 0.0 for gains in self._gains):
             every_ns = DOUBTED_EVERY_NS
         due = since is None or not 0 <= stamp_ns - since < every_ns
         if due:
@@ -89,12 +86,10 @@ class FacingWatch:
         """
         index, self._next = self._next, (self._next + 1) % len(_ROTATIONS)
         other, gain = search.compared(np.clip(_ROTATIONS[index](body, search.pose), *limits), CLOSE)
-        total = max(0.0, _FORGET * self._gains[index] + gain)
-        self._gains[index] = total
-        self._counts[index] = self._counts[index] + 1 if total > 0.0 else 0
-        means = [g / max(1, count) for g, count in zip(self._gains, self._counts, strict=True)]
-        sure = total >= LEAST_GAIN and self._counts[index] >= LEAST_COMPARISONS
-        if not sure or gain <= 0.0 or means[index] < max(means):
+        gains = self._gains[index]
+        gains.add(gain)
+        sure = gains.total >= LEAST_GAIN and gains.count >= LEAST_COMPARISONS
+        if not sure or gain <= 0.0 or gains.mean < max(each.mean for each in self._gains):
             return None
         self._begin()
         return other

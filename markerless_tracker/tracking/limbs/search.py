@@ -129,7 +129,7 @@ class LimbSearch:
         distance = distance_m(self._own.body, other, self.pose)
         return float(here - there) + GAIN_PER_M * (distance - FREE_M)
 
-    def takes(self, other: FloatArray, least_gain: float, close: float) -> bool:
+    def take_if_better(self, other: FloatArray, least_gain: float, close: float) -> bool:
         """Take another pose (p,) if it gains `least_gain`; return whether it was taken.
 
         Other arguments as for `compared`.

@@ -1,11 +1,12 @@
-"""Which limbs are searched in turn, though nothing suggests that they are wrong."""
+"""Which limbs are searched in rotation, though nothing suggests that they are wrong."""
 
 from collections.abc import Sequence
 
 PER_LIMB_NS = 40_000_000
 """Time between two frames after which one limb is searched."""
 PUT_OFF = 2.0
-"""A turn is put off until it is due so many times over: at 60 frames/s from 0.1 to 0.2 s."""
+"""While frames have other searches, a limb is searched only when so many limbs are due: at
+60 frames/s after 0.2 instead of 0.1 s."""
 
 
 class LimbTurns:

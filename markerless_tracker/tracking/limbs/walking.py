@@ -48,13 +48,13 @@ class WalkingWatch:
         while stamp_ns - self._trunks[0][0] > WALKED_NS:
             self._trunks.popleft()
 
-    def due(
+    def take_turn(
         self, body: BodyModel, pose: FloatArray, limits: FloatArray, stamp_ns: int
     ) -> list[FloatArray]:
         """Poses (p,) facing the walking direction, if the body does not and a comparison is due.
 
-        The frame has been noted (`note`). The joints keep their angles in one of the poses; in the
-        other, left and right are exchanged.
+        The time is noted as that of a comparison. The frame has been noted (`note`). The joints
+        keep their angles in one of the poses; in the other, left and right are exchanged.
 
         Args:
             body: the body.

@@ -12,7 +12,8 @@ from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
-from markerless_tracker.tracking.limbs.watch import LimbWatch, Recovered
+from markerless_tracker.tracking.limbs.recovered import Recovered
+from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
 
 

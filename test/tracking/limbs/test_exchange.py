@@ -24,7 +24,8 @@ from markerless_tracker.tracking.limbs.exchange import (
     PAIRS,
     PairExchange,
 )
-from markerless_tracker.tracking.limbs.watch import LimbWatch, Recovered
+from markerless_tracker.tracking.limbs.recovered import Recovered
+from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
 
 EXCHANGE = "markerless_tracker.tracking.limbs.exchange"
@@ -77,7 +78,7 @@ def recovered(
     body, config = scene.body, TrackerConfig(threads=1)
     searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
     watch = watch or LimbWatch(scene.rig)
-    watch._exchange._next = PAIRS.index(walking.pair)
+    watch._schedule.exchange._next = PAIRS.index(walking.pair)
     contours = searcher.frame(walking.seen, stamp_ns, pose).contours
     seen = Seen(stamp_ns, walking.seen, walking.seen, walking.seen)
     return watch.recover(searcher, contours, seen, pose)
@@ -107,7 +108,7 @@ def test_when_an_exchange_is_taken() -> None:
 
     def taken(*gains: float, least_gain: float = LEAST_GAIN, moved_m: float = far_m) -> list[bool]:
         exchange.forget_gains()
-        return [exchange.takes("arms", gain, least_gain, moved_m) for gain in gains]
+        return [exchange.add_comparison("arms", gain, least_gain, moved_m) for gain in gains]
 
     assert taken(LEAST_GAIN) == [True]
     # 0.4, 0.76 and 1.08 of the least sum; then it begins anew.
@@ -126,17 +127,17 @@ def test_when_an_exchange_is_taken() -> None:
     assert taken(0.0, least_gain=0.0, moved_m=0.0) == [False]
     assert taken(0.0, least_gain=0.0) == [True]
     assert taken(0.9, 0.9, least_gain=1.0) == [False, False]
-    assert not exchange.takes("arms", 0.9, 1.0, moved_m=0.0)
-    assert exchange.takes("arms", 0.9, 1.0, far_m)
+    assert not exchange.add_comparison("arms", 0.9, 1.0, moved_m=0.0)
+    assert exchange.add_comparison("arms", 0.9, 1.0, far_m)
 
 
 def test_each_pair_has_a_sum_of_its_own() -> None:
     exchange, some, far_m = PairExchange(), 0.4 * LEAST_SUM, 2.0 * LEAST_M
     pairs = ("arms", "legs") * 2
-    assert not any(exchange.takes(pair, some, LEAST_GAIN, far_m) for pair in pairs)
-    assert exchange.takes("legs", some, LEAST_GAIN, far_m)
+    assert not any(exchange.add_comparison(pair, some, LEAST_GAIN, far_m) for pair in pairs)
+    assert exchange.add_comparison("legs", some, LEAST_GAIN, far_m)
     exchange.reset()
-    assert not exchange.takes("arms", some, LEAST_GAIN, far_m)
+    assert not exchange.add_comparison("arms", some, LEAST_GAIN, far_m)
 
 
 def test_a_pair_in_its_place_stays(walking: Walking) -> None:
@@ -146,7 +147,7 @@ def test_a_pair_in_its_place_stays(walking: Walking) -> None:
 def test_the_pairs_are_tried_in_turn_where_it_changes_anything(walking: Walking) -> None:
     body, exchange = walking.scene.body, PairExchange()
     stamps = [10, 10 + EVERY_NS, 10 + 2 * EVERY_NS]
-    tried = [exchange.due(body, walking.pose, body.limits, stamp) for stamp in stamps]
+    tried = [exchange.take_turn(body, walking.pose, body.limits, stamp) for stamp in stamps]
     assert [one and one[0] for one in tried] == [PAIRS[0], PAIRS[1], PAIRS[0]]
     other = tried[PAIRS.index(walking.pair)]
     assert other is not None
@@ -154,11 +155,11 @@ def test_the_pairs_are_tried_in_turn_where_it_changes_anything(walking: Walking)
         markers(body, other.poses[0]), markers(body, walking.swapped), atol=0.01
     )
     assert other.least_gains == (LEAST_GAIN, LEAST_GAIN_PLACED)
-    assert exchange.due(body, walking.pose, body.limits, stamps[-1] + EVERY_NS - 1) is None
+    assert exchange.take_turn(body, walking.pose, body.limits, stamps[-1] + EVERY_NS - 1) is None
     # Time that was set back begins anew.
-    assert exchange.due(body, walking.pose, body.limits, 0) is not None
+    assert exchange.take_turn(body, walking.pose, body.limits, 0) is not None
     exchange.reset()
-    assert exchange.due(body, body.neutral, body.limits, 0) is None
+    assert exchange.take_turn(body, body.neutral, body.limits, 0) is None
     assert LEAST_M > 0.0
 
 
@@ -167,7 +168,7 @@ def test_a_pair_alone_in_another_place_is_tried_every_time(walking: Walking) -> 
     pose, limbs = body.neutral.copy(), body.subspaces[walking.pair]
     pose[limbs] = walking.pose[limbs]
     for stamp in (0, EVERY_NS):
-        tried = exchange.due(body, pose, body.limits, stamp)
+        tried = exchange.take_turn(body, pose, body.limits, stamp)
         assert tried is not None and tried[0] == walking.pair
 
 
@@ -201,10 +202,10 @@ def test_crossed_legs_take_each_others_place(standing: Walking) -> None:
 
 def test_what_is_crossed_no_more_need_not_be_better(standing: Walking) -> None:
     body = standing.scene.body
-    due = PairExchange().due(body, standing.swapped, body.limits, 0)
+    due = PairExchange().take_turn(body, standing.swapped, body.limits, 0)
     assert due is not None and due.name == "legs" and due.least_gains == (0.0,)
     assert not is_crossed(body, due.poses[0], "legs")
-    due = PairExchange().due(body, standing.pose, body.limits, 0)
+    due = PairExchange().take_turn(body, standing.pose, body.limits, 0)
     assert due is None or due.least_gains == (LEAST_GAIN, LEAST_GAIN_PLACED)
 
 

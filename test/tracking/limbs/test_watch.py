@@ -10,14 +10,10 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
+from markerless_tracker.tracking.limbs.schedule import FIRST_WAIT_NS
 from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
-from markerless_tracker.tracking.limbs.watch import (
-    FIRST_WAIT_NS,
-    RECOVERED_M,
-    LimbWatch,
-    Recovered,
-)
+from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
 
 TRACKING, LOST = TrackState.TRACKING, TrackState.LOST
@@ -134,20 +130,6 @@ def test_a_body_that_names_no_limbs_has_none_to_look_for(standing) -> None:
     assert recover(watch, searcher, contours, seen, 0, pose) == (pose, ())
 
 
-@pytest.mark.parametrize(
-    ("moved_m", "rotated", "allowed"),
-    [(0.5 * RECOVERED_M, False, 0.2), (2.0 * RECOVERED_M, False, 1.0), (0.0, True, 1.0)],
-)
-def test_a_limb_jumps_only_from_where_it_was_wrong(standing, moved_m, rotated, allowed) -> None:
-    body = standing[0].body
-    pose, arm = body.neutral + 1.0, body.subspaces["l_arm"]
-    near = [np.array([body.neutral - reach, body.neutral + reach]) for reach in (0.3, 0.2)]
-    placed = Recovered(pose, ("l_arm",), rotated=rotated, moved_m=moved_m).placed(body, *near)
-    np.testing.assert_allclose((placed - body.neutral)[arm], allowed)
-    rest = np.setdiff1d(np.arange(body.size), arm)
-    np.testing.assert_allclose((placed - body.neutral)[rest], 1.0 if rotated else 0.3)
-
-
 def test_rotation_is_by_time_and_depends_on_nothing_else(balancing, monkeypatch) -> None:
     scene, seen, _, hidden = balancing
     explained = "markerless_tracker.tracking.limbs.watch.find_unexplained"
@@ -187,7 +169,7 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
         ),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
-    monkeypatch.setattr("markerless_tracker.tracking.limbs.watch.FIRST_WAIT_NS", 0)
+    monkeypatch.setattr("markerless_tracker.tracking.limbs.schedule.FIRST_WAIT_NS", 0)
     searcher, watch, searched = searcher_of(scene), LimbWatch(scene.rig), []
     contours = contours_of(searcher, seen, pose)
     recover(watch, searcher, contours, seen, 0, pose)
@@ -218,7 +200,7 @@ def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_turns(
         f"{package}.watch.find_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})
     )
     monkeypatch.setattr(f"{package}.search.other_limb", elsewhere)
-    monkeypatch.setattr(f"{package}.watch.FIRST_WAIT_NS", 0)
+    monkeypatch.setattr(f"{package}.schedule.FIRST_WAIT_NS", 0)
     monkeypatch.setattr(f"{package}.facing.FacingWatch.compare", faces)
     monkeypatch.setattr(f"{package}.exchange.LEAST_M", 9.0)
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)

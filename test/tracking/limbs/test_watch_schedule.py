@@ -41,7 +41,7 @@ def searches_of(monkeypatch, every_ns, count, areas_m2=None, named=False, **how)
 
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained(dict(areas_m2 or {}), {})),
-        ("watch.FIRST_WAIT_NS", 0),
+        ("schedule.FIRST_WAIT_NS", 0),
         ("facing.FacingWatch.compare", lambda *_: now.append("facing")),
         ("exchange.LEAST_M", 0.0),
         ("search.LimbSearch.compared", compared),
