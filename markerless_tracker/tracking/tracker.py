@@ -130,7 +130,8 @@ class Tracker:
         self._lookahead.restart(self._outlook(-1), self._outlook(0))
 
     def configure(self, config: TrackerConfig) -> None:
-        """Use other `live_settings` from the next step on; the track continues.
+        """Use other `live_settings` from the next step on; the track continues, and so does a start
+        that has begun, with its settings.
 
         Raises:
             ConfigError: the budget cannot be spent; nothing has changed then.
@@ -139,7 +140,7 @@ class Tracker:
         if self._start is not None:
             self._start.wait()
         self.config = config
-        for part in (self._motion, self._body, self._assessor, self._effort):
+        for part in (self._motion, self._body, self._assessor, self._effort, self._correction):
             part.configure(config)
         self._searchers.config = config
         self._searcher = self._searchers.near(self.body)

@@ -84,7 +84,7 @@ class TrackerNode(GivenNode):
         self._tracker: Tracker | TrackerProcess | None = None
         self._end_process: Callable[[], None] = lambda: None
         self._time_offsets: TimeOffsetEstimate | None = None
-        self._found = False
+        self._subject: BodyModel | None = None
         self._missing: Sequence[str] = ()
         self._repeated = (0, 0.0)
         self._skipped = SkippedShare()
@@ -186,8 +186,8 @@ class TrackerNode(GivenNode):
         return None if segmenter is None else segmenter.background.channels
 
     def _person(self) -> BodyModel | None:
-        """The tracked body; None before a person was tracked."""
-        return self._tracker.body if self._tracker is not None and self._found else None
+        """The body of the person tracked last; None before a start was complete."""
+        return self._subject
 
     # work, in the worker's thread
 
@@ -241,7 +241,8 @@ class TrackerNode(GivenNode):
         self._report.add(tracked.result, tracked.body)
         self._announcer.result(tracked.result)
         self._announcer.doubts(self._report.doubts)
-        self._found = self._found or tracked.result.state is TrackState.TRACKING
+        if tracked.result.state is TrackState.TRACKING and not tracked.result.settling:
+            self._subject = tracked.body
         if not self.context.ok():  # a signal was received while this set was tracked
             return
         self._results.publish(tracked.result, tracked.body)

@@ -235,8 +235,11 @@ class TrackWorker:
         self._sets.keep(handle.kept if handle.searches else 0)
 
     def _keep_for(self, result: TrackResult, kept: int) -> None:
-        """Keep the sets that come during the search for a person; without a person, the newest."""
-        searching = result.state is TrackState.SEARCHING
+        """Keep the sets that come during the search for a person; without a person, the newest.
+
+        A step that gives up a lost person searches, too.
+        """
+        searching = result.state is not TrackState.TRACKING
         self._sets.keep(kept if searching or result.settling else 0, followed=result.settling)
         if searching:
             self._sets.drop_older()

@@ -73,7 +73,7 @@ class Shift:
 class CameraCheck:
     """Compares each camera with the others over a run.
 
-    The cameras are compared in turn, so that no frame takes much longer than others.
+    The cameras are compared in rotation, so that no frame takes much longer than others.
 
     Args:
         rig: the cameras as calibrated.
@@ -90,6 +90,10 @@ class CameraCheck:
         self._searcher: Searcher | None = None
         self.reset()
 
+    def configure(self, config: TrackerConfig) -> None:
+        """Use other settings from the next frame on."""
+        self._config, self._searcher = config, None
+
     def reset(self) -> None:
         """Forget all frames."""
         self._due_ns: int | None = None
@@ -103,8 +107,9 @@ class CameraCheck:
         """Begin the checks of the cameras that are not suspected."""
         self._checks = 0
         self._gains: deque[dict[str, float]] = deque(maxlen=REMEMBERED)
-        for name in set(self._rig.names) - self.suspects:
-            self._found[name] = deque(maxlen=REMEMBERED)
+        for name in self._rig.names:
+            if name not in self.suspects:
+                self._found[name] = deque(maxlen=REMEMBERED)
 
     def add(self, result: TrackResult, body: BodyModel, *, late: bool = False) -> bool:
         """Take a tracked frame: compare the cameras whose turn has come; often there is none.
@@ -185,7 +190,8 @@ class CameraCheck:
 
     def _suspect(self) -> None:
         """Find the wrong camera; it is excluded from the others' checks, which begin anew."""
-        before, self.shares = self.shares, dict.fromkeys(self.suspects, 1.0)
+        before = self.shares
+        self.shares = {name: 1.0 for name in self._rig.names if name in self.suspects}
         doubted = [
             name
             for name, shift in self.shifts().items()

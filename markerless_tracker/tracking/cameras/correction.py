@@ -38,6 +38,10 @@ class CameraCorrection:
         self._check = CameraCheck(rig, config)
         self.reset()
 
+    def configure(self, config: TrackerConfig) -> None:
+        """Use other settings from the next frame on; whether cameras are corrected is none."""
+        self._check.configure(config)
+
     def reset(self) -> None:
         """Return to the cameras as calibrated."""
         self._check.reset()

@@ -8,14 +8,13 @@ _LENGTH = struct.Struct("<Q")
 
 
 def send(stream: BinaryIO, message: Any) -> None:
-    """Write an object.
+    """Write an object, at once: several threads may send to one stream.
 
     Raises:
         OSError: the other side has ended.
     """
     data = pickle.dumps(message, protocol=5)
-    stream.write(_LENGTH.pack(len(data)))
-    stream.write(data)
+    stream.write(_LENGTH.pack(len(data)) + data)
     stream.flush()
 
 

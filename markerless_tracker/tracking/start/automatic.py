@@ -113,7 +113,11 @@ class AutomaticStart:
         """
         self._followed = self.follows(late=late)
         if not anybody(seen.used):
+            beside = self._beside
             self.reset()
+            if beside is not None:
+                # Nobody takes the result, but an error is reported as that of this frame.
+                beside.future.result()
             return None
         return self._follow(seen, predicted, late) if self._followed else self._search(seen)
 
@@ -168,7 +172,10 @@ class AutomaticStart:
         else:
             pose = _followed(searcher, found.pose, self._since)
         if found.rest is not None:
+            # It completes the pose of the searched frame, so the frames since that one count.
+            since = [*self._since, seen]
             self._begin(found.rest, seen.stamp_ns, REST_NS, found.pose)
+            self._since = since
         elif not found.settled and late:
             self._next = seen
         decided = decide(seen.imaged, searcher.cameras, searcher.body, pose)

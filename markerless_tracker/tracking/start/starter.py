@@ -181,11 +181,11 @@ class Starter:
         cameras = [self._cameras[name] for name in observed]
         self._rejections.begin_frame(stamp_ns)
         for hull in find_hulls(self._cameras, observed):
-            if self._rejections.waits(hull):
-                continue
-            # A search takes long, so a person hardly in view is not searched.
+            # A search takes long, so a person hardly in view is not searched. How long one is in
+            # view counts while the hull waits, too.
             standing = put_at(self._body, hull, self._body.neutral)
-            if not self._in_view.enough(self._body, standing, cameras, stamp_ns):
+            enough = self._in_view.enough(self._body, standing, cameras, stamp_ns)
+            if self._rejections.waits(hull) or not enough:
                 continue
             observations = hulls_silhouettes(observed, self._cameras, hull)
             found = self._search(hull, observations, stamp_ns)

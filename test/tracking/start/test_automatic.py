@@ -24,6 +24,7 @@ from markerless_tracker.tracking.start.estimate import StartEstimate
 from markerless_tracker.tracking.start.starter import GAP_NS, Starter
 from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
 
+AUTOMATIC = "markerless_tracker.tracking.start.automatic"
 BODY = load_body("person31")
 STEP = 3
 """Frames of 1/60 s between two sets."""
@@ -43,6 +44,14 @@ def tracker_of(scene):
 
 def error_mm(result, points) -> float:
     return 1e3 * float(np.linalg.norm(result.markers_m - points, axis=1).mean())
+
+
+def nobody(seen) -> dict[str, Observation]:
+    """The same views without a silhouette."""
+    return {
+        name: Observation.from_mask(name, 0, np.zeros_like(view.mask, np.uint8), view.edges)
+        for name, view in seen.items()
+    }
 
 
 def count_searches(monkeypatch) -> list[int]:
@@ -135,11 +144,7 @@ def test_who_leaves_meanwhile_is_forgotten(walk) -> None:
     tracker = tracker_of(scene)
     for stamp, seen, _ in taken[:3]:
         tracker.step(seen, stamp, 0.5)
-    empty = {
-        name: Observation.from_mask(name, 0, np.zeros_like(view.mask, np.uint8), view.edges)
-        for name, view in taken[0][1].items()
-    }
-    result = tracker.step(empty, taken[3][0], 0.5)
+    result = tracker.step(nobody(taken[0][1]), taken[3][0], 0.5)
     assert result.state is TrackState.SEARCHING and result.pose is None
     stamp, seen, points = taken[4]
     assert error_mm(tracker.step(seen, stamp, 0.5), points) < 120.0
@@ -198,6 +203,51 @@ def test_an_error_of_a_search_is_raised_once(walk, monkeypatch) -> None:
             tracker.step(taken[3][1], taken[3][0], 0.5)
     stamp, seen, points = taken[4]
     assert error_mm(tracker.step(seen, stamp, 0.5), points) < 120.0
+
+
+def test_an_error_is_raised_even_if_the_person_has_left(walk, monkeypatch) -> None:
+    scene, taken = walk
+    tracker = tracker_of(scene)
+    tracker.step(taken[0][1], taken[0][0], 0.5)
+
+    def fails(self, *_):
+        raise ValueError("in the search")
+
+    monkeypatch.setattr(Starter, "step", fails)
+    tracker.step(taken[1][1], taken[1][0], 0.5)
+    with pytest.raises(ValueError, match="in the search"):
+        tracker.step(nobody(taken[1][1]), taken[2][0], 0.5)
+    # The person was forgotten, so there is nothing to raise again.
+    assert tracker.step(nobody(taken[1][1]), taken[3][0], 0.5).state is TrackState.SEARCHING
+
+
+def test_what_completes_a_start_is_followed_from_the_frame_that_was_searched(
+    walk, monkeypatch
+) -> None:
+    """Its pose is one of that frame, not of the frame in which the search was taken."""
+    scene, taken = walk
+    followed: list[list[int]] = []
+
+    def noted(searcher, pose, frames):
+        followed.append([seen.stamp_ns for seen in frames])
+        return _followed(searcher, pose, frames)
+
+    searched = count_searches(monkeypatch)
+    monkeypatch.setattr(f"{AUTOMATIC}._same", lambda *_: False)
+    monkeypatch.setattr(f"{AUTOMATIC}._followed", noted)
+    tracker = tracker_of(scene)
+    for stamp, seen, _ in taken:
+        tracker.step(seen, stamp, 0.5)
+    stamps = [stamp for stamp, _, _ in taken]
+    last = stamps.index(searched[-1])
+    settled = (
+        last
+        + 2
+        + next(
+            i for i, stamp in enumerate(stamps[last + 2 :]) if stamp - stamps[last + 2] >= REST_NS
+        )
+    )
+    assert followed[-1] == stamps[last + 1 : settled]
 
 
 def changed(**angles_rad: float) -> np.ndarray:

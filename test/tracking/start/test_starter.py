@@ -138,6 +138,24 @@ def test_warming_up_leaves_it_looking(walk) -> None:
     assert tracker.body.lengths_m == tracker_of(scene, stature=1.72).body.lengths_m
 
 
+def test_how_long_somebody_is_in_view_counts_while_the_hull_waits(walk, monkeypatch) -> None:
+    scene, taken = walk
+    looked: list[int] = []
+    searched: list[int] = []
+    monkeypatch.setattr(
+        f"{STARTER}.InViewGate.enough", lambda *arguments: looked.append(arguments[-1]) or True
+    )
+    monkeypatch.setattr(
+        f"{STARTER}.Starter._search", lambda *arguments: searched.append(arguments[-1])
+    )
+    tracker = tracker_of(scene, stature=1.72)
+    stamps = [stamp for stamp, _, _ in taken[:6]]
+    for stamp, seen, _ in taken[:6]:
+        tracker.step(seen, stamp)
+    assert sorted(set(looked)) == stamps
+    assert set(searched) < set(stamps)
+
+
 def test_a_given_shape_is_not_fitted_again(walk, tmp_path) -> None:
     from markerless_tracker.body import Subject, write_subject
 

@@ -95,7 +95,8 @@ class WaitingSets(Generic[View]):
             if followed:
                 self._spacing_ns = max(self._spacing_ns, FOLLOWED_SPACING_NS)
         elif self._keeping:
-            self._places = min(self._places, len(self._sets) + _SPARE)
+            behind = len(self._sets) > 1
+            self._places = min(self._places, len(self._sets) + _SPARE) if behind else 1
             self._caught_up_ns = self._newest_ns + self._places * PLACE_NS
         self._keeping = at_most > 0
 
@@ -124,7 +125,8 @@ class WaitingSets(Generic[View]):
         return taken
 
     def drop_older(self) -> int:
-        """Drop all sets but the newest; returns the number of dropped sets."""
+        """Drop all sets but the newest, as no start goes on; returns the number of dropped sets."""
+        self._spacing_ns = SPACING_NS
         before = len(self._sets)
         self._drop_to(1)
         return before - len(self._sets)

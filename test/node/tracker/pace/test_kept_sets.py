@@ -126,6 +126,21 @@ def test_sets_that_came_while_nobody_was_found_are_skipped(
     assert worker.published == [*STAMPS[:2], STAMPS[-1]] and worker.sets.counts.skipped == 3
 
 
+def test_sets_that_come_while_a_lost_person_is_searched_for_are_kept(
+    make_worker: Callable[..., Worker],
+) -> None:
+    worker = make_worker(10)
+    worker.tracker.state = TrackState.LOST
+    worker.take_during_a_step(*STAMPS[:1])
+    until(lambda: len(worker.published) == 1)
+    # This step gives the person up, searches, and finds the person.
+    worker.tracker.free.clear()
+    worker.tracker.state, worker.tracker.settling = TrackState.TRACKING, True
+    worker.take_during_a_step(*STAMPS[1:])
+    until(lambda: len(worker.published) == len(STAMPS))
+    assert worker.published == STAMPS and worker.sets.counts.skipped == 0
+
+
 def test_a_tracked_person_is_tracked_in_the_newest_set(
     make_worker: Callable[..., Worker],
 ) -> None:

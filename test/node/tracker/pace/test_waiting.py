@@ -100,6 +100,30 @@ def test_without_a_person_the_older_sets_are_dropped() -> None:
     assert matched is not None and (matched.stamp_ns, matched.replaced) == (200 * MS, 2)
 
 
+def test_after_a_start_that_failed_sets_lie_as_close_as_before_the_first() -> None:
+    waiting: WaitingSets[str] = WaitingSets()
+    waiting.keep(AT_MOST, followed=True)
+    waiting.drop_older()
+    waiting.keep(AT_MOST)
+    for stamp in range(0, 320, FRAME_MS):
+        waiting.put(a_set(stamp))
+    assert drained(waiting) == [0, 60, 120, 180, 240, 300]
+
+
+@pytest.mark.parametrize("waits, expected", [(0, [400]), (1, [400]), (2, [200, 300, 400])])
+def test_nothing_is_caught_up_if_the_newest_set_alone_waits(
+    waits: int, expected: list[int]
+) -> None:
+    waiting: WaitingSets[str] = WaitingSets()
+    waiting.keep(AT_MOST)
+    for number in range(waits):
+        waiting.put(a_set(80 * number))
+    waiting.keep(0)
+    for stamp in (200, 300, 400):
+        waiting.put(a_set(stamp))
+    assert drained(waiting) == expected
+
+
 def catch_up(step_ms: int, kept: int) -> list[int]:
     """Ages of the sets when they are taken, ms, by a worker that takes so long for each."""
     waiting: WaitingSets[str] = WaitingSets()
