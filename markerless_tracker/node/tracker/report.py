@@ -19,6 +19,7 @@ _LEFT_OUT = {
     "dropped_before_start": "before the start frame",
     "dropped_while_learning": "while learning",
     "dropped_on_error": "with an error",
+    "dropped_at_end": "waiting at the end",
 }
 """Count of `state` -> words, for sets that were not tracked, except skipped ones."""
 

@@ -28,6 +28,7 @@ NOTED = (
     "dropped_before_start",
     "dropped_while_learning",
     "dropped_on_error",
+    "dropped_at_end",
     "latency_median_ms",
     "latency_p95_ms",
     "fps",
@@ -213,6 +214,7 @@ class TrackerStatus:
                 "dropped_before_start": str(self._dropped["before_start"]),
                 "dropped_while_learning": str(self._dropped["while_learning"]),
                 "dropped_on_error": str(self._dropped["error"]),
+                "dropped_at_end": str(self._dropped["at_end"]),
                 "latency_median_ms": _number(np.median(latencies) if latencies.size else None, 1),
                 "latency_p95_ms": _number(
                     np.percentile(latencies, 95) if latencies.size else None, 1

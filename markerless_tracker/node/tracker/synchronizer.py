@@ -174,6 +174,13 @@ class Synchronizer(Generic[View]):
         with self._changed:
             self._counts["skipped"] += self._waiting.drop_older()
 
+    def drop_all(self) -> int:
+        """Drop all waiting complete sets; returns their number, which counts nowhere."""
+        with self._changed:
+            dropped = len(self._waiting)
+            self._waiting.clear()
+            return dropped
+
     def wake(self) -> None:
         """Make a waiting `take` return."""
         with self._changed:

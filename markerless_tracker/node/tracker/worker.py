@@ -149,7 +149,7 @@ class TrackWorker:
                 published = publishing.submit(self._give, taken.matched, tracked)
             if (request := self._request.current) is not None:
                 request.refuse_if_overdue(self._status.activity)
-        ahead.close()
+        self._status.dropped("at_end", ahead.close() + self._sets.drop_all())
         publishing.shutdown()
         if (request := self._request.current) is not None:
             request.refuse("the tracker ends")

@@ -56,6 +56,22 @@ def test_the_camera_that_is_off_is_named(scene, checked) -> None:
     assert line.startswith("cam03: silhouettes (+")
 
 
+def test_other_settings_are_used_from_the_next_frame_on(scene, tracked, monkeypatch) -> None:
+    used: list[TrackerConfig] = []
+
+    def noted(searcher, contours, pose):
+        used.append(searcher.config)
+        return pose
+
+    monkeypatch.setattr("markerless_tracker.tracking.cameras.check._refined", noted)
+    check = CameraCheck(scene.rig, CONFIG)
+    check.add(tracked(0), scene.body)
+    other = TrackerConfig(threads=1, min_improvement=0.5)
+    check.configure(other)
+    check.add(tracked(1), scene.body)
+    assert used[0] is CONFIG and used[-1] is other
+
+
 def test_few_checks_and_lost_frames_say_nothing(scene) -> None:
     assert not Shift((9.0, 9.0), 0.1, 2).disagrees
     check = CameraCheck(scene.rig, CONFIG)

@@ -82,11 +82,13 @@ class Ahead:
         self._fits_s.append(self._clock() - self._began_s)
         self._fitted.set()
 
-    def close(self) -> None:
-        """Stop taking sets."""
+    def close(self) -> int:
+        """Stop taking sets; returns how many were taken that are not fitted, one at most."""
         self._fitted.set()
         self._sets.wake()
         self._pool.shutdown()
+        following, self._following = self._following, None
+        return int(following is not None and following.result() is not None)
 
     def _take(self, delay_s: float) -> Taken | None:
         if delay_s > 0.0:

@@ -87,8 +87,18 @@ def test_an_error_comes_with_its_set(bench) -> None:
     assert str(taken.error) == "no evidence"
 
 
+def test_a_set_that_was_taken_and_not_fitted_is_told_at_the_end(bench) -> None:
+    bench.offer(1)
+    bench.next()
+    bench.ahead.fitting()
+    bench.offer(2, 3)
+    assert bench.making.wait(60.0)
+    assert bench.ahead.close() + bench.sets.drop_all() + bench.sets.counts.skipped == 2
+    assert bench.ahead.close() == bench.sets.drop_all() == 0
+
+
 def test_without_a_set_there_is_nothing() -> None:
     sets: Synchronizer[int] = Synchronizer(("a",))
     ahead = Ahead(sets, lambda _: None, poll_s=0.0)
     assert ahead.next() is None
-    ahead.close()
+    assert ahead.close() == 0

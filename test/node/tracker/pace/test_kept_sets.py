@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -60,7 +61,7 @@ class Worker:
         self.tracker = SearchingTracker()
         self.sets: Synchronizer[int] = Synchronizer(("a",))
         self.published: list[int] = []
-        status = TrackerStatus()
+        self.status = status = TrackerStatus()
         handle = TrackerHandle(
             self.tracker, None, lambda name, view: np.zeros(1), kept=kept, searches=searches
         )
@@ -85,6 +86,10 @@ class Worker:
                 until(lambda: self.sets.held == 0)
         self.tracker.free.set()
 
+    def count(self, key: str) -> int:
+        """A count of `state`."""
+        return int(self.status.values(self.sets.counts, (), ())[key])
+
 
 @pytest.fixture
 def make_worker() -> Iterator[Callable[..., Worker]]:
@@ -106,6 +111,22 @@ def test_sets_that_come_during_the_start_are_kept(make_worker: Callable[..., Wor
     worker.take_during_a_step(*STAMPS)
     until(lambda: len(worker.published) == len(STAMPS))
     assert worker.published == STAMPS and worker.sets.counts.skipped == 0
+
+
+def test_sets_that_wait_at_the_end_are_counted(make_worker: Callable[..., Worker]) -> None:
+    worker = make_worker(10)
+    worker.tracker.settling = True
+    for number, stamp in enumerate(STAMPS):
+        worker.sets.add("a", stamp, 7, now_s=time.monotonic())
+        if number < 2:
+            until(lambda: worker.sets.held == 0)
+    with ThreadPoolExecutor(1) as pool:
+        ended = pool.submit(worker.worker.stop, 60)
+        until(worker.worker._stop.is_set)
+        worker.tracker.free.set()
+        assert ended.result()
+    assert worker.published == STAMPS[:1]
+    assert (worker.count("tracked"), worker.count("dropped_at_end")) == (1, len(STAMPS) - 1)
 
 
 def test_no_more_are_kept_than_the_memory_holds(make_worker: Callable[..., Worker]) -> None:
