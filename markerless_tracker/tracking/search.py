@@ -104,6 +104,10 @@ class Searcher:
         return FrameSearch(self, observations, stamp_ns, predicted, limits, radius_m)
 
 
+SearcherFor = Callable[[BodyModel], Searcher]
+"""Makes a searcher of a body."""
+
+
 def make_searcher(
     body: BodyModel,
     *,

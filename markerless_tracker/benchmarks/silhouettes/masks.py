@@ -6,7 +6,7 @@ it, as the predicted body does in tracking.
 
 OpenCV's background subtractors MOG2 and KNN are measured on the same frames. They learn from the
 same empty-scene images only, remove shadows by their own rule, and need the same morphological
-cleaning afterwards (`imaging.morphology.clean_mask`). Each method uses one thread. Times run from
+cleaning afterwards (`imaging.segmentation.clean_mask`). Each method uses one thread. Times run from
 the image to the cleaned silhouette, without the edge map.
 """
 

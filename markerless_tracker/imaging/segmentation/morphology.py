@@ -95,19 +95,6 @@ def open_and_close(mask: Mask, settings: ImagingSettings, frame_px: int) -> None
 def clean_mask(mask: Mask, settings: ImagingSettings) -> Mask:
     """Open, close, drop small blobs, fill small holes: mask (h, w), 0 or 255, in place."""
     open_and_close(mask, settings, mask.size)
-    drop_blobs(mask, settings.mask.blob_share * mask.size)
-    fill_holes(mask, settings.mask.hole_share * mask.size)
+    clear_small(mask, settings.mask.blob_share * mask.size, connectivity=8)
+    fill_small(mask, settings.mask.hole_share * mask.size)
     return mask
-
-
-def drop_blobs(mask: Mask, least_px: float) -> None:
-    """Clear 8-connected blobs of fewer than ``least_px`` pixels, in place."""
-    clear_small(mask, least_px, connectivity=8)
-
-
-def fill_holes(mask: Mask, largest_px: float) -> None:
-    """Set 4-connected gaps of fewer than ``largest_px`` pixels inside the image, in place.
-
-    A gap that reaches the border of the mask's bounding box is no hole.
-    """
-    fill_small(mask, largest_px)

@@ -28,17 +28,19 @@ DISAGREES_M = 0.030
 EVERY_NS = (80_000_000, 400_000_000, 2_000_000_000)
 """Time between the first `FEW_CHECKS` checks, between those up to `MANY_CHECKS`, and later."""
 FEW_CHECKS, MANY_CHECKS = 3, 12
-"""Numbers of checks whose median tells whether a camera is wrong, and is precise."""
+"""Least number of checks that tell whether a camera is wrong; number whose median is precise."""
 REMEMBERED = 30
 """Number of a camera's latest checks that count, so that a camera may be touched during a run."""
 LEAST_VIEWS = 3
 """Least number of views: of two views that disagree, either may be wrong."""
 _ITERATIONS, _TRUNCATION_M = 4, (0.10, 0.035)
 """Refinement without a camera: its iterations, and the first and last truncation."""
-_CANDIDATE_M, _GAIN_TRUNCATION_M = 0.020, 0.05
-"""Least shift whose gain is computed and of a camera that was doubted; truncation of the cost."""
+_CANDIDATE_M = 0.020
+"""Least shift of a camera that may be the wrong one, once a camera disagrees."""
+_GAIN_TRUNCATION_M = 0.05
+"""Truncation of the cost by which these cameras are compared."""
 _LEAD = 0.1
-"""A camera is the wrong one if its gain exceeds those of others by this fraction."""
+"""A camera is the wrong one if the others' gains are lower than its own by this fraction."""
 _SHIFT_STEPS, _SHIFT_TRUNCATION_M = 3, 0.10
 """Estimate of a shift: its steps and their truncation."""
 

@@ -18,6 +18,8 @@ from markerless_tracker.fitness.raster.mask_words import has
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import MaskWords, Observation, locked
 
+TESTED_RADIUS_M = 3.0
+"""Floor points farther than this from the person are not tested: they may lie behind a wall."""
 PENUMBRA_PX = 2
 """Background this near to person or undecided pixels may be half in shadow, so it is not lit."""
 

@@ -36,7 +36,7 @@ MOST_VOLUME_M3 = 1.5
 whose hull is too large."""
 MOST_COARSE_M3 = 6.0
 """The same upper limit on the coarse grid."""
-FLOOR_M = 0.08
+SHADOW_HEIGHT_M = 0.08
 """Below this height above the floor, z = 0, undecided pixels are taken for shadows."""
 LEAST_PERSON = 0.15
 """Fraction of a component's points that two cameras must see as person."""
@@ -57,7 +57,7 @@ _RADIUS_M = 5.0
 _UP_M = 2.5
 """Half the width and half the height of the grid."""
 TOP_M = 0.12
-"""The middle of this much of a hull's height is its top."""
+"""The top is the mean position of the points within this distance of the highest one."""
 _FAR_M = 4.0
 """Distance of the scene from the cameras, assumed where their optical axes are parallel."""
 _TRUNK_SHARE = 0.5
@@ -123,7 +123,7 @@ class Hull:
         thick = high & (depth_m >= _TRUNK_SHARE * depth_m[high].max())
         trunk = points_m[thick]
         aside = np.linalg.norm((points_m - trunk.mean(axis=0))[:, :2], axis=1) > TRUNK_DISTANCE_M
-        low = (points_m[:, 2] < FLOOR_M) | ((points_m[:, 2] < HIGH_M) & ~person)
+        low = (points_m[:, 2] < SHADOW_HEIGHT_M) | ((points_m[:, 2] < HIGH_M) & ~person)
         kept = (~(aside & low) | thick) & ~_isolated_floor(points_m, ~(aside & low))
         sure = kept & (person | (points_m[:, 2] > HIGH_M)) & (points_m[:, 2] > SHIN_M)
         return cls(points_m[kept], trunk, points_m[sure])
@@ -304,7 +304,7 @@ def _occupied(
     person = person_count >= LEAST_VIEWS
     inside = np.zeros(len(view_count), dtype=np.bool_)
     seen = view_count[index] >= LEAST_VIEWS
-    inside[index] = seen & (person[index] | (points[:, 2] > FLOOR_M))
+    inside[index] = seen & (person[index] | (points[:, 2] > SHADOW_HEIGHT_M))
     shape = tuple(int(n) for n in size)
     return inside.reshape(shape), view_count.reshape(shape), person.reshape(shape)
 

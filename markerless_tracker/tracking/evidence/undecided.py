@@ -25,13 +25,16 @@ from markerless_tracker.fitness.raster.mask_words import (
 from markerless_tracker.fitness.raster.silhouette import body_words
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import MaskWords, Observation
-from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, lit_elsewhere
+from markerless_tracker.tracking.evidence.floor import (
+    TESTED_RADIUS_M,
+    FloorView,
+    floor_points,
+    lit_elsewhere,
+)
 from markerless_tracker.tracking.search import pixels_per_m, root_m
 
 BESIDE_M = 0.06
 """Width of the band beside the body whose undecided pixels are person unless they may be shadow."""
-FLOOR_M = 3.0
-"""Floor points farther than this from the body are not tested: they may lie behind a wall."""
 
 
 def decide(
@@ -89,7 +92,7 @@ def _explained(view: FloorView, others: list[FloorView], where_m: FloatArray) ->
         count = _floor_pixels(view.hidden, tested, going_on, radius, width, pixels)
         pixels = pixels[:count]
         points = floor_points(pixels + view.offset_px, view.camera)
-        points[np.linalg.norm(points[:, :2] - where_m[:2], axis=1) > FLOOR_M] = np.nan
+        points[np.linalg.norm(points[:, :2] - where_m[:2], axis=1) > TESTED_RADIUS_M] = np.nan
         found = pixels[lit_elsewhere(points, others)].astype(np.int64)
         _take(found, tested, person, width)
         _going_on(view.undecided, beside, tested, away, rows, going_on)

@@ -18,7 +18,8 @@ from markerless_tracker.tracking.search import LIMB_TRUNCATION_M
 DRAWS = 120
 """First draws of a limb: half about the neutral posture, half uniform."""
 AIMED, AIMED_OF = 60, 1000
-"""If silhouette is unexplained: further draws of the limb in its regions, the best of how many."""
+"""If silhouette is unexplained: number of further draws that lie in its regions, and of those that
+they are selected from."""
 LAYERS = (0.4, 0.2)
 """The best draws are varied in layers, by these fractions of the prior's standard deviations."""
 HOPELESS = 0.03

@@ -25,7 +25,7 @@ TRUNCATION_M = (0.10, 0.05)
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedBody:
     """A fitted body.
 
     Attributes:
@@ -75,7 +75,7 @@ class BodyFitting:
         self._seen = 0
         self._last = np.zeros(limits.shape[1])
 
-    def add(self, body: BodyModel, contours: ContourFrame, pose: FloatArray) -> Fitted | None:
+    def add(self, body: BodyModel, contours: ContourFrame, pose: FloatArray) -> FittedBody | None:
         """Take a tracked frame; returns the fitted body when the fit is complete, else None.
 
         Args:
@@ -101,7 +101,7 @@ class BodyFitting:
             for _ in range(PIECES if taking else PIECES_THEN):
                 next(self._pieces)
         except StopIteration:
-            return Fitted(self._fit.body, self._fit.poses[-1] - self._last)
+            return FittedBody(self._fit.body, self._fit.poses[-1] - self._last)
         return None
 
     def _fitting(self, fit: BodyFit) -> Iterator[None]:

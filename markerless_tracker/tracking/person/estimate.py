@@ -1,6 +1,6 @@
 """The estimate of the tracked person's body, and the schedule of its fits."""
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from markerless_tracker.tracking.person.first_frame import StartMarkers, shape_o
 from markerless_tracker.tracking.person.later_fits import LaterFits
 from markerless_tracker.tracking.person.varied import VariedFrames
 from markerless_tracker.tracking.refinement import floor_precision
-from markerless_tracker.tracking.search import FrameSearch, Searcher
+from markerless_tracker.tracking.search import FrameSearch, SearcherFor
 from markerless_tracker.tracking.stages.frame import frame_stages
 
 START_FRAMES = 30
@@ -34,7 +34,6 @@ PIECES = 2
 """Pieces of a revision that are computed in each tracked frame, so that no frame takes much longer
 than others. A piece is the sums of one step over one frame."""
 
-SearcherFor = Callable[[BodyModel], Searcher]
 RECOVERED_FRAMES = 30
 """The lengths are fitted again if a limb is found elsewhere during a fit, or within this many
 frames after it."""
@@ -103,8 +102,13 @@ class BodyEstimate:
         self._later: LaterFits | None = None
         self._since_fit = self._recovered = 0
         self._wrong_limb = False
-        if self._person is not None and self._fits_sections and self._config.fit_lengths:
+        if self._person is not None and self._fits_lengths:
             self._begin_lengths(self._person)
+
+    @property
+    def _fits_lengths(self) -> bool:
+        """Whether lengths that were not measured are fitted to tracked frames."""
+        return self._fits_sections and self._config.fit_lengths
 
     @property
     def unfitted(self) -> Unmeasured | None:
@@ -211,7 +215,7 @@ class BodyEstimate:
         Args:
             searcher_for: makes a searcher of a body, with the new cameras.
         """
-        if self._person is not None and self._fits_sections and self._config.fit_lengths:
+        if self._person is not None and self._fits_lengths:
             self._begin_lengths(self._person)
         elif self._first is not None:
             self._revision = None
@@ -225,7 +229,7 @@ class BodyEstimate:
         Returns:
             As `fit_tracked_frame`.
         """
-        if self._person is None or not (self._fits_sections and self._config.fit_lengths):
+        if self._person is None or not self._fits_lengths:
             return None
         sizes = self._person.sizes
         self.body = sizes.body(sizes.of(self.body))
@@ -238,7 +242,7 @@ class BodyEstimate:
         The frames that were kept for later fits are forgotten.
         """
         person = self._person
-        if person is None or not (self._fits_sections and self._config.fit_lengths):
+        if person is None or not self._fits_lengths:
             return
         if self._lengths is not None:
             self._wrong_limb = True

@@ -29,7 +29,7 @@ NEAR_M = 1.0
 
 
 class _InView(NamedTuple):
-    """A hull in view of two cameras: its last place, and the times since which and when last."""
+    """A hull in view of two cameras: its last place, when it came into view and was seen last."""
 
     place_m: FloatArray
     since_ns: int

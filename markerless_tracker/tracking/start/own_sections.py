@@ -5,7 +5,7 @@ trunk explain the coat, so that the right place of an arm costs more than the wr
 sections fitted to each pose it costs less.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
 from markerless_tracker.tracking.candidates.population import FramePopulation, Population
-from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.search import Searcher, SearcherFor
 
 CLOSE, MOST = 0.025, 4
 """Poses that cost at most this much more than the best one, with its body, are compared; the number
@@ -31,7 +31,7 @@ _REFINE = (6, (0.10, 0.05))
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedPose:
     """A pose with sections of its own.
 
     Attributes:
@@ -48,10 +48,10 @@ class Fitted:
 def better_with_own_sections(
     population: Population,
     body: BodyModel,
-    searcher_for: Callable[[BodyModel], Searcher],
+    searcher_for: SearcherFor,
     imaged: Mapping[str, Observation],
     stamp_ns: int,
-) -> Fitted | None:
+) -> FittedPose | None:
     """The pose that explains a frame better than the best one, if sections are fitted to both.
 
     None if there is no such pose.
@@ -76,10 +76,10 @@ def better_with_own_sections(
 def _fitted(
     pose: FloatArray,
     body: BodyModel,
-    searcher_for: Callable[[BodyModel], Searcher],
+    searcher_for: SearcherFor,
     imaged: Mapping[str, Observation],
     stamp_ns: int,
-) -> Fitted:
+) -> FittedPose:
     def evidence(searcher: Searcher) -> OwnEvidence:
         frame = FramePopulation(searcher, imaged, stamp_ns, pose)
         return OwnEvidence(searcher, imaged, stamp_ns, frame)
@@ -90,4 +90,4 @@ def _fitted(
         shaped = fit_shape(body, [(contours, pose)], hands=searcher.config.fit_lengths)
         searcher = searcher_for(shaped)
         pose, cost = evidence(searcher).refined(pose, *_REFINE)
-    return Fitted(searcher, pose, float(cost))
+    return FittedPose(searcher, pose, float(cost))

@@ -1,18 +1,17 @@
 """The last part of an automatic start: poses with sections of their own, then the body's fit."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.candidates.population import FramePopulation, Population
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.person.start_fit import fitted_to_start
-from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.search import Searcher, SearcherFor
 from markerless_tracker.tracking.start.estimate import StartEstimate
 from markerless_tracker.tracking.start.own_sections import better_with_own_sections
 from markerless_tracker.tracking.start.two_headings import HeadingFit
@@ -23,7 +22,7 @@ _SHAPE_SLACK = 0.01
 """Frames that the sections are fitted to cost at most this much more than the best."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Settling:
     """Completes a start in its last frame, once the heading is known.
 
@@ -41,7 +40,7 @@ class Settling:
     """
 
     searcher: Searcher
-    searcher_for: Callable[[BodyModel], Searcher]
+    searcher_for: SearcherFor
     cameras: Mapping[str, CameraModel]
     person: Unmeasured | None
     fits: Sequence[HeadingFit]

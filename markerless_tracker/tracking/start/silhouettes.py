@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 from markerless_tracker.camera import CameraModel, project_camera
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation, pack_mask
-from markerless_tracker.tracking.evidence.floor import FloorView, floor_points, lit_elsewhere
+from markerless_tracker.tracking.evidence.floor import (
+    TESTED_RADIUS_M,
+    FloorView,
+    floor_points,
+    lit_elsewhere,
+)
 from markerless_tracker.tracking.evidence.hull import FINE_M, TRUNK_DISTANCE_M, Hull
 
-FLOOR_RADIUS_M = 3.0
-"""Floor points farther than this from the hull are not tested: they may lie behind a wall."""
 _BLOCK_PX = 2
 """The floor test is made once per block of this many rows and columns."""
 _REACH_M = (-1.2, 1.0)
@@ -33,10 +36,10 @@ _FAR_PX = 1e5
 """Points projected farther than this from the image are beside the camera."""
 
 
-def hulls_silhouettes(
+def silhouettes_in_hull(
     observations: Mapping[str, Observation], cameras: Mapping[str, CameraModel], hull: Hull
 ) -> dict[str, Observation]:
-    """The silhouettes of the person in a hull: `decided_by_hull`, then `hulls_part` of each.
+    """The silhouettes of the person in a hull: `components_in_hull` of each, `decided_by_hull`.
 
     Args:
         observations: the views.
@@ -44,10 +47,10 @@ def hulls_silhouettes(
         hull: where the person is.
     """
     decided = decided_by_hull(observations, cameras, hull)
-    return {name: hulls_part(seen, cameras[name], hull) for name, seen in decided.items()}
+    return {name: components_in_hull(seen, cameras[name], hull) for name, seen in decided.items()}
 
 
-def hulls_part(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
+def components_in_hull(observation: Observation, camera: CameraModel, hull: Hull) -> Observation:
     """The silhouette's components that belong to the person; the same object if all do.
 
     A hull's points fall on them, or they are small and lie around the trunk: where one view shows
@@ -124,7 +127,7 @@ def _maybe_shadows(
     )
     pixels = np.asarray(blocks[0] * _BLOCK_PX + 0.5 * (_BLOCK_PX - 1), dtype=np.float64)
     points = floor_points(pixels + view.offset_px, view.camera)
-    points[np.linalg.norm((points - middle)[:, :2], axis=1) > FLOOR_RADIUS_M] = np.nan
+    points[np.linalg.norm((points - middle)[:, :2], axis=1) > TESTED_RADIUS_M] = np.nan
     maybe = np.isfinite(points).all(axis=1) & ~lit_elsewhere(points, others)
     out = np.zeros_like(asked)
     out[rows, columns] = maybe[blocks[1].reshape(-1)]

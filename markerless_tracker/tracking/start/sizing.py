@@ -10,7 +10,7 @@ from markerless_tracker.body.sizes import MEAN_STATURE_M
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.candidates.population import FramePopulation, Population, scaled_to
 from markerless_tracker.tracking.evidence.hull import Hull
-from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.search import Searcher, SearcherFor
 
 STATURES = (0.84, 0.88, 0.92, 0.96, 1.0, 1.04)
 """Statures that are tried for an unknown person, as fractions of the hull's height; raised arms
@@ -109,7 +109,7 @@ class SizeSearch:
 
     def __init__(
         self,
-        searcher_for: Callable[[BodyModel], Searcher],
+        searcher_for: SearcherFor,
         body: BodyModel,
         sized: Callable[[float], BodyModel] | None,
         girths: bool,

@@ -17,13 +17,13 @@ from markerless_tracker.tracking.evidence.hull import Hull, find_hulls
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
-from markerless_tracker.tracking.search import Searcher
+from markerless_tracker.tracking.search import Searcher, SearcherFor
 from markerless_tracker.tracking.start.estimate import StartEstimate
 from markerless_tracker.tracking.start.generations import improved
 from markerless_tracker.tracking.start.in_view import InViewGate
 from markerless_tracker.tracking.start.rejections import Rejections
 from markerless_tracker.tracking.start.settling import Settling
-from markerless_tracker.tracking.start.silhouettes import hulls_silhouettes
+from markerless_tracker.tracking.start.silhouettes import silhouettes_in_hull
 from markerless_tracker.tracking.start.sizing import (
     Sized,
     SizeSearch,
@@ -51,13 +51,13 @@ _GAP_GENERATIONS = 2
 _DOUBTFUL = 0.12
 """If the first search's best pose costs more, a second one adds a cost of unusual postures."""
 _SURE_FIT, _SURE_GAP = 0.91, 0.025
-"""No second search if 1 - cost of the first is at least this, and the opposite's lower by this."""
+"""The second frame is not searched independently if 1 - cost of the best pose is at least
+`_SURE_FIT`, and lower by at least `_SURE_GAP` for the opposite heading."""
 
 Select = Callable[
     [Mapping[str, Observation], BodyModel, FloatArray],
     tuple[dict[str, Observation], tuple[str, ...]],
 ]
-SearcherFor = Callable[[BodyModel], Searcher]
 
 
 class Starter:
@@ -171,9 +171,17 @@ class Starter:
         rest = None
         if over and self._fit_shape:
             rest = Settling(
-                self._searcher, self._searcher_for, self._cameras, self._person,
-                self._headings.leading_fits, frame, leading, observations, imaged, stamp_ns,
-            ).run  # fmt: skip
+                searcher=self._searcher,
+                searcher_for=self._searcher_for,
+                cameras=self._cameras,
+                person=self._person,
+                fits=self._headings.leading_fits,
+                frame=frame,
+                population=leading,
+                observations=observations,
+                imaged=imaged,
+                stamp_ns=stamp_ns,
+            ).run
         settled, pose = over and rest is None, leading.poses[0]
         return StartEstimate(self._searcher, pose, observations, settled, notes, rest)
 
@@ -187,7 +195,7 @@ class Starter:
             enough = self._in_view.enough(self._body, standing, cameras, stamp_ns)
             if self._rejections.waits(hull) or not enough:
                 continue
-            observations = hulls_silhouettes(observed, self._cameras, hull)
+            observations = silhouettes_in_hull(observed, self._cameras, hull)
             found = self._search(hull, observations, stamp_ns)
             if found is None:
                 self._rejections.note(hull)
@@ -228,7 +236,7 @@ class Starter:
         if self.searches_again:
             hull = next(find_hulls(self._cameras, observations), None)
             if hull is not None:
-                observations = hulls_silhouettes(observations, self._cameras, hull)
+                observations = silhouettes_in_hull(observations, self._cameras, hull)
         return decide(observations, self._cameras, self._searcher.body, pose)
 
     def _second_search(

@@ -4,12 +4,11 @@ from hypothesis import given
 from hypothesis.extra import numpy as hnp
 
 from markerless_tracker.imaging import ImagingSettings
+from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_small
 from markerless_tracker.imaging.segmentation.morphology import (
     SPLIT_RADIUS_PX,
     clean_mask,
     closing_px,
-    drop_blobs,
-    fill_holes,
     shadow_patches,
     split_undecided,
 )
@@ -34,14 +33,14 @@ def test_small_holes_fill_and_large_ones_stay() -> None:
     mask = body()
     mask[40:42, 70:72] = 0
     mask[60:80, 70:90] = 0
-    fill_holes(mask, 10)
+    fill_small(mask, 10)
     assert mask[40, 70] == 255 and mask[70, 80] == 0
 
 
 def test_a_gap_that_is_open_to_the_outside_is_no_hole() -> None:
     mask = body()
     mask[50, 60:64] = 0
-    fill_holes(mask, 10)
+    fill_small(mask, 10)
     assert (mask[50, 60:64] == 0).all()
 
 
@@ -57,7 +56,7 @@ def test_the_closing_is_smaller_in_small_images() -> None:
 def test_blobs_are_dropped_by_area() -> None:
     mask = np.zeros((50, 50), np.uint8)
     mask[2:5, 2:5] = mask[20:30, 20:30] = 255
-    drop_blobs(mask, 10)
+    clear_small(mask, 10, connectivity=8)
     assert mask[3, 3] == 0 and (mask[20:30, 20:30] == 255).all()
 
 

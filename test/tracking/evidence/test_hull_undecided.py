@@ -13,8 +13,8 @@ from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking.evidence.hull import (
     FINE_M,
     FLAT_M,
-    FLOOR_M,
     FOOT_M,
+    SHADOW_HEIGHT_M,
     SHIN_M,
     find_hulls,
 )
@@ -93,7 +93,7 @@ def test_a_shadow_on_the_floor_adds_nothing_above_it(person) -> None:
         next(find_hulls(cameras(scene), {n: observe(n, masks[n] | u[n], u[n]) for n in masks}))
         for u in (nothing, discs)
     )
-    above = [int((hull.points_m[:, 2] > FLOOR_M + 0.1).sum()) for hull in (plain, shadowed)]
+    above = [int((hull.points_m[:, 2] > SHADOW_HEIGHT_M + 0.1).sum()) for hull in (plain, shadowed)]
     assert above[1] == pytest.approx(above[0], rel=0.02)
     trunks = [hull.trunk_m.mean(axis=0) for hull in (plain, shadowed)]
     assert np.linalg.norm(trunks[0] - trunks[1]) < 0.03

@@ -86,7 +86,7 @@ def test_what_a_pose_must_gain_grows_with_what_it_costs_more(
     costs = iter([0.08, 0.08 - gain])
     monkeypatch.setattr(
         own_sections, "_fitted",
-        lambda pose, *_: own_sections.Fitted(searcher_for(BODY), pose, next(costs)),
+        lambda pose, *_: own_sections.FittedPose(searcher_for(BODY), pose, next(costs)),
     )  # fmt: skip
     found = better_with_own_sections(population, BODY, searcher_for, seen, 0)
     assert (found is not None) is taken
@@ -108,7 +108,7 @@ def test_a_start_ends_with_the_better_pose_and_its_body(monkeypatch, fit_shape) 
     def better(population, body, make, *_):
         pose = population.poses[0].copy()
         pose[body.index("l_elbow")] += 0.5
-        taken.append(own_sections.Fitted(make(replace(body, name="its own")), pose, 0.0))
+        taken.append(own_sections.FittedPose(make(replace(body, name="its own")), pose, 0.0))
         return taken[-1]
 
     monkeypatch.setattr(

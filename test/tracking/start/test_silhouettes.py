@@ -10,9 +10,9 @@ from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking.evidence.hull import find_hulls
 from markerless_tracker.tracking.start.silhouettes import (
+    components_in_hull,
     decided_by_hull,
-    hulls_part,
-    hulls_silhouettes,
+    silhouettes_in_hull,
 )
 
 
@@ -116,7 +116,7 @@ def test_a_dark_shadow_beside_the_hull_is_undecided(person) -> None:
 def test_silhouettes_without_undecided_pixels_stay(person) -> None:
     scene, masks, hull = person
     seen = {n: observe(n, m) for n, m in masks.items()}
-    decided = hulls_silhouettes(seen, cameras(scene), hull)
+    decided = silhouettes_in_hull(seen, cameras(scene), hull)
     assert all(decided[name] is seen[name] for name in seen)
 
 
@@ -126,11 +126,11 @@ def test_other_components_are_left_out(person) -> None:
     mask = masks[name].copy()
     mask[:8, :8] = True
     seen = observe(name, mask)
-    kept = hulls_part(seen, scene.rig[name], hull)
+    kept = components_in_hull(seen, scene.rig[name], hull)
     assert not kept.mask[:8, :8].any()
     assert kept.mask.sum() == masks[name].sum()
     alone = replace(seen, mask_words=kept.mask_words)
-    assert hulls_part(alone, scene.rig[name], hull) is alone
+    assert components_in_hull(alone, scene.rig[name], hull) is alone
 
 
 def cut(mask, share):
@@ -162,7 +162,7 @@ def test_a_small_part_that_another_view_does_not_show_stays(person, share, stays
     for name in others:
         above = parts[name][0] & parts[name][1]
         assert above.any()
-        assert hulls_part(seen[name], scene.rig[name], hull).mask[above].all() == stays
+        assert components_in_hull(seen[name], scene.rig[name], hull).mask[above].all() == stays
 
 
 def near(mask, px=6):
