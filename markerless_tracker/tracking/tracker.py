@@ -147,12 +147,12 @@ class Tracker:
 
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
-        blank, pose = self.evidence.warm_up(), self._motion.pose
+        blank, pose = self.evidence.start_compiling(), self._motion.pose
         seen = Seen(0, blank, decide(blank, self._searcher.cameras, self.body, pose), blank)
         search = self._searcher.frame(seen.used, 0, pose)
         search.run(swarm_stages(self.body, self.config, pose, self.body.sigma))
         # What the segmenting process compiles is not compiled twice.
-        self.evidence.wait()
+        self.evidence.finish_compiling()
         self._start, self._assessor.track = None, Track(Phase.TRACKING)
         self.step(blank, 0)
         if self.config.refinement != "none":

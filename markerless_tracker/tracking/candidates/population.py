@@ -89,11 +89,11 @@ class FramePopulation:
         near: (p,) a pose whose root is near the person.
         contours: the frame's contour evidence, if it exists already.
         radius_m: as in `FrameSearch`, if it does not.
-        usual: whether unusual postures cost something.
+        charges_unusual: whether unusual postures cost something.
 
     Attributes:
         near: as given.
-        usual: as given.
+        charges_unusual: as given.
     """
 
     def __init__(
@@ -105,9 +105,9 @@ class FramePopulation:
         *,
         contours: ContourFrame | None = None,
         radius_m: float = RADIUS_M,
-        usual: bool = False,
+        charges_unusual: bool = False,
     ) -> None:
-        self.usual = usual
+        self.charges_unusual = charges_unusual
         self._searcher = searcher
         self._stamp_ns = stamp_ns
         self.near = near
@@ -249,7 +249,7 @@ class FramePopulation:
     def total_costs(self, poses: FloatArray) -> FloatArray:
         """`costs_with_prior` and unusual postures (`usual`)."""
         costs = self.costs_with_prior(poses)
-        if self.usual:
+        if self.charges_unusual:
             costs += unlike_postures(self._searcher.body, poses)
         return costs
 

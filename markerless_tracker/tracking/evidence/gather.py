@@ -162,7 +162,7 @@ class EvidenceMaker:
         """CPU time of the segmenting process; 0 without one."""
         return 0.0 if self._process is None else self._process.cpu_s
 
-    def wait(self) -> None:
+    def finish_compiling(self) -> None:
         """Compile the imaging, and wait until the segmenting process has done so, too."""
         if self._process is not None:
             self._process.wait()
@@ -203,8 +203,8 @@ class EvidenceMaker:
         shift = self.rig.names.index(name) * self._every // len(self.rig)
         return self._follows and (number + shift) % self._every == 0
 
-    def warm_up(self) -> dict[str, Observation]:
-        """Start the compilation of the imaging (`wait` completes it); returns made-up observations.
+    def start_compiling(self) -> dict[str, Observation]:
+        """Let the segmenting process compile, if there is one; returns made-up observations.
 
         All but the first are of regions, as when the body is tracked. The silhouette is a rectangle
         and a pixel in the corner. Pixels beside and below the rectangle are undecided.

@@ -28,7 +28,7 @@ class Observer:
     def whole(self, segmented: Mapping[str, SeenView], stamp_ns: int, body: BodyModel) -> Seen:
         """The evidence of the whole views, of all that is in them."""
         observed = self._evidence.whole(segmented, stamp_ns)
-        used, notes = self._views.sort(observed, body, None)
+        used, notes = self._views.usable(observed, body, None)
         return Seen(stamp_ns, observed, used, used, notes)
 
     def near(
@@ -52,7 +52,7 @@ class Observer:
         """
         observed, left_out = self._evidence.gather(segmented, stamp_ns, body, predicted)
         expected = predicted if state is TrackState.TRACKING else None
-        imaged, notes = self._views.sort(observed, body, expected)
+        imaged, notes = self._views.usable(observed, body, expected)
         lost = state is TrackState.LOST
         used = imaged if lost else decide(imaged, cameras, body, predicted)
         return Seen(stamp_ns, observed, used, imaged, notes, left_out)

@@ -58,8 +58,8 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
                 rig, config, backgrounds = message
                 maker = EvidenceMaker(rig, config, backgrounds, map)
                 with compilation(lambda *_: None) as kernels:
-                    blank = maker.warm_up()
-                    maker.wait()
+                    blank = maker.start_compiling()
+                    maker.finish_compiling()
                     # The parent has stored some of its kernels by now.
                     compile_contours(rig, config, blank)
                 collect_for_good()

@@ -31,7 +31,7 @@ class ViewWatch:
         """Forget which cameras were left out."""
         self._out = {}
 
-    def sort(
+    def usable(
         self,
         observed: Mapping[str, Observation],
         body: BodyModel,

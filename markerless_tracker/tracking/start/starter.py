@@ -113,7 +113,7 @@ class Starter:
         self._stamp_ns = 0
         self._searcher: Searcher | None = None
         self._headings = TwoHeadings(0.0)
-        self._sure = self._usual = False
+        self._sure = self._charges_unusual = False
         self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
 
     @property
@@ -147,7 +147,9 @@ class Starter:
         if any(seen.undecided_words is not None for seen in imaged.values()):
             observations = self._decide(imaged, best)
         near = population.poses[0]
-        frame = FramePopulation(self._searcher, observations, stamp_ns, near, usual=self._usual)
+        frame = FramePopulation(
+            self._searcher, observations, stamp_ns, near, charges_unusual=self._charges_unusual
+        )
         population = frame.propagated(population, far=far)
         if tracked is not None:
             population = frame.with_tracked(population, tracked)
@@ -256,10 +258,10 @@ class Starter:
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> tuple[FramePopulation, Population] | None:
         """The population found in a hull; None if it is no person."""
-        self._usual = False
+        self._charges_unusual = False
         frame, population = first = self._search_once(hull, observations, stamp_ns)
         if frame.best_cost(population) > _DOUBTFUL:
-            self._usual = True
+            self._charges_unusual = True
             frame, population = self._search_once(hull, observations, stamp_ns)
             population = frame.with_found(population, *first)
         return (frame, population) if 1.0 - frame.best_cost(population) >= LEAST_FIT else None
@@ -304,7 +306,9 @@ class Starter:
             searcher = self._searcher_for(body)
             near = body.neutral.copy()
             near[body.root_position] = hull.trunk_m.mean(axis=0)
-            frame = FramePopulation(searcher, observations, stamp_ns, near, usual=self._usual)
+            frame = FramePopulation(
+                searcher, observations, stamp_ns, near, charges_unusual=self._charges_unusual
+            )
             last = self._last_pose
             hints = None if last is None else np.array([last, put_at(body, hull, last)])
             population = frame.initialised(hull, hints)

@@ -58,7 +58,7 @@ def images() -> dict[str, np.ndarray]:
 @pytest.fixture(scope="module")
 def here(backgrounds) -> EvidenceMaker:
     maker = EvidenceMaker(RIG, CONFIG, backgrounds, map)
-    maker.wait()
+    maker.finish_compiling()
     return maker
 
 
