@@ -87,7 +87,7 @@ def test_the_first_step_of_warming_up_waits_for_the_segmenting_process(
         ring_rig(2, (64, 48)), TrackerConfig.from_mapping({"threads": 1})
     ).tracker
     calls: list[str] = []
-    for owner, name in ((tracker.evidence, "wait"), (tracker, "step")):
+    for owner, name in ((tracker.evidence, "finish_compiling"), (tracker, "step")):
         real = getattr(owner, name)
 
         def noted(*args: Any, real: Any = real, name: str = name) -> Any:
@@ -96,4 +96,4 @@ def test_the_first_step_of_warming_up_waits_for_the_segmenting_process(
 
         monkeypatch.setattr(owner, name, noted)
     tracker.warm_up()
-    assert calls == ["wait", "step"]
+    assert calls == ["finish_compiling", "step"]
