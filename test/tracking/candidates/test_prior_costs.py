@@ -13,15 +13,20 @@ BODY = load_body("person32", 1.75)
 
 def twin(body: BodyModel, pose: np.ndarray) -> float:
     """Cost of one pose, joint by joint."""
-    cost = 0.0
-    for name in body.limbs:
-        candidates = [MOST]
-        for units, mean in [(0.0, body.prior_mean), *((POSTURE, q) for q in postures(body))]:
-            for i in body.subspaces[name]:
-                units += 0.5 * ((pose[i] - mean[i]) / body.prior_sd[i]) ** 2
-            candidates.append(units)
-        cost += COST * min(candidates)
-    return cost
+
+    def energy(name: str, mean: np.ndarray) -> float:
+        limb = body.subspaces[name]
+        return sum(0.5 * ((pose[i] - mean[i]) / body.prior_sd[i]) ** 2 for i in limb)
+
+    def alone(name: str) -> float:
+        known = min(POSTURE + energy(name, mean) for mean in postures(body))
+        return min(energy(name, body.prior_mean), known, MOST)
+
+    units = 0.0
+    for left, right in (("l_arm", "r_arm"), ("l_leg", "r_leg")):
+        both = min(energy(left, mean) + energy(right, mean) for mean in postures(body))
+        units += min(alone(left) + alone(right), POSTURE + both)
+    return COST * units
 
 
 def test_poses_cost_what_their_limbs_do() -> None:
@@ -52,7 +57,17 @@ def test_a_limb_costs_more_the_farther_it_is_up_to_a_limit() -> None:
 
 @pytest.mark.parametrize("number", range(len(POSTURES)))
 def test_a_limb_as_in_a_known_posture_has_a_fixed_cost(number: int) -> None:
-    assert prior_costs(BODY, postures(BODY)[[number]])[0] <= 4.0 * POSTURE * COST + 1e-12
+    assert prior_costs(BODY, postures(BODY)[[number]])[0] <= 2.0 * POSTURE * COST + 1e-12
+
+
+def test_crossed_arms_cost_once_and_a_single_one_as_much() -> None:
+    crossed = postures(BODY)[-1].copy()
+    legs = [name for name in BODY.limbs if name.endswith("leg")]
+    for name in legs:
+        crossed[BODY.subspaces[name]] = BODY.prior_mean[BODY.subspaces[name]]
+    one = crossed.copy()
+    one[BODY.subspaces["r_arm"]] = BODY.prior_mean[BODY.subspaces["r_arm"]]
+    assert prior_costs(BODY, np.array([crossed, one])) == pytest.approx([POSTURE * COST] * 2)
 
 
 def test_where_the_person_stands_and_faces_costs_nothing() -> None:
