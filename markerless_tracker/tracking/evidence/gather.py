@@ -157,6 +157,11 @@ class EvidenceMaker:
         if several and self.segmenters and not self._follows and self._process is None:
             self._process = SegmentingProcess(self.rig, shared)
 
+    def take_notes(self) -> tuple[str, ...]:
+        """A line, told once, if the segmenting process cannot segment any more."""
+        fault = None if self._process is None else self._process.take_fault()
+        return () if fault is None else (f"{fault}; images are segmented beside the fit",)
+
     @property
     def process_cpu_s(self) -> float:
         """CPU time of the segmenting process; 0 without one."""

@@ -29,7 +29,7 @@ class Observer:
         """The evidence of the whole views, of all that is in them."""
         observed = self._evidence.whole(segmented, stamp_ns)
         used, notes = self._views.usable(observed, body, None)
-        return Seen(stamp_ns, observed, used, used, notes)
+        return Seen(stamp_ns, observed, used, used, (*notes, *self._evidence.take_notes()))
 
     def near(
         self,
@@ -55,4 +55,5 @@ class Observer:
         imaged, notes = self._views.usable(observed, body, expected)
         lost = state is TrackState.LOST
         used = imaged if lost else decide(imaged, cameras, body, predicted)
+        notes += self._evidence.take_notes()
         return Seen(stamp_ns, observed, used, imaged, notes, left_out)

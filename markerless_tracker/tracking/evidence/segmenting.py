@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, cast
 
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.compiled import compiled_elsewhere
+from markerless_tracker.errors import one_line
 from markerless_tracker.imaging import BackgroundModel, Image, Region
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.prepared import SeenView
@@ -43,7 +44,8 @@ class SegmentingProcess:
     def __init__(self, rig: CameraRig, shared: SharedMemory | None = None) -> None:
         self._rig = rig
         self._lock = Lock()
-        self._ready = False
+        self._ready = self._closed = False
+        self._fault: str | None = None
         self._cpu_s = 0.0
         self._child = Child(_MAIN, shared or set_bytes(rig))
         self._own_bytes = 0 if shared else len(self._child.memory)
@@ -98,14 +100,22 @@ class SegmentingProcess:
         seen = cast(dict[str, SeenView], answer)
         return {name: view._replace(image=images[name]) for name, view in seen.items()}
 
+    def take_fault(self) -> str | None:
+        """Why the process cannot segment, told once; None if it can, or was not asked yet."""
+        fault, self._fault = self._fault, None
+        return fault
+
     def close(self) -> None:
         """End the process."""
+        self._closed = True
         self._child.close()
 
     def _begin(self, message: Any) -> None:
         try:
             answer = self._ask(message)
             self._ready = isinstance(answer, Ready)
+            if isinstance(answer, Exception):
+                self._fault = one_line(answer)
             if isinstance(answer, Ready):
                 compiled_elsewhere("segmentation", answer.compiled, answer.compiled)
         finally:
@@ -118,5 +128,7 @@ class SegmentingProcess:
             answer, self._cpu_s = self._child.receive()
         except (EOFError, OSError, ValueError):
             self._ready = False
+            if not self._closed:
+                self._fault = "the segmenting process has ended"
             return None
         return answer

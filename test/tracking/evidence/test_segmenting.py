@@ -7,13 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from markerless_tracker.body import load_body
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.compiled import compilation
 from markerless_tracker.errors import ImageError
 from markerless_tracker.imaging import BackgroundModel, Region, learn_background
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
+from markerless_tracker.tracking.evidence.observer import Observer
 from markerless_tracker.tracking.evidence.segmenting import SegmentingProcess
+from markerless_tracker.tracking.evidence.views import ViewWatch
 
 WIDTH, HEIGHT = 96, 80
 CONFIG = TrackerConfig.from_mapping({"threads": 2})
@@ -102,6 +105,25 @@ def test_a_process_that_was_killed_segments_nothing(process, images) -> None:
     os.kill(process.pid, signal.SIGKILL)
     assert process.segment(images, 1, dict.fromkeys(images)) is None
     assert process.segment(images, 2, dict.fromkeys(images)) is None
+    assert process.take_fault() == "the segmenting process has ended"
+    assert process.take_fault() is None
+
+
+def test_its_end_is_told_once_with_a_frame(here, backgrounds, images) -> None:
+    maker = EvidenceMaker(RIG, CONFIG, backgrounds, map)
+    maker.start_process()
+    maker.start_compiling()
+    maker.finish_compiling()
+    process = maker._process
+    assert process is not None
+    os.kill(process.pid, signal.SIGKILL)
+    assert process.segment(images, 1, dict.fromkeys(images)) is None
+    observer, body = Observer(maker, ViewWatch(RIG)), load_body("person32")
+    segmented = here.segment_regions(images, 1, dict.fromkeys(images))
+    told = "the segmenting process has ended; images are segmented beside the fit"
+    assert observer.whole(segmented, 1, body).notes == (told,)
+    assert observer.whole(segmented, 2, body).notes == ()
+    maker.close()
 
 
 def test_without_backgrounds_nothing_is_segmented_there(images) -> None:
