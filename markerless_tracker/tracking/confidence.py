@@ -99,22 +99,9 @@ def confidence_of(
         suspected_m: by limb, the size of unexplained silhouette that it may belong to.
         rivals: by limb, another place that explains the images nearly as well.
     """
-    sums = contours.equations(pose, _TRUNCATION_M)
-    rows = outline_rows(contours)
-    total = float(rows.weight.sum())
-    weight, value = rows.weight, rows.value
-    if not (total > 0.0 and np.isfinite(value).all() and np.isfinite(sums.hessian).all()):
-        return None
-    variance = max(float((weight * value**2).sum()) / total, _LEAST_SIGMA_M**2)
-    seen = np.ones(body.size)
-    seen[twists(body)] = np.sqrt(1.0 - straightness(body, pose))
-    precision = np.outer(seen, seen) * sums.hessian / (CORRELATED * CORRELATION_M * variance)
-    precision[np.diag_indices_from(precision)] += 1.0 / body.prior_sd**2 + 1e-9
-    try:
-        covariance = np.linalg.inv(precision)
-    except np.linalg.LinAlgError:
-        return None
-    if not (np.isfinite(covariance).all() and np.diag(covariance).min() >= 0.0):
+    hessian, rows = contours.equations(pose, _TRUNCATION_M).hessian, outline_rows(contours)
+    covariance = _covariance(body, pose, hessian, rows)
+    if covariance is None:
         return None
     unseen = MEASURED_M if measured else UNMEASURED_M
     by_limb, of_trunk = excesses_m(body, rows)
@@ -147,6 +134,34 @@ def confidence_of(
         markers_sd_m=np.sqrt(of_markers.reshape(-1, 3) + of_model_m),
         root_covariance=0.5 * (of_root + of_root.T),
     )
+
+
+def _covariance(
+    body: BodyModel, pose: FloatArray, hessian: FloatArray, rows: OutlineRows
+) -> FloatArray | None:
+    """Covariance (p, p) from the curvature of the contours' cost; None if it is not determined.
+
+    Args:
+        body: the body.
+        pose: (p,) the estimate.
+        hessian: (p, p) of the cost at the pose.
+        rows: the contours' residuals there.
+    """
+    total, weight, value = float(rows.weight.sum()), rows.weight, rows.value
+    if not (total > 0.0 and np.isfinite(value).all() and np.isfinite(hessian).all()):
+        return None
+    variance = max(float((weight * value**2).sum()) / total, _LEAST_SIGMA_M**2)
+    seen = np.ones(body.size)
+    seen[twists(body)] = np.sqrt(1.0 - straightness(body, pose))
+    precision = np.outer(seen, seen) * hessian / (CORRELATED * CORRELATION_M * variance)
+    precision[np.diag_indices_from(precision)] += 1.0 / body.prior_sd**2 + 1e-9
+    try:
+        covariance = np.linalg.inv(precision)
+    except np.linalg.LinAlgError:
+        return None
+    if not (np.isfinite(covariance).all() and np.diag(covariance).min() >= 0.0):
+        return None
+    return np.asarray(covariance)
 
 
 def disagreement_m(contours: ContourFrame, rows: OutlineRows) -> float:

@@ -209,19 +209,11 @@ def other_limb(
         thorough: whether draws near the former place are left out at once. Else they are often the
             best ones, and the search ends, which takes less time.
     """
-    body, half = recombiner.body, DRAWS // 2
-    poses = np.concatenate(
-        [
-            recombiner.with_prior_limb(pose, limb, half, rng),
-            recombiner.with_limb(pose, limb, DRAWS - half, rng),
-        ]
-    )
+    body = recombiner.body
+    poses = _drawn(recombiner, pose, limb, DRAWS, rng)
     if aim is not None:
-        many = [
-            recombiner.with_prior_limb(pose, limb, AIMED_OF // 2, rng),
-            recombiner.with_limb(pose, limb, AIMED_OF // 2, rng),
-        ]
-        poses = np.concatenate([poses, aim(np.concatenate(many), AIMED)])
+        aimed = aim(_drawn(recombiner, pose, limb, AIMED_OF, rng), AIMED)
+        poses = np.concatenate([poses, aimed])
     if thorough:
         poses = poses[_far(body, poses, pose)]
     if not len(poses):
@@ -251,6 +243,19 @@ def other_limb(
     refined = frame.refined(far, *_REFINE)
     costs = frame.costs_with_prior(refined)
     return refined[int(costs.argmin())], float(costs.min())
+
+
+def _drawn(
+    recombiner: Recombiner, pose: FloatArray, limb: IntArray, count: int, rng: np.random.Generator
+) -> FloatArray:
+    """Poses (count, p) with other limbs: half about the neutral posture, half uniform."""
+    half = count // 2
+    return np.concatenate(
+        [
+            recombiner.with_prior_limb(pose, limb, half, rng),
+            recombiner.with_limb(pose, limb, count - half, rng),
+        ]
+    )
 
 
 def _best(costs: FloatArray, priors: FloatArray, count: int) -> IntArray:
