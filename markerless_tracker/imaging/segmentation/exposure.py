@@ -65,11 +65,12 @@ def _mode(counts, weights, sums):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def modal_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-untyped-def]
+def modal_ratio(image, where, base_logs, base_weights, value_logs, gain):  # type: ignore[no-untyped-def]
     """Fill gain (c,) from the pixels where (n, 2) = (v, u) of an image (h, w, c).
 
     base_logs: (n, c) log of the background at these pixels; value_logs: (256,) log of each grey
-    level; NaN if not usable.
+    level; NaN if not usable. base_weights: (n, c) inverse variance of a ratio to the background,
+    whose error is the same in grey levels.
     """
     per_log = _BINS / (2.0 * _LOG_RANGE)
     channels = gain.size
@@ -83,8 +84,7 @@ def modal_ratio(image, where, base_logs, value_logs, gain):  # type: ignore[no-u
             ratio = value_logs[pixel[c]] - base_logs[i, c]
             if abs(ratio) < _LOG_RANGE:  # False for NaN.
                 place = min(int((ratio + _LOG_RANGE) * per_log), _BINS - 1)
-                # The inverse variance of a ratio whose error is the same in grey levels.
-                weight = math.exp(2.0 * base_logs[i, c])
+                weight = base_weights[i, c]
                 counts[c, place] += 1
                 weights[c, place] += weight
                 sums[c, place] += weight * ratio
@@ -104,14 +104,18 @@ class ExposureMeter:
         step = max(1, math.isqrt(height * width // _SAMPLES))
         v, u = np.mgrid[step // 2 : height : step, step // 2 : width : step]
         self._where = np.column_stack([v.ravel(), u.ravel()])
-        self._base_logs = _logs(mean[v.ravel(), u.ravel()].astype(np.float64))
+        base = mean[v.ravel(), u.ravel()].astype(np.float64)
+        self._base_logs, self._base_weights = _logs(base), base**2
         self._value_logs = _logs(np.arange(256.0))
         self._channels = channels
 
     def gain(self, image: Image) -> NDArray[np.float32]:
         """(c,) float32: relative brightness of an image (h, w, c) uint8; 1 if it has no mode."""
         gain = np.empty(self._channels, dtype=np.float32)
-        modal_ratio(locked(image, np.uint8), self._where, self._base_logs, self._value_logs, gain)
+        modal_ratio(
+            locked(image, np.uint8), self._where, self._base_logs, self._base_weights,
+            self._value_logs, gain,
+        )  # fmt: skip
         return gain
 
 
