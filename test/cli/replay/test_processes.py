@@ -62,7 +62,9 @@ def test_a_process_ends_on_sigint(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "try:\n"
         "    print('domain', os.environ['ROS_DOMAIN_ID'])\n"
-        "    time.sleep(60)\n"
+        # A signal just before a sleep does not end it.
+        "    while True:\n"
+        "        time.sleep(0.05)\n"
         "except KeyboardInterrupt:\n"
         "    sys.exit(0)\n",
     )
