@@ -97,8 +97,16 @@ def measure_live(
                 report=tell,
             )
             start = "given" if given else "nothing given"
-            row = {"source": str(source), "rate": rate, "start": start, **_row(run, truth)}
-            rows.append({**row, "reference_us": cores.reference_us, "cores_at_once": cores.at_once})
+            rows.append(
+                {
+                    "source": str(source),
+                    "rate": rate,
+                    "start": start,
+                    **_row(run, truth),
+                    "reference_us": cores.reference_us,
+                    "cores_at_once": cores.at_once,
+                }
+            )
     return rows
 
 

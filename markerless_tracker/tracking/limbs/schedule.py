@@ -1,7 +1,7 @@
 """Which searches for limbs and headings a frame gets."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
@@ -132,7 +132,7 @@ class LimbSchedule:
             in_turn = self._turns.take(body.limbs, put_off=put_off, single=late)
             others = body.limbs if badly and not late else in_turn
             limbs += [name for name in others if name not in limbs]
-        return Due(due.pair, due.facing, due.walking, limbs)
+        return replace(due, limbs=limbs)
 
     def found(self, name: str) -> None:
         """Note that a limb was found elsewhere."""

@@ -136,17 +136,17 @@ class LimbWatch:
         if not due:
             return Recovered(pose)
         search = _search(searcher, contours, seen, pose, thorough=not late)
-        if self._turns(search, due, searcher):
+        if self._compare_headings(search, due, searcher):
             # Rivals, and sums of earlier comparisons, were those of the former heading.
             self._rivals = {}
             self._schedule.exchange.forget_gains()
             return Recovered(search.pose, rotated=True)
         found = []
-        if due.pair is not None and self._exchanges(search, due.pair, searcher.body):
+        if due.pair is not None and self._compare_exchange(search, due.pair, searcher.body):
             self._rivals = {}
             found.append(due.pair.name)
         for name in due.limbs:
-            if self._finds_elsewhere(search, name, searcher, unexplained, seen.stamp_ns):
+            if self._search_limb(search, name, searcher, unexplained, seen.stamp_ns):
                 found.append(name)
         if found:
             # They explain at least a part of the silhouette; the next search finds the rest.
@@ -154,7 +154,7 @@ class LimbWatch:
         moved_m = distance_m(searcher.body, search.pose, pose)
         return Recovered(search.pose, tuple(found), moved_m=moved_m)
 
-    def _turns(self, search: LimbSearch, due: Due, searcher: Searcher) -> bool:
+    def _compare_headings(self, search: LimbSearch, due: Due, searcher: Searcher) -> bool:
         """Compare the other headings that are due; whether one was taken."""
         if due.facing:
             rotated = self._schedule.facing.compare(search, searcher.body, searcher.limits)
@@ -167,7 +167,7 @@ class LimbWatch:
                 return True
         return False
 
-    def _exchanges(self, search: LimbSearch, pair: Exchange, body: BodyModel) -> bool:
+    def _compare_exchange(self, search: LimbSearch, pair: Exchange, body: BodyModel) -> bool:
         """Compare an exchange of both legs or both arms; whether it was taken."""
         best = search.cheapest(pair.poses)
         other, gain = search.compared(pair.poses[best], CLOSE)
@@ -178,7 +178,7 @@ class LimbWatch:
         search.take(other)
         return True
 
-    def _finds_elsewhere(
+    def _search_limb(
         self,
         search: LimbSearch,
         name: str,

@@ -110,6 +110,9 @@ class AutomaticStart:
             seen: the evidence of the whole views; near the predicted pose, if it `follows`.
             predicted: (p,) pose expected in this frame.
             late: whether the effort is below 1; if not, the frame takes a search's result now.
+
+        Raises:
+            Exception: raised by a search beside the steps; told once.
         """
         self._followed = self.follows(late=late)
         if not anybody(seen.used):

@@ -120,7 +120,7 @@ def test_its_end_is_told_once_with_a_frame(here, backgrounds, images) -> None:
     assert process.segment(images, 1, dict.fromkeys(images)) is None
     observer, body = Observer(maker, ViewWatch(RIG)), load_body("person32")
     segmented = here.segment_regions(images, 1, dict.fromkeys(images))
-    told = "the segmenting process has ended; images are segmented beside the fit"
+    told = "the segmenting process has ended; images are segmented in the tracker's own process"
     assert observer.whole(segmented, 1, body).notes == (told,)
     assert observer.whole(segmented, 2, body).notes == ()
     maker.close()

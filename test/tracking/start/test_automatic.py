@@ -54,6 +54,10 @@ def nobody(seen) -> dict[str, Observation]:
     }
 
 
+def fails(*_):
+    raise ValueError("in the search")
+
+
 def count_searches(monkeypatch) -> list[int]:
     """The stamps of the frames that the starter searches."""
     searched: list[int] = []
@@ -193,9 +197,6 @@ def test_an_error_of_a_search_is_raised_once(walk, monkeypatch) -> None:
     tracker = tracker_of(scene)
     tracker.step(taken[0][1], taken[0][0], 0.5)
 
-    def fails(self, *_):
-        raise ValueError("in the search")
-
     with monkeypatch.context() as patch:
         patch.setattr(Starter, "step", fails)
         tracker.step(taken[1][1], taken[1][0], 0.5)
@@ -209,9 +210,6 @@ def test_an_error_is_raised_even_if_the_person_has_left(walk, monkeypatch) -> No
     scene, taken = walk
     tracker = tracker_of(scene)
     tracker.step(taken[0][1], taken[0][0], 0.5)
-
-    def fails(self, *_):
-        raise ValueError("in the search")
 
     monkeypatch.setattr(Starter, "step", fails)
     tracker.step(taken[1][1], taken[1][0], 0.5)
@@ -240,13 +238,7 @@ def test_what_completes_a_start_is_followed_from_the_frame_that_was_searched(
         tracker.step(seen, stamp, 0.5)
     stamps = [stamp for stamp, _, _ in taken]
     last = stamps.index(searched[-1])
-    settled = (
-        last
-        + 2
-        + next(
-            i for i, stamp in enumerate(stamps[last + 2 :]) if stamp - stamps[last + 2] >= REST_NS
-        )
-    )
+    settled = next(i for i, at in enumerate(stamps) if at - stamps[last + 2] >= REST_NS)
     assert followed[-1] == stamps[last + 1 : settled]
 
 

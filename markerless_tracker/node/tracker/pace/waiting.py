@@ -90,7 +90,7 @@ class WaitingSets(Generic[View]):
         """
         if at_most:
             self._places = at_most
-            if not self._keeping:
+            if not (followed and self._keeping):
                 self._spacing_ns = SPACING_NS
             if followed:
                 self._spacing_ns = max(self._spacing_ns, FOLLOWED_SPACING_NS)
@@ -125,8 +125,7 @@ class WaitingSets(Generic[View]):
         return taken
 
     def drop_older(self) -> int:
-        """Drop all sets but the newest, as no start goes on; returns the number of dropped sets."""
-        self._spacing_ns = SPACING_NS
+        """Drop all sets but the newest; returns the number of dropped sets."""
         before = len(self._sets)
         self._drop_to(1)
         return before - len(self._sets)

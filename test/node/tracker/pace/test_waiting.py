@@ -103,7 +103,6 @@ def test_without_a_person_the_older_sets_are_dropped() -> None:
 def test_after_a_start_that_failed_sets_lie_as_close_as_before_the_first() -> None:
     waiting: WaitingSets[str] = WaitingSets()
     waiting.keep(AT_MOST, followed=True)
-    waiting.drop_older()
     waiting.keep(AT_MOST)
     for stamp in range(0, 320, FRAME_MS):
         waiting.put(a_set(stamp))
