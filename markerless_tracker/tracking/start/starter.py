@@ -67,9 +67,8 @@ class Starter:
     tried if it is unknown). The best ones are refined, recombined and refined again; if they fit
     poorly, once more with a cost of unusual postures, by which the poses of both searches are
     compared. Legs and arms are tried in each other's place. The opposite heading is propagated,
-    too, until one is kept (`two_headings`). What remains then is left to the caller (`settling`):
-    poses that cost about as much as the best one are compared with sections of their own, and the
-    body is fitted.
+    too, until one is kept (`two_headings`). The fit of the body is then left to the caller
+    (`settling`).
 
     Args:
         rig: the cameras.
@@ -175,14 +174,11 @@ class Starter:
             rest = Settling(
                 searcher=self._searcher,
                 searcher_for=self._searcher_for,
-                cameras=self._cameras,
                 person=self._person,
                 fits=self._headings.leading_fits,
-                frame=frame,
-                population=leading,
+                contours=frame.contours,
+                pose=leading.poses[0],
                 observations=observations,
-                imaged=imaged,
-                stamp_ns=stamp_ns,
             ).run
         settled, pose = over and rest is None, leading.poses[0]
         return StartEstimate(self._searcher, pose, observations, settled, notes, rest)

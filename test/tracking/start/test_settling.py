@@ -1,0 +1,42 @@
+"""The end of a start: the body is fitted if it may be, and the best pose is kept."""
+
+import numpy as np
+import pytest
+
+from markerless_tracker.body import load_body, markers
+from markerless_tracker.records import Observation
+from markerless_tracker.synthesis import SyntheticScene
+from markerless_tracker.tracking import TrackerConfig
+from markerless_tracker.tracking.search import make_searcher
+from markerless_tracker.tracking.start.starter import Starter
+from markerless_tracker.tracking.start.two_headings import MOST_FRAMES
+
+BODY = load_body("person31", 1.75)
+
+
+@pytest.mark.parametrize("fit_shape", [True, False])
+def test_a_start_ends_with_the_fit_of_the_body(fit_shape) -> None:
+    scene = SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=2)
+    _, masks, _ = scene.frame(0)
+    seen = {
+        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
+        for name, mask in masks.items()
+    }
+    searching = dict(rig=scene.rig, config=TrackerConfig(threads=1), threads=1)
+    starter = Starter(
+        scene.rig, BODY, lambda body: make_searcher(body, **searching),
+        lambda observed, *_: (dict(observed), ()), fit_shape=fit_shape,
+    )  # fmt: skip
+    for number in range(MOST_FRAMES):
+        found = starter.step(seen, number * 16_000_000)
+        assert found is not None
+        if found.settled or found.rest:
+            break
+    assert (found.rest is not None) is fit_shape
+    end = found.rest() if found.rest else found
+    assert end.settled and end.rest is None
+    sections = end.searcher.body.cone_shape
+    assert np.allclose(sections, BODY.cone_shape) is not fit_shape
+    off_m = np.linalg.norm(markers(BODY, end.pose) - markers(BODY, found.pose), axis=1)
+    assert off_m.max() < 0.02
+    assert end.observations.keys() == seen.keys()
