@@ -49,19 +49,21 @@ def _take_differences(value, mean, gain, plain, old, total):  # type: ignore[no-
 
 
 @kernel
-def _sum_patches(total, side, out):  # type: ignore[no-untyped-def]
-    """out[j] = total[j] + ... + total[j + side - 1]."""
+def sum_across(part, side, total):  # type: ignore[no-untyped-def]
+    """total[j] = part[j] + ... + part[j + side - 1]; part (n + side - 1,), total (n,), side odd."""
+    n = total.size
     if side == 7:
-        for j in range(out.size):
-            left = total[j] + total[j + 1] + total[j + 2]
-            right = total[j + 4] + total[j + 5] + total[j + 6]
-            out[j] = left + total[j + 3] + right
+        for j in range(n):
+            left = part[j] + part[j + 1] + part[j + 2]
+            total[j] = left + part[j + 3] + part[j + 4] + part[j + 5] + part[j + 6]
         return
-    for j in range(out.size):
-        whole = total[j]
-        for k in range(1, side):
-            whole += total[j + k]
-        out[j] = whole
+    for j in range(n):
+        total[j] = part[j]
+    for shift in range(1, side, 2):
+        one = part[shift : shift + n]
+        other = part[shift + 1 : shift + 1 + n]
+        for j in range(n):
+            total[j] += one[j] + other[j]
 
 
 @kernel
@@ -107,11 +109,11 @@ def _weak_rows(planes, mean, gain, radius, limit, least, left, top, rings, total
         if i < 0:
             continue
         _mirror_ends(total[channels], radius)
-        _sum_patches(total[channels], side, patch)
+        sum_across(total[channels], side, patch)
         _limits(patch, limit, least, limits)
         for c in range(channels):
             _mirror_ends(total[c], radius)
-            _sum_patches(total[c], side, patch)
+            sum_across(total[c], side, patch)
             _mark_beyond(patch, limits, labels[i])
 
 

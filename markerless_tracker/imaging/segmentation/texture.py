@@ -15,6 +15,7 @@ from markerless_tracker.compiled import compiled
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.kernels import FOREGROUND, SHADOW
+from markerless_tracker.imaging.segmentation.patches import sum_across
 
 SHOWN_LEAST, HIDDEN_LEAST = 6.0, 6.0
 """Least ratio of the pattern's variance to the noise's to decide that it is shown, or hidden."""
@@ -47,24 +48,6 @@ def _slide_product(total, came_x, came_y, gone_x, gone_y):  # type: ignore[no-un
     """As `_slide`, for products of two images."""
     for j in range(came_x.size):
         total[j] += came_x[j] * came_y[j] - gone_x[j] * gone_y[j]
-
-
-@compiled()
-def _sum_across(part, side, total):  # type: ignore[no-untyped-def]
-    """total[j] = part[j] + ... + part[j + side - 1], side odd."""
-    n = total.size
-    if side == 7:
-        for j in range(n):
-            left = part[j] + part[j + 1] + part[j + 2]
-            total[j] = left + part[j + 3] + part[j + 4] + part[j + 5] + part[j + 6]
-        return
-    for j in range(n):
-        total[j] = part[j]
-    for shift in range(1, side, 2):
-        one = part[shift : shift + n]
-        other = part[shift + 1 : shift + 1 + n]
-        for j in range(n):
-            total[j] += one[j] + other[j]
 
 
 # With NumPy's error model the loop has no branch to test for division by zero.
@@ -162,7 +145,7 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
         if i < 0:
             continue
         for k in range(5):
-            _sum_across(sums[k], side, window[k])
+            sum_across(sums[k], side, window[k])
         down = np.int32(min(i + radius, rows - 1) - max(i - radius, 0) + 1)
         _light_of_sums(
             window[0], window[1], window[2], window[3], window[4], across, down, noise, light[i]

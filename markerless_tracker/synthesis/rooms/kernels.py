@@ -3,6 +3,7 @@
 import numpy as np
 
 from markerless_tracker.compiled import compiled
+from markerless_tracker.synthesis.triangles import doubled_area, range_of, weights_at
 
 
 @compiled()
@@ -18,19 +19,16 @@ def add_occlusion(points, triangles, stamp, stamps, total, weight):  # type: ign
         ax, ay = points[i, 0], points[i, 1]
         bx, by = points[j, 0], points[j, 1]
         cx, cy = points[k, 0], points[k, 1]
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        area = doubled_area(ax, ay, bx, by, cx, cy)
         if not abs(area) > 1e-12:
             continue
-        left = max(0, int(np.ceil(max(min(ax, bx, cx), -1.0))))
-        right = min(width - 1, int(np.floor(min(max(ax, bx, cx), float(width)))))
-        top = max(0, int(np.ceil(max(min(ay, by, cy), -1.0))))
-        bottom = min(height - 1, int(np.floor(min(max(ay, by, cy), float(height)))))
-        for v in range(top, bottom + 1):
-            for u in range(left, right + 1):
+        left, right = range_of(ax, bx, cx, width)
+        top, bottom = range_of(ay, by, cy, height)
+        for v in range(top, bottom):
+            for u in range(left, right):
                 if stamps[v, u] == stamp:
                     continue
-                wb = ((u - ax) * (cy - ay) - (v - ay) * (cx - ax)) / area
-                wc = ((bx - ax) * (v - ay) - (by - ay) * (u - ax)) / area
+                wb, wc = weights_at(u, v, ax, ay, bx, by, cx, cy, area)
                 if wb >= 0.0 and wc >= 0.0 and wb + wc <= 1.0:
                     stamps[v, u] = stamp
                     total[v, u] += weight
@@ -49,17 +47,14 @@ def nearest_triangles(points, triangles, nearness, number):  # type: ignore[no-u
         ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
         bx, by, bz = points[j, 0], points[j, 1], points[j, 2]
         cx, cy, cz = points[k, 0], points[k, 1], points[k, 2]
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        area = doubled_area(ax, ay, bx, by, cx, cy)
         if not abs(area) > 1e-12:
             continue
-        left = max(0, int(np.ceil(max(min(ax, bx, cx), -1.0))))
-        right = min(width - 1, int(np.floor(min(max(ax, bx, cx), float(width)))))
-        top = max(0, int(np.ceil(max(min(ay, by, cy), -1.0))))
-        bottom = min(height - 1, int(np.floor(min(max(ay, by, cy), float(height)))))
-        for v in range(top, bottom + 1):
-            for u in range(left, right + 1):
-                wb = ((u - ax) * (cy - ay) - (v - ay) * (cx - ax)) / area
-                wc = ((bx - ax) * (v - ay) - (by - ay) * (u - ax)) / area
+        left, right = range_of(ax, bx, cx, width)
+        top, bottom = range_of(ay, by, cy, height)
+        for v in range(top, bottom):
+            for u in range(left, right):
+                wb, wc = weights_at(u, v, ax, ay, bx, by, cx, cy, area)
                 wa = 1.0 - wb - wc
                 if wa < 0.0 or wb < 0.0 or wc < 0.0:
                     continue

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.imaging.segmentation.kernels import LEVELS, WEAK
-from markerless_tracker.imaging.segmentation.patches import STEPS, mark_weak
+from markerless_tracker.imaging.segmentation.patches import STEPS, mark_weak, sum_across
 
 LEFT, TOP = 4, 3
 
@@ -48,3 +48,13 @@ def test_it_is_the_box_filter_of_differences(shape, radius, channels) -> None:
     np.testing.assert_array_equal(labels, expected)
     if rows > 50:
         assert 50 < (labels == WEAK).sum() < 0.7 * labels.size
+
+
+@pytest.mark.parametrize("side", range(1, 14, 2))
+def test_sums_across_a_window(side: int) -> None:
+    part = np.random.default_rng(side).integers(-10_000, 10_000, 49 + side).astype(np.int32)
+    total = np.empty(50, dtype=np.int32)
+    sum_across(part, side, total)
+    np.testing.assert_array_equal(
+        total, np.lib.stride_tricks.sliding_window_view(part, side).sum(axis=1)
+    )

@@ -71,16 +71,6 @@ def test_column_sums_slide_by_a_row(seed: int) -> None:
     np.testing.assert_array_equal(moved, total + came * other - gone * last)
 
 
-@pytest.mark.parametrize("radius", range(1, MOST_RADIUS + 1))
-def test_sums_across_a_window(radius: int) -> None:
-    part = np.random.default_rng(radius).integers(0, 10_000, 50 + 2 * radius).astype(np.int32)
-    total = np.empty(50, dtype=np.int32)
-    texture._sum_across(part, 2 * radius + 1, total)
-    np.testing.assert_array_equal(
-        total, np.lib.stride_tricks.sliding_window_view(part, 2 * radius + 1).sum(axis=1)
-    )
-
-
 @few
 @given(SEEDS)
 def test_grey_levels_of_the_background_are_rounded(seed: int) -> None:
