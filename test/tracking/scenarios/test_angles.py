@@ -130,12 +130,16 @@ def test_deviations_are_those_of_what_is_seen(still) -> None:
     assert deviation["knee_angle_r"] < 8.0
 
 
-@pytest.mark.parametrize(("frames", "turn_rad_s"), [(70, 2.4 * np.pi), (130, 1.2 * np.pi)])
-def test_a_full_turn_goes_through_without_a_jump(frames: int, turn_rad_s: float) -> None:
+@pytest.mark.parametrize(
+    ("frames", "turn_rad_s", "least_deg"),
+    [(60, 2.4 * np.pi, 360.0), (62, 1.2 * np.pi, 180.0)],
+    ids=["once round", "half round, slowly"],
+)
+def test_a_turn_goes_through_without_a_jump(frames, turn_rad_s, least_deg) -> None:
     turning = track(standing("hanging"), frames, turn_rad_s)
     rotation = turning.names.index("pelvis_rotation")
     turned = turning.found[-1, rotation] - turning.found[0, rotation]
-    assert turned > 360.0
+    assert turned > least_deg
     for name, error in turning.errors.items():
         assert np.sqrt((error**2).mean()) < (5.0 if name.startswith("arm_rot") else 3.0), name
     step, name = turning.largest_step()
