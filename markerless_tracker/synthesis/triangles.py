@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import inlined
 
 
-@compiled(inline="always")
+@inlined
 def doubled_area(ax, ay, bx, by, cx, cy):  # type: ignore[no-untyped-def]
     """Twice the signed area of a triangle; NaN if a corner is."""
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
-@compiled(inline="always")
+@inlined
 def range_of(a, b, c, size):  # type: ignore[no-untyped-def]
     """First column (or row) of a triangle and the one after the last, of `size` ones."""
     first = max(0, int(np.ceil(max(min(a, b, c), -1.0))))
@@ -19,7 +19,7 @@ def range_of(a, b, c, size):  # type: ignore[no-untyped-def]
     return first, last + 1
 
 
-@compiled(inline="always")
+@inlined
 def weights_at(u, v, ax, ay, bx, by, cx, cy, area):  # type: ignore[no-untyped-def]
     """Weights of the corners b and c at (u, v), where those of a, b and c add up to 1."""
     wb = ((u - ax) * (cy - ay) - (v - ay) * (cx - ax)) / area

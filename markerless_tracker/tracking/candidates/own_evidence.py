@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from markerless_tracker.fitness.contour import RADIUS_M, ContourFrame
+from markerless_tracker.fitness.contour import RADIUS_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking.candidates.population import FramePopulation
@@ -73,10 +73,6 @@ class OwnEvidence:
         """
         found = self._decided(pose).refined(pose[None], iterations, truncation_m)[0]
         return found, self.cost_with_prior(found)
-
-    def contours(self, pose: FloatArray) -> ContourFrame:
-        """The contour evidence that the body at a pose (p,) decides."""
-        return self._decided(pose).contours
 
     def _decided(self, pose: FloatArray) -> FramePopulation:
         """The evidence that the body at a pose (p,) decides; cached for the last pose."""

@@ -160,11 +160,9 @@ class EvidenceMaker:
     def take_notes(self) -> tuple[str, ...]:
         """A line, told once, if the segmenting process cannot segment any more."""
         fault = None if self._process is None else self._process.take_fault()
-        return (
-            ()
-            if fault is None
-            else (f"{fault}; images are segmented in the tracker's own process",)
-        )
+        if fault is None:
+            return ()
+        return (f"{fault}; images are segmented in the tracker's own process",)
 
     @property
     def process_cpu_s(self) -> float:

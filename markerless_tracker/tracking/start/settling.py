@@ -1,7 +1,6 @@
 """The last part of an automatic start: the fit of the body."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,11 +19,19 @@ _SHAPE_SLACK = 0.01
 """Frames that the sections are fitted to cost at most this much more than the best."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Settling:
-    """Completes a start in its last frame, once the heading is known.
+def with_fitted_body(
+    searcher: Searcher,
+    searcher_for: SearcherFor,
+    person: Unmeasured | None,
+    *,
+    fits: Sequence[HeadingFit],
+    contours: ContourFrame,
+    pose: FloatArray,
+    observations: Mapping[str, Observation],
+) -> StartEstimate:
+    """The result of a start, with the body fitted to the frames that it explains best.
 
-    Attributes:
+    Args:
         searcher: with the body found so far.
         searcher_for: makes a searcher of a body.
         person: as in `fitted_to_start`.
@@ -33,21 +40,10 @@ class Settling:
         pose: (p,) the best one in it with that heading.
         observations: the parts of its silhouettes that belong to the person.
     """
-
-    searcher: Searcher
-    searcher_for: SearcherFor
-    person: Unmeasured | None
-    fits: Sequence[HeadingFit]
-    contours: ContourFrame
-    pose: FloatArray
-    observations: Mapping[str, Observation]
-
-    def run(self) -> StartEstimate:
-        """The start's result, with the body fitted to the frames that it explains best."""
-        good = min((fit.cost for fit in self.fits), default=0.0) + _SHAPE_SLACK
-        used = [(fit.contours, fit.pose) for fit in self.fits if fit.cost <= good][-_SHAPE_FRAMES:]
-        used = used or [(self.contours, self.pose)]
-        body, last = fitted_to_start(self.searcher, used, self.person)
-        searcher = self.searcher_for(body)
-        moved = np.clip(self.pose + last - used[-1][1], *searcher.limits)
-        return StartEstimate(searcher, moved, self.observations, True)
+    good = min((fit.cost for fit in fits), default=0.0) + _SHAPE_SLACK
+    used = [(fit.contours, fit.pose) for fit in fits if fit.cost <= good][-_SHAPE_FRAMES:]
+    used = used or [(contours, pose)]
+    body, last = fitted_to_start(searcher, used, person)
+    fitted = searcher_for(body)
+    moved = np.clip(pose + last - used[-1][1], *fitted.limits)
+    return StartEstimate(fitted, moved, observations, True)

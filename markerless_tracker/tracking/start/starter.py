@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from markerless_tracker.tracking.start.estimate import StartEstimate
 from markerless_tracker.tracking.start.generations import improved
 from markerless_tracker.tracking.start.in_view import InViewGate
 from markerless_tracker.tracking.start.rejections import Rejections
-from markerless_tracker.tracking.start.settling import Settling
+from markerless_tracker.tracking.start.settling import with_fitted_body
 from markerless_tracker.tracking.start.silhouettes import silhouettes_in_hull
 from markerless_tracker.tracking.start.sizing import (
     Sized,
@@ -171,15 +172,11 @@ class Starter:
         leading, over = self._best(population), self._headings.over
         rest = None
         if over and self._fit_shape:
-            rest = Settling(
-                searcher=self._searcher,
-                searcher_for=self._searcher_for,
-                person=self._person,
-                fits=self._headings.leading_fits,
-                contours=frame.contours,
-                pose=leading.poses[0],
+            rest = partial(
+                with_fitted_body, self._searcher, self._searcher_for, self._person,
+                fits=self._headings.leading_fits, contours=frame.contours, pose=leading.poses[0],
                 observations=observations,
-            ).run
+            )  # fmt: skip
         settled, pose = over and rest is None, leading.poses[0]
         return StartEstimate(self._searcher, pose, observations, settled, notes, rest)
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from markerless_tracker.body import load_body, markers
-from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.search import make_searcher
@@ -15,13 +14,9 @@ BODY = load_body("person31", 1.75)
 
 
 @pytest.mark.parametrize("fit_shape", [True, False])
-def test_a_start_ends_with_the_fit_of_the_body(fit_shape) -> None:
+def test_a_start_ends_with_the_fit_of_the_body(take_frames, fit_shape) -> None:
     scene = SyntheticScene(body="person31", motion="stand", size_px=(328, 245), seed=2)
-    _, masks, _ = scene.frame(0)
-    seen = {
-        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-        for name, mask in masks.items()
-    }
+    ((_, seen, _),) = take_frames(scene, [0])
     searching = dict(rig=scene.rig, config=TrackerConfig(threads=1), threads=1)
     starter = Starter(
         scene.rig, BODY, lambda body: make_searcher(body, **searching),
