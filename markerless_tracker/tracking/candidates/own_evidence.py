@@ -1,4 +1,4 @@
-"""Compares poses, each in the evidence that it decides itself.
+"""Compares poses in the evidence that they decide themselves.
 
 Undecided pixels near a body become person. Evidence that was decided with one pose is therefore
 biased against every other pose: a wrong leg over a floor of the trousers' colour would be kept.
@@ -16,9 +16,12 @@ from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.search import Searcher
 
+_CACHED = 4
+"""Number of poses whose evidence is kept: the estimate's, another's, and both refined."""
+
 
 class OwnEvidence:
-    """Costs of poses of one frame, each in its own evidence.
+    """Costs of poses of one frame, in the evidence that each decides.
 
     Args:
         searcher: the body, the cameras and the settings.
@@ -46,7 +49,7 @@ class OwnEvidence:
         self._stamp_ns = stamp_ns
         self._frame = frame
         self._radius_m = radius_m
-        self._last: tuple[FloatArray, FramePopulation] | None = None
+        self._latest: dict[bytes, FramePopulation] = {}
         self.body = searcher.body
         self.differs = any(seen.undecided_words is not None for seen in imaged.values())
 
@@ -58,30 +61,52 @@ class OwnEvidence:
         return self._population(self._imaged, self._frame.near)
 
     def cost_with_prior(self, pose: FloatArray) -> float:
-        """The cost of a pose (p,) as `FramePopulation.costs_with_prior`; to compare poses."""
+        """The cost of a pose (p,) in its own evidence, as `FramePopulation.costs_with_prior`."""
         return float(self._decided(pose).costs_with_prior(pose[None])[0])
+
+    def gain(self, pose: FloatArray, other: FloatArray, *, other_share: float = 0.0) -> float:
+        """How much less another pose (p,) costs than a pose (p,), with the prior.
+
+        Args:
+            pose, other: the poses.
+            other_share: weight of a pose's cost in the evidence of the other pose, beside that in
+                its own, 0 to 1. A pose that leaves a limb's undecided pixels out has no fault in
+                its own evidence, but misses the limb in that of the other.
+        """
+        if other_share == 0.0:
+            return self.cost_with_prior(pose) - self.cost_with_prior(other)
+        both = np.stack([pose, other])
+        here, there = (self._decided(each).costs_with_prior(both) for each in both)
+        costs = (1.0 - other_share) * np.array([here[0], there[1]])
+        costs += other_share * np.array([there[0], here[1]])
+        return float(costs[0] - costs[1])
 
     def refined(
         self, pose: FloatArray, iterations: int, truncation_m: tuple[float, float]
-    ) -> tuple[FloatArray, float]:
-        """A pose (p,) refined in its own evidence, and its `cost_with_prior` there.
+    ) -> FloatArray:
+        """A pose (p,) refined in its own evidence.
 
         Args:
             pose: the initial pose.
             iterations: of the contour refinement.
             truncation_m: residuals beyond it are outliers, in the first and in the last iteration.
         """
-        found = self._decided(pose).refined(pose[None], iterations, truncation_m)[0]
-        return found, self.cost_with_prior(found)
+        refined = self._decided(pose).refined(pose[None], iterations, truncation_m)
+        return np.asarray(refined[0])
 
     def _decided(self, pose: FloatArray) -> FramePopulation:
-        """The evidence that the body at a pose (p,) decides; cached for the last pose."""
+        """The evidence that the body at a pose (p,) decides; cached for the latest poses."""
         if not self.differs:
             return self._frame
-        if self._last is None or not np.array_equal(self._last[0], pose):
+        key = pose.tobytes()
+        frame = self._latest.pop(key, None)
+        if frame is None:
             decided = decide(self._imaged, self._searcher.cameras, self.body, pose)
-            self._last = pose.copy(), self._population(decided, pose)
-        return self._last[1]
+            frame = self._population(decided, pose)
+        self._latest[key] = frame
+        if len(self._latest) > _CACHED:
+            del self._latest[next(iter(self._latest))]
+        return frame
 
     def _population(
         self, observations: Mapping[str, Observation], near: FloatArray

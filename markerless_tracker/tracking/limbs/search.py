@@ -36,6 +36,10 @@ farther than `FREE_M`; nearer, it may lose as much for each m. However unusual a
 limb that was tracked there is seldom far from it."""
 CLOSE = 0.01
 """A pose that costs at most this much more in undecided evidence may be better in its own."""
+ARMS_SHARE = 0.25
+"""Weight of the other pose's evidence where places of an arm are compared. An arm in the trunk
+misses nothing in its own evidence, even if the person's arm looks like a shadow. Legs stand in
+shadows, which a wrong leg makes person as well, so that evidence does not count for them."""
 _PARENTS, _CHILDREN = 3, 10
 """Draws that are varied in each layer: the best by f_s, and as many with the prior, too (many are
 the same); and variations of each."""
@@ -54,7 +58,8 @@ class LimbSearch:
     better than the estimate, and better than the estimate after the same refinement: a gain of the
     rest of the body is not due to the limb. Other whole poses are compared with the estimate alone.
     Poses are compared by `costs_with_prior`; the gain of a pose is how far its cost lies below the
-    estimate's. The evidence alone must gain enough, too (`GAIN_PER_M`).
+    estimate's: where pixels were undecided, each in its own evidence, and for arms in part in that
+    of the other pose (`ARMS_SHARE`). The evidence alone must gain enough, too (`GAIN_PER_M`).
 
     Args:
         recombiner: draws limbs of the body.
@@ -87,23 +92,23 @@ class LimbSearch:
         self._frame = frame
         self._own = own
         self.rival: Rival | None = None
-        self._take(pose, None)
+        self.pose = pose
 
     def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
         """Search a limb; return whether it was found elsewhere. Arguments as for `other_limb`."""
         before = self.pose
         other, gain, better = self._elsewhere(limb, rng, aim)
         if better:
-            self._take(*other)
+            self.pose = other
             self.rival = rival_of(self._own.body, self.pose, before, gain)
         else:
-            self.rival = rival_of(self._own.body, before, other[0], -gain)
+            self.rival = rival_of(self._own.body, before, other, -gain)
         return better
 
     def _elsewhere(
         self, limb: IntArray, rng: np.random.Generator, aim: Aim | None
-    ) -> tuple[tuple[FloatArray, float], float, bool]:
-        """The best other pose (p,) and its cost, its gain, and whether that is enough."""
+    ) -> tuple[FloatArray, float, bool]:
+        """The best other pose (p,), its gain, and whether that is enough."""
         frame = self._own.undecided
         cost = float(frame.costs_with_prior(self.pose[None])[0])
         other, other_cost = other_limb(
@@ -115,14 +120,21 @@ class LimbSearch:
             gain = min(gain, float(frame.costs_with_prior(refined)[0]) - other_cost)
         if self._own.differs:
             if other_cost > cost + CLOSE or distance_m(self._own.body, other, self.pose) < LEAST_M:
-                return (other, other_cost), gain, False
+                return other, gain, False
             least_gain = 0.0 if gain > least_gain else LEAST_GAIN
-            other, other_cost = self._own.refined(other, *_REFINE)
-            gain = self.own_cost - other_cost
+            share = ARMS_SHARE if self._is_arm(limb) else 0.0
+            other = self._own.refined(other, *_REFINE)
+            gain = self._own.gain(self.pose, other, other_share=share)
             if gain > least_gain:
-                gain = min(gain, self._own.refined(self.pose, *_REFINE)[1] - other_cost)
+                refined_too = self._own.refined(self.pose, *_REFINE)
+                gain = min(gain, self._own.gain(refined_too, other, other_share=share))
         better = gain > least_gain and gain > self._least_gain_of(other)
-        return (other, other_cost), gain, better
+        return other, gain, better
+
+    def _is_arm(self, limb: IntArray) -> bool:
+        """Whether a limb is one of the arms."""
+        arms = self._own.body.subspaces.get("arms", ())
+        return bool(np.isin(limb, arms).all())
 
     def _least_gain_of(self, other: FloatArray) -> float:
         """Least gain of a pose (p,): the prior's part, and the evidence's own at that distance."""
@@ -143,14 +155,14 @@ class LimbSearch:
 
     def take(self, other: FloatArray) -> None:
         """Take another pose (p,)."""
-        self._take(other, None)
+        self.pose = other
 
     def cheapest(self, others: FloatArray) -> int:
         """Which of other poses (n, p) costs least, not refined."""
         return int(self._frame.costs_with_prior(others).argmin()) if len(others) > 1 else 0
 
     def compared(self, other: FloatArray, close: float) -> tuple[FloatArray, float]:
-        """Another pose (p,), refined, and its gain: the estimate's `costs_with_prior` less its own.
+        """Another pose (p,), refined, and its gain: how much less it costs than the estimate.
 
         Args:
             other: the pose, which may be far from the estimate.
@@ -161,19 +173,8 @@ class LimbSearch:
         costs = self._frame.costs_with_prior(np.concatenate([self.pose[None], refined]))
         if not self._own.differs or costs[1] > costs[0] + close:
             return refined[0], float(costs[0] - costs[1])
-        found, cost = self._own.refined(refined[0], *_REFINE)
-        return found, self.own_cost - cost
-
-    def _take(self, pose: FloatArray, cost: float | None) -> None:
-        self.pose = pose
-        self._known_cost = cost
-
-    @property
-    def own_cost(self) -> float:
-        """The estimate's `cost_with_prior` in its own evidence."""
-        if self._known_cost is None:
-            self._known_cost = self._own.cost_with_prior(self.pose)
-        return self._known_cost
+        found = self._own.refined(refined[0], *_REFINE)
+        return found, self._own.gain(self.pose, found)
 
 
 def other_limb(

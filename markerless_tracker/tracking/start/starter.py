@@ -32,6 +32,7 @@ from markerless_tracker.tracking.start.sizing import (
     stature_cost,
 )
 from markerless_tracker.tracking.start.two_headings import HeadingFit, TwoHeadings
+from markerless_tracker.tracking.start.uncrossed import uncrossed
 
 GENERATIONS = 7
 """Generations of the search of the first frame."""
@@ -67,7 +68,8 @@ class Starter:
     First guesses are many postures and headings of a body of the person's stature (several are
     tried if it is unknown). The best ones are refined, recombined and refined again; if they fit
     poorly, once more with a cost of unusual postures, by which the poses of both searches are
-    compared. Legs and arms are tried in each other's place. The opposite heading is propagated,
+    compared. Legs and arms are tried in each other's place, and in every frame crossed ones are
+    compared with uncrossed ones (`uncrossed`). The opposite heading is propagated,
     too, until one is kept (`two_headings`). The fit of the body is then left to the caller
     (`settling`).
 
@@ -161,11 +163,12 @@ class Starter:
         elif len(self._headings) == 1 + _FINER_AFTER:
             frame, population = self._resized((frame, population), observations, stamp_ns)
         population = frame.recombined(population, 0, fraction=_GENERATION_FRACTION)
+        own = OwnEvidence(self._searcher, imaged, stamp_ns, frame)
+        population = uncrossed(own, frame, population, self._best)
         if 1.0 - frame.best_cost(population) < LEAST_FIT:
             self.reset()
             return None
         self._population, self._stamp_ns = population, stamp_ns
-        own = OwnEvidence(self._searcher, imaged, stamp_ns, frame)
         self._note(own, frame, population, stamp_ns)
         if self._headings.change():
             notes += ("start: the person has the opposite heading, turned round",)
@@ -200,10 +203,11 @@ class Starter:
             best = population.poses[0]
             if not self._in_view.enough(self._searcher.body, best, cameras, stamp_ns):
                 continue
-            self._population, self._stamp_ns = population, stamp_ns
             self._headings = TwoHeadings(float(population.headings[0]))
             self._sure = _is_sure(population)
             own = OwnEvidence(self._searcher, observations, stamp_ns, frame)
+            population = uncrossed(own, frame, population, self._best)
+            self._population, self._stamp_ns = population, stamp_ns
             self._note(own, frame, population, stamp_ns)
             return StartEstimate(self._searcher, population.poses[0], observations, False)
         return None

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from markerless_tracker.fitness.raster.silhouette import body_masks
 from markerless_tracker.records import Observation
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
@@ -24,6 +25,23 @@ def legs_undecided(bent_leg):
     body, config = scene.body, TrackerConfig(threads=1)
     searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
     return searcher, seen, pose, wrong
+
+
+@pytest.fixture(scope="module")
+def arm_undecided(bent_leg):
+    """A person whose raised left arm is undecided, and the same pose with that arm at the side."""
+    scene, _, beside, _, _ = bent_leg(0.0, 0.0)
+    body, cameras = scene.body, list(scene.rig)
+    raised = beside.copy()
+    raised[body.index("l_shoulder_x")] += 0.9
+    masks, without = body_masks(body, raised, cameras), body_masks(body, beside, cameras)
+    seen = {}
+    for name, mask in masks.items():
+        undecided, edges = mask & ~without[name], np.zeros(mask.shape, np.uint8)
+        seen[name] = Observation.from_mask(name, 0, mask & ~undecided, edges, undecided=undecided)
+    config = TrackerConfig(threads=1)
+    searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
+    return searcher, seen, raised, beside
 
 
 def own_of(searcher, seen, at):
@@ -60,9 +78,35 @@ def test_a_pose_is_refined_in_its_own_evidence(legs_undecided) -> None:
     _, own = own_of(searcher, seen, wrong)
     off = true.copy()
     off[:3] += 0.03
-    found, cost = own.refined(off, 6, (0.12, 0.035))
-    assert cost < own.cost_with_prior(off)
-    assert cost == own.cost_with_prior(found)
+    found = own.refined(off, 6, (0.12, 0.035))
+    assert own.cost_with_prior(found) < own.cost_with_prior(off)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+def test_a_gain_weighs_the_evidence_of_both_poses(legs_undecided, share) -> None:
+    searcher, seen, true, wrong = legs_undecided
+    _, own = own_of(searcher, seen, wrong)
+    in_wrong, in_true = (
+        own_of(searcher, seen, at)[0].costs_with_prior(np.array([wrong, true]))
+        for at in (wrong, true)
+    )
+    cost_wrong = (1.0 - share) * in_wrong[0] + share * in_true[0]
+    cost_true = (1.0 - share) * in_true[1] + share * in_wrong[1]
+    gain = own.gain(wrong, true, other_share=share)
+    assert gain == pytest.approx(cost_wrong - cost_true)
+    assert own.gain(true, wrong, other_share=share) == pytest.approx(-gain)
+    assert own.gain(true, true, other_share=share) == 0.0
+
+
+def test_a_pose_without_an_undecided_arm_misses_nothing_in_its_own_evidence(
+    arm_undecided,
+) -> None:
+    """In the evidence of the other pose it misses the arm."""
+    searcher, seen, raised, beside = arm_undecided
+    _, own = own_of(searcher, seen, raised)
+    alone = own.gain(raised, beside)
+    assert alone > -0.01
+    assert own.gain(raised, beside, other_share=0.5) < alone - 0.01
 
 
 def test_the_evidence_of_a_pose_is_decided_once(legs_undecided, monkeypatch) -> None:
@@ -75,12 +119,11 @@ def test_the_evidence_of_a_pose_is_decided_once(legs_undecided, monkeypatch) -> 
         return decide(imaged, cameras, body, pose)
 
     monkeypatch.setattr("markerless_tracker.tracking.candidates.own_evidence.decide", counted)
-    first, again, other = (
-        own.cost_with_prior(true),
-        own.cost_with_prior(true.copy()),
-        own.cost_with_prior(wrong),
-    )
-    assert first == again != other and len(poses) == 2
+    first = own.cost_with_prior(true)
+    assert own.cost_with_prior(true.copy()) == first != own.cost_with_prior(wrong)
+    assert len(poses) == 2
+    own.gain(wrong, true, other_share=0.5)
+    assert len(poses) == 2
 
 
 def test_without_undecided_pixels_all_poses_share_the_evidence(legs_undecided) -> None:

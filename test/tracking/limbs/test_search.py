@@ -18,7 +18,12 @@ from markerless_tracker.tracking.candidates.recombination import Recombiner
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.limbs import search as search_module
 from markerless_tracker.tracking.limbs.rivals import rival_of
-from markerless_tracker.tracking.limbs.search import CLOSE, LimbSearch, other_limb
+from markerless_tracker.tracking.limbs.search import (
+    ARMS_SHARE,
+    CLOSE,
+    LimbSearch,
+    other_limb,
+)
 from markerless_tracker.tracking.search import Searcher
 
 SEARCH = "markerless_tracker.tracking.limbs.search"
@@ -116,8 +121,8 @@ def test_the_prior_moves_a_limb_only_where_the_evidence_allows_it(
     frame = SimpleNamespace(costs_with_prior=costs, refined=lambda poses, *_: poses)
     own = SimpleNamespace(
         undecided=frame, differs=undecided, body=body,
-        refined=lambda pose, *_: (pose, costs(pose[None])[0]),
-        cost_with_prior=lambda pose: costs(pose[None])[0],
+        refined=lambda pose, *_: pose,
+        gain=lambda pose, other, **_: costs(pose[None])[0] - costs(other[None])[0],
     )  # fmt: skip
     monkeypatch.setattr(f"{SEARCH}.prior_costs", priors)
     monkeypatch.setattr(f"{SEARCH}.distance_m", lambda *_: moved_m)
@@ -132,6 +137,24 @@ def test_the_prior_moves_a_limb_only_where_the_evidence_allows_it(
     assert search.rival is not None and expected is not None
     np.testing.assert_array_equal(search.rival.moved, -moved if taken else moved)
     assert search.rival.probability == pytest.approx(expected.probability)
+
+
+def test_the_other_evidence_counts_for_arms_alone(bent, monkeypatch) -> None:
+    body, estimate, other = bent[0].body, bent[2], bent[3]
+    shares: list[float] = []
+    frame = SimpleNamespace(
+        costs_with_prior=lambda poses: np.zeros(len(poses)), refined=lambda poses, *_: poses
+    )
+    own = SimpleNamespace(
+        undecided=frame, differs=True, body=body, refined=lambda pose, *_: pose,
+        gain=lambda *_, other_share: shares.append(other_share) or 0.1,
+    )  # fmt: skip
+    monkeypatch.setattr(f"{SEARCH}.other_limb", lambda *_, **__: (other, 0.0))
+    for name in body.limbs:
+        search = LimbSearch(Recombiner(body, body.limits), frame, own, estimate, 0.001)
+        assert search.elsewhere(body.subspaces[name], keyed_generator(0, 0, name), None)
+        assert shares == ([ARMS_SHARE] * 2 if name.endswith("arm") else [0.0] * 2)
+        shares.clear()
 
 
 @pytest.mark.parametrize("thorough", [True, False])
@@ -197,11 +220,6 @@ def test_poses_are_compared_with_the_prior_of_their_limbs(bent, monkeypatch) -> 
     prior = 0.25
     assert own.cost_with_prior(true) == pytest.approx(plain + 0.25)
     assert frame.total_costs(true[None])[0] >= frame.costs(true[None])[0] + 0.25
-    search = LimbSearch(Recombiner(searcher.body, searcher.limits), frame, own, true, 0.003)
-    assert search.own_cost == pytest.approx(plain + 0.25)
-    found, cost = own.refined(true, 3, (0.1, 0.03))
-    prior = 0.0
-    assert cost == pytest.approx(own.cost_with_prior(found) + 0.25)
 
 
 @pytest.mark.parametrize(("floor_sd_m", "found"), [(0.03, True), (0.0, False)])

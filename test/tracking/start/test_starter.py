@@ -10,6 +10,8 @@ from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig, build_tracker
+from markerless_tracker.tracking.candidates.crossed import in_each_others_place, is_crossed
+from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.evidence.hull import find_hulls
 from markerless_tracker.tracking.start.starter import GAP_NS
 from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
@@ -67,6 +69,34 @@ def test_the_stature_need_not_be_known(walk) -> None:
     body = tracker.body
     tall = {m: markers(b, b.neutral)[2, 2] for m, b in (("it", body), ("true", scene.body))}
     assert abs(tall["it"] - tall["true"]) < 0.10
+
+
+def crossing(searcher, population):
+    """The best pose of a population with crossed legs, and as it is."""
+    best = population.poses[0]
+    legs = in_each_others_place(searcher.body, best, "legs", searcher.limits)
+    assert is_crossed(searcher.body, legs, "legs")
+    poses, headings = np.array([legs, best]), population.headings[[0, 0]]
+    return replace(population, poses=poses, costs=np.array([0.0, 0.1]), headings=headings)
+
+
+def test_crossed_legs_of_the_search_give_way_to_uncrossed_ones(walk, monkeypatch) -> None:
+    scene, taken = walk
+    tracker = tracker_of(scene, stature=1.72)
+
+    def exchanged(frame, population, generation):
+        return crossing(frame._searcher, population)
+
+    monkeypatch.setattr(FramePopulation, "with_exchanged_pairs", exchanged)
+    for stamp, seen, _ in taken[6:8]:
+        result = tracker.step(seen, stamp)
+        assert not is_crossed(tracker.body, result.pose, "legs")
+
+        def recombined(frame, population, generation, *, fraction):
+            return crossing(frame._searcher, population)
+
+        # From now on each frame's generation ends with crossed legs.
+        monkeypatch.setattr(FramePopulation, "recombined", recombined)
 
 
 def test_how_usual_the_limbs_are_counts_for_the_heading(walk, monkeypatch) -> None:
