@@ -2,9 +2,9 @@
 
     python bench/changed_images.py RECORDING... [--changes dark,noisy,grey,pale,flicker,blurred]
 
-Each recording folder is copied with its videos and backgrounds changed, then tracked, and compared
-with its `ground_truth.trc` without the first 30 frames. Printed: mean error and largest error of a
-joint, mm.
+The videos (.mp4) of each recording folder and of its backgrounds are changed in a copy, which is
+tracked and compared with `ground_truth.trc`, without the first 30 frames. Printed: mean error and
+largest error of a joint, mm.
 """
 
 import argparse

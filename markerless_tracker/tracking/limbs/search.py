@@ -126,8 +126,8 @@ class LimbSearch:
             other = self._own.refined(other, *_REFINE)
             gain = self._own.gain(self.pose, other, other_share=share)
             if gain > least_gain:
-                refined_too = self._own.refined(self.pose, *_REFINE)
-                gain = min(gain, self._own.gain(refined_too, other, other_share=share))
+                mine = self._own.refined(self.pose, *_REFINE)
+                gain = min(gain, self._own.gain(mine, other, other_share=share))
         better = gain > least_gain and gain > self._least_gain_of(other)
         return other, gain, better
 
