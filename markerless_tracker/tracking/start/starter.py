@@ -69,9 +69,8 @@ class Starter:
     tried if it is unknown). The best ones are refined, recombined and refined again; if they fit
     poorly, once more with a cost of unusual postures, by which the poses of both searches are
     compared. Legs and arms are tried in each other's place, and in every frame crossed ones are
-    compared with uncrossed ones (`uncrossed`). The opposite heading is propagated,
-    too, until one is kept (`two_headings`). The fit of the body is then left to the caller
-    (`settling`).
+    compared with uncrossed ones (`uncrossed`). The opposite heading is propagated, too, until one
+    is kept (`two_headings`). The fit of the body is then left to the caller (`settling`).
 
     Args:
         rig: the cameras.
@@ -209,7 +208,8 @@ class Starter:
             population = uncrossed(own, frame, population, self._best)
             self._population, self._stamp_ns = population, stamp_ns
             self._note(own, frame, population, stamp_ns)
-            return StartEstimate(self._searcher, population.poses[0], observations, False)
+            leading = self._best(population).poses[0]
+            return StartEstimate(self._searcher, leading, observations, False)
         return None
 
     def _moved(self, population: Population, observed: Mapping[str, Observation]) -> Population:
