@@ -1,6 +1,7 @@
 """How `track` does on recordings whose images were made worse, with nothing given.
 
     python bench/changed_images.py RECORDING... [--changes dark,noisy,grey,pale,flicker,blurred]
+        [--seed 0]
 
 The videos (.mp4) of each recording folder and of its backgrounds are changed in a copy, which is
 tracked and compared with `ground_truth.trc`, without the first 30 frames. Printed: mean error and
@@ -59,9 +60,11 @@ def changed(
     return np.clip(np.rint(found), 0.0, 255.0).astype(np.uint8)
 
 
-def copy_video(source: Path, target: Path, change: Change, camera: int, moves: bool) -> None:
+def copy_video(
+    source: Path, target: Path, change: Change, camera: int, *, moves: bool, seed: int
+) -> None:
     """Copy a video as Motion JPEG with changed images; the light changes only if it `moves`."""
-    rng = np.random.default_rng([camera, moves])
+    rng = np.random.default_rng([camera, moves, seed])
     video = cv2.VideoCapture(str(source))
     size_px = [int(video.get(p)) for p in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)]
     codec = cv2.VideoWriter.fourcc(*"MJPG")
@@ -74,7 +77,7 @@ def copy_video(source: Path, target: Path, change: Change, camera: int, moves: b
     out.release()
 
 
-def copy_recording(source: Path, target: Path, change: Change) -> None:
+def copy_recording(source: Path, target: Path, change: Change, seed: int) -> None:
     """Copy a folder with videos of cameras and of their backgrounds."""
     (target / "background").mkdir(parents=True)
     for name in (TRUTH, "calibration.toml"):
@@ -82,7 +85,7 @@ def copy_recording(source: Path, target: Path, change: Change) -> None:
     for folder in (source, source / "background"):
         for camera, path in enumerate(sorted(folder.glob("*.mp4"))):
             where = target / path.relative_to(source).with_suffix(".avi")
-            copy_video(path, where, change, camera, moves=folder == source)
+            copy_video(path, where, change, camera, moves=folder == source, seed=seed)
 
 
 def run() -> None:
@@ -90,12 +93,13 @@ def run() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("recordings", nargs="+", type=Path)
     parser.add_argument("--changes", default=",".join(CHANGES), help="names, with commas")
+    parser.add_argument("--seed", type=int, default=0, help="of the noise")
     args = parser.parse_args()
     for recording in args.recordings:
         for name in args.changes.split(","):
             with tempfile.TemporaryDirectory() as made:
                 folder, out = Path(made) / recording.name, Path(made) / "out.trc"
-                copy_recording(recording, folder, CHANGES[name])
+                copy_recording(recording, folder, CHANGES[name], args.seed)
                 with redirect_stdout(StringIO()):
                     main(["track", str(folder), "-o", str(out)])
                 with redirect_stdout(StringIO()) as printed:

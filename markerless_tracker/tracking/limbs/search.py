@@ -72,7 +72,7 @@ class LimbSearch:
         thorough: as for `other_limb`.
 
     Attributes:
-        pose: (p,) the estimate so far.
+        pose: (p,) the estimate so far; assigned to take another one.
         rival: the place that the last search of a limb did not take: the best other one, or the
             former one; None if there is none.
     """
@@ -150,12 +150,8 @@ class LimbSearch:
         found, gain = self.compared(other, close)
         if gain < least_gain:
             return False
-        self.take(found)
+        self.pose = found
         return True
-
-    def take(self, other: FloatArray) -> None:
-        """Take another pose (p,)."""
-        self.pose = other
 
     def cheapest(self, others: FloatArray) -> int:
         """Which of other poses (n, p) costs least, not refined."""

@@ -159,7 +159,7 @@ class LimbWatch:
         if due.facing:
             rotated = self._schedule.facing.compare(search, searcher.body, searcher.limits)
             if rotated is not None:
-                search.take(rotated)
+                search.pose = rotated
                 return True
         for other in due.walking:
             if search.take_if_better(other, WALKING_GAIN, WALKING_CLOSE):
@@ -175,7 +175,7 @@ class LimbWatch:
         schedule = self._schedule.exchange
         if not schedule.add_comparison(pair.name, gain, pair.least_gains[best], moved_m):
             return False
-        search.take(other)
+        search.pose = other
         return True
 
     def _search_limb(

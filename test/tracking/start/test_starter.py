@@ -11,6 +11,7 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig, build_tracker
 from markerless_tracker.tracking.candidates.crossed import in_each_others_place, is_crossed
+from markerless_tracker.tracking.candidates.mirror import opposite_heading
 from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.evidence.hull import find_hulls
 from markerless_tracker.tracking.start.starter import GAP_NS
@@ -97,6 +98,22 @@ def test_crossed_legs_of_the_search_give_way_to_uncrossed_ones(walk, monkeypatch
 
         # From now on each frame's generation ends with crossed legs.
         monkeypatch.setattr(FramePopulation, "recombined", recombined)
+
+
+def test_the_first_frame_keeps_the_heading_of_the_search(walk, monkeypatch) -> None:
+    """Also if the best pose that is left without crossed legs faces the other way."""
+    scene, taken = walk
+    stamp, seen, points = taken[0]
+
+    def reversed_first(own, frame, population, leading_of):
+        best = population.poses[0]
+        poses = np.array([opposite_heading(own.body).of(best), best])
+        headings = population.headings[[0, 0]] + (np.pi, 0.0)
+        return replace(population, poses=poses, costs=np.array([0.0, 0.1]), headings=headings)
+
+    monkeypatch.setattr(f"{STARTER}.uncrossed", reversed_first)
+    result = tracker_of(scene, stature=1.72).step(seen, stamp)
+    assert heading_difference(heading(result.markers_m), heading(points)) < 0.5
 
 
 def test_how_usual_the_limbs_are_counts_for_the_heading(walk, monkeypatch) -> None:

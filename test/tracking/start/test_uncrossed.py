@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.candidates.crossed import in_each_others_place, is_crossed
@@ -14,14 +13,10 @@ from markerless_tracker.tracking.start.uncrossed import uncrossed
 
 
 @pytest.fixture(scope="module")
-def stride():
+def stride(take_frames):
     """A person in mid stride; the pose, and that with each leg in the other's place."""
     scene = SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=3)
-    _, masks, pose = scene.frame(12)
-    seen = {
-        name: Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-        for name, mask in masks.items()
-    }
+    pose, [(_, seen, _)] = scene.frame(12)[2], take_frames(scene, [12])
     body, config = scene.body, TrackerConfig(threads=1)
     searcher = Searcher(scene.rig, body, config, limits=body.limits, threads=1)
     frame = FramePopulation(searcher, seen, 0, pose)
@@ -37,7 +32,7 @@ def population_of(poses):
 
 def test_uncrossed_legs_take_the_place_of_crossed_ones(stride) -> None:
     frame, own, pose, crossed = stride
-    found = uncrossed(own, frame, population_of([crossed, pose]), lambda all_of_them: all_of_them)
+    found = uncrossed(own, frame, population_of([crossed, pose]), lambda poses: poses)
     assert len(found) == 1 and not is_crossed(own.body, found.poses[0], "legs")
     assert found.costs[0] <= frame.total_costs(crossed[None])[0]
 
