@@ -243,12 +243,16 @@ def live(world: World, tmp_path_factory: pytest.TempPathFactory, tools: Any) -> 
 
 @pytest.fixture
 def begin(world: World, other_domain: None, start: Any, peer: Any) -> Callable[..., Live]:
-    """Start a tracker of the test's own, with further parameters (None: left out)."""
+    """Start a tracker of the test's own, with further parameters (None: left out).
+
+    With `threads=0`, the default of the node, it tracks in a process of its own, which takes twice
+    as long to start: for tests of what crosses to that process or ends it.
+    """
 
     def begun(
         *, reliable: bool = True, environment: Any = None, camera: Any = None, **parameters: Any
     ) -> Live:
-        given = {**world.parameters(), **parameters}
+        given = {**world.parameters(), "threads": 1, **parameters}
         given = {name: value for name, value in given.items() if value is not None}
         process = start("tracker", environment=environment, **given)
         return Live(peer, process, world, reliable=reliable, **(camera or {}))

@@ -24,7 +24,7 @@ def test_the_background_is_learned_from_the_empty_scene(
 ) -> None:
     folder = tmp_path / "background"
     shutil.copytree(world.folder / "background", folder)
-    live = begin(background_dir=folder, learn_background_sets=4)
+    live = begin(background_dir=folder, learn_background_sets=4, threads=0)
     client = peer.node.create_client(Trigger, "tracker/learn_background")
     live.until(client.service_is_ready, "the service")
 

@@ -18,7 +18,7 @@ from markerless_tracker.results.journal import read_summary
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_completes_the_result(number: int, tmp_path: Path, begin: Any) -> None:
-    live = begin(result_file=tmp_path / "new" / "name.of")
+    live = begin(result_file=tmp_path / "new" / "name.of", threads=0)
     stamps = [live.world.scene.stamp_ns(live.track()) for _ in range(2)]
     live.process.signal(number)
     assert live.process.wait() == 0, live.process.output
@@ -36,7 +36,7 @@ def test_a_signal_completes_the_result(number: int, tmp_path: Path, begin: Any) 
 
 
 def test_a_killed_node_leaves_every_row(tmp_path: Path, begin: Any) -> None:
-    live = begin(result_file=tmp_path / "walk")
+    live = begin(result_file=tmp_path / "walk", threads=0)
     stamps = [live.world.scene.stamp_ns(live.track()) for _ in range(3)]
     used = live.process.shared_memory()
     live.process.signal(signal.SIGKILL)

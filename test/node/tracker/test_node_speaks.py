@@ -15,7 +15,7 @@ from markerless_tracker.node.health import Level
 
 
 def test_a_run_from_ready_to_the_result(tmp_path: Path, begin: Any, scenes: Any) -> None:
-    live = begin(result_file=tmp_path / "walk")
+    live = begin(result_file=tmp_path / "walk", threads=0)
     live.until(lambda: "ready, " in live.process.output, "ready in the log")
     log = live.process.output
     assert re.search(r"ready, waiting for images; \d+ kernels compiled, \d+\.\d s", log), log

@@ -108,7 +108,7 @@ def test_the_report_is_compiled_before_the_node_is_ready(
 
     warmed: list[str] = []
     monkeypatch.setattr(StaticSilhouette, "warm_up", lambda _, body: warmed.append(body.name))
-    given = {key: str(value) for key, value in world.parameters().items()}
+    given = {key: str(value) for key, value in world.parameters().items()} | {"threads": 1}
     overrides = [Parameter(name, value=value) for name, value in given.items()]
     node = TrackerNode(context=ros_context, parameter_overrides=overrides)
     try:

@@ -172,7 +172,7 @@ def test_a_mixed_graph_gives_the_poses_of_images(
     only.mkdir()
     for name in ("cam01", "cam03", "cam04"):
         (only / name).symlink_to(world.folder / "background" / name)
-    live = begin(background_dir=only, evidence_cameras="[cam02]", **shared)
+    live = begin(background_dir=only, evidence_cameras="[cam02]", threads=0, **shared)
 
     def counted() -> dict[str, str]:
         said = [s for m in live.diagnostics for s in m.status]

@@ -71,7 +71,7 @@ def test_eight_cameras_behind_a_link_that_loses_frames_give_the_poses_of_images(
 def test_a_signal_while_a_person_is_searched_ends_with_whole_files(
     tmp_path: Path, begin: Any
 ) -> None:
-    live = begin(start_file=None, result_file=tmp_path / "walk")
+    live = begin(start_file=None, result_file=tmp_path / "walk", threads=0)
     live.camera.send(0)
     live.until(lambda: live.value("activity") == "processing images", "the search to begin")
     live.process.signal(signal.SIGTERM)
@@ -82,11 +82,11 @@ def test_a_signal_while_a_person_is_searched_ends_with_whole_files(
 
 @pytest.mark.long
 def test_a_killed_tracker_that_is_started_again_goes_on(tmp_path: Path, begin: Any) -> None:
-    live = begin(result_file=tmp_path / "first")
+    live = begin(result_file=tmp_path / "first", threads=0)
     before = [live.world.scene.stamp_ns(live.track()) for _ in range(4)]
     live.process.signal(signal.SIGKILL)
     live.process.wait()
-    again = begin(result_file=tmp_path / "second")
+    again = begin(result_file=tmp_path / "second", threads=0)
     again.next = live.next
     after = [again.world.scene.stamp_ns(again.track()) for _ in range(4)]
     again.process.signal(signal.SIGINT)

@@ -41,9 +41,8 @@ def seen(
     rclpy.init(context=context, args=[])
     peer = tools.Peer(context)
     log = tmp_path_factory.mktemp("frames") / "tracker.log"
-    process = tools.Process(
-        "tracker", log, {**world.parameters(), "frame_prefix": "one/", "human_id": "p1"}, tf2_msgs
-    )
+    named = {"frame_prefix": "one/", "human_id": "p1", "threads": 1}
+    process = tools.Process("tracker", log, {**world.parameters(), **named}, tf2_msgs)
     try:
         live = scenes.Live(peer, process, world)
         live.frames = peer.collect(TFMessage, "/tf", image_qos(depth=100))
