@@ -4,6 +4,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+# ruff: noqa: E402
+from markerless_tracker.libraries import single_threaded
+
+# As the programs do, before NumPy is imported: the tests' matrices are as small as theirs.
+single_threaded()
+
 import numpy as np
 import pytest
 from hypothesis import settings
