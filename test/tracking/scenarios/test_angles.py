@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from markerless_tracker.body import load_body
 from markerless_tracker.body.anatomy import posture
@@ -67,11 +68,16 @@ def standing(name) -> FloatArray:
     return pose
 
 
-def seen(pose, index) -> dict[str, Observation]:
-    """Silhouettes with noisy edges."""
+def shown(pose) -> list[NDArray[np.uint8]]:
+    """Exact silhouettes in all cameras."""
+    return [silhouette(BODY, pose, camera).astype(np.uint8) for camera in RIG]
+
+
+def seen(masks, index) -> dict[str, Observation]:
+    """The silhouettes with noisy edges."""
     square, views = np.ones((3, 3), np.uint8), {}
-    for number, camera in enumerate(RIG):
-        mask = silhouette(BODY, pose, camera).astype(np.uint8)
+    for number, (camera, exact) in enumerate(zip(RIG, masks, strict=True)):
+        mask = exact.copy()
         rng = np.random.default_rng([number, index])
         edge = cv2.dilate(mask, square) != cv2.erode(mask, square)
         mask[edge & (rng.random(mask.shape) < EDGE_NOISE)] ^= 1
@@ -92,12 +98,14 @@ def track(pose, frames, turn_rad_s=0.0) -> Run:
     tracker = Tracker(RIG, BODY, config, start_pose=start)
     readers = AngleReader(BODY), AngleReader(BODY)
     heading = BODY.index("pelvis_rz")
-    rows = []
+    rows, masks = [], shown(pose)
     for index in range(frames):
         true = pose.copy()
         true[heading] += turn_rad_s * index / FPS
+        if turn_rad_s:
+            masks = shown(true)
         stamp_ns = round(index * 1e9 / FPS)
-        result = tracker.step(seen(true, index), stamp_ns)
+        result = tracker.step(seen(masks, index), stamp_ns)
         found = readers[1].read(result.pose, stamp_ns, result.confidence.covariance)
         rows.append((readers[0].read(true, stamp_ns).values_rad, found.values_rad, found.sd_rad))
     settled = np.rad2deg(np.array(rows[SETTLED:])).transpose(1, 0, 2)
