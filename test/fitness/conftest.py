@@ -83,12 +83,13 @@ class Twin:
         rows = np.flatnonzero((v >= hull[:, 1].min()) & (v <= hull[:, 1].max()))
         if columns.size == 0 or rows.size == 0:
             return inside
-        grid_u, grid_v = np.meshgrid(u[columns], v[rows])
-        within = np.ones(grid_u.shape, dtype=np.bool_)
+        u, v = u[columns], v[rows, None]
+        within = np.ones((rows.size, columns.size), dtype=np.bool_)
         following = np.roll(hull, -1, axis=0)
         turn = np.sign(np.sum(hull[:, 0] * following[:, 1] - hull[:, 1] * following[:, 0]))
         for (pu, pv), (qu, qv) in zip(hull, following, strict=True):
-            within &= turn * ((qu - pu) * (grid_v - pv) - (qv - pv) * (grid_u - pu)) >= 0.0
+            # The sign of the cross product, by row and by column.
+            within &= turn * ((qu - pu) * (v - pv)) >= turn * ((qv - pv) * (u - pu))
         inside[np.ix_(rows, columns)] = within
         return inside
 
