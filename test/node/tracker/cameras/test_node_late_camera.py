@@ -14,7 +14,7 @@ from markerless_tracker.synthesis.scene import SyntheticScene
 
 FPS = 100.0 / 3.0
 LATE_NS = 30_000_000
-MOST_SETS = 900
+MOST_FRAMES = 900
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def test_a_late_camera_is_told_with_the_parameter_that_corrects_it(walking: Any)
     live = walking()
     says = "images are late, by the person's motion: cam02 by +"
     while says not in live.process.output:
-        assert live.next < MOST_SETS, live.values
+        assert live.next < MOST_FRAMES, live.values
         send(live, live.next - 1, live.camera.scene.stamp_ns(live.next))
     assert 18.0 < float(live.value("late_ms/cam02")) < 36.0
     assert float(live.value("late_sd_ms/cam02")) < 9.0
@@ -67,7 +67,7 @@ def test_a_late_camera_is_told_with_the_parameter_that_corrects_it(walking: Any)
 def test_a_late_camera_that_is_corrected_is_in_step(walking: Any) -> None:
     live = walking(stamp_offsets="[0.0, 0.03, 0.0, 0.0]")
     while live.value("late_ms/cam02") in ("", "nan"):
-        assert live.next < MOST_SETS, live.values
+        assert live.next < MOST_FRAMES, live.values
         send(live, live.next, live.camera.scene.stamp_ns(live.next) + LATE_NS)
     assert abs(float(live.value("late_ms/cam02"))) < 6.0
     assert "images are late" not in live.process.output
