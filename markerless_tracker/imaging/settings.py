@@ -77,7 +77,7 @@ class ShadowSettings(SettingsGroup):
         "not counted; false: they are background",
     )
     weak_sigmas: float = setting(
-        2.0,
+        1.0,
         "patches whose mean differs from the background by so many sigmas are undecided; 0 = none",
         least=0.0,
         most=1000.0,

@@ -3,6 +3,7 @@
 import math
 
 import cv2
+import numpy as np
 
 from markerless_tracker.imaging.masks import SOLID, Mask, disc
 from markerless_tracker.imaging.region import Region
@@ -12,11 +13,20 @@ from markerless_tracker.imaging.settings import ImagingSettings
 
 # In images of at least this size, lengths in pixels are used unscaled.
 FULL_FRAME_PX = 640 * 480
+_WIDE = np.ones((5, 5), dtype=np.uint8)
+"""Least width of a patch in which weak pixels mix with others, and of solid foreground."""
+_SOLID_RADIUS_PX, _WIDE_RADIUS_PX = 2, 4
+"""Radii of the pixels that an opening or closing by `SOLID` and by `_WIDE` depends on."""
 
 
 def opening_radius_px(settings: ImagingSettings, *, grey: bool) -> int:
-    """Radius of the labels that `shadow_patches` depends on, px, besides the size of patches."""
-    return 2 if grey or settings.shadow.undecided else 0
+    """Radius of the labels that patches depend on, px, besides the size of patches.
+
+    The patches are those of `shadow_patches`, `fill_specks` and `add_mixed_patches`.
+    """
+    if settings.shadow.undecided:
+        return _SOLID_RADIUS_PX + 2 * _WIDE_RADIUS_PX
+    return _SOLID_RADIUS_PX if grey else 0
 
 
 def shadow_patches(
@@ -48,6 +58,42 @@ def shadow_patches(
     if least_px <= 1.0:
         return False
     return clear_small(shadow, least_px, connectivity=4, zone=zone, need=need, unknown=unknown)
+
+
+def fill_specks(labels: Mask) -> None:
+    """Label weak pixels between foreground pixels as foreground, in place.
+
+    In a noisy image only some pixels of clothes like the background differ from it by themselves;
+    the patches around the others do. Opened, such a mixture would be background.
+
+    Args:
+        labels: (h, w) uint8, as of `labels.PixelLabeller`.
+    """
+    fill = cv2.morphologyEx(_foreground(labels), cv2.MORPH_CLOSE, SOLID)
+    cv2.bitwise_and(fill, cv2.inRange(labels, (WEAK,), (WEAK,)), dst=fill)
+    cv2.bitwise_or(labels, fill, dst=labels)
+
+
+def add_mixed_patches(labels: Mask, shadow: Mask) -> None:
+    """Add the weak pixels of patches in which they mix with shadow and specks of foreground.
+
+    An opening of the shadow alone removes them. Such patches are wide, unlike the seam of partly
+    covered pixels around a body.
+
+    Args:
+        labels: (h, w) uint8, as of `labels.PixelLabeller`.
+        shadow: (h, w) uint8, 0 or 255, of `shadow_patches`; changed.
+    """
+    solid = cv2.morphologyEx(_foreground(labels), cv2.MORPH_OPEN, _WIDE)
+    loose = cv2.subtract(cv2.threshold(labels, 0, 255, cv2.THRESH_BINARY)[1], solid)
+    wide = cv2.morphologyEx(loose, cv2.MORPH_OPEN, _WIDE)
+    cv2.bitwise_and(wide, cv2.inRange(labels, (WEAK,), (WEAK,)), dst=wide)
+    cv2.bitwise_or(shadow, wide, dst=shadow)
+
+
+def _foreground(labels: Mask) -> Mask:
+    found = cv2.threshold(labels, SHADOW, 255, cv2.THRESH_BINARY)[1]
+    return np.asarray(found, dtype=np.uint8)
 
 
 SPLIT_RADIUS_PX = 3

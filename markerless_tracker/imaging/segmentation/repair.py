@@ -11,7 +11,12 @@ from markerless_tracker.imaging.segmentation.border import trim_border
 from markerless_tracker.imaging.segmentation.kernels import WEAK
 from markerless_tracker.imaging.segmentation.labels import PixelLabeller
 from markerless_tracker.imaging.segmentation.level_set import refine_contour
-from markerless_tracker.imaging.segmentation.morphology import open_and_close, shadow_patches
+from markerless_tracker.imaging.segmentation.morphology import (
+    add_mixed_patches,
+    fill_specks,
+    open_and_close,
+    shadow_patches,
+)
 from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
 
@@ -34,7 +39,8 @@ def repair_mask(
     With three classes the mask holds shadows, too.
 
     Args:
-        labels: (h, w) uint8 of `zones.window`, from `labels.PixelLabeller`.
+        labels: (h, w) uint8 of `zones.window`, from `labels.PixelLabeller`; with three classes
+            `fill_specks` changes them.
         mask: (h, w) uint8, written: 0 or 255; correct only within `zones.zone`.
         shadow: (h, w) uint8, written: 0 or 255, patches of shadow.
         zones: the place of the labels in the image, and where the mask is needed.
@@ -46,16 +52,21 @@ def repair_mask(
         False if the size of a needed patch is unknown, as it may continue outside the zone.
     """
     frame_px, window = zones.frame_px, zones.window
-    opened = settings.shadow.undecided or (grey and least_shadow_px > 1.0)
+    undecided = settings.shadow.undecided
+    if undecided:
+        fill_specks(labels)
+    opened = undecided or (grey and least_shadow_px > 1.0)
     if shadow_patches(
         labels, shadow, least_shadow_px, opened=opened,
         zone=zones.zone_before_repair.relative_to(window),
         need=zones.patches_before_repair.relative_to(window), unknown=zones.open_sides,
     ):  # fmt: skip
         return False
+    if undecided:
+        add_mixed_patches(labels, shadow)
     # Weak pixels count in large patches only, since small ones are noise.
     cv2.threshold(labels, WEAK, 255, cv2.THRESH_BINARY, dst=mask)
-    if settings.shadow.undecided:
+    if undecided:
         cv2.bitwise_or(mask, shadow, dst=mask)
     else:
         cv2.subtract(mask, shadow, dst=mask)

@@ -44,6 +44,7 @@ def peopled(room: np.ndarray) -> np.ndarray:
     image[12:18, 150:190] = (20, 210, 230)
     image[140:150, 170:185] *= 0.7
     image[20:90, 125:185] += 5.0
+    image[100:135, 140:180] = np.linspace(6.0, 18.0, 35)[:, None, None] + room[100:135, 140:180]
     image[10:90, 15:60] -= np.linspace(0.0, 12.0, 45)[:, None]
     return np.asarray(image)
 
@@ -114,6 +115,20 @@ def test_a_patch_nearly_of_the_backgrounds_colour_is_undecided(channels: int, st
     away[24:96, 44:116] = False
     assert not undecided[away].any()
     assert not person[away].any() and (person > 0).mean() < 1e-3
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("step", range(6, 25, 2))
+def test_clothes_of_which_the_noise_hides_some_pixels_are_not_background(
+    channels: int, step: float
+) -> None:
+    """Some of their pixels differ clearly, the others do not: no class covers them alone."""
+    segmenter = learned(flat(120.0, channels), PLAIN)
+    image = flat(120.0, channels)
+    image[30:90, 50:110] += step
+    person, undecided = segmenter.classes(with_noise(image, 50))
+    assert ((person | undecided)[32:88, 52:108] > 0).mean() > 0.97
+    assert ((person | undecided) > 0).sum() < 1.1 * 60 * 60
 
 
 @pytest.mark.parametrize("channels", [1, 3])

@@ -7,8 +7,10 @@ from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.imaging.segmentation.blobs import clear_small, fill_small
 from markerless_tracker.imaging.segmentation.morphology import (
     SPLIT_RADIUS_PX,
+    add_mixed_patches,
     clean_mask,
     closing_px,
+    fill_specks,
     shadow_patches,
     split_undecided,
 )
@@ -98,6 +100,43 @@ def test_threads_of_a_patch_are_opened_away() -> None:
     opened = patches(labels, 50, opened=True)
     assert not opened[70, 80] and opened[105, 100]
     assert patches(labels, 50, opened=False)[70, 80]
+
+
+def test_weak_pixels_between_foreground_pixels_are_foreground() -> None:
+    labels = np.zeros((40, 60), np.uint8)
+    labels[10:30, 10:30] = 64
+    labels[10:30:2, 10:30:2] = 255  # every second pixel of clothes like the background
+    labels[20, 40] = 64  # alone
+    fill_specks(labels)
+    assert (labels[11:28, 11:28] == 255).all()
+    assert labels[20, 40] == 64 and not labels[:, 31:40].any()
+
+
+def test_shadow_between_foreground_pixels_stays() -> None:
+    labels = np.full((40, 60), 127, np.uint8)
+    labels[::2, ::2] = 255
+    before = labels.copy()
+    fill_specks(labels)
+    np.testing.assert_array_equal(labels, before)
+
+
+def test_weak_pixels_of_a_wide_mixture_are_a_patch() -> None:
+    labels = np.zeros((60, 60), np.uint8)
+    labels[10:40, 10:40] = 64
+    labels[10:40:3, 10:40] = 255  # stripes, between which an opening leaves nothing
+    assert not patches(labels, 0, opened=True).any()
+    shadow = np.zeros_like(labels)
+    add_mixed_patches(labels, shadow)
+    np.testing.assert_array_equal(shadow[12:38, 10:40] > 0, labels[12:38, 10:40] == 64)
+    assert not shadow[labels == 0].any()
+
+
+def test_a_seam_around_the_body_is_no_mixture() -> None:
+    labels = np.where(cv2.dilate(body(), np.ones((3, 3), np.uint8)) > 0, 64, 0).astype(np.uint8)
+    labels[body() > 0] = 255
+    shadow = np.zeros_like(labels)
+    add_mixed_patches(labels, shadow)
+    assert not shadow.any()
 
 
 def split(either: np.ndarray, shadow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
