@@ -132,6 +132,15 @@ def test_clothes_of_which_the_noise_hides_some_pixels_are_not_background(
 
 
 @pytest.mark.parametrize("channels", [1, 3])
+def test_clothes_of_which_half_of_the_pixels_differ_are_a_person(channels: int) -> None:
+    segmenter = learned(flat(120.0, channels), PLAIN)
+    image = flat(120.0, channels)
+    image[30:90, 50:110] += 12.0
+    person, _ = segmenter.classes(with_noise(image, 50))
+    assert (person[32:88, 52:108] > 0).mean() > 0.95
+
+
+@pytest.mark.parametrize("channels", [1, 3])
 def test_plain_noise_is_background(channels: int) -> None:
     segmenter = learned(flat(120.0, channels), PLAIN)
     for seed in range(50, 56):
