@@ -11,6 +11,7 @@ from markerless_tracker.imaging.segmentation.morphology import (
     clean_mask,
     closing_px,
     fill_specks,
+    opening_radius_px,
     shadow_patches,
     split_undecided,
 )
@@ -137,6 +138,29 @@ def test_a_seam_around_the_body_is_no_mixture() -> None:
     shadow = np.zeros_like(labels)
     add_mixed_patches(labels, shadow)
     assert not shadow.any()
+
+
+def mixed(labels: np.ndarray) -> np.ndarray:
+    """(h, w): labels after `fill_specks`, plus 1 in shadow patches, mixed ones included."""
+    labels, shadow = labels.copy(), np.empty_like(labels)
+    fill_specks(labels)
+    assert not shadow_patches(labels, shadow, 0, opened=True)
+    add_mixed_patches(labels, shadow)
+    return labels.astype(int) + (shadow > 0)
+
+
+def test_patches_depend_on_labels_within_the_stated_radius() -> None:
+    """So a region of an image gives what the whole image gives."""
+    radius = opening_radius_px(ImagingSettings(), grey=False)
+    rng, classes = np.random.default_rng(5), np.array([0, 64, 127, 255], np.uint8)
+    inside, crop = slice(35, 55), slice(35 - radius, 55 + radius)
+    for _ in range(60):
+        blocks = rng.choice(classes, (23, 23), p=[0.01, 0.3, 0.0, 0.69])
+        labels = np.kron(blocks, np.ones((4, 4), np.uint8))
+        specks = rng.random(labels.shape) < 0.03
+        labels[specks] = rng.choice(classes, int(specks.sum()))
+        found = mixed(labels[crop, crop].copy())[radius:-radius, radius:-radius]
+        np.testing.assert_array_equal(found, mixed(labels)[inside, inside])
 
 
 def split(either: np.ndarray, shadow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
