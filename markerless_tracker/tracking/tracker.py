@@ -37,7 +37,6 @@ from markerless_tracker.tracking.person.resting import at_rest
 from markerless_tracker.tracking.searchers import Searchers
 from markerless_tracker.tracking.stages.effort import Effort
 from markerless_tracker.tracking.stages.frame import frame_stages, swarm_stages
-from markerless_tracker.tracking.start.automatic import AutomaticStart, stages_of
 from markerless_tracker.tracking.start.starter import Starter
 from markerless_tracker.tracking.states import Phase, Track
 
@@ -137,8 +136,6 @@ class Tracker:
             ConfigError: the budget cannot be spent; nothing has changed then.
         """
         frame_stages(self.body, config, self._motion.pose, self.body.sigma)
-        if self._start is not None:
-            self._start.wait()
         self.config = config
         for part in (self._motion, self._body, self._assessor, self._effort, self._correction):
             part.configure(config)
@@ -213,7 +210,6 @@ class Tracker:
                 to a ready-made observation; cameras may be missing. Or the result of `prepare`.
             stamp_ns: time of the images; the search widens with the time since the last step.
             effort: fraction, 0 to 1, of the frames explained as usual that are searched further.
-                Below 1, an automatic start searches beside the steps once it has found a person.
 
         Raises:
             ConfigError: the effort is not between 0 and 1.
@@ -240,13 +236,11 @@ class Tracker:
         evidence = made or self.evidence.segment(views, stamp_ns, outlook)
         predicted = self._motion.predict(stamp_ns, self._body.limits)
         body, cameras = self.body, self._searcher.cameras
-        if self._start is not None and not self._start.follows(late=self._effort.late):
+        if self._start is not None:
             seen = self._observer.whole(evidence, stamp_ns, body)
+            found = self._search_room(self._start, seen)
         else:
             seen = self._observer.near(evidence, stamp_ns, body, predicted, cameras, self.state)
-        if self._start is not None:
-            found = self._search_room(self._start, predicted, seen)
-        else:
             found = self._search_near(predicted, seen)
         if found is None:
             result = self._assessor.without_person(seen)
@@ -258,28 +252,26 @@ class Tracker:
         return replace(result, exposure=exposure)
 
     def _outlook(self, number: int) -> Outlook:
-        searching = self._start is not None and not self._start.followed
-        motion = copy.copy(self._motion)
+        motion, searching = copy.copy(self._motion), self._start is not None
         return Outlook(number, self.rig, self.body, motion, self._body.limits, searching)
 
-    def _search_room(
-        self, start: AutomaticStart, predicted: FloatArray, seen: Seen
-    ) -> Found | None:
-        """Search for a person, or follow the person found so far; None if there is none."""
-        found = start.step(seen, predicted, late=self._effort.late)
+    def _search_room(self, start: Starter, seen: Seen) -> Found | None:
+        """Search for a person in the whole views; None if there is none."""
+        if not anybody(seen.used):
+            start.reset()
+            return None
+        found = start.step(seen.used, seen.stamp_ns)
         if found is None:
             return None
-        if not found.continued:
-            self._searcher = self._searchers.near(found.searcher.body)
-            self._body.take_found(found.searcher.body, settled=found.settled)
+        self._searcher = self._searchers.near(found.searcher.body)
+        self._body.take_found(found.searcher.body, settled=found.settled)
         search = self._searcher.frame(found.observations, seen.stamp_ns, found.pose)
         if found.settled:
             self._start = None
-        start.tracked(search.run(stages_of(found, self.body, self.config)))
+            search.run(frame_stages(self.body, self.config, found.pose, self.body.sigma))
         return Found(
             search, seen.stamp_ns, found.observations, seen.notes + found.notes,
-            restarted=not found.continued, settling=not found.settled,
-            jumped=None if found.continued else np.arange(self.body.size),
+            restarted=True, settling=not found.settled, jumped=np.arange(self.body.size),
         )  # fmt: skip
 
     def _search_near(self, predicted: FloatArray, seen: Seen) -> Found | None:
@@ -340,10 +332,9 @@ class Tracker:
         self.evidence.rig = self._views.rig = self._assessor.limbs.rig = rig
         self._searcher = self._searchers.near(self.body)
 
-    def _new_start(self, last_pose: FloatArray | None = None) -> AutomaticStart:
-        starter = Starter(
+    def _new_start(self, last_pose: FloatArray | None = None) -> Starter:
+        return Starter(
             self.rig, self.body, self._searchers.start, self.evidence.select,
             sized=self._body.sized, fit_shape=not self._body.sections_fitted,
             person=self._body.unfitted, last_pose=last_pose,
         )  # fmt: skip
-        return AutomaticStart(starter, beside=self.config.refinement != "none")

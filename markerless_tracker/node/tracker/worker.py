@@ -221,7 +221,6 @@ class TrackWorker:
             self._status.record_failed_set(one_line(error))
             self._trouble(matched.stamp_ns, error)
             return None
-        self._effort.settling = result.settling
         self._keep_for(result, handle.kept)
         self._status.tracked(result, arrived_s=matched.arrived_s, finished_s=finished_s)
         tracked = TrackedSet(result, images, handle.tracker.body)

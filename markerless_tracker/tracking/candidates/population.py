@@ -16,7 +16,6 @@ from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
 from markerless_tracker.records import Comparison, Observation
 from markerless_tracker.tracking.candidates.crossed import PAIRS, in_each_others_place
-from markerless_tracker.tracking.candidates.mirror import opposite_heading
 from markerless_tracker.tracking.candidates.posture_costs import unlike_postures
 from markerless_tracker.tracking.candidates.postures import first_guesses
 from markerless_tracker.tracking.candidates.recombination import Recombiner
@@ -222,16 +221,6 @@ class FramePopulation:
     def propagated(self, population: Population, *, far: bool = False) -> Population:
         """The population of the frame before, refined in this one; `far`: after a gap in time."""
         return self.selected(self.refined(population.poses, *(_INITIALISE if far else _PROPAGATE)))
-
-    def with_tracked(self, population: Population, pose: FloatArray) -> Population:
-        """A population, a pose (p,) tracked up to this frame, and that with the opposite heading.
-
-        The population may have lost a fast limb since its last frame.
-        """
-        searcher = self._searcher
-        opposite = np.clip(opposite_heading(searcher.body).of(pose), *searcher.limits)
-        both = self.refined(np.stack([pose, opposite]), *_INITIALISE)
-        return self.selected(np.concatenate([population.poses, both]))
 
     def costs(self, poses: FloatArray) -> FloatArray:
         """1 - f_s (n,) of poses (n, p); infinite where it is undefined."""

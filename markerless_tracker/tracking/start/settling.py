@@ -1,16 +1,14 @@
 """The last part of an automatic start: the fit of the body."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.person.start_fit import fitted_to_start
 from markerless_tracker.tracking.search import Searcher, SearcherFor
-from markerless_tracker.tracking.start.estimate import StartEstimate
 from markerless_tracker.tracking.start.two_headings import HeadingFit
 
 _SHAPE_FRAMES = 5
@@ -27,9 +25,8 @@ def with_fitted_body(
     fits: Sequence[HeadingFit],
     contours: ContourFrame,
     pose: FloatArray,
-    observations: Mapping[str, Observation],
-) -> StartEstimate:
-    """The result of a start, with the body fitted to the frames that it explains best.
+) -> tuple[Searcher, FloatArray]:
+    """A searcher with the body fitted to the frames that it explains best, and the last pose (p,).
 
     Args:
         searcher: with the body found so far.
@@ -38,12 +35,10 @@ def with_fitted_body(
         fits: of the heading that was kept, by frame.
         contours: of the last frame.
         pose: (p,) the best one in it with that heading.
-        observations: the parts of its silhouettes that belong to the person.
     """
     good = min((fit.cost for fit in fits), default=0.0) + _SHAPE_SLACK
     used = [(fit.contours, fit.pose) for fit in fits if fit.cost <= good][-_SHAPE_FRAMES:]
     used = used or [(contours, pose)]
     body, last = fitted_to_start(searcher, used, person)
     fitted = searcher_for(body)
-    moved = np.clip(pose + last - used[-1][1], *fitted.limits)
-    return StartEstimate(fitted, moved, observations, True)
+    return fitted, np.clip(pose + last - used[-1][1], *fitted.limits)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -46,8 +45,6 @@ _FINER_AFTER = 1
 """Frames between the second search and the finer sizes, so that no frame has to do both."""
 GAP_NS = 150_000_000
 """After a longer gap, such as a live first search, a refinement may not reach the person."""
-FOLLOWED_GAP_NS = 200_000_000
-"""The same if the person was followed across the gap."""
 _GAP_GENERATIONS = 2
 """Generations after such a gap."""
 _DOUBTFUL = 0.12
@@ -122,24 +119,17 @@ class Starter:
         """Whether the next frame is searched independently, too, which takes long."""
         return len(self._headings) == 1 and not self._sure
 
-    def step(
-        self,
-        observed: Mapping[str, Observation],
-        stamp_ns: int,
-        tracked: FloatArray | None = None,
-    ) -> StartEstimate | None:
+    def step(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
         """Search one frame; None without a person.
 
         Args:
             observed: the observations of the usable cameras.
             stamp_ns: their time.
-            tracked: (p,) pose that was tracked up to this frame; None if none was.
         """
         if self._population is None or self._searcher is None:
             return self._begin(observed, stamp_ns)
         population = self._population
-        most_ns = GAP_NS if tracked is None else FOLLOWED_GAP_NS
-        far = not 0 <= stamp_ns - self._stamp_ns <= most_ns
+        far = not 0 <= stamp_ns - self._stamp_ns <= GAP_NS
         if far:
             population = self._moved(population, observed)
         best = self._best(population).poses[0]
@@ -152,8 +142,6 @@ class Starter:
             self._searcher, observations, stamp_ns, near, charges_unusual=self._charges_unusual
         )
         population = frame.propagated(population, far=far)
-        if tracked is not None:
-            population = frame.with_tracked(population, tracked)
         if far:
             self._headings.restart()
             population = improved(frame, population, range(1, 1 + _GAP_GENERATIONS))
@@ -171,16 +159,14 @@ class Starter:
         self._note(own, frame, population, stamp_ns)
         if self._headings.change():
             notes += ("start: the person has the opposite heading, turned round",)
-        leading, over = self._best(population), self._headings.over
-        rest = None
-        if over and self._fit_shape:
-            rest = partial(
-                with_fitted_body, self._searcher, self._searcher_for, self._person,
-                fits=self._headings.leading_fits, contours=frame.contours, pose=leading.poses[0],
-                observations=observations,
+        searcher, settled = self._searcher, self._headings.over
+        pose = self._best(population).poses[0]
+        if settled and self._fit_shape:
+            searcher, pose = with_fitted_body(
+                searcher, self._searcher_for, self._person, fits=self._headings.leading_fits,
+                contours=frame.contours, pose=pose,
             )  # fmt: skip
-        settled, pose = over and rest is None, leading.poses[0]
-        return StartEstimate(self._searcher, pose, observations, settled, notes, rest)
+        return StartEstimate(searcher, pose, observations, settled, notes)
 
     def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
         cameras = [self._cameras[name] for name in observed]

@@ -52,19 +52,6 @@ def scene_views(
     return {name: Observation.from_mask(name, 0, mask, nothing) for name, mask in masks.items()}
 
 
-def test_a_tracked_pose_and_its_opposite_join_a_population() -> None:
-    frame, pose = made_up(1)
-    lost = pose.copy()
-    body = SyntheticScene(body="person31").body
-    lost[body.index("l_shoulder_y")] += 1.5
-    population = frame.selected(lost[None])
-    joined = frame.with_tracked(population, pose)
-    assert frame.best_cost(joined) < 0.5 * frame.best_cost(population)
-    gaps_m = np.linalg.norm(markers(body, joined.poses[0]) - markers(body, pose), axis=1)
-    assert gaps_m.max() < 0.05
-    assert len(joined.facing(joined.headings[0] + np.pi))
-
-
 def refined(threads: int) -> np.ndarray:
     frame, pose = made_up(threads)
     rng = np.random.default_rng(1)

@@ -1,4 +1,4 @@
-"""The end of a start: the body is fitted if it may be, and the best pose is kept."""
+"""The end of a start: the body is fitted if it may be, and its pose stays near the last one."""
 
 import numpy as np
 import pytest
@@ -25,13 +25,12 @@ def test_a_start_ends_with_the_fit_of_the_body(take_frames, fit_shape) -> None:
     for number in range(MOST_FRAMES):
         found = starter.step(seen, number * 16_000_000)
         assert found is not None
-        if found.settled or found.rest:
+        if found.settled:
             break
-    assert (found.rest is not None) is fit_shape
-    end = found.rest() if found.rest else found
-    assert end.settled and end.rest is None
-    sections = end.searcher.body.cone_shape
+        before = found.pose
+    assert found.settled
+    sections = found.searcher.body.cone_shape
     assert np.allclose(sections, BODY.cone_shape) is not fit_shape
-    off_m = np.linalg.norm(markers(BODY, end.pose) - markers(BODY, found.pose), axis=1)
-    assert off_m.max() < 0.02
-    assert end.observations.keys() == seen.keys()
+    off_m = np.linalg.norm(markers(BODY, found.pose) - markers(BODY, before), axis=1)
+    assert off_m.max() < 0.03
+    assert found.observations.keys() == seen.keys()

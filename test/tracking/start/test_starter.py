@@ -46,6 +46,34 @@ def test_a_walking_person_is_found_and_tracked(walk) -> None:
     assert heading_difference(heading(results[-1].markers_m), heading(taken[-1][2])) < 0.5
 
 
+def test_a_start_does_not_depend_on_the_effort(walk) -> None:
+    """A start that a late tracker would shorten would be the start of a wrong track."""
+    scene, taken = walk
+    late, other = tracker_of(scene), tracker_of(scene)
+    for stamp, seen, _ in taken:
+        result, expected = late.step(seen, stamp, 0.5), other.step(seen, stamp)
+        if not expected.settling:
+            break
+        np.testing.assert_array_equal(result.pose, expected.pose)
+    assert not result.settling
+
+
+def test_who_leaves_during_a_start_is_forgotten(walk) -> None:
+    scene, taken = walk
+    tracker, other = tracker_of(scene), tracker_of(scene)
+    (at, seen, _), (then, blank, _), (later, views, points) = taken[:3]
+    tracker.step(seen, at)
+    empty = {
+        name: Observation.from_mask(name, 0, np.zeros_like(view.mask, np.uint8), view.edges)
+        for name, view in blank.items()
+    }
+    result = tracker.step(empty, then)
+    assert result.state is TrackState.SEARCHING and result.pose is None
+    result = tracker.step(views, later)
+    np.testing.assert_array_equal(result.pose, other.step(views, later).pose)
+    assert error_mm(result, points) < 120.0
+
+
 def test_silhouettes_with_holes_alone_are_searched_for_a_usual_posture(walk) -> None:
     scene, taken = walk
     stamp, seen, _ = taken[0]
@@ -59,7 +87,7 @@ def test_silhouettes_with_holes_alone_are_searched_for_a_usual_posture(walk) -> 
     for views, usual in ((seen, False), (torn, True)):
         tracker = tracker_of(scene, stature=1.72)
         tracker.step(views, stamp)
-        assert tracker._start._starter._charges_unusual is usual
+        assert tracker._start._charges_unusual is usual
 
 
 def test_the_stature_need_not_be_known(walk) -> None:

@@ -49,17 +49,12 @@ class EffortRule:
     It falls to `LEAST` when `LATE_SETS` of the last `WINDOW` sets were late, since longer times
     between the sets make each of them costlier. It rises again while there is time to spare. In
     between it does not change, so that it does not oscillate.
-
-    Attributes:
-        settling: whether an automatic start needs further sets. A late one gets `LEAST` then, with
-            which the start does not keep the later sets waiting.
     """
 
     def __init__(self) -> None:
         self._effort = 1.0
         self._recent: deque[bool] = deque(maxlen=WINDOW)
         self._early = 0
-        self.settling = False
 
     @property
     def effort(self) -> float:
@@ -75,4 +70,4 @@ class EffortRule:
             self._recent.clear()
         elif self._early >= EARLY_SETS:
             self._effort, self._early = min(1.0, _RISE * self._effort), 0
-        return min(self._effort, LEAST) if self.settling and lateness.late else self._effort
+        return self._effort

@@ -56,17 +56,6 @@ def test_one_long_search_changes_nothing() -> None:
     assert set(efforts) == {1.0}
 
 
-@pytest.mark.parametrize("settling", [True, False])
-def test_a_single_late_set_lowers_it_during_an_automatic_start_alone(settling) -> None:
-    rule = EffortRule()
-    in_time = Lateness(left_out=0, waited_s=0.0, age_s=0.0, period_s=PERIOD_S)
-    late = Lateness(left_out=0, waited_s=0.0, age_s=20 * PERIOD_S, period_s=PERIOD_S)
-    rule.settling = settling
-    assert [rule.take(lateness) for lateness in (in_time, late, in_time)] == [
-        1.0, LEAST if settling else 1.0, 1.0,
-    ]  # fmt: skip
-
-
 def test_it_never_falls_below_the_least_and_recovers() -> None:
     rule = EffortRule()
     for _ in range(99):
