@@ -56,7 +56,6 @@ class TwoHeadings:
     def __init__(self, heading_rad: float) -> None:
         self._first_rad = heading_rad
         self._leading = 0
-        self._changed = False
         self._counted_from = SIZED_FROM
         self._fits: list[tuple[HeadingFit | None, HeadingFit | None]] = []
         self._stamps_ns: list[int] = []
@@ -68,7 +67,7 @@ class TwoHeadings:
     @property
     def over(self) -> bool:
         """Whether all frames of the start have been taken."""
-        gains = [] if self._changed else self._gains
+        gains = self._gains
         changing = bool(gains) and (gains[-1] > 0.0) != (float(np.mean(gains)) > 0.0)
         return len(self) >= (MOST_FRAMES if changing else SETTLING_FRAMES)
 
@@ -107,21 +106,21 @@ class TwoHeadings:
         self._stamps_ns.append(stamp_ns)
 
     def change(self) -> bool:
-        """Let the opposite heading lead if it explains the frames better; at most once.
+        """Let the opposite heading lead if it explains the frames better.
 
         Returns:
             Whether it leads from now on.
         """
         other = 1 - self._leading
         last = self._fits[self._counted_from :][-1:]
-        if self._changed or not last or last[0][other] is None:
+        if not last or last[0][other] is None:
             return False
         gains = self._gains
         rise = float(np.mean(gains)) if gains and last[0][self._leading] else 1.0
         rise += 2.0 * _WALK_BONUS * self._walks_along(self.both_rad[other])
         if rise <= (0.0 if self.over else _MARGIN):
             return False
-        self._leading, self._changed = other, True
+        self._leading = other
         return True
 
     @property
