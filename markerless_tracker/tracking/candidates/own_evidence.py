@@ -67,17 +67,18 @@ class OwnEvidence:
     def gain(self, pose: FloatArray, other: FloatArray, *, other_share: float = 0.0) -> float:
         """How much less another pose (p,) costs than a pose (p,), with the prior.
 
+        The evidence of two poses can differ in a region that neither limb concerns. So each pose is
+        judged in that of both evidences in which it costs less.
+
         Args:
             pose, other: the poses.
-            other_share: weight of a pose's cost in the evidence of the other pose, beside that in
-                its own, 0 to 1. A pose that leaves a limb's undecided pixels out has no fault in
+            other_share: weight of a pose's cost in the evidence of the other pose, beside the
+                lesser one, 0 to 1. A pose that leaves a limb's undecided pixels out has no fault in
                 its own evidence, but misses the limb in that of the other.
         """
-        if other_share == 0.0:
-            return self.cost_with_prior(pose) - self.cost_with_prior(other)
         both = np.stack([pose, other])
         here, there = (self._decided(each).costs_with_prior(both) for each in both)
-        costs = (1.0 - other_share) * np.array([here[0], there[1]])
+        costs = (1.0 - other_share) * np.minimum(here, there)
         costs += other_share * np.array([there[0], here[1]])
         return float(costs[0] - costs[1])
 

@@ -26,7 +26,8 @@ def uncrossed(
     """A population without crossed legs or arms if uncrossed ones explain the frame as well.
 
     The best pose that leads is compared with the best one of which the pair is not crossed, each
-    refined in its own evidence. Else the population stays as it is.
+    refined in its own evidence. Else the population stays as it is; poses with the opposite heading
+    stay in any case.
 
     Args:
         own: the evidence for poses that decide it themselves.
@@ -42,8 +43,10 @@ def uncrossed(
         best = own.refined(leading.poses[0], *_REFINE)
         other = own.refined(leading.poses[int(crossed.argmin())], *_REFINE)
         if not is_crossed(own.body, other, pair) and own.gain(best, other) >= 0.0:
-            others = population.poses[~_are_crossed(own, population, pair)]
-            population = frame.selected(np.concatenate([others, other[None]]))
+            heading_rad = float(leading.headings[0])
+            same, away = (population.facing(h) for h in (heading_rad, heading_rad + np.pi))
+            kept = (same.poses[~_are_crossed(own, same, pair)], other[None], away.poses)
+            population = frame.selected(np.concatenate(kept))
     return population
 
 

@@ -1,5 +1,7 @@
 """Poses compared each in the evidence that its body decides."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -96,6 +98,25 @@ def test_a_gain_weighs_the_evidence_of_both_poses(legs_undecided, share) -> None
     assert gain == pytest.approx(cost_wrong - cost_true)
     assert own.gain(true, wrong, other_share=share) == pytest.approx(-gain)
     assert own.gain(true, true, other_share=share) == 0.0
+
+
+def test_evidence_that_suits_both_poses_is_no_gain_of_the_one_that_decided_it(monkeypatch) -> None:
+    """It differs in a region that the poses do not; figures of a frame of a recording."""
+    here, there = np.array([0.0480, 0.0489]), np.array([0.0373, 0.0382])
+
+    class Decided:
+        def __init__(self, costs):
+            self.costs = costs
+
+        def costs_with_prior(self, poses):
+            return self.costs
+
+    own = OwnEvidence(SimpleNamespace(body=None), {}, 0, None)
+    pose, other = np.zeros(1), np.ones(1)
+    monkeypatch.setattr(own, "_decided", lambda at: Decided(there if at[0] else here))
+    assert own.gain(pose, other) == pytest.approx(0.0373 - 0.0382)
+    shared = 0.75 * (0.0373 - 0.0382) + 0.25 * (0.0373 - 0.0489)
+    assert own.gain(pose, other, other_share=0.25) == pytest.approx(shared)
 
 
 def test_a_pose_without_an_undecided_arm_misses_nothing_in_its_own_evidence(

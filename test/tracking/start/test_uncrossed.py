@@ -6,6 +6,7 @@ import pytest
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.candidates.crossed import in_each_others_place, is_crossed
+from markerless_tracker.tracking.candidates.mirror import opposite_heading
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
 from markerless_tracker.tracking.candidates.population import FramePopulation, Population
 from markerless_tracker.tracking.search import Searcher
@@ -25,9 +26,10 @@ def stride(take_frames):
     return frame, OwnEvidence(searcher, seen, 0, frame), pose, crossed
 
 
-def population_of(poses):
+def population_of(poses, headings_rad=None):
     """Poses in this order, whatever they cost."""
-    return Population(np.array(poses), np.arange(float(len(poses))), np.zeros(len(poses)))
+    headings = np.zeros(len(poses)) if headings_rad is None else np.array(headings_rad)
+    return Population(np.array(poses), np.arange(float(len(poses))), headings)
 
 
 def test_uncrossed_legs_take_the_place_of_crossed_ones(stride) -> None:
@@ -35,6 +37,18 @@ def test_uncrossed_legs_take_the_place_of_crossed_ones(stride) -> None:
     found = uncrossed(own, frame, population_of([crossed, pose]), lambda poses: poses)
     assert len(found) == 1 and not is_crossed(own.body, found.poses[0], "legs")
     assert found.costs[0] <= frame.total_costs(crossed[None])[0]
+
+
+def test_poses_with_the_opposite_heading_stay(stride) -> None:
+    """Which heading is right is decided later."""
+    frame, own, pose, crossed = stride
+    turned = opposite_heading(own.body).of(crossed)
+    found = uncrossed(
+        own, frame, population_of([crossed, pose, turned], [0.0, 0.0, np.pi]),
+        lambda poses: poses.facing(0.0),
+    )  # fmt: skip
+    assert len(found) == 2
+    assert any(np.array_equal(turned, kept) for kept in found.poses)
 
 
 def test_crossed_legs_that_explain_more_stay(stride, monkeypatch) -> None:
