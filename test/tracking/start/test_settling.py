@@ -32,5 +32,5 @@ def test_a_start_ends_with_the_fit_of_the_body(take_frames, fit_shape) -> None:
     sections = found.searcher.body.cone_shape
     assert np.allclose(sections, BODY.cone_shape) is not fit_shape
     off_m = np.linalg.norm(markers(BODY, found.pose) - markers(BODY, before), axis=1)
-    assert off_m.max() < 0.03
+    assert off_m.max() < 0.02
     assert found.observations.keys() == seen.keys()
