@@ -67,8 +67,8 @@ class OwnEvidence:
     def gain(self, pose: FloatArray, other: FloatArray, *, other_share: float = 0.0) -> float:
         """How much less another pose (p,) costs than a pose (p,), with the prior.
 
-        The evidence of two poses can differ in a region that neither limb concerns. So each pose is
-        judged in that of both evidences in which it costs less.
+        The evidence of two poses can differ in a region that concerns neither pose. So each pose is
+        judged in its own evidence or in that of the other pose, where it costs less.
 
         Args:
             pose, other: the poses.

@@ -58,8 +58,8 @@ class LimbSearch:
     better than the estimate, and better than the estimate after the same refinement: a gain of the
     rest of the body is not due to the limb. Other whole poses are compared with the estimate alone.
     Poses are compared by `costs_with_prior`; the gain of a pose is how far its cost lies below the
-    estimate's: where pixels were undecided, each in its own evidence, and for arms in part in that
-    of the other pose (`ARMS_SHARE`). The evidence alone must gain enough, too (`GAIN_PER_M`).
+    estimate's; where pixels were undecided, `OwnEvidence.gain`, for arms with `ARMS_SHARE`. The
+    evidence alone must gain enough, too (`GAIN_PER_M`).
 
     Args:
         recombiner: draws limbs of the body.
@@ -162,7 +162,7 @@ class LimbSearch:
 
         Args:
             other: the pose, which may be far from the estimate.
-            close: each pose is compared in its own evidence if the other costs at most this much
+            close: the poses are compared by `OwnEvidence.gain` if the other costs at most this much
                 more in the evidence decided with the predicted pose.
         """
         refined = self._frame.refined(other[None], *_REFINE_FAR)

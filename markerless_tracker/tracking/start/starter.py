@@ -115,7 +115,7 @@ class Starter:
         self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
 
     @property
-    def searches_again(self) -> bool:
+    def _searches_again(self) -> bool:
         """Whether the next frame is searched independently, too, which takes long."""
         return len(self._headings) == 1 and not self._sure
 
@@ -145,7 +145,7 @@ class Starter:
         if far:
             self._headings.restart()
             population = improved(frame, population, range(1, 1 + _GAP_GENERATIONS))
-        if self.searches_again:
+        if self._searches_again:
             population = self._second_search(frame, population, observations)
         elif len(self._headings) == 1 + _FINER_AFTER:
             frame, population = self._resized((frame, population), observations, stamp_ns)
@@ -218,7 +218,7 @@ class Starter:
         If this is a second frame that is searched independently, the hull decides before the body.
         """
         assert self._searcher is not None
-        if self.searches_again:
+        if self._searches_again:
             hull = next(find_hulls(self._cameras, observations), None)
             if hull is not None:
                 observations = silhouettes_in_hull(observations, self._cameras, hull)

@@ -101,7 +101,7 @@ def test_a_gain_weighs_the_evidence_of_both_poses(legs_undecided, share) -> None
 
 
 def test_evidence_that_suits_both_poses_is_no_gain_of_the_one_that_decided_it(monkeypatch) -> None:
-    """It differs in a region that the poses do not; figures of a frame of a recording."""
+    """The evidence differs where the poses do not; figures of a frame of a recording."""
     here, there = np.array([0.0480, 0.0489]), np.array([0.0373, 0.0382])
 
     class Decided:

@@ -36,6 +36,14 @@ def error_mm(result, points) -> float:
     return 1e3 * float(np.linalg.norm(result.markers_m - points, axis=1).mean())
 
 
+def nobody(seen) -> dict[str, Observation]:
+    """The same views without a silhouette."""
+    return {
+        name: Observation.from_mask(name, 0, np.zeros_like(view.mask, np.uint8), view.edges)
+        for name, view in seen.items()
+    }
+
+
 def test_a_walking_person_is_found_and_tracked(walk) -> None:
     scene, taken = walk
     tracker = tracker_of(scene, stature=1.72)
@@ -63,11 +71,7 @@ def test_who_leaves_during_a_start_is_forgotten(walk) -> None:
     tracker, other = tracker_of(scene), tracker_of(scene)
     (at, seen, _), (then, blank, _), (later, views, points) = taken[:3]
     tracker.step(seen, at)
-    empty = {
-        name: Observation.from_mask(name, 0, np.zeros_like(view.mask, np.uint8), view.edges)
-        for name, view in blank.items()
-    }
-    result = tracker.step(empty, then)
+    result = tracker.step(nobody(blank), then)
     assert result.state is TrackState.SEARCHING and result.pose is None
     result = tracker.step(views, later)
     np.testing.assert_array_equal(result.pose, other.step(views, later).pose)
@@ -163,13 +167,7 @@ def test_nobody_is_a_state_and_no_error(walk) -> None:
     scene, taken = walk
     tracker = tracker_of(scene, stature=1.72)
     stamp, seen, _ = taken[0]
-    empty = {
-        name: Observation.from_mask(
-            name, 0, np.zeros((view.height, view.width), np.uint8), view.edges
-        )
-        for name, view in seen.items()
-    }
-    result = tracker.step(empty, stamp - 1)
+    result = tracker.step(nobody(seen), stamp - 1)
     assert result.state is TrackState.SEARCHING
     assert result.pose is None and result.markers_m is None and not result.iou
     assert tracker.step(seen, stamp).state is TrackState.TRACKING
