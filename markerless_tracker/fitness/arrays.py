@@ -81,6 +81,23 @@ class Views:
     names: tuple[str, ...]
     arrays: ViewArrays
 
+    def seen_by(self, cameras: Sequence[CameraModel]) -> "Views":
+        """The views of some cameras, at least one, as these are calibrated.
+
+        Masks and edge maps are shared.
+        """
+        kept = [self.names.index(camera.name) for camera in cameras]
+        seen = self.arrays
+        arrays = camera_arrays(cameras)._replace(
+            mask=seen.mask,
+            mask_start=seen.mask_start[kept],
+            edges=seen.edges,
+            edge_start=seen.edge_start[kept],
+            observed=seen.observed[kept],
+            known=seen.known,
+        )
+        return Views(tuple(camera.name for camera in cameras), arrays)
+
 
 @lru_cache(maxsize=_KEPT)
 def body_arrays(body: BodyModel) -> BodyArrays:

@@ -320,7 +320,9 @@ class Tracker:
         if moved is not None:
             self._searcher = self._searchers.near(self.body)
             self._motion.shift(moved, self._body.limits)
-        if corrected := self._correction.add(result, self.body, late=self._effort.late):
+        if corrected := self._correction.add(
+            result, self.body, search=found.search, late=self._effort.late
+        ):
             self._searchers.rig = self._correction.rig
             self._body.cameras_changed(self._searchers.near)
             self._use_cameras(self._correction.rig)

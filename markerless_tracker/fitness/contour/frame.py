@@ -1,7 +1,7 @@
 """Contour evidence of a frame, and the normal equations that contour refinement solves."""
 
 import copy
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from markerless_tracker.fitness.contour.silhouette_contour import (
     SilhouetteContour,
     join_edges,
     silhouette_contour,
+    some_edges,
 )
 from markerless_tracker.fitness.raster import Outlines, make_outlines
 from markerless_tracker.geometry import FloatArray
@@ -91,6 +92,19 @@ class ContourFrame:
         """
         other = copy.copy(self)
         other.body, other._arrays = body, body_arrays(body)
+        other._allocate()
+        return other
+
+    def seen_by(self, cameras: Sequence[CameraModel], body: BodyModel) -> "ContourFrame":
+        """The views of some cameras, at least one, as these are calibrated, for a body of the same
+        kind, with its own working memory.
+        """
+        other = copy.copy(self)
+        other.body, other._arrays = body, body_arrays(body)
+        other.views = self.views.seen_by(cameras)
+        other.contours = some_edges(
+            self.contours, [self.views.names.index(name) for name in other.views.names]
+        )
         other._allocate()
         return other
 

@@ -259,3 +259,17 @@ def join_edges(edges: Sequence[SilhouetteContour]) -> ContourViews:
         spacing=np.concatenate([edge.spacing for edge in edges]),
         point_start=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
     )
+
+
+def some_edges(contours: ContourViews, views: Sequence[int]) -> ContourViews:
+    """The edges of some views, by index; the distances are shared."""
+    rows = [np.s_[contours.point_start[i] : contours.point_start[i + 1]] for i in views]
+    counts = [row.stop - row.start for row in rows]
+    return contours._replace(
+        distance_start=contours.distance_start[list(views)],
+        window=contours.window[list(views)],
+        points=np.concatenate([contours.points[row] for row in rows]),
+        normals=np.concatenate([contours.normals[row] for row in rows]),
+        spacing=np.concatenate([contours.spacing[row] for row in rows]),
+        point_start=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+    )

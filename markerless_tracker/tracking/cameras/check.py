@@ -15,13 +15,12 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraModel, CameraRig
-from markerless_tracker.fitness.arrays import lay_out_views
 from markerless_tracker.fitness.contour import ContourFrame
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.records import Observation, TrackResult, TrackState
+from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.refinement import pose_prior, refined_on_contours
-from markerless_tracker.tracking.search import Searcher, pixels_per_m, root_m
+from markerless_tracker.tracking.search import FrameSearch, Searcher, root_m
 
 DISAGREES_M = 0.030
 """Least persistent shift, at the body's distance, that is attributed to the calibration."""
@@ -89,12 +88,11 @@ class CameraCheck:
     def __init__(self, rig: CameraRig, config: TrackerConfig) -> None:
         self._rig = rig
         self._config = config
-        self._searcher: Searcher | None = None
         self.reset()
 
     def configure(self, config: TrackerConfig) -> None:
         """Use other settings from the next frame on."""
-        self._config, self._searcher = config, None
+        self._config = config
 
     def reset(self) -> None:
         """Forget all frames."""
@@ -113,12 +111,20 @@ class CameraCheck:
             if name not in self.suspects:
                 self._found[name] = deque(maxlen=REMEMBERED)
 
-    def add(self, result: TrackResult, body: BodyModel, *, late: bool = False) -> bool:
+    def add(
+        self,
+        result: TrackResult,
+        body: BodyModel,
+        *,
+        search: FrameSearch | None = None,
+        late: bool = False,
+    ) -> bool:
         """Take a tracked frame: compare the cameras whose turn has come; often there is none.
 
         Args:
             result: of the frame.
             body: the tracked body.
+            search: of the frame, whose contour evidence is used; None to make it anew.
             late: whether sets come faster than they are tracked. Then at most one camera is
                 compared, and after the first `FEW_CHECKS` checks they come as seldom as later ones.
 
@@ -134,13 +140,14 @@ class CameraCheck:
         for _ in range(1 if late else count):
             if result.stamp_ns < self._due_ns:
                 return checks > 0
-            self._compare(self._rig.names[self._compared], result, result.pose, body)
+            search = search or self._search(result, result.pose, body)
+            self._compare(self._rig.names[self._compared], search.contours, result.pose, body)
             self._compared = (self._compared + 1) % count
             self._due_ns += self._every_ns(late) // count
             if self._compared == 0:
                 checks += 1
                 self._checks += 1
-                self._weigh(result, result.pose)
+                self._weigh(search.contours, result.pose, body)
                 self._suspect()
         # Frames come less often than checks are due.
         self._due_ns = max(self._due_ns, result.stamp_ns)
@@ -150,35 +157,42 @@ class CameraCheck:
         phase = (self._checks >= FEW_CHECKS) + (self._checks >= MANY_CHECKS)
         return EVERY_NS[-1 if late and phase else phase]
 
-    def _compare(self, name: str, result: TrackResult, pose: FloatArray, body: BodyModel) -> None:
-        """Estimate the shift of one camera from the body as the others see it."""
-        seen = {n: o for n, o in result.observations.items() if o.mask_words.any()}
-        others = {n: o for n, o in seen.items() if n != name and n not in self.suspects}
-        if name not in seen or len(others) < LEAST_VIEWS - 1:
-            return
-        if self._searcher is None or self._searcher.body is not body:
-            self._searcher = Searcher(self._rig, body, self._config, limits=body.limits, threads=1)
-        searcher, stamp_ns = self._searcher, result.stamp_ns
-        without = _refined(searcher, searcher.frame(others, stamp_ns, pose).contours, pose)
-        shift = _shift(searcher, seen[name], self._rig[name], without)
-        if shift is None:
-            return
-        self._found[name].append(shift)
+    def _search(self, result: TrackResult, pose: FloatArray, body: BodyModel) -> FrameSearch:
+        searcher = Searcher(self._rig, body, self._config, limits=body.limits, threads=1)
+        return searcher.frame(result.observations, result.stamp_ns, pose)
 
-    def _weigh(self, result: TrackResult, pose: FloatArray) -> None:
+    def _compare(
+        self, name: str, contours: ContourFrame, pose: FloatArray, body: BodyModel
+    ) -> None:
+        """Estimate the shift of one camera from the body as the others see it."""
+        seen = self._seen(contours)
+        others = [c for c in seen if c.name != name and c.name not in self.suspects]
+        if self._rig[name] not in seen or len(others) < LEAST_VIEWS - 1:
+            return
+        without = _refined(contours.seen_by(others, body), pose, self._config)
+        shift = _shift(contours.seen_by([self._rig[name]], body), self._rig[name], without)
+        if shift is not None:
+            self._found[name].append(shift)
+
+    def _weigh(self, contours: ContourFrame, pose: FloatArray, body: BodyModel) -> None:
         """Estimate how much each camera that may be wrong explains, all in the same frame."""
-        seen = {n: o for n, o in result.observations.items() if o.mask_words.any()}
-        seen = {n: o for n, o in seen.items() if n not in self.suspects}
+        seen = [c for c in self._seen(contours) if c.name not in self.suspects]
+        names = {camera.name for camera in seen}
         shifts = {
             name: shift.px
             for name, shift in self.shifts().items()
-            if name in seen and shift.length_m >= _CANDIDATE_M
+            if name in names and shift.length_m >= _CANDIDATE_M
         }
         # As many views as a suspicion needs.
-        if self._searcher is None or not shifts or len(seen) <= LEAST_VIEWS:
+        if not shifts or len(seen) <= LEAST_VIEWS:
             return
-        contours = self._searcher.frame(seen, result.stamp_ns, pose).contours
-        self._gains.append(_gains(self._searcher, contours, pose, shifts))
+        self._gains.append(_gains(contours.seen_by(seen, body), pose, shifts, self._config))
+
+    def _seen(self, contours: ContourFrame) -> list[CameraModel]:
+        """The cameras that see the person, as calibrated."""
+        views = contours.views
+        seen = {n for n, count in zip(views.names, views.arrays.observed, strict=True) if count}
+        return [camera for camera in self._rig if camera.name in seen]
 
     def shifts(self) -> dict[str, Shift]:
         """The shift of every camera that could be compared, by name."""
@@ -233,35 +247,35 @@ def describe(shifts: Mapping[str, Shift]) -> list[str]:
     ]
 
 
-def _refined(searcher: Searcher, contours: ContourFrame, pose: FloatArray) -> FloatArray:
+def _refined(frame: ContourFrame, pose: FloatArray, config: TrackerConfig) -> FloatArray:
     """A pose (p,) refined on these views only."""
     return refined_on_contours(
-        contours,
+        frame,
         pose,
-        searcher.config,
-        priors=(pose_prior(searcher.body),),
-        limits=searcher.limits,
+        config,
+        priors=(pose_prior(frame.body),),
+        limits=frame.body.limits,
         iterations=_ITERATIONS,
         truncation_m=_TRUNCATION_M,
     )
 
 
 def _gains(
-    searcher: Searcher,
-    contours: ContourFrame,
+    frame: ContourFrame,
     pose: FloatArray,
     shifts_px: Mapping[str, tuple[float, float]],
+    config: TrackerConfig,
 ) -> dict[str, float]:
     """How much less it costs to explain all views if one camera is shifted, m³, by camera."""
-    intrinsics = contours.views.arrays.intrinsics
+    intrinsics = frame.views.arrays.intrinsics
 
     def cost() -> float:
-        contours.collect(_refined(searcher, contours, pose), _GAIN_TRUNCATION_M)
-        return float(contours.residuals.cost.sum())
+        frame.collect(_refined(frame, pose, config), _GAIN_TRUNCATION_M)
+        return float(frame.residuals.cost.sum())
 
     before, gains = cost(), {}
     for name, shift_px in shifts_px.items():
-        view = contours.views.names.index(name)
+        view = frame.views.names.index(name)
         centre = intrinsics[view, [2, 4]]
         intrinsics[view, [2, 4]] = centre + shift_px
         gains[name] = before - cost()
@@ -270,37 +284,33 @@ def _gains(
 
 
 def _shift(
-    searcher: Searcher, observation: Observation, camera: CameraModel, pose: FloatArray
+    frame: ContourFrame, camera: CameraModel, pose: FloatArray
 ) -> tuple[float, float, float] | None:
     """Shift (u, v) px with which the body fits one view's silhouette, and px per metre.
 
     Weighted least squares on the contours' residuals, repeated with the camera moved by the shift
     so far, since larger residuals have less weight.
+
+    Args:
+        frame: the view; its principal point is moved.
+        camera: of the view.
+        pose: (p,).
     """
-    to_camera, name = camera.T_cam_world, camera.name
-    at = root_m(searcher.body, pose)
-    depth = float(to_camera[2, :3] @ at + to_camera[2, 3])
+    to_camera = camera.T_cam_world
+    depth = float(to_camera[2, :3] @ root_m(frame.body, pose) + to_camera[2, 3])
     if depth <= 0.0:
         return None
     focal = np.array([camera.matrix[0, 0], camera.matrix[1, 1]])
-    views = lay_out_views([camera], {name: observation})
-    contours = ContourFrame(
-        searcher.body,
-        {name: camera},
-        {name: observation},
-        views,
-        pixels_per_m={name: pixels_per_m(camera, at)},
-        step_px=searcher.config.edges.step_px,
-    )
+    intrinsics, residuals = frame.views.arrays.intrinsics, frame.residuals
     # The silhouette is fixed; the principal point is moved.
-    centre = views.arrays.intrinsics[0, [2, 4]]
+    centre = intrinsics[0, [2, 4]]
     shift = np.zeros(2)
     for _ in range(_SHIFT_STEPS):
-        views.arrays.intrinsics[0, [2, 4]] = centre + shift
-        contours.collect(pose, _SHIFT_TRUNCATION_M)
-        rows = slice(int(contours.residuals.count[0]))
-        value, weight = contours.residuals.value[0, rows], contours.residuals.weight[0, rows]
-        jacobian = contours.residuals.gradient[0, rows] @ to_camera[:2, :3].T * (depth / focal)
+        intrinsics[0, [2, 4]] = centre + shift
+        frame.collect(pose, _SHIFT_TRUNCATION_M)
+        rows = slice(int(residuals.count[0]))
+        value, weight = residuals.value[0, rows], residuals.weight[0, rows]
+        jacobian = residuals.gradient[0, rows] @ to_camera[:2, :3].T * (depth / focal)
         normal = jacobian.T @ (weight[:, None] * jacobian)
         if np.linalg.matrix_rank(normal) < 2:
             return None

@@ -9,6 +9,7 @@ from markerless_tracker.camera import CameraRig
 from markerless_tracker.records import TrackResult
 from markerless_tracker.tracking.cameras.check import CameraCheck, Shift
 from markerless_tracker.tracking.config import TrackerConfig
+from markerless_tracker.tracking.search import FrameSearch
 
 _CHANGED_M = 0.010
 """A correction is replaced when a later estimate differs from it by this much, at the body."""
@@ -55,12 +56,20 @@ class CameraCorrection:
             for name, shift in self._check.shifts().items()
         }
 
-    def add(self, result: TrackResult, body: BodyModel, *, late: bool = False) -> tuple[str, ...]:
+    def add(
+        self,
+        result: TrackResult,
+        body: BodyModel,
+        *,
+        search: FrameSearch | None = None,
+        late: bool = False,
+    ) -> tuple[str, ...]:
         """Take a frame; returns a line for each camera whose correction has changed in `rig`.
 
         Arguments as of `CameraCheck.add`.
         """
-        if not self._check.add(result, body, late=late) or not self._corrects:
+        weighed = self._check.add(result, body, search=search, late=late)
+        if not weighed or not self._corrects:
             return ()
         shares, shifts = self._check.shares, self._check.shifts()
         changed = [

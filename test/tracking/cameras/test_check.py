@@ -59,8 +59,8 @@ def test_the_camera_that_is_off_is_named(scene, checked) -> None:
 def test_other_settings_are_used_from_the_next_frame_on(scene, tracked, monkeypatch) -> None:
     used: list[TrackerConfig] = []
 
-    def noted(searcher, contours, pose):
-        used.append(searcher.config)
+    def noted(contours, pose, config):
+        used.append(config)
         return pose
 
     monkeypatch.setattr("markerless_tracker.tracking.cameras.check._refined", noted)
