@@ -13,6 +13,9 @@ from markerless_tracker.tracking.limbs.walking import WalkingWatch
 DENSE_NS = 40_000_000
 """If frames follow each other faster than this, searches that can wait are put off to other frames,
 since sets that come too late are lost."""
+HALVES_NS = 25_000_000
+"""If frames follow each other faster than this, one suspected limb at most is searched in a frame,
+and the search of a limb in rotation takes two frames."""
 FIRST_WAIT_NS = 32_000_000
 """Time before a limb near unexplained silhouette is searched again, after one search without gain.
 It doubles with each further search without gain, at most `_DOUBLINGS` times."""
@@ -30,12 +33,14 @@ class Due:
         facing: whether to compare another heading.
         walking: poses (p,) that face the walking direction.
         limbs: names of the limbs to search elsewhere.
+        halves: names of limbs that are drawn in this frame, and compared in the next one.
     """
 
     pair: Exchange | None = None
     facing: bool = False
     walking: Sequence[FloatArray] = ()
     limbs: Sequence[str] = ()
+    halves: Sequence[str] = ()
 
     @property
     def whole(self) -> bool:
@@ -43,7 +48,7 @@ class Due:
         return self.facing or self.pair is not None or bool(self.walking)
 
     def __bool__(self) -> bool:
-        return self.whole or bool(self.limbs)
+        return self.whole or bool(self.limbs) or bool(self.halves)
 
 
 @dataclass(frozen=True)
@@ -101,6 +106,7 @@ class LimbSchedule:
         badly: bool,
         late: bool,
         single: bool,
+        busy: bool,
     ) -> Due:
         """The searches that are due in the next frame; they count as done.
 
@@ -112,6 +118,7 @@ class LimbSchedule:
             lost: the lost limbs.
             areas_m2: unexplained silhouette by limb that it may belong to, the likeliest first.
             badly, late, single: as for `LimbWatch.recover`.
+            busy: whether a limb drawn in the frame before is compared in this one.
         """
         if not areas_m2:
             self._waits.clear()
@@ -122,16 +129,22 @@ class LimbSchedule:
         self._last_ns = stamp_ns
         self._turns.advance(since_ns)
         due = Due()
-        if not single or self._frames % 2:
+        if not busy and (not single or self._frames % 2):
             due = self._whole_poses(body, pose, limits, stamp_ns, dense=dense)
         if single:
-            limbs = [] if due.whole else self._one_limb(body.limbs, lost, areas_m2, stamp_ns)
-        else:
-            limbs = [*dict.fromkeys((*lost, *self._suspects(stamp_ns, areas_m2)))]
-            put_off = dense and (due.whole or bool(limbs))
-            in_turn = self._turns.take(body.limbs, put_off=put_off, single=late)
-            others = body.limbs if badly and not late else in_turn
-            limbs += [name for name in others if name not in limbs]
+            whole = due.whole or busy
+            limbs = [] if whole else self._one_limb(body.limbs, lost, areas_m2, stamp_ns)
+            return replace(due, limbs=limbs)
+        if dense and since_ns < HALVES_NS and not badly:
+            limbs = [*lost] or self._suspects(stamp_ns, areas_m2)[:1]
+            put_off = due.whole or busy or bool(limbs)
+            in_turn = self._turns.take(body.limbs, put_off=put_off)[:1]
+            return replace(due, limbs=limbs, halves=[n for n in in_turn if n not in limbs])
+        limbs = [*dict.fromkeys((*lost, *self._suspects(stamp_ns, areas_m2)))]
+        put_off = dense and (due.whole or bool(limbs))
+        in_turn = self._turns.take(body.limbs, put_off=put_off, single=late)
+        others = body.limbs if badly and not late else in_turn
+        limbs += [name for name in others if name not in limbs]
         return replace(due, limbs=limbs)
 
     def found(self, name: str) -> None:

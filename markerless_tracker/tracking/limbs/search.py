@@ -69,7 +69,7 @@ class LimbSearch:
         least_gain: least gain for which a limb is taken, in evidence decided with the predicted
             pose. If pixels were undecided, a limb with that gain must not cost more in its own
             evidence either, and one without it must gain `LEAST_GAIN` there.
-        thorough: as for `other_limb`.
+        thorough: as for `drawn_limbs`.
 
     Attributes:
         pose: (p,) the estimate so far; assigned to take another one.
@@ -94,10 +94,29 @@ class LimbSearch:
         self.rival: Rival | None = None
         self.pose = pose
 
-    def elsewhere(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> bool:
-        """Search a limb; return whether it was found elsewhere. Arguments as for `other_limb`."""
+    def drawn(self, limb: IntArray, rng: np.random.Generator, aim: Aim | None) -> FloatArray:
+        """The first half of a search; arguments as for `drawn_limbs`."""
+        frame = self._own.undecided
+        cost = float(frame.costs_with_prior(self.pose[None])[0])
+        return drawn_limbs(
+            frame, self._recombiner, self.pose, limb, rng, aim, cost, thorough=self._thorough
+        )
+
+    def take_drawn(self, limb: IntArray, drawn: FloatArray) -> bool:
+        """The second half of a search, in the same frame or a later one: take a limb if it is
+        better; return whether it was.
+
+        Args:
+            limb: the limb's parameters.
+            drawn: (n, d) draws of it, not refined.
+        """
+        self.rival = None
+        if not len(drawn):
+            return False
         before = self.pose
-        other, gain, better = self._elsewhere(limb, rng, aim)
+        poses = np.tile(before, (len(drawn), 1))
+        poses[:, limb] = drawn
+        other, gain, better = self._elsewhere(limb, poses)
         if better:
             self.pose = other
             self.rival = rival_of(self._own.body, self.pose, before, gain)
@@ -105,15 +124,11 @@ class LimbSearch:
             self.rival = rival_of(self._own.body, before, other, -gain)
         return better
 
-    def _elsewhere(
-        self, limb: IntArray, rng: np.random.Generator, aim: Aim | None
-    ) -> tuple[FloatArray, float, bool]:
-        """The best other pose (p,), its gain, and whether that is enough."""
+    def _elsewhere(self, limb: IntArray, poses: FloatArray) -> tuple[FloatArray, float, bool]:
+        """The best of other poses (n, p), refined, its gain, and whether that is enough."""
         frame = self._own.undecided
         cost = float(frame.costs_with_prior(self.pose[None])[0])
-        other, other_cost = other_limb(
-            frame, self._recombiner, self.pose, limb, rng, aim, cost, thorough=self._thorough
-        )
+        other, other_cost = best_refined(frame, poses)
         gain, least_gain = cost - other_cost, self._least_gain
         if gain > least_gain:
             refined = frame.refined(self.pose[None], *_REFINE)
@@ -173,7 +188,7 @@ class LimbSearch:
         return found, self._own.gain(self.pose, found)
 
 
-def other_limb(
+def drawn_limbs(
     frame: FramePopulation,
     recombiner: Recombiner,
     pose: FloatArray,
@@ -183,16 +198,14 @@ def other_limb(
     most_cost: float = np.inf,
     *,
     thorough: bool = True,
-) -> tuple[FloatArray, float]:
-    """The best pose (p,) with a limb elsewhere, and its cost (`FramePopulation.costs_with_prior`).
+) -> FloatArray:
+    """The best draws (n, d) of a limb elsewhere, at most two, not refined.
 
     The draws are sparse for a limb of six joints, so the best ones are varied twice, as in an
     annealed particle filter. They are the best by f_s, and the best if the prior counts, too: where
     the limb explains few pixels, f_s tells little; where people have it seldom, the prior misleads.
-    A contour refinement of the whole body refines the best pose of either kind, and the better one
-    is returned. If no draw comes within `HOPELESS` of `most_cost`, the given pose is returned with
-    the least cost of the draws, 1 - f_s; if the best draws of both kinds lie near the former place,
-    with `most_cost`.
+    There is none if no draw comes within `HOPELESS` of `most_cost`, or if the best draws of both
+    kinds lie near the former place.
 
     Args:
         frame: the evidence.
@@ -214,7 +227,7 @@ def other_limb(
     if thorough:
         poses = poses[_far(body, poses, pose)]
     if not len(poses):
-        return pose, most_cost
+        return poses[:, limb]
     costs_of = frame.limb_costs(pose, limb)
     costs, priors = costs_of(poses[:, limb]), prior_costs(body, poses)
     best = _best(costs, priors, _PARENTS)
@@ -233,13 +246,19 @@ def other_limb(
         priors = np.concatenate([priors[best], prior_costs(body, near)])
         best = _best(costs, priors, count)
     if costs.min() > most_cost + HOPELESS:
-        return pose, float(costs.min())
-    far = poses[best][_far(body, poses[best], pose)]
-    if not len(far):
-        return pose, most_cost
-    refined = frame.refined(far, *_REFINE)
+        return poses[:0, limb]
+    best = best[_far(body, poses[best], pose)]
+    return poses[best][:, limb]
+
+
+def best_refined(frame: FramePopulation, poses: FloatArray) -> tuple[FloatArray, float]:
+    """The best of poses (n, p) after a refinement of the whole body on the contours, (p,), and its
+    cost (`FramePopulation.costs_with_prior`).
+    """
+    refined = frame.refined(poses, *_REFINE)
     costs = frame.costs_with_prior(refined)
-    return refined[int(costs.argmin())], float(costs.min())
+    best = int(costs.argmin())
+    return refined[best], float(costs[best])
 
 
 def _drawn(

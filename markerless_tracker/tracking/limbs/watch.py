@@ -53,6 +53,7 @@ class LimbWatch:
         self._schedule = LimbSchedule()
         self._areas_m2: dict[str, float] = {}
         self._rivals: dict[str, Rival] = {}
+        self._begun: dict[str, FloatArray] = {}
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -129,11 +130,12 @@ class LimbWatch:
             return Recovered(pose)
         unexplained = find_unexplained(searcher.body, pose, seen.used, self.rig)
         self._areas_m2 = dict(unexplained.areas_m2)
+        begun, self._begun = self._begun, {}
         due = self._schedule.take(
             searcher.body, pose, searcher.limits, seen.stamp_ns, lost=self.lost,
-            areas_m2=unexplained.areas_m2, badly=badly, late=late, single=single,
+            areas_m2=unexplained.areas_m2, badly=badly, late=late, single=single, busy=bool(begun),
         )  # fmt: skip
-        if not due:
+        if not (due or begun):
             return Recovered(pose)
         search = _search(searcher, contours, seen, pose, thorough=not late)
         if self._compare_headings(search, due, searcher):
@@ -145,9 +147,15 @@ class LimbWatch:
         if due.pair is not None and self._compare_exchange(search, due.pair, searcher.body):
             self._rivals = {}
             found.append(due.pair.name)
-        for name in due.limbs:
-            if self._search_limb(search, name, searcher, unexplained, seen.stamp_ns):
+        for name, drawn in begun.items():
+            if self._take_limb(search, name, drawn, searcher, unexplained, seen.stamp_ns):
                 found.append(name)
+        for name in due.limbs:
+            drawn = self._draw_limb(search, name, searcher, unexplained, seen.stamp_ns)
+            if self._take_limb(search, name, drawn, searcher, unexplained, seen.stamp_ns):
+                found.append(name)
+        for name in due.halves:
+            self._begun[name] = self._draw_limb(search, name, searcher, unexplained, seen.stamp_ns)
         if found:
             # They explain at least a part of the silhouette; the next search finds the rest.
             self._areas_m2 = {}
@@ -178,21 +186,33 @@ class LimbWatch:
         search.pose = other
         return True
 
-    def _search_limb(
+    def _draw_limb(
         self,
         search: LimbSearch,
         name: str,
         searcher: Searcher,
         unexplained: Unexplained,
         stamp_ns: int,
-    ) -> bool:
-        """Search a limb in its whole range; whether it was found elsewhere."""
+    ) -> FloatArray:
+        """The best draws (n, d) of a limb in its whole range."""
         body = searcher.body
         limb, aim = body.subspaces[name], None
         if unexplained.regions:
             aim = partial(most_aimed, body, limb=limb, regions=unexplained.regions, rig=self.rig)
         rng = keyed_generator(searcher.config.seed, stamp_ns, f"{name} elsewhere")
-        found = search.elsewhere(limb, rng, aim)
+        return search.drawn(limb, rng, aim)
+
+    def _take_limb(
+        self,
+        search: LimbSearch,
+        name: str,
+        drawn: FloatArray,
+        searcher: Searcher,
+        unexplained: Unexplained,
+        stamp_ns: int,
+    ) -> bool:
+        """Compare draws (n, d) of a limb with the estimate; whether it was found elsewhere."""
+        found = search.take_drawn(searcher.body.subspaces[name], drawn)
         self._rivals.pop(name, None)
         if search.rival is not None:
             self._rivals[name] = search.rival

@@ -19,6 +19,9 @@ NEAR = 0.1
 """A pose is refined once more if a parameter has moved by more than this, rad or m."""
 FAR_S = 0.045
 """Frames farther apart than this are all searched: a limb can be lost from each to the next."""
+DENSE_S = 0.025
+"""If frames follow each other faster than this, what one could not explain need not be searched
+again in the next one."""
 _MEMORY = 0.05
 """Weight of a frame in the running mean of the track's cost."""
 
@@ -57,6 +60,7 @@ class Effort:
         self._badly = True
         self._allowed = True
         self._late = False
+        self._dense = False
 
     def begin(self, effort: float, *, doubt: bool, since_s: float = 0.0) -> None:
         """Begin a frame.
@@ -81,6 +85,7 @@ class Effort:
             self._limbs_frame = not self._limbs_frame
         self._reduced, self._swarms = effort < 1.0 and not doubt, False
         self._doubt, self._allowed, self._late = doubt, effort > 0.0, effort < 1.0
+        self._dense = since_s < DENSE_S
 
     @property
     def granted(self) -> bool:
@@ -153,6 +158,13 @@ class Effort:
         return self._badly or self._doubt or not self._needed_only
 
     def tracked(self, cost: float) -> None:
-        """Add the cost of a frame in which the person was tracked to the running mean."""
+        """Add the cost of a frame in which the person was tracked to the running mean.
+
+        What remains after all searches of a frame explained badly is usual from then on: the frames
+        that follow soon would be searched in vain.
+        """
         usual = self._usual_cost
-        self._usual_cost = cost if usual is None else usual + _MEMORY * (cost - usual)
+        if usual is None or (self._badly and self._dense and self._granted):
+            self._usual_cost = max(cost, usual or 0.0)
+        else:
+            self._usual_cost = usual + _MEMORY * (cost - usual)

@@ -22,13 +22,27 @@ from markerless_tracker.tracking.limbs.search import (
     ARMS_SHARE,
     CLOSE,
     LimbSearch,
-    other_limb,
+    best_refined,
+    drawn_limbs,
 )
 from markerless_tracker.tracking.search import Searcher
 
 SEARCH = "markerless_tracker.tracking.limbs.search"
 ANKLE = MARKER_NAMES.index("LAnkle")
 ANKLES = [ANKLE, MARKER_NAMES.index("RAnkle")]
+
+
+def elsewhere(search: LimbSearch, limb, key: str) -> bool:
+    """Search a limb in one frame."""
+    return search.take_drawn(limb, search.drawn(limb, keyed_generator(0, 0, key), None))
+
+
+def found_at(monkeypatch, other, cost) -> None:
+    """Let the searches find a pose (p,)."""
+    monkeypatch.setattr(
+        f"{SEARCH}.drawn_limbs", lambda _f, _r, _p, limb, *_, **__: other[None, limb]
+    )
+    monkeypatch.setattr(f"{SEARCH}.best_refined", lambda *_: (other, cost))
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +71,7 @@ def test_a_leg_that_decided_its_evidence_is_found_elsewhere(bent) -> None:
     assert own.cost_with_prior(true) < own.cost_with_prior(wrong)
     search = LimbSearch(Recombiner(body, searcher.limits), frame, own, wrong, 0.003)
     leg = body.subspaces["l_leg"]
-    assert any(search.elsewhere(leg, keyed_generator(0, 0, f"{i}"), None) for i in range(8))
+    assert any(elsewhere(search, leg, f"{i}") for i in range(8))
     off_m = np.linalg.norm(markers(body, search.pose) - markers(body, true), axis=1)[ANKLE]
     assert off_m < 0.1 < np.linalg.norm(markers(body, wrong) - markers(body, true), axis=1)[ANKLE]
 
@@ -69,7 +83,7 @@ def test_a_leg_in_its_place_stays(bent) -> None:
     own = OwnEvidence(searcher, seen, 0, frame)
     search = LimbSearch(Recombiner(body, searcher.limits), frame, own, true, 0.003)
     for name in body.limbs:
-        assert not search.elsewhere(body.subspaces[name], keyed_generator(0, 0, name), None)
+        assert not elsewhere(search, body.subspaces[name], name)
     assert search.pose is true
 
 
@@ -94,10 +108,10 @@ def test_what_the_rest_of_the_body_gains_is_no_merit_of_a_limb(
     other[knee] += knee_rad
     costs = frame.costs(np.array([estimate, other]))
     assert costs[1] < costs[0] - 0.003
-    monkeypatch.setattr(f"{SEARCH}.other_limb", lambda *_, **__: (other, float(costs[1])))
+    found_at(monkeypatch, other, float(costs[1]))
     own = OwnEvidence(searcher, seen, 0, frame)
     search = LimbSearch(Recombiner(body, searcher.limits), frame, own, estimate, 0.003)
-    assert search.elsewhere(leg, keyed_generator(0, 0, "leg"), None) is taken
+    assert elsewhere(search, leg, "leg") is taken
 
 
 @pytest.mark.parametrize(
@@ -126,10 +140,10 @@ def test_the_prior_moves_a_limb_only_where_the_evidence_allows_it(
     )  # fmt: skip
     monkeypatch.setattr(f"{SEARCH}.prior_costs", priors)
     monkeypatch.setattr(f"{SEARCH}.distance_m", lambda *_: moved_m)
-    monkeypatch.setattr(f"{SEARCH}.other_limb", lambda *_, **__: (other, costs(other[None])[0]))
+    found_at(monkeypatch, other, costs(other[None])[0])
     search = LimbSearch(Recombiner(body, body.limits), frame, own, estimate, 0.001)
     leg = body.subspaces["l_leg"]
-    assert bool(search.elsewhere(leg, keyed_generator(0, 0, "leg"), None)) is taken
+    assert bool(elsewhere(search, leg, "leg")) is taken
     assert search.pose is (other if taken else estimate)
     # The place that was not taken is the rival.
     gain, moved = evidence + prior, other - estimate
@@ -149,10 +163,10 @@ def test_the_other_evidence_counts_for_arms_alone(bent, monkeypatch) -> None:
         undecided=frame, differs=True, body=body, refined=lambda pose, *_: pose,
         gain=lambda *_, other_share: shares.append(other_share) or 0.1,
     )  # fmt: skip
-    monkeypatch.setattr(f"{SEARCH}.other_limb", lambda *_, **__: (other, 0.0))
+    found_at(monkeypatch, other, 0.0)
     for name in body.limbs:
         search = LimbSearch(Recombiner(body, body.limits), frame, own, estimate, 0.001)
-        assert search.elsewhere(body.subspaces[name], keyed_generator(0, 0, name), None)
+        assert elsewhere(search, body.subspaces[name], name)
         assert shares == ([ARMS_SHARE] * 2 if name.endswith("arm") else [0.0] * 2)
         shares.clear()
 
@@ -166,20 +180,15 @@ def test_a_draw_where_the_limb_is_is_not_refined(bent, monkeypatch, thorough) ->
     monkeypatch.setattr(Recombiner, "with_prior_limb", lambda _, at, limb, n, rng: drawn)
     monkeypatch.setattr(Recombiner, "with_limb", lambda _, at, limb, n, rng: drawn)
     monkeypatch.setattr(Recombiner, "with_limb_near", lambda _, at, limb, f, rng: at.copy())
-    refined: list[int] = []
-    monkeypatch.setattr(
-        FramePopulation, "refined", lambda _, poses, *args: refined.append(1) or poses
-    )
-    for knee_rad, times in ((0.1, 0), (0.5, 1)):
+    for knee_rad, count in ((0.1, 0), (0.5, 1)):
         drawn = np.tile(true, (2, 1))
         drawn[:, body.index("l_knee")] += knee_rad
         limb = body.subspaces["l_leg"]
         rng = keyed_generator(0, 0, "leg")
-        found, cost = other_limb(
+        found = drawn_limbs(
             frame, Recombiner(body, searcher.limits), true, limb, rng, thorough=thorough
         )
-        assert len(refined) == times
-        assert (found is true) == (times == 0) and (cost == np.inf) == (times == 0)
+        assert found.shape == (count, limb.size)
 
 
 @pytest.mark.parametrize("thorough", [True, False])
@@ -194,17 +203,12 @@ def test_with_time_worse_draws_elsewhere_are_refined(bent, monkeypatch, thorough
     monkeypatch.setattr(Recombiner, "with_prior_limb", lambda _, at, limb, n, rng: drawn)
     monkeypatch.setattr(Recombiner, "with_limb", lambda _, at, limb, n, rng: drawn)
     monkeypatch.setattr(Recombiner, "with_limb_near", lambda _, at, limb, f, rng: at.copy())
-    refined: list[np.ndarray] = []
-    monkeypatch.setattr(
-        FramePopulation, "refined", lambda _, poses, *args: refined.extend(poses) or poses
-    )
     limb, rng = body.subspaces["l_leg"], keyed_generator(0, 0, "leg")
     recombiner, cost = Recombiner(body, searcher.limits), float(frame.costs(true[None])[0])
     assert cost < frame.costs(drawn[1:])[0]
     monkeypatch.setattr(f"{SEARCH}.HOPELESS", 9.0)
-    other_limb(frame, recombiner, true, limb, rng, None, cost, thorough=thorough)
-    assert len(refined) == thorough
-    assert not thorough or np.array_equal(refined[0], drawn[1])
+    found = drawn_limbs(frame, recombiner, true, limb, rng, None, cost, thorough=thorough)
+    np.testing.assert_array_equal(found, drawn[1:, limb] if thorough else np.empty((0, limb.size)))
 
 
 def test_poses_are_compared_with_the_prior_of_their_limbs(bent, monkeypatch) -> None:
@@ -244,7 +248,7 @@ def test_legs_of_which_little_shows_are_found_on_the_floor(bent_leg, floor_sd_m,
     own = OwnEvidence(searcher, seen, 0, frame)
     search = LimbSearch(Recombiner(body, searcher.limits), frame, own, folded, 0.003)
     for turn, name in enumerate(("l_leg", "r_leg") * 3):
-        search.elsewhere(body.subspaces[name], keyed_generator(0, 0, f"turn {turn}"), None)
+        elsewhere(search, body.subspaces[name], f"turn {turn}")
     assert (markers(body, search.pose)[ANKLES, 2].max() < 0.3) == found
 
 
@@ -282,5 +286,8 @@ def test_a_limb_with_the_prior_is_refined_beside_the_best_one(bent, monkeypatch)
             FramePopulation, "costs_with_prior", lambda _, poses, costs=costs: costs[: len(poses)]
         )
         rng = keyed_generator(0, 0, "leg")
-        found, cost = other_limb(frame, Recombiner(body, searcher.limits), true, limb, rng)
-        assert found[knee] == drawn[better, knee] and cost == 0.1
+        found = drawn_limbs(frame, Recombiner(body, searcher.limits), true, limb, rng)
+        poses = np.tile(true, (len(found), 1))
+        poses[:, limb] = found
+        best, cost = best_refined(frame, poses)
+        assert best[knee] == drawn[better, knee] and cost == 0.1

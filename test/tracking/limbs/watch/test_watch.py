@@ -10,7 +10,7 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
-from markerless_tracker.tracking.limbs.schedule import FIRST_WAIT_NS
+from markerless_tracker.tracking.limbs.schedule import FIRST_WAIT_NS, HALVES_NS
 from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import LimbWatch
@@ -38,6 +38,11 @@ def searcher_of(scene, threads=1, **changes):
 
 def contours_of(searcher, seen, pose):
     return searcher.frame(seen, 0, pose).contours
+
+
+def none(limb):
+    """No draws of a limb."""
+    return np.empty((0, len(limb)))
 
 
 def recover(watch, searcher, contours, seen, stamp_ns, pose, *, single=False):
@@ -164,8 +169,8 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})),
         (
-            "search.other_limb",
-            lambda _f, _r, at, limb, *_, **__: searched.append(limb.tobytes()) or (at, 9.0),
+            "search.drawn_limbs",
+            lambda _f, _r, _p, limb, *_, **__: searched.append(limb.tobytes()) or none(limb),
         ),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
@@ -174,8 +179,8 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
     contours = contours_of(searcher, seen, pose)
     recover(watch, searcher, contours, seen, 0, pose)
     searched.clear()
-    for stamp_ns in (1, 2, 3):
-        recover(watch, searcher, contours, seen, stamp_ns, pose)
+    for number in (1, 2, 3):
+        recover(watch, searcher, contours, seen, number * HALVES_NS, pose)
     name_of = {scene.body.subspaces[name].tobytes(): name for name in limbs}
     names = [name_of[limb] for limb in searched]
     assert names[::2] == ["r_leg"] * 3 and set(names[1::2]) == {"l_leg", "r_arm", "l_arm"}
@@ -192,14 +197,14 @@ def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_turns(
     def faces(*_):
         done.append("facing")
 
-    def elsewhere(_f, _r, at, limb, *_, **__):
+    def drawn(_f, _r, _p, limb, *_, **__):
         done.append(next(n for n in limbs if np.array_equal(scene.body.subspaces[n], limb)))
-        return at, 9.0
+        return none(limb)
 
     monkeypatch.setattr(
         f"{package}.watch.find_unexplained", lambda *_: Unexplained(dict.fromkeys(limbs, 0.01), {})
     )
-    monkeypatch.setattr(f"{package}.search.other_limb", elsewhere)
+    monkeypatch.setattr(f"{package}.search.drawn_limbs", drawn)
     monkeypatch.setattr(f"{package}.schedule.FIRST_WAIT_NS", 0)
     monkeypatch.setattr(f"{package}.facing.FacingWatch.compare", faces)
     monkeypatch.setattr(f"{package}.exchange.LEAST_M", 9.0)
@@ -217,15 +222,15 @@ def test_draws_near_a_limb_are_left_out_unless_sets_are_late(balancing, monkeypa
     scene, seen, pose, _ = balancing
     thorough: list[bool] = []
 
-    def elsewhere(_f, _r, at, *_, **options):
+    def drawn(_f, _r, _p, limb, *_, **options):
         thorough.append(options["thorough"])
-        return at, 9.0
+        return none(limb)
 
     package = "markerless_tracker.tracking.limbs"
     monkeypatch.setattr(
         f"{package}.watch.find_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})
     )
-    monkeypatch.setattr(f"{package}.search.other_limb", elsewhere)
+    monkeypatch.setattr(f"{package}.search.drawn_limbs", drawn)
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)
     contours = contours_of(searcher, seen, pose)
     watch.recover(searcher, contours, Seen(0, seen, seen, seen), pose, late=late)
@@ -237,7 +242,10 @@ def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monk
     searched: list[int] = []
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained({"r_leg": 0.01}, {})),
-        ("search.other_limb", lambda _f, _r, at, limb, *_, **__: searched.append(now) or (at, 9.0)),
+        (
+            "search.drawn_limbs",
+            lambda _f, _r, _p, limb, *_, **__: searched.append(now) or none(limb),
+        ),
         ("turns.PER_LIMB_NS", 10**12),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
@@ -260,8 +268,8 @@ def test_a_limb_does_not_wait_where_more_silhouette_is_unexplained_than_before(
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained(dict(areas), {})),
         (
-            "search.other_limb",
-            lambda _f, _r, at, limb, *_, **__: searched.append((now, limb)) or (at, 9.0),
+            "search.drawn_limbs",
+            lambda _f, _r, _p, limb, *_, **__: searched.append((now, limb)) or none(limb),
         ),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)

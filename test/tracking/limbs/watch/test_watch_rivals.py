@@ -17,12 +17,12 @@ def watching(stander, monkeypatch):
     found: dict[str, Rival] = {}
     stamps_ns = iter(range(0, 10**12, APART_NS))
 
-    def elsewhere(search, limb, *_):
+    def not_taken(search, limb, *_):
         name = next(n for n in body.limbs if np.array_equal(body.subspaces[n], limb))
         search.rival = found.get(name)
         return False
 
-    monkeypatch.setattr(f"{PACKAGE}.search.LimbSearch.elsewhere", elsewhere)
+    monkeypatch.setattr(f"{PACKAGE}.search.LimbSearch.take_drawn", not_taken)
     for due in ("facing.FacingWatch.take_turn", "exchange.PairExchange.take_turn"):
         monkeypatch.setattr(f"{PACKAGE}.{due}", lambda *_: None)
 

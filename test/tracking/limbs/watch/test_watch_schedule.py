@@ -16,7 +16,7 @@ from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
 
 
-def searches_of(monkeypatch, every_ns, count, areas_m2=None, named=False, **how):
+def searches_of(monkeypatch, every_ns, count, areas_m2=None, named=False, wait_ns=0, **how):
     """What each of `count` frames searches, while an exchange is always possible.
 
     Limbs are `limb`, or their names with `named`.
@@ -34,18 +34,19 @@ def searches_of(monkeypatch, every_ns, count, areas_m2=None, named=False, **how)
         now.append("exchange")
         return other, -1.0
 
-    def elsewhere(_, limb, *__):
+    def not_taken(_, limb, *__):
         name = next(n for n in body.limbs if np.array_equal(body.subspaces[n], limb))
         now.append(name if named else "limb")
         return False
 
     for name, value in (
         ("watch.find_unexplained", lambda *_: Unexplained(dict(areas_m2 or {}), {})),
-        ("schedule.FIRST_WAIT_NS", 0),
+        ("schedule.FIRST_WAIT_NS", wait_ns),
         ("facing.FacingWatch.compare", lambda *_: now.append("facing")),
         ("exchange.LEAST_M", 0.0),
         ("search.LimbSearch.compared", compared),
-        ("search.LimbSearch.elsewhere", elsewhere),
+        ("search.LimbSearch.drawn", lambda _, limb, *__: np.zeros((1, len(limb)))),
+        ("search.LimbSearch.take_drawn", not_taken),
     ):
         monkeypatch.setattr(f"{package}.{name}", value)
     body, watch = scene.body, LimbWatch(scene.rig)
@@ -66,8 +67,48 @@ def test_searches_that_can_wait_are_spread_over_dense_frames(monkeypatch) -> Non
     assert first == ["exchange", "facing", "limb"]
     assert max(map(len, others)) == 1
     counts = {name: sum(frame == [name] for frame in others) for name in first}
-    # In a second: every 50, 250 and 96 ms, the last two up to three frames later.
-    assert counts == {"exchange": 20, "facing": 3, "limb": 10}
+    # In a second: every 50, 250 and 96 ms, up to three frames later.
+    assert counts == {"exchange": 19, "facing": 3, "limb": 10}
+
+
+def test_of_the_limbs_near_unexplained_silhouette_one_is_searched_in_a_dense_frame(
+    monkeypatch,
+) -> None:
+    """The next one has its turn while the likeliest, which was searched in vain, waits."""
+    monkeypatch.setattr("markerless_tracker.tracking.limbs.turns.PER_LIMB_NS", 10**12)
+    monkeypatch.setattr("markerless_tracker.tracking.limbs.exchange.EVERY_NS", 10**12)
+    areas_m2 = {"r_leg": 0.02, "l_leg": 0.01}
+    frames = searches_of(monkeypatch, 16_666_667, 5, areas_m2, named=True, wait_ns=20_000_000)
+    legs = [[name for name in frame if name.endswith("leg")] for frame in frames]
+    assert legs == [["l_leg", "r_leg"], [], ["r_leg"], ["l_leg"], []]
+
+
+def test_a_limb_in_rotation_is_drawn_in_a_dense_frame_and_compared_in_the_next(
+    stander, monkeypatch
+) -> None:
+    package, now = "markerless_tracker.tracking.limbs", 0
+    drawn, taken = [], []
+
+    def draw(_, limb, *__):
+        drawn.append(now)
+        return np.full((1, len(limb)), now)
+
+    def take(_, limb, draws):
+        taken.append((now, int(draws[0, 0])))
+        return False
+
+    monkeypatch.setattr(f"{package}.watch.find_unexplained", lambda *_: Unexplained({}, {}))
+    monkeypatch.setattr(f"{package}.search.LimbSearch.drawn", draw)
+    monkeypatch.setattr(f"{package}.search.LimbSearch.take_drawn", take)
+    while len(drawn) < 4:
+        stander.recover(now * 16_666_667)
+        now += 1
+    first, *halves, last = drawn
+    assert taken == [(first, first), *((number + 1, number) for number in halves)]
+    # A watch that was reset compares nothing that was drawn before.
+    stander.watch.reset()
+    stander.recover(now * 16_666_667)
+    assert taken[-1] == (now, now) and (now, last) not in taken
 
 
 def test_all_limbs_are_searched_where_a_frame_is_explained_badly(monkeypatch) -> None:

@@ -19,7 +19,7 @@ def searched(stander, monkeypatch):
         limbs = [body.subspaces[name] for name in found]
         monkeypatch.setattr(f"{LIMBS}.watch.find_unexplained", lambda *_: Unexplained(areas_m2, {}))
         monkeypatch.setattr(
-            f"{LIMBS}.search.LimbSearch.elsewhere",
+            f"{LIMBS}.search.LimbSearch.take_drawn",
             lambda _, limb, *__: any(np.array_equal(limb, one) for one in limbs),
         )
         stander.recover(next(stamps))
