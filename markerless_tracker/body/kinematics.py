@@ -203,6 +203,48 @@ def markers_of_many(body: BodyModel, poses: FloatArray) -> FloatArray:
     return np.asarray(rotated + nodes[..., 3])
 
 
+def farthest_moved_m(
+    body: BodyModel, pose: FloatArray, poses: FloatArray, active: IntArray
+) -> FloatArray:
+    """Largest distance (n,) of a marker from its place at a pose (p,), m.
+
+    Args:
+        body: the body.
+        pose: the pose.
+        poses: (n, p), which differ from it in active parameters only.
+        active: indices of these.
+    """
+    nodes, moves = transforms(body, pose), moving_nodes(body, active)
+    out = np.empty(len(poses))
+    _farthest_moved(
+        np.ascontiguousarray(poses, dtype=np.float64), nodes, moves, body.node_parent,
+        body.node_fixed, body.node_kind, body.node_sign, body.node_parameter, body.marker_node,
+        body.marker_offset, nodes.copy(), out,
+    )  # fmt: skip
+    return out
+
+
+@kernel
+def _farthest_moved(  # type: ignore[no-untyped-def]
+    poses, before, moves, parent, fixed, kind, sign, parameter, marker_node, offset, nodes, out
+):
+    for i in range(len(poses)):
+        for n in range(parent.size):
+            if moves[n]:
+                node_transform(n, poses[i], parent, fixed, kind, sign, parameter, nodes)
+        most = 0.0
+        for k in range(marker_node.size):
+            n, apart = marker_node[k], 0.0
+            if moves[n]:
+                for r in range(3):
+                    gap = nodes[n, r, 3] - before[n, r, 3]
+                    for c in range(3):
+                        gap += (nodes[n, r, c] - before[n, r, c]) * offset[k, c]
+                    apart += gap * gap
+            most = max(most, apart)
+        out[i] = np.sqrt(most)
+
+
 def cone_transforms(body: BodyModel, pose: FloatArray) -> FloatArray:
     """World transforms (c, 3, 4) of the cones' base frames at a pose (p,); the axis is +z."""
     nodes = transforms(body, pose)[body.cone_node]

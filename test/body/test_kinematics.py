@@ -12,10 +12,15 @@ from markerless_tracker.body import (
     load_body,
     load_description,
     markers,
+    markers_of_many,
     root_transform,
     transforms,
 )
-from markerless_tracker.body.kinematics import moving_nodes, node_transforms
+from markerless_tracker.body.kinematics import (
+    farthest_moved_m,
+    moving_nodes,
+    node_transforms,
+)
 
 _LENGTHS = {
     "torso": 0.579, "head": 0.268, "l_clavicle": 0.241, "r_clavicle": 0.177,
@@ -223,3 +228,17 @@ def test_moving_nodes_are_those_whose_transforms_change(part) -> None:
     assert (moving_nodes(body, active) | ~changes).all()
     assert moving_nodes(body, active).sum() < len(changes) or part == "root"
     assert not moving_nodes(body, np.empty(0, dtype=int)).any()
+
+
+@pytest.mark.parametrize("part", ["l_arm", "r_leg", "torso"])
+def test_the_farthest_marker_is_that_of_all_markers(part) -> None:
+    body = load_body("person32", 1.7)
+    active = body.subspaces[part]
+    rng = np.random.default_rng(5)
+    pose = body.neutral + 0.2 * rng.standard_normal(body.size)
+    poses = np.tile(pose, (6, 1))
+    poses[1:, active] += rng.uniform(-1.5, 1.5, (5, active.size))
+    apart = np.linalg.norm(markers_of_many(body, poses) - markers(body, pose), axis=2)
+    far = farthest_moved_m(body, pose, poses, active)
+    np.testing.assert_allclose(far, apart.max(axis=1), atol=1e-12)
+    assert far[0] == 0.0 and far[1:].min() > 0.01

@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.body import BodyModel, markers, markers_of_many
+from markerless_tracker.body import BodyModel, markers
+from markerless_tracker.body.kinematics import farthest_moved_m
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.own_evidence import OwnEvidence
@@ -220,12 +221,16 @@ def drawn_limbs(
             best ones, and the search ends, which takes less time.
     """
     body = recombiner.body
+
+    def far(poses: FloatArray) -> NDArray[np.bool_]:
+        return np.asarray(farthest_moved_m(body, pose, poses, limb) >= NEAR_M)
+
     poses = _drawn(recombiner, pose, limb, DRAWS, rng)
     if aim is not None:
         aimed = aim(_drawn(recombiner, pose, limb, AIMED_OF, rng), AIMED)
         poses = np.concatenate([poses, aimed])
     if thorough:
-        poses = poses[_far(body, poses, pose)]
+        poses = poses[far(poses)]
     if not len(poses):
         return poses[:, limb]
     costs_of = frame.limb_costs(pose, limb)
@@ -236,7 +241,7 @@ def drawn_limbs(
             np.repeat(poses[best], _CHILDREN, axis=0), limb, fraction, rng
         )
         if thorough:
-            near = near[_far(body, near, pose)]
+            near = near[far(near)]
         # Of the last layer only the best draws of both kinds are used, of the others the parents.
         count = 1 if fraction == LAYERS[-1] else _PARENTS
         cutoff = costs[_best(costs, priors, count)].max()
@@ -247,7 +252,7 @@ def drawn_limbs(
         best = _best(costs, priors, count)
     if costs.min() > most_cost + HOPELESS:
         return poses[:0, limb]
-    best = best[_far(body, poses[best], pose)]
+    best = best[far(poses[best])]
     return poses[best][:, limb]
 
 
@@ -280,13 +285,8 @@ def _best(costs: FloatArray, priors: FloatArray, count: int) -> IntArray:
     """
     first = np.argsort(costs, kind="stable")[:count]
     second = np.argsort(costs + priors, kind="stable")[:count]
-    return np.concatenate([first, second[~np.isin(second, first)]])
-
-
-def _far(body: BodyModel, poses: FloatArray, pose: FloatArray) -> NDArray[np.bool_]:
-    """Which of poses (n, p) have a marker at least `NEAR_M` from its place in a pose (p,)."""
-    apart = markers_of_many(body, poses) - markers(body, pose)
-    return np.asarray((np.linalg.norm(apart, axis=2) >= NEAR_M).any(axis=1))
+    # (Faster than NumPy's set operations.)
+    return np.array([*dict.fromkeys((*first, *second))], dtype=np.int64)
 
 
 def distance_m(body: BodyModel, pose: FloatArray, other: FloatArray) -> float:
