@@ -228,6 +228,12 @@ class FrameSearch:
                 self.pose, self.cost = found, found_cost
         return self.pose
 
+    def take(self, pose: FloatArray) -> None:
+        """Take a pose (p,) that was found otherwise as the estimate."""
+        if self._costs_of is not None and not np.array_equal(pose, self.pose):
+            self.cost = float(self._costs_of(pose[None])[0])
+        self.pose = pose
+
     def terms(self) -> dict[str, ViewTerms]:
         """The terms of the fitness of the estimate in each view."""
         if self._terms is None or not np.array_equal(self._terms[0], self.pose):

@@ -81,6 +81,7 @@ class Tracker:
         self.config = config
         self._given = start_pose is not None
         start = np.array(body.neutral if start_pose is None else start_pose, np.float64)
+        check_pose(body, start, None)
         if self._given and body.measured:
             body = at_rest(body, start)
         self._body = BodyEstimate(
@@ -130,7 +131,7 @@ class Tracker:
 
     def configure(self, config: TrackerConfig) -> None:
         """Use other `live_settings` from the next step on; the track continues, and so does a start
-        that has begun, with its settings.
+        that has begun.
 
         Raises:
             ConfigError: the budget cannot be spent; nothing has changed then.
@@ -301,7 +302,7 @@ class Tracker:
         notes = seen.notes + self._body.take_warnings() + recovered.notes + seen.left_out
         jumped = recovered.jumped(self.body)
         corrected = self._motion.reachable(stamp_ns, limits, np.full_like(speeds, LIMB_RAD_S))
-        search.pose = recovered.placed(self.body, limits, corrected)
+        search.take(recovered.placed(self.body, limits, corrected))
         return Found(
             search, stamp_ns, used, notes,
             rotated=recovered.rotated, jumped=jumped, recovered=recovered.moved_m > RECOVERED_M,

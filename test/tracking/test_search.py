@@ -258,6 +258,15 @@ def test_refinement_gets_limits_beliefs_and_distance(person, monkeypatch) -> Non
         assert (posture.precision[person.body.joints] > 0).all()
 
 
+def test_the_cost_is_that_of_a_pose_that_was_found_otherwise(person) -> None:
+    config = settings()
+    frame = person.searcher(config).frame(person.observations, STAMP_NS, person.predicted)
+    frame.run((contour_stage("align", BODY, config, person.predicted, BODY.sigma),))
+    frame.take(person.pose)
+    assert frame.pose is person.pose
+    assert frame.cost == pytest.approx(1.0 + config.edge_weight - person.f(person.pose, config))
+
+
 def test_what_was_spent_with_refinement(person) -> None:
     config = settings(evaluations=1000, **{"refine.iterations": 5})
     frame = searched(person, config)

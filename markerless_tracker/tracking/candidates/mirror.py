@@ -122,13 +122,13 @@ class _Exchange:
 
 @lru_cache(maxsize=4)
 def mirror_of(body: BodyModel) -> Mirror:
-    """The mirror of a body; it is the same for all sizes of the body."""
+    """The mirror of a body."""
     return Mirror(body)
 
 
 @lru_cache(maxsize=4)
 def opposite_heading(body: BodyModel) -> OppositeHeading:
-    """The reversal of a body's heading; it is the same for all sizes of the body."""
+    """The reversal of a body's heading."""
     return OppositeHeading(body)
 
 

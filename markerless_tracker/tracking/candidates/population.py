@@ -88,11 +88,11 @@ class FramePopulation:
         near: (p,) a pose whose root is near the person.
         contours: the frame's contour evidence, if it exists already.
         radius_m: as in `FrameSearch`, if it does not.
-        charges_unusual: whether unusual postures cost something.
+        charges_postures: whether unusual postures cost something.
 
     Attributes:
         near: as given.
-        charges_unusual: as given.
+        charges_postures: as given.
     """
 
     def __init__(
@@ -104,9 +104,9 @@ class FramePopulation:
         *,
         contours: ContourFrame | None = None,
         radius_m: float = RADIUS_M,
-        charges_unusual: bool = False,
+        charges_postures: bool = False,
     ) -> None:
-        self.charges_unusual = charges_unusual
+        self.charges_postures = charges_postures
         self._searcher = searcher
         self._stamp_ns = stamp_ns
         self.near = near
@@ -236,9 +236,9 @@ class FramePopulation:
         return float(self.costs(population.poses[:1])[0])
 
     def total_costs(self, poses: FloatArray) -> FloatArray:
-        """`costs_with_prior` and unusual postures (`usual`)."""
+        """`costs_with_prior` and those of unusual postures (`unlike_postures`), if charged."""
         costs = self.costs_with_prior(poses)
-        if self.charges_unusual:
+        if self.charges_postures:
             costs += unlike_postures(self._searcher.body, poses)
         return costs
 

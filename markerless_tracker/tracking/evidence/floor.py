@@ -33,7 +33,7 @@ class FloorView(NamedTuple):
         width: of the window, px.
         person: (h, ceil(w / 64)) silhouette, packed as by `pack_mask`.
         undecided: pixels that may be shadow, packed likewise.
-        hidden: pixels of the predicted body, packed likewise; they show no floor.
+        hidden: pixels of the body or of the hull, packed likewise; they show no floor.
     """
 
     camera: CameraModel

@@ -68,7 +68,7 @@ class PairExchange:
         """Forget all gains: left and right are no longer what they were."""
         self._gains = {name: GainSum() for name in PAIRS}
 
-    def take_turn(
+    def take_due(
         self, body: BodyModel, pose: FloatArray, limits: FloatArray, stamp_ns: int
     ) -> Exchange | None:
         """The exchange of a pair in a pose (p,), within limits (2, p), if one is due.

@@ -63,7 +63,7 @@ class FacingWatch:
         self._next = 0
         self._gains = [GainSum() for _ in _ROTATIONS]
 
-    def take_turn(self, stamp_ns: int) -> bool:
+    def take_due(self, stamp_ns: int) -> bool:
         """Whether to compare at this time; if so, the time is noted as that of a comparison."""
         if self._began_ns is None:
             self._began_ns = stamp_ns

@@ -7,13 +7,13 @@ from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.limbs.exchange import Exchange, PairExchange
 from markerless_tracker.tracking.limbs.facing import FacingWatch
-from markerless_tracker.tracking.limbs.turns import LimbTurns
+from markerless_tracker.tracking.limbs.round_robin import RoundRobin
 from markerless_tracker.tracking.limbs.walking import WalkingWatch
 
 DENSE_NS = 40_000_000
 """If frames follow each other faster than this, searches that can wait are put off to other frames,
 since sets that come too late are lost."""
-HALVES_NS = 25_000_000
+VERY_DENSE_NS = 25_000_000
 """If frames follow each other faster than this, one suspected limb at most is searched in a frame,
 and the search of a limb in rotation takes two frames."""
 FIRST_WAIT_NS = 32_000_000
@@ -33,14 +33,14 @@ class Due:
         facing: whether to compare another heading.
         walking: poses (p,) that face the walking direction.
         limbs: names of the limbs to search elsewhere.
-        halves: names of limbs that are drawn in this frame, and compared in the next one.
+        begun: names of limbs that are drawn in this frame, and compared in the next one.
     """
 
     pair: Exchange | None = None
     facing: bool = False
     walking: Sequence[FloatArray] = ()
     limbs: Sequence[str] = ()
-    halves: Sequence[str] = ()
+    begun: Sequence[str] = ()
 
     @property
     def whole(self) -> bool:
@@ -48,7 +48,7 @@ class Due:
         return self.facing or self.pair is not None or bool(self.walking)
 
     def __bool__(self) -> bool:
-        return self.whole or bool(self.limbs) or bool(self.halves)
+        return self.whole or bool(self.limbs) or bool(self.begun)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class LimbSchedule:
         self.exchange = PairExchange()
         self.facing = FacingWatch()
         self.walking = WalkingWatch()
-        self._turns = LimbTurns()
+        self._round_robin = RoundRobin()
         self._frames = 0
         self._rounds = 0
         self._round_of: dict[str, int] = {}
@@ -108,7 +108,7 @@ class LimbSchedule:
         single: bool,
         busy: bool,
     ) -> Due:
-        """The searches that are due in the next frame; they count as done.
+        """The searches that are due in a frame; they count as done.
 
         Args:
             body: the body.
@@ -127,7 +127,7 @@ class LimbSchedule:
         since_ns = 0 if self._last_ns is None else max(0, stamp_ns - self._last_ns)
         dense = self._last_ns is not None and since_ns < DENSE_NS
         self._last_ns = stamp_ns
-        self._turns.advance(since_ns)
+        self._round_robin.advance(since_ns)
         due = Due()
         if not busy and (not single or self._frames % 2):
             due = self._whole_poses(body, pose, limits, stamp_ns, dense=dense)
@@ -135,14 +135,14 @@ class LimbSchedule:
             whole = due.whole or busy
             limbs = [] if whole else self._one_limb(body.limbs, lost, areas_m2, stamp_ns)
             return replace(due, limbs=limbs)
-        if dense and since_ns < HALVES_NS and not badly:
+        if dense and since_ns < VERY_DENSE_NS and not badly:
             limbs = [*lost] or self._suspects(stamp_ns, areas_m2)[:1]
             put_off = due.whole or busy or bool(limbs)
-            in_turn = self._turns.take(body.limbs, put_off=put_off)[:1]
-            return replace(due, limbs=limbs, halves=[n for n in in_turn if n not in limbs])
+            in_turn = self._round_robin.take(body.limbs, put_off=put_off, single=True)
+            return replace(due, limbs=limbs, begun=[n for n in in_turn if n not in limbs])
         limbs = [*dict.fromkeys((*lost, *self._suspects(stamp_ns, areas_m2)))]
         put_off = dense and (due.whole or bool(limbs))
-        in_turn = self._turns.take(body.limbs, put_off=put_off, single=late)
+        in_turn = self._round_robin.take(body.limbs, put_off=put_off, single=late)
         others = body.limbs if badly and not late else in_turn
         limbs += [name for name in others if name not in limbs]
         return replace(due, limbs=limbs)
@@ -163,13 +163,13 @@ class LimbSchedule:
         self, body: BodyModel, pose: FloatArray, limits: FloatArray, stamp_ns: int, *, dense: bool
     ) -> Due:
         """The comparisons of whole poses that are due; where frames are dense, one at most."""
-        pair = self.exchange.take_turn(body, pose, limits, stamp_ns)
+        pair = self.exchange.take_due(body, pose, limits, stamp_ns)
         if dense and pair:
             return Due(pair)
-        facing = self.facing.take_turn(stamp_ns)
+        facing = self.facing.take_due(stamp_ns)
         if dense and facing:
             return Due(pair, facing)
-        return Due(pair, facing, self.walking.take_turn(body, pose, limits, stamp_ns))
+        return Due(pair, facing, self.walking.take_due(body, pose, limits, stamp_ns))
 
     def _one_limb(
         self,
@@ -185,7 +185,7 @@ class LimbSchedule:
         doubted = [*dict.fromkeys((*lost, *self._rested(areas_m2, areas_m2, stamp_ns)))]
         self._rounds += 1
         if self._rounds % (len(doubted) + 1) == 0 and (
-            in_turn := self._turns.take(limbs, single=True)
+            in_turn := self._round_robin.take(limbs, single=True)
         ):
             return in_turn
         # The one whose last search lies farthest back.

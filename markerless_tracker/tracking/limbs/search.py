@@ -67,8 +67,8 @@ class LimbSearch:
         frame: the evidence, decided near the predicted body.
         own: the evidence for poses that decide it themselves.
         pose: (p,) the estimate.
-        least_gain: least gain for which a limb is taken, in evidence decided with the predicted
-            pose. If pixels were undecided, a limb with that gain must not cost more in its own
+        least_gain: least gain for which a limb is taken, in evidence whose undecided pixels do not
+            count. If pixels were undecided, a limb with that gain must not cost more in its own
             evidence either, and one without it must gain `LEAST_GAIN` there.
         thorough: as for `drawn_limbs`.
 
@@ -216,7 +216,8 @@ def drawn_limbs(
         rng: draws.
         aim: selects, from poses (n, p), at most a given number whose limb lies in unexplained
             silhouette; None for no such draws.
-        most_cost: largest useful cost; the result matters only below it.
+        most_cost: of the estimate, with the prior. Draws that cost `HOPELESS` more, without the
+            prior, are not worth a refinement.
         thorough: whether draws near the former place are left out at once. Else they are often the
             best ones, and the search ends, which takes less time.
     """

@@ -34,16 +34,11 @@ class Unexplained:
     Attributes:
         areas_m2: by limb, the weighted area of the regions that it may belong to, the likeliest
             limb first.
-        regions: by camera with such regions, their pixels (h, w) in its frame.
+        regions: by camera with such regions, all unexplained pixels (h, w) of its frame.
     """
 
     areas_m2: Mapping[str, float]
     regions: Mapping[str, NDArray[np.bool_]]
-
-    @property
-    def limbs(self) -> tuple[str, ...]:
-        """The limbs that may belong to the regions, the likeliest first."""
-        return tuple(self.areas_m2)
 
 
 def find_unexplained(

@@ -33,10 +33,6 @@ class WalkingWatch:
     """Proposes poses whose heading is the walking direction."""
 
     def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget where the trunk was."""
         self._trunks: deque[tuple[int, FloatArray]] = deque()
         self._compared_ns: int | None = None
 
@@ -48,7 +44,7 @@ class WalkingWatch:
         while stamp_ns - self._trunks[0][0] > WALKED_NS:
             self._trunks.popleft()
 
-    def take_turn(
+    def take_due(
         self, body: BodyModel, pose: FloatArray, limits: FloatArray, stamp_ns: int
     ) -> list[FloatArray]:
         """Poses (p,) facing the walking direction, if the body does not and a comparison is due.

@@ -150,11 +150,11 @@ class LimbWatch:
         for name, drawn in begun.items():
             if self._take_limb(search, name, drawn, searcher, unexplained, seen.stamp_ns):
                 found.append(name)
-        for name in due.limbs:
+        for name in (name for name in due.limbs if name not in begun):
             drawn = self._draw_limb(search, name, searcher, unexplained, seen.stamp_ns)
             if self._take_limb(search, name, drawn, searcher, unexplained, seen.stamp_ns):
                 found.append(name)
-        for name in due.halves:
+        for name in due.begun:
             self._begun[name] = self._draw_limb(search, name, searcher, unexplained, seen.stamp_ns)
         if found:
             # They explain at least a part of the silhouette; the next search finds the rest.

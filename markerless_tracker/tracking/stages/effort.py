@@ -19,7 +19,7 @@ NEAR = 0.1
 """A pose is refined once more if a parameter has moved by more than this, rad or m."""
 FAR_S = 0.045
 """Frames farther apart than this are all searched: a limb can be lost from each to the next."""
-DENSE_S = 0.025
+VERY_DENSE_S = 0.025
 """If frames follow each other faster than this, what one could not explain need not be searched
 again in the next one."""
 _MEMORY = 0.05
@@ -60,7 +60,7 @@ class Effort:
         self._badly = True
         self._allowed = True
         self._late = False
-        self._dense = False
+        self._very_dense = False
 
     def begin(self, effort: float, *, doubt: bool, since_s: float = 0.0) -> None:
         """Begin a frame.
@@ -85,7 +85,7 @@ class Effort:
             self._limbs_frame = not self._limbs_frame
         self._reduced, self._swarms = effort < 1.0 and not doubt, False
         self._doubt, self._allowed, self._late = doubt, effort > 0.0, effort < 1.0
-        self._dense = since_s < DENSE_S
+        self._very_dense = since_s < VERY_DENSE_S
 
     @property
     def granted(self) -> bool:
@@ -164,7 +164,7 @@ class Effort:
         that follow soon would be searched in vain.
         """
         usual = self._usual_cost
-        if usual is None or (self._badly and self._dense and self._granted):
+        if usual is None or (self._badly and self._very_dense and self._granted):
             self._usual_cost = max(cost, usual or 0.0)
         else:
             self._usual_cost = usual + _MEMORY * (cost - usual)

@@ -182,7 +182,7 @@ class SizeSearch:
             contours = found.frame.contours.with_body(searcher.body)
             frame = FramePopulation(
                 searcher, observations, stamp_ns, moved[0],
-                contours=contours, charges_unusual=found.frame.charges_unusual,
+                contours=contours, charges_postures=found.frame.charges_postures,
             )  # fmt: skip
             refined = frame.refined(moved[:1], _ITERATIONS, _TRUNCATION_M)
             cost = float(frame.total_costs(refined)[0]) + self._cost(stature_m, girth)

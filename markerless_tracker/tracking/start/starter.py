@@ -67,7 +67,7 @@ class Starter:
     poorly, once more with a cost of unusual postures, by which the poses of both searches are
     compared. Legs and arms are tried in each other's place, and in every frame crossed ones are
     compared with uncrossed ones (`uncrossed`). The opposite heading is propagated, too, until one
-    is kept (`two_headings`). The fit of the body is then left to the caller (`settling`).
+    is kept (`two_headings`). Then the body is fitted (`with_fitted_body`).
 
     Args:
         rig: the cameras.
@@ -111,7 +111,7 @@ class Starter:
         self._stamp_ns = 0
         self._searcher: Searcher | None = None
         self._headings = TwoHeadings(0.0)
-        self._sure = self._charges_unusual = False
+        self._sure = self._charges_postures = False
         self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
 
     @property
@@ -139,7 +139,7 @@ class Starter:
             observations = self._decide(imaged, best)
         near = population.poses[0]
         frame = FramePopulation(
-            self._searcher, observations, stamp_ns, near, charges_unusual=self._charges_unusual
+            self._searcher, observations, stamp_ns, near, charges_postures=self._charges_postures
         )
         population = frame.propagated(population, far=far)
         if far:
@@ -241,10 +241,10 @@ class Starter:
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> tuple[FramePopulation, Population] | None:
         """The population found in a hull; None if it is no person."""
-        self._charges_unusual = False
+        self._charges_postures = False
         frame, population = first = self._search_once(hull, observations, stamp_ns)
         if frame.best_cost(population) > _DOUBTFUL:
-            self._charges_unusual = True
+            self._charges_postures = True
             frame, population = self._search_once(hull, observations, stamp_ns)
             population = frame.with_found(population, *first)
         return (frame, population) if 1.0 - frame.best_cost(population) >= LEAST_FIT else None
@@ -290,7 +290,7 @@ class Starter:
             near = body.neutral.copy()
             near[body.root_position] = hull.trunk_m.mean(axis=0)
             frame = FramePopulation(
-                searcher, observations, stamp_ns, near, charges_unusual=self._charges_unusual
+                searcher, observations, stamp_ns, near, charges_postures=self._charges_postures
             )
             last = self._last_pose
             hints = None if last is None else np.array([last, put_at(body, hull, last)])

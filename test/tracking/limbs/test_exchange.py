@@ -147,7 +147,7 @@ def test_a_pair_in_its_place_stays(walking: Walking) -> None:
 def test_the_pairs_are_tried_in_turn_where_it_changes_anything(walking: Walking) -> None:
     body, exchange = walking.scene.body, PairExchange()
     stamps = [10, 10 + EVERY_NS, 10 + 2 * EVERY_NS]
-    tried = [exchange.take_turn(body, walking.pose, body.limits, stamp) for stamp in stamps]
+    tried = [exchange.take_due(body, walking.pose, body.limits, stamp) for stamp in stamps]
     assert [one and one[0] for one in tried] == [PAIRS[0], PAIRS[1], PAIRS[0]]
     other = tried[PAIRS.index(walking.pair)]
     assert other is not None
@@ -155,11 +155,11 @@ def test_the_pairs_are_tried_in_turn_where_it_changes_anything(walking: Walking)
         markers(body, other.poses[0]), markers(body, walking.swapped), atol=0.01
     )
     assert other.least_gains == (LEAST_GAIN, LEAST_GAIN_PLACED)
-    assert exchange.take_turn(body, walking.pose, body.limits, stamps[-1] + EVERY_NS - 1) is None
+    assert exchange.take_due(body, walking.pose, body.limits, stamps[-1] + EVERY_NS - 1) is None
     # Time that was set back begins anew.
-    assert exchange.take_turn(body, walking.pose, body.limits, 0) is not None
+    assert exchange.take_due(body, walking.pose, body.limits, 0) is not None
     exchange.reset()
-    assert exchange.take_turn(body, body.neutral, body.limits, 0) is None
+    assert exchange.take_due(body, body.neutral, body.limits, 0) is None
     assert LEAST_M > 0.0
 
 
@@ -168,7 +168,7 @@ def test_a_pair_alone_in_another_place_is_tried_every_time(walking: Walking) -> 
     pose, limbs = body.neutral.copy(), body.subspaces[walking.pair]
     pose[limbs] = walking.pose[limbs]
     for stamp in (0, EVERY_NS):
-        tried = exchange.take_turn(body, pose, body.limits, stamp)
+        tried = exchange.take_due(body, pose, body.limits, stamp)
         assert tried is not None and tried[0] == walking.pair
 
 
@@ -202,10 +202,10 @@ def test_crossed_legs_take_each_others_place(standing: Walking) -> None:
 
 def test_what_is_crossed_no_more_need_not_be_better(standing: Walking) -> None:
     body = standing.scene.body
-    due = PairExchange().take_turn(body, standing.swapped, body.limits, 0)
+    due = PairExchange().take_due(body, standing.swapped, body.limits, 0)
     assert due is not None and due.name == "legs" and due.least_gains == (0.0,)
     assert not is_crossed(body, due.poses[0], "legs")
-    due = PairExchange().take_turn(body, standing.pose, body.limits, 0)
+    due = PairExchange().take_due(body, standing.pose, body.limits, 0)
     assert due is None or due.least_gains == (LEAST_GAIN, LEAST_GAIN_PLACED)
 
 

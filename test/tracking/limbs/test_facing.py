@@ -50,7 +50,7 @@ def compared(scene, pose_of, count):
     for number in range(count):
         seen, true = observed(scene, 15 * number)
         pose, stamp_ns = pose_of(true), number * EVERY_NS
-        assert watch.take_turn(stamp_ns) and not watch.take_turn(stamp_ns + DOUBTED_EVERY_NS - 1)
+        assert watch.take_due(stamp_ns) and not watch.take_due(stamp_ns + DOUBTED_EVERY_NS - 1)
         frame = FramePopulation(searcher, seen, stamp_ns, pose)
         own = OwnEvidence(searcher, seen, stamp_ns, frame)
         search = LimbSearch(Recombiner(body, body.limits), frame, own, pose, 0.001)
@@ -96,7 +96,7 @@ def test_a_tracker_that_starts_the_wrong_way_turns_the_person_round(scene) -> No
 
 def test_at_first_comparisons_are_frequent() -> None:
     watch = FacingWatch()
-    times = [t for t in range(0, 2 * FIRST_NS, 10_000_000) if watch.take_turn(t)]
+    times = [t for t in range(0, 2 * FIRST_NS, 10_000_000) if watch.take_due(t)]
     gaps = np.diff(times)
     early = np.array(times[1:]) < FIRST_NS
     assert early.any() and set(gaps[early]) == {FIRST_EVERY_NS}

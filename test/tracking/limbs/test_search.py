@@ -247,8 +247,8 @@ def test_legs_of_which_little_shows_are_found_on_the_floor(bent_leg, floor_sd_m,
     frame = FramePopulation(searcher, seen, 0, folded)
     own = OwnEvidence(searcher, seen, 0, frame)
     search = LimbSearch(Recombiner(body, searcher.limits), frame, own, folded, 0.003)
-    for turn, name in enumerate(("l_leg", "r_leg") * 3):
-        elsewhere(search, body.subspaces[name], f"turn {turn}")
+    for number, name in enumerate(("l_leg", "r_leg") * 3):
+        elsewhere(search, body.subspaces[name], f"search {number}")
     assert (markers(body, search.pose)[ANKLES, 2].max() < 0.3) == found
 
 

@@ -36,7 +36,7 @@ def walk_along(watch, direction_rad, faced_rad, speed_m_s, count, begin_ns=0):
         pose[BODY.index("pelvis_tx")] += metres * np.cos(direction_rad)
         pose[BODY.index("pelvis_ty")] += metres * np.sin(direction_rad)
         watch.note(BODY, pose, begin_ns + k * STEP_NS)
-        found.append((pose, watch.take_turn(BODY, pose, BODY.limits, begin_ns + k * STEP_NS)))
+        found.append((pose, watch.take_due(BODY, pose, BODY.limits, begin_ns + k * STEP_NS)))
     return found
 
 

@@ -1,5 +1,7 @@
 """Views and start poses that do not fit: one clear line, and the tracker stays as it was."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,9 +82,11 @@ class TestErrors:
     @pytest.mark.parametrize(
         "start", [np.zeros(30), np.zeros((1, 31)), np.full(31, np.nan), np.full(31, np.inf)]
     )
-    def test_a_start_pose_that_is_none(self, make_tracker, start):
+    @pytest.mark.parametrize("measured", [False, True])
+    def test_a_start_pose_that_is_none(self, scene, start, measured):
+        body = replace(scene.body, measured=measured)
         with pytest.raises(BodyModelError, match="start pose has shape .* balan31 expects 31"):
-            make_tracker(start_pose=start)
+            Tracker(scene.rig, body, TrackerConfig(), start_pose=start)
 
 
 def test_a_start_outside_the_limits_is_refused_by_name(scene, swarm_settings) -> None:

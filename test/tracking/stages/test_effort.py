@@ -6,7 +6,7 @@ import pytest
 from markerless_tracker.body import load_body
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.tracking import TrackerConfig
-from markerless_tracker.tracking.stages.effort import DENSE_S, NEAR, WORSE, Effort
+from markerless_tracker.tracking.stages.effort import NEAR, VERY_DENSE_S, WORSE, Effort
 
 
 def _settled() -> Effort:
@@ -61,7 +61,9 @@ def test_frames_in_which_the_person_is_lost_are_not_usual() -> None:
     assert _wants_swarms(effort, 0.05 + 1.1 * WORSE)
 
 
-@pytest.mark.parametrize("since_s, again", [(0.9 * DENSE_S, False), (1.1 * DENSE_S, True)])
+@pytest.mark.parametrize(
+    "since_s, again", [(0.9 * VERY_DENSE_S, False), (1.1 * VERY_DENSE_S, True)]
+)
 def test_what_all_searches_left_is_usual_for_the_frames_that_follow_soon(since_s, again) -> None:
     effort = _settled()
     for wants in (True, again):

@@ -91,7 +91,7 @@ def test_silhouettes_with_holes_alone_are_searched_for_a_usual_posture(walk) -> 
     for views, usual in ((seen, False), (torn, True)):
         tracker = tracker_of(scene, stature=1.72)
         tracker.step(views, stamp)
-        assert tracker._start._charges_unusual is usual
+        assert tracker._start._charges_postures is usual
 
 
 def test_the_stature_need_not_be_known(walk) -> None:

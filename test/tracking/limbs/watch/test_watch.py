@@ -10,8 +10,8 @@ from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
-from markerless_tracker.tracking.limbs.schedule import FIRST_WAIT_NS, HALVES_NS
-from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS
+from markerless_tracker.tracking.limbs.round_robin import PER_LIMB_NS
+from markerless_tracker.tracking.limbs.schedule import FIRST_WAIT_NS, VERY_DENSE_NS
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
@@ -162,7 +162,7 @@ def test_a_limb_near_unexplained_silhouette_is_searched_in_every_frame(balancing
         assert "l_arm" in names
 
 
-def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monkeypatch) -> None:
+def test_limbs_that_may_lie_in_unexplained_silhouette_take_dues(balancing, monkeypatch) -> None:
     """The likeliest is searched in every frame, and one of the others."""
     scene, seen, pose, _ = balancing
     limbs = ("r_leg", "l_leg", "r_arm", "l_arm")
@@ -180,13 +180,13 @@ def test_limbs_that_may_lie_in_unexplained_silhouette_take_turns(balancing, monk
     recover(watch, searcher, contours, seen, 0, pose)
     searched.clear()
     for number in (1, 2, 3):
-        recover(watch, searcher, contours, seen, number * HALVES_NS, pose)
+        recover(watch, searcher, contours, seen, number * VERY_DENSE_NS, pose)
     name_of = {scene.body.subspaces[name].tobytes(): name for name in limbs}
     names = [name_of[limb] for limb in searched]
     assert names[::2] == ["r_leg"] * 3 and set(names[1::2]) == {"l_leg", "r_arm", "l_arm"}
 
 
-def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_turns(
+def test_where_there_is_time_for_one_thing_limbs_and_the_whole_body_take_dues(
     standing, monkeypatch
 ) -> None:
     scene, seen, pose, _ = standing
@@ -246,7 +246,7 @@ def test_a_limb_that_is_not_found_waits_longer_after_each_search(balancing, monk
             "search.drawn_limbs",
             lambda _f, _r, _p, limb, *_, **__: searched.append(now) or none(limb),
         ),
-        ("turns.PER_LIMB_NS", 10**12),
+        ("round_robin.PER_LIMB_NS", 10**12),
     ):
         monkeypatch.setattr(f"markerless_tracker.tracking.limbs.{name}", value)
     searcher, watch = searcher_of(scene), LimbWatch(scene.rig)

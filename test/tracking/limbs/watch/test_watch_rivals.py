@@ -23,7 +23,7 @@ def watching(stander, monkeypatch):
         return False
 
     monkeypatch.setattr(f"{PACKAGE}.search.LimbSearch.take_drawn", not_taken)
-    for due in ("facing.FacingWatch.take_turn", "exchange.PairExchange.take_turn"):
+    for due in ("facing.FacingWatch.take_due", "exchange.PairExchange.take_due"):
         monkeypatch.setattr(f"{PACKAGE}.{due}", lambda *_: None)
 
     def frame():
@@ -61,7 +61,7 @@ def test_after_a_rotation_limbs_have_no_rivals(watching, monkeypatch) -> None:
     watch, frame, found, pose = watching
     found.update(l_arm=rival(pose.size))
     frame()
-    monkeypatch.setattr(f"{PACKAGE}.facing.FacingWatch.take_turn", lambda *_: True)
+    monkeypatch.setattr(f"{PACKAGE}.facing.FacingWatch.take_due", lambda *_: True)
     monkeypatch.setattr(f"{PACKAGE}.facing.FacingWatch.compare", lambda *_: pose)
     assert frame().rotated
     assert watch.rivals == {}

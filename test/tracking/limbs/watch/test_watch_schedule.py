@@ -10,7 +10,7 @@ from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.seen import Seen
-from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS, PUT_OFF
+from markerless_tracker.tracking.limbs.round_robin import PER_LIMB_NS, PUT_OFF
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 from markerless_tracker.tracking.limbs.watch import LimbWatch
 from markerless_tracker.tracking.search import Searcher
@@ -74,8 +74,8 @@ def test_searches_that_can_wait_are_spread_over_dense_frames(monkeypatch) -> Non
 def test_of_the_limbs_near_unexplained_silhouette_one_is_searched_in_a_dense_frame(
     monkeypatch,
 ) -> None:
-    """The next one has its turn while the likeliest, which was searched in vain, waits."""
-    monkeypatch.setattr("markerless_tracker.tracking.limbs.turns.PER_LIMB_NS", 10**12)
+    """The next one is due while the likeliest, which was searched in vain, waits."""
+    monkeypatch.setattr("markerless_tracker.tracking.limbs.round_robin.PER_LIMB_NS", 10**12)
     monkeypatch.setattr("markerless_tracker.tracking.limbs.exchange.EVERY_NS", 10**12)
     areas_m2 = {"r_leg": 0.02, "l_leg": 0.01}
     frames = searches_of(monkeypatch, 16_666_667, 5, areas_m2, named=True, wait_ns=20_000_000)
@@ -83,32 +83,58 @@ def test_of_the_limbs_near_unexplained_silhouette_one_is_searched_in_a_dense_fra
     assert legs == [["l_leg", "r_leg"], [], ["r_leg"], ["l_leg"], []]
 
 
-def test_a_limb_in_rotation_is_drawn_in_a_dense_frame_and_compared_in_the_next(
-    stander, monkeypatch
-) -> None:
+@pytest.fixture
+def begun(stander, monkeypatch):
+    """A stander whose last frame drew a limb that is not compared yet, its number, and for each
+    draw and each comparison the limb and the numbers of the frames.
+    """
     package, now = "markerless_tracker.tracking.limbs", 0
-    drawn, taken = [], []
+    drawn: list[tuple[bytes, int]] = []
+    compared: list[tuple[bytes, int, int]] = []
 
     def draw(_, limb, *__):
-        drawn.append(now)
+        drawn.append((limb.tobytes(), now))
         return np.full((1, len(limb)), now)
 
     def take(_, limb, draws):
-        taken.append((now, int(draws[0, 0])))
+        compared.append((limb.tobytes(), int(draws[0, 0]), now))
         return False
+
+    def frame(**how):
+        nonlocal now
+        stander.recover(now * 16_666_667, **how)
+        now += 1
 
     monkeypatch.setattr(f"{package}.watch.find_unexplained", lambda *_: Unexplained({}, {}))
     monkeypatch.setattr(f"{package}.search.LimbSearch.drawn", draw)
     monkeypatch.setattr(f"{package}.search.LimbSearch.take_drawn", take)
     while len(drawn) < 4:
-        stander.recover(now * 16_666_667)
-        now += 1
-    first, *halves, last = drawn
-    assert taken == [(first, first), *((number + 1, number) for number in halves)]
-    # A watch that was reset compares nothing that was drawn before.
+        frame()
+    return stander, frame, drawn, compared
+
+
+def test_a_limb_in_rotation_is_drawn_in_a_dense_frame_and_compared_in_the_next(begun) -> None:
+    _, frame, drawn, compared = begun
+    frame()
+    (limb, first), *others = drawn
+    assert compared == [(limb, first, first), *((name, at, at + 1) for name, at in others)]
+
+
+def test_a_limb_that_was_drawn_is_searched_once_where_all_are(begun) -> None:
+    _, frame, drawn, compared = begun
+    limb, at = drawn[-1]
+    compared.clear()
+    frame(badly=True)
+    assert len({name for name, *_ in compared}) == len(compared) == 4
+    assert [when for name, when, _ in compared if name == limb] == [at]
+
+
+def test_a_watch_that_was_reset_compares_nothing_that_was_drawn_before(begun) -> None:
+    stander, frame, _, compared = begun
+    compared.clear()
     stander.watch.reset()
-    stander.recover(now * 16_666_667)
-    assert taken[-1] == (now, now) and (now, last) not in taken
+    frame()
+    assert all(when == now for _, when, now in compared)
 
 
 def test_all_limbs_are_searched_where_a_frame_is_explained_badly(monkeypatch) -> None:
@@ -129,7 +155,7 @@ def test_searches_of_frames_far_apart_do_not_wait(monkeypatch) -> None:
 @pytest.mark.parametrize("every_ns", [50_000_000, 66_666_667, 100_000_000, 133_333_333])
 @pytest.mark.parametrize("areas_m2", [{}, {"r_leg": 0.02, "l_leg": 0.01}])
 def test_a_late_tracker_searches_every_limb(monkeypatch, every_ns, areas_m2) -> None:
-    """Comparisons of whole poses fall on the same frames as some limbs' turns."""
+    """Comparisons of whole poses fall on the same frames as some limbs of the rotation."""
     frames = searches_of(monkeypatch, every_ns, 120, areas_m2, named=True, late=True, single=True)
     limbs = {"l_arm", "r_arm", "l_leg", "r_leg"}
     assert all(len(frame) == 1 for frame in frames if limbs.intersection(frame))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from markerless_tracker.tracking.limbs.turns import PER_LIMB_NS
+from markerless_tracker.tracking.limbs.round_robin import PER_LIMB_NS
 from markerless_tracker.tracking.limbs.unexplained import Unexplained
 
 LIMBS = "markerless_tracker.tracking.limbs"

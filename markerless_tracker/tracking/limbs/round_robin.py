@@ -9,8 +9,8 @@ PUT_OFF = 2.0
 60 frames/s after 0.2 instead of 0.1 s."""
 
 
-class LimbTurns:
-    """Lets the limbs take turns.
+class RoundRobin:
+    """Names the limbs to search, one after the other.
 
     The pose of a frame is predicted from the motion so far. How far a limb's acceleration takes it
     from there grows with the square of the time between frames, and the refinement loses limbs
@@ -19,10 +19,6 @@ class LimbTurns:
     """
 
     def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Begin with the first limb again."""
         self._next = 0
         self._due = 1.0
 
@@ -33,12 +29,12 @@ class LimbTurns:
     def take(
         self, limbs: Sequence[str], *, put_off: bool = False, single: bool = False
     ) -> list[str]:
-        """The limbs whose turn it is in a frame, after `advance`; those of a frame in which it is
-        not called have their turn later.
+        """The limbs that are due in a frame, after `advance`; those of a frame in which it is not
+        called are due later.
 
         Args:
             limbs: names of all limbs, in the same order in every call.
-            put_off: whether turns that can wait are put off; then one limb at most is due.
+            put_off: whether limbs that can wait are put off; then one limb at most is due.
             single: whether there is time for one limb at most.
         """
         if self._due < (PUT_OFF if put_off else 1.0):
