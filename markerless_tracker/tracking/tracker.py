@@ -145,19 +145,21 @@ class Tracker:
 
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
-        blank, pose = self.evidence.start_compiling(), self._motion.pose
-        seen = Seen(0, blank, decide(blank, self._searcher.cameras, self.body, pose), blank)
+        # The segmenting process compiles the imaging meanwhile.
+        self.evidence.start_compiling()
+        made_up, pose = self.evidence.made_up(), self._motion.pose
+        seen = Seen(0, made_up, decide(made_up, self._searcher.cameras, self.body, pose), made_up)
         search = self._searcher.frame(seen.used, 0, pose)
         search.run(swarm_stages(self.body, self.config, pose, self.body.sigma))
         # What the segmenting process compiles is not compiled twice.
         self.evidence.finish_compiling()
         self._start, self._assessor.track = None, Track(Phase.TRACKING)
-        self.step(blank, 0)
+        self.step(made_up, 0)
         if self.config.refinement != "none":
             self._assessor.limbs.recover(self._searcher, search.contours, seen, pose)
         self._assessor.warm_up(Found(search, 0, seen.used), self.body, self._body.limits)
         self.reset()
-        self._body.warm_up(self._searchers.near, blank, self._motion.pose)
+        self._body.warm_up(self._searchers.near, made_up, self._motion.pose)
         self.reset()
 
     def take_backgrounds(self, backgrounds: Mapping[str, BackgroundModel]) -> None:

@@ -210,15 +210,17 @@ class EvidenceMaker:
         shift = self.rig.names.index(name) * self._every // len(self.rig)
         return self._follows and (number + shift) % self._every == 0
 
-    def start_compiling(self) -> dict[str, Observation]:
-        """Let the segmenting process compile, if there is one; returns made-up observations.
+    def start_compiling(self) -> None:
+        """Let the segmenting process compile the imaging, if there is one."""
+        if self._process is not None:
+            self._process.use(self._config, self._backgrounds)
+
+    def made_up(self) -> dict[str, Observation]:
+        """Made-up observations, to compile with.
 
         All but the first are of regions, as when the body is tracked. The silhouette is a rectangle
         and a pixel in the corner. Pixels beside and below the rectangle are undecided.
         """
-        if self._process is not None:
-            # It compiles the imaging while this process compiles the other kernels.
-            self._process.use(self._config, self._backgrounds)
         made_up: dict[str, Observation] = {}
         for camera in self.rig:
             width, height = camera.size_px

@@ -58,10 +58,9 @@ def serve(requests: BinaryIO, answers: BinaryIO, memory: mmap.mmap) -> None:
                 rig, config, backgrounds = message
                 maker = EvidenceMaker(rig, config, backgrounds, map)
                 with compilation(lambda *_: None) as kernels:
-                    blank = maker.start_compiling()
                     maker.finish_compiling()
                     # The parent has stored some of its kernels by now.
-                    compile_contours(rig, config, blank)
+                    compile_contours(rig, config, maker.made_up())
                 collect_for_good()
                 answer = Ready(kernels.done)
             elif maker is None:

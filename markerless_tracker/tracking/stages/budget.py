@@ -15,6 +15,11 @@ SWARM_SHARE = Fraction(2, 10)
 """The swarm's fraction of the budget if there is contour refinement, too."""
 
 
+def swarm_share(config: TrackerConfig) -> Fraction:
+    """The swarm's fraction of the budget."""
+    return Fraction(1) if config.refinement == "none" else SWARM_SHARE
+
+
 def scaled_particles(
     published: Sequence[tuple[int, int]],
     evaluations: int,
@@ -50,7 +55,7 @@ def shared_out(
         ConfigError: the budget cannot be met exactly; names the nearest that can.
     """
     particles = scaled_particles(published, config.evaluations, config.optimizer)
-    share = Fraction(1) if config.refinement == "none" else SWARM_SHARE
+    share = swarm_share(config)
     return tuple(
         (n, max(1, math.floor(iterations * share)))
         for n, (_, iterations) in zip(particles, published, strict=True)

@@ -4,15 +4,13 @@ APF: 600 particles x 6 layers, 3600 evaluations, in Saini et al. (2015); 200 x 5
 in HumanEva's baseline (Sigal, Balan and Black, 2010) and in SPPSO's comparison [R].
 """
 
-from fractions import Fraction
-
 import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Stage
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.stages.budget import SWARM_SHARE, scaled_particles
+from markerless_tracker.tracking.stages.budget import scaled_particles, swarm_share
 from markerless_tracker.tracking.stages.stage import swarm_stage
 
 
@@ -25,9 +23,8 @@ def filter_stages(
         ConfigError: the budget is no multiple of the layers.
     """
     layers = 1 if config.optimizer == "pf" else layers_for(config)
-    share = Fraction(1) if config.refinement == "none" else SWARM_SHARE
     (particles,) = scaled_particles(
-        ((1, layers),), config.evaluations, config.optimizer, share=share
+        ((1, layers),), config.evaluations, config.optimizer, share=swarm_share(config)
     )
     every = np.arange(body.size)
     return (

@@ -8,7 +8,6 @@ spend as many evaluations, and the second of three steps varies torso and head.
 """
 
 from collections.abc import Mapping
-from fractions import Fraction
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Stage
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.stages.budget import SWARM_SHARE, scaled_particles
+from markerless_tracker.tracking.stages.budget import scaled_particles, swarm_share
 from markerless_tracker.tracking.stages.stage import swarm_stage
 
 SPPSO_STAGES: Mapping[str, tuple[tuple[int, int], ...]] = {
@@ -53,8 +52,7 @@ def sppso_stages(
     """
     alone = config.refinement == "none"
     published = (SPPSO_STAGES if alone else RESCUE_STAGES)[config.sppso.stages]
-    share = Fraction(1) if alone else SWARM_SHARE
-    particles = scaled_particles(published, config.evaluations, "sppso", share=share)
+    particles = scaled_particles(published, config.evaluations, "sppso", share=swarm_share(config))
     trunk = body.cone_node == body.frames[body.root_frame]
     stages: list[Stage] = []
     earlier = np.empty(0, dtype=np.int64)

@@ -32,7 +32,7 @@ def signatures():
 rig, config = ring_rig(3, (160, 120)), TrackerConfig.from_mapping({"threads": 1})
 setup = build_tracker(rig, config)
 tracker = setup.tracker
-compile_contours(rig, config, tracker.evidence.start_compiling())
+compile_contours(rig, config, tracker.evidence.made_up())
 ahead = signatures()
 tracker.warm_up()
 print([len(each) for each in ahead.values()], signatures() == ahead)
