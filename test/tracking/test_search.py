@@ -126,6 +126,8 @@ def test_the_best_of_prediction_and_stages_wins(person, found, edge_weight) -> N
     np.testing.assert_array_equal(frame.pose, tried[int(np.argmax(f))])
     assert max(f) > f[0]
     assert person.error_mm(frame.pose) < 0.5 * person.error_mm(person.predicted)
+    frame.take(person.predicted)
+    assert frame.pose is person.predicted and frame.cost == pytest.approx(1 + edge_weight - f[0])
 
 
 @pytest.mark.parametrize("order", ["swarms first", "swarms last", "root alone first"])
@@ -258,15 +260,6 @@ def test_refinement_gets_limits_beliefs_and_distance(person, monkeypatch) -> Non
         assert (posture.precision[person.body.joints] > 0).all()
 
 
-def test_the_cost_is_that_of_a_pose_that_was_found_otherwise(person) -> None:
-    config = settings()
-    frame = person.searcher(config).frame(person.observations, STAMP_NS, person.predicted)
-    frame.run((contour_stage("align", BODY, config, person.predicted, BODY.sigma),))
-    frame.take(person.pose)
-    assert frame.pose is person.pose
-    assert frame.cost == pytest.approx(1.0 + config.edge_weight - person.f(person.pose, config))
-
-
 def test_what_was_spent_with_refinement(person) -> None:
     config = settings(evaluations=1000, **{"refine.iterations": 5})
     frame = searched(person, config)
@@ -315,9 +308,6 @@ def test_what_was_spent_without_refinement(person) -> None:
     config = settings(refinement="none", evaluations=300)
     frame = searched(person, config)
     assert (frame.evaluations, frame.refinements) == (300, 0)
-
-
-# --- both -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("refinement", ["contour", "none"])
