@@ -113,7 +113,7 @@ class LimbWatch:
         """Run the searches that are due: other headings, exchanges of legs or arms, and limbs.
 
         A result is taken by the rules of `LimbSearch`; headings and exchanges have least gains of
-        their own (`facing`, `walking`, `exchange`).
+        their own (`facing`, `walking`, `exchange`). Limbs that the frame before drew are compared.
 
         Args:
             searcher: of the frame.

@@ -137,6 +137,27 @@ def test_a_watch_that_was_reset_compares_nothing_that_was_drawn_before(begun) ->
     assert all(when == now for _, when, now in compared)
 
 
+def test_no_limb_is_left_out_where_several_became_due_meanwhile(begun, monkeypatch) -> None:
+    stander, frame, drawn, _ = begun
+    limbs = {stander.body.subspaces[name].tobytes(): name for name in stander.body.limbs}
+    stander.watch.reset()
+    drawn.clear()
+    package = "markerless_tracker.tracking.limbs"
+    # Nine tenths of a limb a frame, put off while another one is suspected.
+    monkeypatch.setattr(f"{package}.round_robin.PER_LIMB_NS", 17_568_000)
+    monkeypatch.setattr(f"{package}.schedule.FIRST_WAIT_NS", 0)
+    monkeypatch.setattr(f"{package}.exchange.EVERY_NS", 10**12)
+    monkeypatch.setattr(f"{package}.facing.FIRST_EVERY_NS", 10**12)
+    for area_m2 in (0.0, 0.01, 0.01, 0.0, 0.0, 0.0):
+        areas_m2 = {"r_leg": area_m2} if area_m2 else {}
+        monkeypatch.setattr(
+            f"{package}.watch.find_unexplained", lambda *_, found=areas_m2: Unexplained(found, {})
+        )
+        frame()
+    names = [limbs[limb] for limb, _ in drawn]
+    assert [name for name in names if name != "r_leg"] == ["l_arm", "r_arm", "l_leg"]
+
+
 def test_all_limbs_are_searched_where_a_frame_is_explained_badly(monkeypatch) -> None:
     frames = searches_of(monkeypatch, 16_666_667, 7, badly=True)
     assert all(frame.count("limb") == 4 for frame in frames)
