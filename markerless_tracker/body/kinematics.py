@@ -228,6 +228,13 @@ def farthest_moved_m(
 def _farthest_moved(  # type: ignore[no-untyped-def]
     poses, before, moves, parent, fixed, kind, sign, parameter, marker_node, offset, nodes, out
 ):
+    """Fill out (n,) with the largest distance of a marker between poses (n, p) and another one.
+
+    Args:
+        before: (m, 3, 4) transforms of the nodes at the other pose.
+        moves: (m,) whether a node's transform differs.
+        nodes: (m, 3, 4) a copy of `before`; overwritten where nodes move.
+    """
     for i in range(len(poses)):
         for n in range(parent.size):
             if moves[n]:
