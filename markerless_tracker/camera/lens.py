@@ -12,17 +12,36 @@ _INVERSE_STEPS = 5
 
 
 @kernel
+def _falls(r2, k1, k2, k3):  # type: ignore[no-untyped-def]
+    """Whether the distorted distance from the axis falls at a squared distance, or before it."""
+    if 1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3)) <= 0.0:
+        return True
+    # The slope may be positive again here; then it has its least value before.
+    if k3 != 0.0:
+        inside = 100.0 * k2 * k2 - 252.0 * k1 * k3
+        least = (np.sqrt(inside) - 10.0 * k2) / (42.0 * k3) if inside >= 0.0 else -1.0
+    else:
+        least = -3.0 * k1 / (10.0 * k2) if k2 > 0.0 else -1.0
+    if least <= 0.0 or least >= r2:
+        return False
+    return 1.0 + least * (3.0 * k1 + least * (5.0 * k2 + least * 7.0 * k3)) <= 0.0
+
+
+@kernel
 def lens(a, b, distortion):  # type: ignore[no-untyped-def]
     """Distorted position of a point of the plane at focal length 1, lens (5,) k1 k2 p1 p2 k3.
 
-    Beyond some distance from the optical axis the polynomial falls: it would put points far beside
-    the camera into the image. They are put outside of any image instead.
+    Beyond some distance from the optical axis the polynomial may fall: it would put points far
+    beside the camera into the image, even where it rises again. They are put outside of any image
+    instead.
     """
     k1, k2, k3 = distortion[0], distortion[1], distortion[4]
     p1, p2 = distortion[2], distortion[3]
     r2 = a * a + b * b
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    if 1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3)) <= 0.0:
+    # (The sum of the absolute terms tells cheaply of most points that it does not fall.)
+    terms = r2 * (3.0 * abs(k1) + r2 * (5.0 * abs(k2) + r2 * 7.0 * abs(k3)))
+    if terms >= 1.0 and _falls(r2, k1, k2, k3):
         radial = _OUTSIDE
     ab = a * b
     return (

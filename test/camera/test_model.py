@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from markerless_tracker.body import load_body
 from markerless_tracker.camera import CameraModel, CameraRig, project, project_camera, scaled_size
+from markerless_tracker.camera.lens import lens
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import apply, rotation_from_rodrigues, transform
@@ -42,8 +43,8 @@ def test_projection_agrees_with_opencv(rotation, local, lens) -> None:
     view = camera(rotation=rotation, lens=lens)
     depth = np.array(local)[:, 2:]
     k1, k2, _, _, k3 = lens
-    r2 = (np.array(local)[:, :2] ** 2).sum(axis=1)
-    assume((1.0 + 3.0 * k1 * r2 + 5.0 * k2 * r2**2 + 7.0 * k3 * r2**3 > 0.0).all())
+    r2 = np.linspace(0.0, (np.array(local)[:, :2] ** 2).sum(axis=1), 100)
+    assume((1.0 + 3.0 * k1 * r2 + 5.0 * k2 * r2**2 + 7.0 * k3 * r2**3 > 1e-3).all())
     points_cam = np.hstack([np.array(local)[:, :2] * depth, depth])
     points_world = points_cam @ view.T_world_cam[:3, :3].T + view.T_world_cam[:3, 3]
     expected, _ = cv2.projectPoints(
@@ -70,6 +71,23 @@ def test_no_point_far_beside_a_camera_is_projected_into_its_image(around, beside
         assert np.hypot(u, v) == pytest.approx(500.0 * tangent * (1.0 + k1 * tangent**2))
     elif tangent > 1.001 * turning:
         assert np.hypot(u, v) > 100.0 * 500.0 * turning
+
+
+@given(
+    st.floats(-0.6, 0.2), st.floats(-0.2, 0.3), st.floats(-0.1, 0.1) | st.just(0.0),
+    st.floats(0.0, 80.0),
+)  # fmt: skip
+def test_points_beyond_a_fall_of_the_lens_are_outside(k1, k2, k3, beside) -> None:
+    """Also where the distorted distance rises again."""
+    tangent = np.tan(np.radians(beside))
+    s = np.linspace(0.0, tangent**2, 20001)
+    slope = 1.0 + s * (3.0 * k1 + s * (5.0 * k2 + s * 7.0 * k3))
+    assume(abs(slope.min()) > 1e-3 * (1.0 + tangent**4))
+    u, v = lens(tangent, 0.0, np.array([k1, k2, 0.0, 0.0, k3]))
+    r2 = tangent**2
+    expected = tangent * (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)))
+    assert u == (pytest.approx(expected) if slope.min() > 0.0 else 1e3 * tangent)
+    assert v == 0.0
 
 
 def test_a_body_far_beside_a_camera_is_not_drawn_into_its_image() -> None:
