@@ -20,9 +20,9 @@ AGES_S = (0.2, 1.0)
 """Limits of the age of images on arrival. Above the second, the clocks disagree or images queue."""
 RECORDED_S = 3600.0
 """Stamps further than this from the current time are those of a recording."""
-OFFSETS = (0.02, 0.35)
-"""Limits of the offset between the cameras' stamps, in periods. Above the first, synchronisation
-needs a tolerance; above the second, the cameras are out of step."""
+OUT_OF_STEP = 0.35
+"""Offset between the cameras' stamps, in periods, above which they are out of step. With a smaller
+one synchronisation needs a tolerance."""
 CLIPPED = (0.05, 0.25)
 """Limits of the share of overexposed pixels."""
 DARK = (40.0, 15.0)
@@ -168,22 +168,34 @@ def _in_step(heard: Mapping[str, CameraStream]) -> list[Finding]:
     for name, stream in heard.items():
         if name == first:
             continue
-        stamps = np.array(stream.stamps_ns, dtype=np.int64)
-        apart = stamps[:, None] - reference[None, :]
-        nearest = apart[np.arange(len(stamps)), np.abs(apart).argmin(axis=1)] / 1e9
-        offset_s, spread_s = float(np.median(nearest)), float(np.abs(nearest).max())
+        nearest_s = _nearest_s(np.array(stream.stamps_ns, dtype=np.int64), reference, period_s)
+        offset_s, apart_s = float(np.median(nearest_s)), np.abs(nearest_s)
         text = f"stamps {1e3 * offset_s:+.2f} ms from those of {first}"
-        if np.abs(nearest).max() == 0.0:
+        if apart_s.max() == 0.0:
             found.append(Finding("in step", GREEN, name, f"equal stamps to {first}"))
             continue
-        state = grade(abs(offset_s) / period_s if period_s > 0.0 else 1.0, OFFSETS)
-        if state == RED:
+        if period_s <= 0.0 or abs(offset_s) >= OUT_OF_STEP * period_s:
+            state = RED
             advice = "trigger the cameras together, or correct the stamps (`stamp_offsets`)"
         else:
-            state, need_s = max(state, YELLOW, key=(GREEN, YELLOW, RED).index), 1.2 * spread_s
+            state, need_s = YELLOW, 1.2 * float(apart_s.max())
             advice = f"sync_tolerance:={max(need_s, 1e-4):.4f}, or `stamp_offsets`"
         found.append(Finding("in step", state, name, text, advice))
     return found
+
+
+def _nearest_s(
+    stamps_ns: NDArray[np.int64], reference_ns: NDArray[np.int64], period_s: float
+) -> NDArray[np.float64]:
+    """Time from the nearest reference stamp to each stamp, s.
+
+    Left out are stamps whose counterpart was lost, or came before the first one that was received:
+    they are more than half a period from any, and from the usual time.
+    """
+    apart = stamps_ns[:, None] - reference_ns[None, :]
+    nearest_s = apart[np.arange(len(apart)), np.abs(apart).argmin(axis=1)] / 1e9
+    most_s = max(0.5 * period_s, float(np.median(np.abs(nearest_s))))
+    return np.asarray(nearest_s[np.abs(nearest_s) <= most_s])
 
 
 def _pictures(name: str, images: Sequence[Image], background: Image | None) -> list[Finding]:

@@ -104,6 +104,33 @@ def test_stamps_of_one_camera_are_off(streams: Any, empty: Any, off_ns: int, sta
         assert "sync_tolerance:=0.0024" in found["in step", "cam02"].advice
 
 
+@pytest.mark.parametrize(
+    "camera, lost", [("cam01", 0), ("cam01", 30), ("cam02", 59), ("cam02", 30)]
+)
+def test_a_lost_image_is_no_offset(streams: Any, empty: Any, camera: str, lost: int) -> None:
+    """The stamp without a counterpart would ask for a tolerance of a whole period."""
+
+    def without(values: Any) -> Any:
+        return [value for index, value in enumerate(values) if index != lost]
+
+    stream = streams[camera]
+    changed = replace(
+        stream, stamps_ns=without(stream.stamps_ns), arrivals_s=without(stream.arrivals_s),
+        ages_s=without(stream.ages_s),
+    )  # fmt: skip
+    found = lines({**streams, camera: changed}, empty)
+    assert found["in step", "cam02"].state == "green"
+
+
+def test_an_offset_is_told_without_a_lost_image(streams: Any, empty: Any) -> None:
+    stamps = [stamp + 2_000_000 for stamp in streams["cam02"].stamps_ns]
+    first = streams["cam01"]
+    lost = replace(first, stamps_ns=[*first.stamps_ns[:30], *first.stamps_ns[31:]],
+                   arrivals_s=first.arrivals_s[1:], ages_s=first.ages_s[1:])  # fmt: skip
+    found = lines({"cam01": lost, "cam02": replace(streams["cam02"], stamps_ns=stamps)}, empty)
+    assert "sync_tolerance:=0.0024" in found["in step", "cam02"].advice
+
+
 def test_pictures(streams: Any, empty: Any) -> None:
     def of(change: Any) -> dict[tuple[str, str], str]:
         stream = streams["cam02"]
