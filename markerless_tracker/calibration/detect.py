@@ -12,6 +12,7 @@ from markerless_tracker.calibration.print_fit import TEXELS, Print, plane_of
 from markerless_tracker.camera.board import CHARUCO, Board, charuco_board, rotations
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image
+from markerless_tracker.imaging.images import grey_of
 from markerless_tracker.records import locked
 
 LEAST_CORNERS = 8
@@ -63,12 +64,12 @@ class BoardFinder:
 
     def find(self, image: Image) -> Seen | None:
         """The corners in an image (h, w) or (h, w, 3) BGR; None if the board is not found."""
-        grey = _grey(image)
+        grey = grey_of(image)
         return self._find_charuco(grey) if self._charuco else self._find_checkerboard(grey)
 
     def size_in(self, image: Image) -> tuple[int, int] | None:
         """Columns and rows of squares of any checkerboard in an image; None if there is none."""
-        grey, _ = _resized(_grey(image))
+        grey, _ = _resized(grey_of(image))
         found, _, meta = cv2.findChessboardCornersSBWithMeta(
             grey, _SMALLEST, cv2.CALIB_CB_LARGER | cv2.CALIB_CB_EXHAUSTIVE
         )
@@ -152,12 +153,6 @@ def _checkerboard_print(board: Board) -> Print:
     row, column = np.indices((board.rows * TEXELS, board.columns * TEXELS)) // TEXELS
     picture = np.where((row + column) % 2 == 0, 0, 255).astype(np.uint8)
     return Print(picture, np.column_stack([x.ravel(), y.ravel()]))
-
-
-def _grey(image: Image) -> Image:
-    if image.ndim == 2:
-        return image
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
 def _resized(grey: Image) -> tuple[Image, float]:

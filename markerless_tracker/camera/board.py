@@ -51,8 +51,13 @@ class Board:
     def __post_init__(self) -> None:
         if self.kind not in (CHECKERBOARD, CHARUCO):
             raise ConfigError(f"board {self.kind!r}: expected {CHECKERBOARD} or {CHARUCO}")
-        if not (3 <= self.columns <= 60 and 3 <= self.rows <= 60 and self.columns * self.rows > 9):
-            raise ConfigError(f"board of {self.columns}x{self.rows} squares, expected 4x3 to 60x60")
+        # OpenCV finds checkerboards from 3 inner corners a side on.
+        least = 4 if self.kind == CHECKERBOARD else 3
+        sides = sorted((self.columns, self.rows))
+        if sides[0] < least or sides[1] < 4 or sides[1] > 60:
+            raise ConfigError(
+                f"board of {self.columns}x{self.rows} squares, expected 4x{least} to 60x60"
+            )
         if not 0.001 <= self.square_m <= 2.0:
             raise ConfigError(
                 f"square size {self.square_m:g} m, expected 0.001 to 2 (metres, not millimetres)"

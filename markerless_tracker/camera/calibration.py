@@ -23,6 +23,8 @@ from markerless_tracker.geometry import (
     transform,
 )
 
+_MOST_PX = 65535
+"""Largest width and height of an image: more than any camera has."""
 # Qualisys stores focal lengths and principal points in 1/64 px.
 QCA_SUBPIXELS = 64.0
 
@@ -135,7 +137,7 @@ def _numbers(
         raise CalibrationError(f"{where}: {key} is missing, expected {expected} numbers")
     try:
         value = np.array(table[key], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         value = np.empty(0)
     if value.shape not in shapes or not np.isfinite(value).all():
         raise CalibrationError(
@@ -146,9 +148,9 @@ def _numbers(
 
 def _size(where: str, size: FloatArray) -> tuple[int, int]:
     width, height = (round(float(value)) for value in size)
-    if width < 1 or height < 1:
+    if not (1 <= width <= _MOST_PX and 1 <= height <= _MOST_PX):
         raise CalibrationError(
-            f"{where}: size is {size.tolist()}, expected positive [width, height]"
+            f"{where}: size is {size.tolist()}, expected [width, height], 1 to {_MOST_PX} px each"
         )
     return width, height
 

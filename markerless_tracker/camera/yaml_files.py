@@ -118,7 +118,7 @@ def read_extrinsics(path: str | Path) -> dict[str, FloatArray]:
             t, q = entry["translation"], entry["rotation"]
             translation = [float(t[axis]) for axis in "xyz"]
             quaternion = np.array([float(q[axis]) for axis in "wxyz"])
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise CalibrationError(
                 f"{path}: {name}: expected translation x, y, z and rotation x, y, z, w ({error})"
             ) from error
@@ -237,7 +237,7 @@ def _array(
         raise CalibrationError(f"{path}: no {names[0]}, expected {expected} numbers")
     try:
         value = np.array(found[1], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         value = np.empty(0)
     if value.shape not in shapes and 1 in value.shape:
         value = value.ravel()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.checks.pictures import small_grey
+from markerless_tracker.checks.scene import DIFFERENCE
 from markerless_tracker.datasets import Recording
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import Image
@@ -16,7 +17,6 @@ from markerless_tracker.imaging import Image
 MOST_FRAMES = 600
 """Largest number of frames that are read, consecutive from the first."""
 _STILLS = 31
-_DIFFERS = 28.0
 _MOTION_S = 0.05
 
 
@@ -105,7 +105,7 @@ def _signals(
         recent.append(now)
         # The median ratio: a person covers less than half of the image.
         gain[number] = float(np.median(now[usable] / base[usable])) if usable.any() else 1.0
-        differs = np.abs(now - gain[number] * base) > _DIFFERS
+        differs = np.abs(now - gain[number] * base) > DIFFERENCE
         height[number] = _blob_height(differs) * width_px / image.shape[1]
     return CameraSignals(motion, gain, height, scene, background, kinds)
 

@@ -99,7 +99,10 @@ class ShadowSettings(SettingsGroup):
         most=1.0,
     )
     value_min: float = setting(
-        0.5, "darkest shadow, as a ratio of its brightness to the background's", least=0.0, most=1.0
+        0.5,
+        "darkest shadow, as a ratio of its brightness to the background's (without `undecided`)",
+        least=0.0,
+        most=1.0,
     )
     value_max: float = setting(
         1.0,
@@ -152,7 +155,7 @@ class ShadowSettings(SettingsGroup):
         super().__post_init__()
         pairs = [("value_min", "value_max"), ("grey_value_min", "grey_value_max")]
         if self.undecided:
-            pairs.append(("undecided_value_min", "value_max"))
+            pairs = [("undecided_value_min", "value_max")]
         for least, most in pairs:
             low, high = getattr(self, least), getattr(self, most)
             if low > high:
@@ -192,7 +195,7 @@ class MaskSettings(SettingsGroup):
     NAME = "mask"
 
     open_px: int = setting(
-        3, "side of the opening that removes specks; 0 or 1 = none", least=0, most=101
+        3, "side of the opening that removes specks, odd; 0 or 1 = none", least=0, most=101
     )
     close_px: int = setting(
         5,
@@ -214,6 +217,11 @@ class MaskSettings(SettingsGroup):
     blob_share: float = setting(
         3e-4, "blobs below this share of the image are dropped", least=0.0, most=1.0
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.open_px and self.open_px % 2 == 0:
+            raise ConfigError(f"mask.open_px: got {self.open_px}, expected 0 or an odd number")
 
 
 @dataclass(frozen=True, kw_only=True)

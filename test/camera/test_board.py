@@ -53,6 +53,8 @@ def test_a_description_is_read_as_written(tmp_path: Path) -> None:
     [
         (("circles", 5, 4, 0.1), "board 'circles'"),
         (("checkerboard", 2, 4, 0.1), "board of 2x4 squares"),
+        (("checkerboard", 7, 3, 0.1), "board of 7x3 squares, expected 4x4 to 60x60"),
+        (("charuco", 3, 3, 0.1, 0.05, "4x4_50"), "board of 3x3 squares, expected 4x3 to 60x60"),
         (("checkerboard", 5, 4, 100.0), "metres, not millimetres"),
         (
             ("charuco", 5, 4, 0.1, 0.2, "4x4_50"),

@@ -21,6 +21,7 @@ def test_every_setting_has_a_doc_and_is_in_a_group() -> None:
         ("shadow.removal", 1),
         ("mask.open_px", -1),
         ("mask.open_px", 2.5),
+        ("mask.open_px", 4),
         ("edges.form", "canny"),
         ("edges.blur_px", 4),
         ("edges.gradient", float("inf")),
@@ -35,7 +36,9 @@ def test_impossible_values_are_refused_by_name(name: str, value: object) -> None
 @pytest.mark.parametrize("kind", ["shadow.value", "shadow.grey_value"])
 def test_a_reversed_range_is_refused(kind: str) -> None:
     with pytest.raises(ConfigError, match=f"{kind}_min: got 0.9, .*_max .0.8"):
-        ImagingSettings.from_mapping({f"{kind}_min": 0.9, f"{kind}_max": 0.8})
+        ImagingSettings.from_mapping(
+            {f"{kind}_min": 0.9, f"{kind}_max": 0.8, "shadow.undecided": False}
+        )
 
 
 def test_integers_are_accepted_as_floats() -> None:

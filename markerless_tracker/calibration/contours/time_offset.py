@@ -101,7 +101,7 @@ class TimeOffsetEstimate:
         self._new_block()
 
     def warm_up(self, body: BodyModel) -> None:
-        """Compile what a frame needs, for bodies of this kind; forgets the frames so far."""
+        """Compile what a frame needs, for bodies of this kind; the frames added last are lost."""
         observations = {}
         for camera in self._cameras:
             width, height = camera.size_px

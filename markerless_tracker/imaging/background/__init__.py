@@ -15,7 +15,6 @@ from markerless_tracker.imaging.background.model_file import (
 )
 from markerless_tracker.imaging.background.model_scale import scale_background_model
 from markerless_tracker.imaging.background.plate import Plate, background_plate
-from markerless_tracker.imaging.background.recording import learn_from_recording
 
 __all__ = [
     "MODEL_SUFFIX",
@@ -26,7 +25,6 @@ __all__ = [
     "Plate",
     "background_plate",
     "learn_background",
-    "learn_from_recording",
     "read_background_model",
     "scale_background_model",
     "write_background_model",

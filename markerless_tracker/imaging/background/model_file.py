@@ -2,6 +2,7 @@
 
 import os
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,10 @@ from markerless_tracker.imaging.background.model import BackgroundModel, Mode
 
 SUFFIX = ".npz"
 _VERSION = 1
+_DAMAGED = (
+    ValueError, KeyError, TypeError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error
+)  # fmt: skip
+"""What NumPy raises for damaged archives and for others' files."""
 
 
 def write_background_model(path: Path, model: BackgroundModel) -> None:
@@ -58,8 +63,7 @@ def read_background_model(path: Path) -> BackgroundModel:
         with np.load(path, allow_pickle=False) as data:
             if int(data["version"]) != _VERSION:
                 raise ImageError(
-                    f"{path}: background model of version {int(data['version'])}, "
-                    f"expected {_VERSION}"
+                    f"background model of version {int(data['version'])}, expected {_VERSION}"
                 )
             modes: list[Mode] = []
             while f"weight_{len(modes)}" in data:
@@ -67,8 +71,10 @@ def read_background_model(path: Path) -> BackgroundModel:
                 modes.append(Mode(data[f"weight_{k}"], data[f"mean_{k}"], data[f"variance_{k}"]))
             note = data["note"].tobytes().decode()
             return BackgroundModel(data["mean"], data["variance"], note, tuple(modes))
+    except ImageError as error:
+        raise ImageError(f"{path}: {error}") from error
     except OSError as error:
         raise ImageError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except _DAMAGED as error:
         what = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ImageError(f"{path}: no background model: {what}") from error

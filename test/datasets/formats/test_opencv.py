@@ -170,7 +170,14 @@ def test_malformed_files_are_named(folder: Path, text: str, message: str) -> Non
 
 
 @pytest.mark.parametrize(
-    "text", ["left: 3", "left: {translation: {x: 1, y: 2}, rotation: {x: 0, y: 0, z: 0, w: 1}}"]
+    "text",
+    [
+        "left: 3",
+        "left: {translation: {x: 1, y: 2}, rotation: {x: 0, y: 0, z: 0, w: 1}}",
+        "left: {translation: {x: N, y: 2, z: 3}, rotation: {x: 0, y: 0, z: 0, w: 1}}".replace(
+            "N", "1" + "0" * 400
+        ),
+    ],
 )
 def test_malformed_poses_are_named(folder: Path, make_rig, text: str) -> None:
     left, _ = make_rig(*NAMES)

@@ -49,6 +49,25 @@ def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
         write_background_model(tmp_path, model())
 
 
+def test_a_damaged_model_is_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "cam01.npz"
+    write_background_model(path, model())
+    whole = path.read_bytes()
+    for place in range(0, len(whole), 7):
+        damaged = bytearray(whole)
+        damaged[place] ^= 0xFF
+        path.write_bytes(damaged)
+        try:
+            read_background_model(path)
+        except ImageError as error:
+            assert str(error).startswith(f"{path}: ")
+    nothing = np.full((7, 9, 3), np.nan, np.float32)
+    with path.open("wb") as file:
+        np.savez(file, version=1, mean=nothing, variance=nothing, note=np.zeros(0, np.uint8))
+    with pytest.raises(ImageError, match="cam01.npz: background: got numbers"):
+        read_background_model(path)
+
+
 def test_an_earlier_file_stays_until_the_new_one_is_complete(tmp_path: Path) -> None:
     path = tmp_path / "cam01.npz"
     write_background_model(path, model())

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.errors import ImageError
-from markerless_tracker.imaging import background_plate, learn_from_recording
+from markerless_tracker.imaging import background_plate
 
 SIZE = (180, 240)
 
@@ -136,29 +136,6 @@ def test_bad_input_names_the_camera_and_the_source() -> None:
         background_plate([[room]], [room.astype(float)], camera="cam03")
     with pytest.raises(ImageError, match="cam03: still 0"):
         background_plate([[room, room]], [room[:, :, 0]], camera="cam03")
-
-
-def test_learning_from_the_recording_itself() -> None:
-    room = empty_room()
-    frames = [stand(room, (20.0 + 2.5 * t, 120.0)) for t in range(60)]
-    model = learn_from_recording(iter(frames), camera="cam01")
-    assert wrong(model.image, room) < 0.003
-    assert "learned as the person" in model.note
-    learned = learn_from_recording([stand(room, (90.0, 120.0))] * 20)
-    assert wrong(learned.image, room) > 0.02
-
-
-def test_learning_from_nothing_or_a_mixture() -> None:
-    with pytest.raises(ImageError, match="cam01: no frame"):
-        learn_from_recording([], camera="cam01")
-    with pytest.raises(ImageError, match="cam01: frame 1"):
-        frames = [np.zeros((4, 5), np.uint8), np.zeros((4, 5, 3), np.uint8)]
-        learn_from_recording(frames, camera="cam01")
-
-
-def test_a_single_frame_assumes_the_noise_of_a_still() -> None:
-    model = learn_from_recording([np.full((4, 5), 9, np.uint8)])
-    assert (model.variance == 16.0).all()
 
 
 def test_the_real_recording_needs_its_stills(balance_real: Path) -> None:
