@@ -43,7 +43,7 @@ class ResultFile:
     def __init__(
         self, name: Path | None, *, overwrite: bool, report: Callable[[str], None]
     ) -> None:
-        self._name = name
+        self._name, self._overwrite = name, overwrite
         self._report = report
         self._lock = Lock()
         self._writer: ResultWriter | None = None
@@ -56,6 +56,8 @@ class ResultFile:
             check_target(name, overwrite=overwrite)
         except DatasetError as error:
             raise DatasetError(f"result_file: {error}") from error
+        except OSError as error:
+            raise DatasetError(f"result_file: {name}: {error.strerror}") from error
 
     def begin(self, tracker: Tracker) -> None:
         """Set the tracker whose results are written; the file records its present settings."""
@@ -64,11 +66,11 @@ class ResultFile:
     def add(self, result: TrackResult, body: BodyModel) -> None:
         """Write a result and the present body; ignored after `close`."""
         with self._lock:
-            writer = self._opened()
-            if writer is None:
-                return
-            writer.body = body
             try:
+                writer = self._opened()
+                if writer is None:
+                    return
+                writer.body = body
                 writer.add(result)
             except DatasetError as error:
                 if not self._refused:
@@ -89,23 +91,30 @@ class ResultFile:
             DatasetError: they cannot be completed; what was written so far is kept.
         """
         with self._lock:
-            writer, self._closed = self._opened(), True
-            if writer is None:
-                return None
-            writer.note(notes)
             try:
+                writer = self._opened()
+                if writer is None:
+                    return None
+                writer.note(notes)
                 writer.close()
             except DatasetError as error:
                 raise DatasetError(f"result_file: {error}; {self._complete()}") from error
+            finally:
+                self._closed = True
             return f"{writer.trc_path}: {writer.frames} frames written"
 
     def _opened(self) -> ResultWriter | None:
         if self._closed or self._name is None or self._tracker is None:
             return None
         if self._writer is None:
-            self._writer = ResultWriter(
-                self._name, self._tracker.body, self._config, fps=None, source="live"
-            )
+            # Another tracker may have written this result since this one was made.
+            try:
+                self._writer = ResultWriter(
+                    self._name, self._tracker.body, self._config,
+                    fps=None, source="live", overwrite=self._overwrite,
+                )  # fmt: skip
+            except OSError as error:
+                raise DatasetError(f"{self._name}: {error.strerror}") from error
         return self._writer
 
     def _complete(self) -> str:
