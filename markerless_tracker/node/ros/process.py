@@ -96,7 +96,7 @@ def run_executable(
             apply_profile()
             require_ros()
             return body(list(sys.argv[1:] if argv is None else argv), stop)
-        except TrackerError as error:
+        except (TrackerError, OSError) as error:
             print(f"{name}: {error}", file=sys.stderr, flush=True)
             return 1
 

@@ -101,9 +101,9 @@ class Services:
 
     def _target(self, name: str) -> Path:
         path = (self._settings.save_dir / name).absolute()
-        if path.exists() and not self._settings.overwrite:
-            raise ConfigError(f"save_dir: {path} exists, and `overwrite` is false")
         try:
+            if path.exists() and not self._settings.overwrite:
+                raise ConfigError(f"save_dir: {path} exists, and `overwrite` is false")
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ConfigError(f"save_dir: {path.parent}: {error.strerror}") from error

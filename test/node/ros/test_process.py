@@ -69,6 +69,17 @@ def test_errors_are_one_line_and_exit_1(capsys: pytest.CaptureFixture[str]) -> N
     assert capsys.readouterr().err == "tracker: seed: got -1, expected at least 0\n"
 
 
+def test_a_path_without_permission_is_one_line_and_exit_1(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail(_: list[str], __: StopSignals) -> int:
+        raise PermissionError(13, "Permission denied", "/closed/walk.trc")
+
+    assert run_executable("tracker", fail, []) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == "tracker: [Errno 13] Permission denied: '/closed/walk.trc'"
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_is_noted_and_breaks_nothing(number: int) -> None:
     done = subprocess.run(
