@@ -134,7 +134,8 @@ class ImageSubscription:
         self._node, self._source, self._before, self._after = node, source, before, after
         self._auto = transport == "auto"
         self._compressed = transport == "compressed"
-        # Compressed images have the resolved name of the topic, after remapping.
+        # After remapping, for the name of compressed images. Raw images are subscribed by the
+        # source's own name: creating a subscription remaps it.
         self._topic = node.resolve_topic_name(source.image_topic)
         self._subscription = self._subscribe()
 
@@ -166,6 +167,7 @@ class ImageSubscription:
             take(serialised, info["publication_sequence_number"])
             after()
 
-        topic = f"{self._topic}{COMPRESSED_SUFFIX}" if self._compressed else self._topic
-        kind = CompressedImage if self._compressed else Image
+        topic, kind = self._source.image_topic, Image
+        if self._compressed:
+            topic, kind = f"{self._topic}{COMPRESSED_SUFFIX}", CompressedImage
         return FollowingSubscription(self._node, kind, topic, receive, raw=True)

@@ -65,6 +65,20 @@ def test_what_is_offered_on_a_remapped_topic_is_received(node: Node, peer: Any) 
     peer.until(lambda: topics.tick() or "info" in source.got, "the camera info sent before")
 
 
+def test_exchanged_names_are_exchanged(ros_context: Any, peer: Any) -> None:
+    """Each rule is applied once: the name that it gives is another rule's, too."""
+    rules = ["cam01/image_raw:=/cam02/image_raw", "cam02/image_raw:=/cam01/image_raw"]
+    arguments = ["--ros-args", *(word for rule in rules for word in ("-r", rule))]
+    node = Node("receiver", context=ros_context, cli_args=arguments)
+    peer.executor.add_node(node)
+    first, second = Source("cam01"), Source("cam02")
+    topics = CameraTopics(node, [first, second], transport="auto", clock=lambda: 0.0)
+    images = peer.node.create_publisher(Image, "/cam01/image_raw", output_qos())
+    peer.until(lambda: topics.tick() or images.publish(Image()) or "raw" in second.got, "an image")
+    assert "raw" not in first.got
+    node.destroy_node()
+
+
 def test_raw_images_that_are_discovered_later_are_received(node: Node, peer: Any) -> None:
     source = Source()
     topics = CameraTopics(node, [source], transport="auto", clock=lambda: 0.0)
