@@ -4,10 +4,11 @@ import time
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from markerless_tracker.node.ros.declared import GivenNode
 from markerless_tracker.node.ros.messages import message_class
+from markerless_tracker.node.ros.qos import FollowingSubscription
 
 _SEARCH_S = 0.5
 """Interval of the search for new topics."""
@@ -53,6 +54,7 @@ class RecorderNode(GivenNode):
         self._writer = writer
         self._wanted = None if topics is None else {f"/{name.strip('/')}" for name in topics}
         self._seen: set[str] = set()
+        self._following: list[FollowingSubscription] = []
         self._flushed_s = time.monotonic()
         self.counts: dict[str, int] = {}
         self.create_timer(_SEARCH_S, self._search)
@@ -64,17 +66,22 @@ class RecorderNode(GivenNode):
             self._writer.flush()
             self._flushed_s = time.monotonic()
         for name, kinds in self.get_topic_names_and_types():
-            if name in self._seen or name in _OF_ROS:
-                continue
-            if name not in self._wanted if self._wanted is not None else _DEBUG in name:
+            if name in self._seen or not self._is_wanted(name):
                 continue
             offers = self.get_publishers_info_by_topic(name)
             if offers:
                 self._record(name, kinds[0], [offer.qos_profile for offer in offers])
+        # A publisher may come later, or be started again, with another quality of service.
+        for subscription in self._following:
+            subscription.follow()
+
+    def _is_wanted(self, name: str) -> bool:
+        if self._wanted is not None:
+            return name in self._wanted
+        return name not in _OF_ROS and _DEBUG not in name
 
     def _record(self, name: str, kind: str, offers: Sequence[QoSProfile]) -> None:
         self._seen.add(name)
-        reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
         latched = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
         try:
             message = message_class(kind)
@@ -86,16 +93,12 @@ class RecorderNode(GivenNode):
             )
             return
         self.counts[name] = 0
-        qos = QoSProfile(
-            history=HistoryPolicy.KEEP_LAST,
-            depth=_DEPTH,
-            reliability=(ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT),
-            durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE),
-        )
 
         def write(data: bytes) -> None:
             self._writer.write_serialized(topic, time.time_ns(), data)
             self.counts[name] += 1
 
-        self.create_subscription(message, name, write, qos, raw=True)
+        self._following.append(
+            FollowingSubscription(self, message, name, write, depth=_DEPTH, raw=True)
+        )
         self.get_logger().info(f"recording {name}")

@@ -79,23 +79,30 @@ class FollowingSubscription:
         self._node, self._kind, self._topic, self._callback = node, kind, topic, callback
         self._depth, self._raw = depth, raw
         self._group = _NotExecuted() if polled else None
-        self._offered = (True, False)
+        self._offered = self._offers() or (True, False)
         self._subscription = self._subscribe()
 
     def follow(self) -> None:
         """Adapt to the publishers; to be called periodically."""
-        offers = [o.qos_profile for o in self._node.get_publishers_info_by_topic(self._topic)]
-        if not offers:
+        offered = self._offers()
+        if offered is None or offered == self._offered:
             return
-        reliable = all(o.reliability != ReliabilityPolicy.BEST_EFFORT for o in offers)
-        latched = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
-        if (reliable, latched) == self._offered:
-            return
+        reliable, latched = offered
         words = f"{'reliable' if reliable else 'best effort'}{' and latched' if latched else ''}"
         self._node.get_logger().info(f"{self._topic} is {words}, subscribed likewise")
-        self._offered = (reliable, latched)
+        self._offered = offered
         self.close()
         self._subscription = self._subscribe()
+
+    def _offers(self) -> tuple[bool, bool] | None:
+        """Whether all publishers are reliable, and all latched; None without publishers."""
+        offers = [o.qos_profile for o in self._node.get_publishers_info_by_topic(self._topic)]
+        if not offers:
+            return None
+        return (
+            all(o.reliability != ReliabilityPolicy.BEST_EFFORT for o in offers),
+            all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers),
+        )
 
     def close(self) -> None:
         """End the subscription."""

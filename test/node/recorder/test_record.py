@@ -16,6 +16,7 @@ import pytest
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from geometry_msgs.msg import PoseArray
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
@@ -24,6 +25,7 @@ from markerless_tracker.cli.main import main
 from markerless_tracker.datasets import open_recording
 from markerless_tracker.datasets.bag.stream import McapFiles
 from markerless_tracker.errors import ConfigError
+from markerless_tracker.node.recorder.node import RecorderNode
 from markerless_tracker.node.ros.images import fill_image
 from markerless_tracker.node.ros.qos import image_qos, latched_qos, output_qos
 from markerless_tracker.node.ros.stamps import time_message
@@ -141,6 +143,52 @@ def test_a_kill_leaves_what_was_flushed(peer: Any, recorder, tmp_path: Path) -> 
     process.wait()
     check_bag(tmp_path / "bag", graph, least // 2)
     assert set(McapFiles([file]).types) <= {"", "/cam01/image_raw", "/cam02/image_raw"}
+
+
+class KeptWords:
+    """Keeps the serialised messages of each topic."""
+
+    def __init__(self) -> None:
+        self.words: dict[str, list[bytes]] = {}
+        self.messages = 0
+
+    def topic(self, name: str, kind: str, *, latched: bool = False) -> str:
+        self.words[name] = []
+        return name
+
+    def write_serialized(self, topic: str, stamp_ns: int, data: bytes) -> None:
+        self.words[topic].append(data)
+
+    def flush(self) -> None:
+        """Do nothing."""
+
+
+def test_a_publisher_that_returns_as_best_effort_is_recorded_on(
+    peer: Any, ros_context: Any
+) -> None:
+    bag = KeptWords()
+    node = RecorderNode(bag, ["words"], context=ros_context)
+    peer.executor.add_node(node)
+    effort = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+    for qos, text in ((QoSProfile(depth=5), b"first"), (effort, b"second")):
+        publisher = peer.node.create_publisher(String, "words", qos)
+
+        def heard(publisher: Any = publisher, text: bytes = text) -> bool:
+            publisher.publish(String(data=text.decode()))
+            return any(text in data for data in bag.words.get("/words", []))
+
+        peer.until(heard, text.decode())
+        peer.node.destroy_publisher(publisher)
+        peer.until(lambda: peer.node.count_publishers("words") == 0, "no publisher")
+    node.destroy_node()
+
+
+def test_topics_of_ros_itself_are_recorded_on_demand(peer: Any, ros_context: Any) -> None:
+    bag = KeptWords()
+    node = RecorderNode(bag, ["/rosout"], context=ros_context)
+    peer.executor.add_node(node)
+    peer.until(lambda: "/rosout" in bag.words, "the topic")
+    node.destroy_node()
 
 
 def test_mistakes_and_silence(recorder, tmp_path: Path) -> None:
