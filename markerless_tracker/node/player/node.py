@@ -10,6 +10,7 @@ from sensor_msgs.msg import CameraInfo, Image
 
 from markerless_tracker.datasets import detect_format
 from markerless_tracker.datasets.bag.recording import BagRecording
+from markerless_tracker.datasets.part import PartRecording
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.node.player.clock import BagClock
 from markerless_tracker.node.player.control import Control
@@ -60,7 +61,7 @@ class PlayerNode(GivenNode):
         self.settings = read_player_settings(given_parameters(self))
         declare_effective(self, player_values(self.settings), descriptions())
         self._recording = _open_bag(self.settings)
-        self._start = round(self.settings.start_offset * self._recording.fps)
+        self._start = _first_set(self._recording, self.settings.start_offset)
         self._ready = False
         self._lockstep = Lockstep(self.settings.lockstep_timeout, clock=time.monotonic)
         self._served_s = time.monotonic()
@@ -259,6 +260,20 @@ def _choice(
         [infos[topic] for topic in topics if topic in infos],
         [topic for topic in topics if topic not in images and topic not in infos],
     )
+
+
+def _first_set(recording: BagRecording, start_offset_s: float) -> int:
+    """Index of the set so many seconds after the first one.
+
+    Raises:
+        DatasetError: the bag ends before; names the parameter.
+    """
+    if start_offset_s == 0.0:
+        return 0
+    try:
+        return PartRecording(recording, from_s=start_offset_s).first
+    except DatasetError as error:
+        raise DatasetError(f"start_offset: {error}") from error
 
 
 def _open_bag(settings: PlayerSettings) -> BagRecording:

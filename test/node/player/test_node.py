@@ -214,7 +214,7 @@ def test_a_loop_begins_anew_until_a_signal_and_an_offset_leaves_sets_out(
     [
         ({"bag": "nowhere"}, "nowhere: no such file"),
         ({"bag": "{tmp}"}, "no bag, expected"),
-        ({"bag": "{bag}", "start_offset": 60.0}, "start at frame 1200"),
+        ({"bag": "{bag}", "start_offset": 60.0}, "start_offset: bag: ends 0.350 s after"),
         ({"bag": "{bag}", "lopp": True}, "'lopp' is unknown, did you mean 'loop'"),
         ({"bag": "{damaged}"}, "damaged"),
     ],
