@@ -1,7 +1,8 @@
 """Writing of bag folders in the layout of rosbag2 (Jazzy): one MCAP file and its metadata.yaml."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -97,7 +98,7 @@ class BagWriter:
         Its data must not change before the chunk ends.
 
         Raises:
-            DatasetError: the stamp does not fit in a message.
+            DatasetError: the stamp does not fit in a message, or the file cannot be written.
         """
         self._write(topic, stamp_ns, serialized(message, topic.kind))
 
@@ -108,7 +109,8 @@ class BagWriter:
     def _write(self, topic: Topic, stamp_ns: int, pieces: Sequence[Piece]) -> None:
         check_stamp(stamp_ns, topic.name)
         number = self._counts[topic.number]
-        self._mcap.add_message(topic.number, stamp_ns, pieces, stamp_ns, number)
+        with self._writing():
+            self._mcap.add_message(topic.number, stamp_ns, pieces, stamp_ns, number)
         self._counts[topic.number] += 1
         self._first_ns = stamp_ns if self._first_ns is None else min(self._first_ns, stamp_ns)
         self._last_ns = max(self._last_ns, stamp_ns)
@@ -119,8 +121,21 @@ class BagWriter:
         return self._counts.total()
 
     def flush(self) -> None:
-        """End the current chunk and flush all data to the operating system."""
-        self._mcap.flush()
+        """End the current chunk and flush all data to the operating system.
+
+        Raises:
+            DatasetError: they cannot be written.
+        """
+        with self._writing():
+            self._mcap.flush()
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Raise the system's errors as one that names the file."""
+        try:
+            yield
+        except OSError as error:
+            raise DatasetError(f"{self._path}: cannot be written: {error.strerror}") from error
 
     def __enter__(self) -> Self:
         return self
@@ -131,14 +146,19 @@ class BagWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        with self._file:
-            if kind is not None:
-                return
-            about = self._metadata()
-            self._mcap.add_metadata("rosbag2", {"serialized_metadata": _dump(about).rstrip("\n")})
-            self._mcap.finish()
-        text = _dump({"rosbag2_bagfile_information": about})
-        (self._folder / "metadata.yaml").write_text(text, encoding="utf-8")
+        if kind is not None:
+            # The first error is more informative than one of closing the file.
+            with suppress(OSError):
+                self._file.close()
+            return
+        with self._writing():
+            with self._file:
+                about = self._metadata()
+                serialized_about = {"serialized_metadata": _dump(about).rstrip("\n")}
+                self._mcap.add_metadata("rosbag2", serialized_about)
+                self._mcap.finish()
+            text = _dump({"rosbag2_bagfile_information": about})
+            (self._folder / "metadata.yaml").write_text(text, encoding="utf-8")
 
     def _metadata(self) -> dict[str, Any]:
         start = {"nanoseconds_since_epoch": self._first_ns or 0}

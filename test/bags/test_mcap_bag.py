@@ -1,6 +1,7 @@
 """Bags as other tools see them: mcap with its checks, mcap-ros2-support, rosbag2."""
 
 import re
+import resource
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +119,24 @@ def test_a_writer_that_fails_leaves_readable_chunks(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="/chatter: stamp -1"):
         with BagWriter(tmp_path / "late") as writer:
             writer.write(writer.topic("/chatter", "std_msgs/msg/String"), -1, text)
+
+
+def test_a_full_disk_is_told_with_the_file(tmp_path: Path) -> None:
+    text = message_type("std_msgs/msg/String")(data="x" * 5000)
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limit[1]))
+    named = rf"{tmp_path.name}.mcap: cannot be written: File too large"
+    try:
+        with pytest.raises(DatasetError, match=named), BagWriter(tmp_path) as writer:
+            topic = writer.topic("/chatter", "std_msgs/msg/String")
+            for stamp_ns in range(10):
+                writer.write(topic, stamp_ns, text)
+                writer.flush()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+    # What came before can be read.
+    with next(tmp_path.glob("*.mcap")).open("rb") as file:
+        assert any(getattr(r, "channel_id", None) for r in _until_cut(file))
 
 
 def _until_cut(file):
