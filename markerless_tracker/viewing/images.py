@@ -80,17 +80,25 @@ class ResultImages:
         wanted = [(row, int(self._stamps_ns[row])) for row in rows]
         if not wanted:
             return
-        start = self._recording.start_index(wanted[0][1])
+        missing: DatasetError | None = None
+        start, every = 0, self._every(wanted)
+        try:
+            start = self._recording.start_index(wanted[0][1])
+        except DatasetError as error:
+            # The source may begin later than the result.
+            missing, every = error, 1
         found = 0
-        for images in self._recording.frames(start=start, every=self._every(wanted)):
+        for images in self._recording.frames(start=start, every=every):
             while found < len(wanted) and self._is_past(wanted[found][1], images):
                 wanted.pop(found)
             if found == len(wanted):
-                return
+                break
             row, stamp_ns = wanted[found]
             if abs(images.stamp_ns - stamp_ns) <= self._tolerance_ns:
                 yield row, images
                 found += 1
+        if found == 0 and missing is not None:
+            raise missing
 
     @property
     def _tolerance_ns(self) -> float:

@@ -9,6 +9,7 @@ import pytest
 
 from markerless_tracker.bags import write_bag
 from markerless_tracker.datasets import open_recording
+from markerless_tracker.datasets.part import PartRecording
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.read import read_result
 from markerless_tracker.viewing.images import ResultImages
@@ -44,6 +45,18 @@ def test_the_source_may_be_elsewhere(make_result, walk: Path) -> None:
 def test_rows_beyond_the_recording_are_left_out(make_result, walk: Path) -> None:
     result = read_result(make_result(frames=8, source=walk))
     assert indices(ResultImages(result), [4, 5, 6, 7]) == [(4, 4), (5, 5)]
+
+
+def test_rows_before_the_source_begins_are_left_out(
+    make_result, walk: Path, tmp_path: Path
+) -> None:
+    result = read_result(make_result(source=walk))
+    later = PartRecording(open_recording(walk), from_s=float(result.stamps_ns[2]) / 1e9)
+    write_bag(later, tmp_path / "later")
+    found = indices(ResultImages(result, tmp_path / "later"), [0, 1, 2, 4])
+    assert [row for row, _ in found] == [2, 4]
+    with pytest.raises(DatasetError, match="no frame within half a frame of 0.000000 s"):
+        indices(ResultImages(result, tmp_path / "later"), [0, 1])
 
 
 def test_cameras_are_brought_into_step_as_the_run_did(make_result, walk: Path) -> None:
