@@ -60,6 +60,8 @@ class EvidenceMaker:
         self._three_classes = config.shadow.undecided
         self._mapper = mapper
         self._process: SegmentingProcess | None = None
+        self._ahead = False
+        self._shared: SharedMemory | None = None
         self.segmenters: dict[str, Segmenter] = {}
         self.take_backgrounds(backgrounds)
 
@@ -85,6 +87,8 @@ class EvidenceMaker:
             )
         self.segmenters = segmenters
         self._backgrounds = dict(backgrounds)
+        if self._ahead:
+            self.start_process(self._shared)
 
     def segment(
         self,
@@ -148,11 +152,12 @@ class EvidenceMaker:
         """Start a process that segments sets ahead of their step; `warm_up` gives it backgrounds.
 
         Without effect with one thread, or if the backgrounds follow the images, which must then be
-        segmented in the order of the steps.
+        segmented in the order of the steps. Without backgrounds it starts when they are given.
 
         Args:
             shared: memory that holds the images; None for memory of its own.
         """
+        self._ahead, self._shared = True, shared
         several = (self._config.threads or usable_cores()) > 1
         if several and self.segmenters and not self._follows and self._process is None:
             self._process = SegmentingProcess(self.rig, shared)
@@ -178,7 +183,7 @@ class EvidenceMaker:
 
     def close(self) -> None:
         """End the segmenting process, if there is one."""
-        process, self._process = self._process, None
+        process, self._process, self._ahead = self._process, None, False
         if process is not None:
             process.close()
 

@@ -14,6 +14,7 @@ from markerless_tracker.tracking.processes.wire import receive, send
 _PACKAGE = Path(__file__).resolve().parents[3]
 _PIPE_BYTES = 1 << 20
 """Size of a pipe: it holds a result, so that the sender need not wait; Linux only."""
+_AS_USUAL = -1
 
 
 class SharedMemory(NamedTuple):
@@ -53,15 +54,23 @@ class Child:
             self.memory = memory.memory if isinstance(memory, SharedMemory) else mmap.mmap(fd, 0)
             paths = [str(_PACKAGE), *filter(None, [os.environ.get("PYTHONPATH")])]
             # In a session of its own it gets no Ctrl-C of the terminal: this process ends it.
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", module, *arguments, str(fd)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                pass_fds=(fd, *pass_fds),
-                pipesize=_PIPE_BYTES,
-                start_new_session=True,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-            )
+
+            def started(pipe_bytes: int) -> "subprocess.Popen[bytes]":
+                return subprocess.Popen(
+                    [sys.executable, "-m", module, *arguments, str(fd)],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    pass_fds=(fd, *pass_fds),
+                    pipesize=pipe_bytes,
+                    start_new_session=True,
+                    env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+                )
+
+            try:
+                self._process = started(_PIPE_BYTES)
+            except OSError:
+                # The system limits the memory of a user's pipes. Smaller ones are only slower.
+                self._process = started(_AS_USUAL)
         finally:
             if not isinstance(memory, SharedMemory):
                 os.close(fd)

@@ -126,6 +126,19 @@ def test_its_end_is_told_once_with_a_frame(here, backgrounds, images) -> None:
     maker.close()
 
 
+def test_it_starts_when_the_backgrounds_come(backgrounds, images) -> None:
+    """As in a tracker that learns them when it runs."""
+    maker = EvidenceMaker(RIG, CONFIG, {}, map)
+    maker.start_process()
+    assert maker._process is None
+    maker.take_backgrounds(backgrounds)
+    maker.start_compiling()
+    maker.finish_compiling()
+    assert maker._process is not None
+    assert maker._process.segment(images, 0, dict.fromkeys(images)) is not None
+    maker.close()
+
+
 def test_without_backgrounds_nothing_is_segmented_there(images) -> None:
     process = SegmentingProcess(RIG)
     assert process.segment(images, 0, dict.fromkeys(images)) is None
