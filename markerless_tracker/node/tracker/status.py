@@ -106,6 +106,8 @@ class TrackerStatus:
         with self._lock:
             self._activity, self._ready, self._ready_s = activity, True, now_s
             self._ready_cpu_s = self._cpu_s()
+            self._refused.clear()
+            self._lost.clear()
 
     def tracked(self, result: TrackResult, *, arrived_s: float, finished_s: float) -> None:
         """Record a result and its times, of one monotonic clock."""
