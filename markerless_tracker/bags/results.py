@@ -44,7 +44,7 @@ def write_result_bag(out: Path, reader: ResultReader, *, replace: bool = False) 
         DatasetError: the folder exists or cannot be written, or a stamp does not fit in a message.
         BodyModelError: the result's body is unknown.
     """
-    body = stored_body(reader.summary)
+    body = reader.body()
     with new_folder(out, replace=replace) as folder:
         with BagWriter(folder) as writer:
             topics = _Topics(writer, body, reader.angle_names)

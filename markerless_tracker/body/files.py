@@ -1,6 +1,7 @@
 """Reading of the YAML files of bodies, subjects and poses."""
 
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,15 @@ def read_yaml(path: Path, what: str) -> Any:
     """
     try:
         return yaml.load(path.read_text(encoding="utf-8-sig"), _Loader)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
+    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
         first = str(error).splitlines()[0]
         raise BodyModelError(f"{path}: cannot read the {what}: {first}") from error
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of a file is a finite number; YAML's integers may be too large for a float.
+
+    The comparison takes integers of any size, which numpy and `math.isfinite` do not.
+    """
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return number and abs(value) <= sys.float_info.max

@@ -1,20 +1,16 @@
 """Structure of a body description: keys of each entry and types of their values."""
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from markerless_tracker.body.files import is_number
 from markerless_tracker.errors import BodyModelError
 
 Check = Callable[[Any], bool]
 
 
-def _number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-
-
 def _positive(value: Any) -> bool:
-    return _number(value) and value > 0
+    return is_number(value) and bool(value > 0)
 
 
 def _text(value: Any) -> bool:
@@ -33,7 +29,7 @@ def _range(value: Any) -> bool:
     return (
         isinstance(value, list)
         and len(value) == 2
-        and all(_number(item) for item in value)
+        and all(is_number(item) for item in value)
         and bool(value[0] < value[1])
     )
 
@@ -42,7 +38,7 @@ def _end(value: Any) -> bool:
     return (
         isinstance(value, list)
         and len(value) == 4
-        and all(_number(item) for item in value)
+        and all(is_number(item) for item in value)
         and min(value[:2]) > 0
     )
 
@@ -53,7 +49,7 @@ def _edges(value: Any) -> bool:
 
 # Requirements on a value, as text for messages and as a test.
 _POSITIVE = ("a number above 0", _positive)
-_NUMBER = ("a number", _number)
+_NUMBER = ("a number", is_number)
 _TEXT = ("text", _text)
 _PAIR = ("two names", _pair)
 _RANGE = ("two numbers, the lower one first", _range)

@@ -7,7 +7,7 @@ import numpy as np
 import yaml
 
 from markerless_tracker.body import kinematics
-from markerless_tracker.body.files import read_yaml
+from markerless_tracker.body.files import is_number, read_yaml
 from markerless_tracker.body.model import MARKER_NAMES, BodyModel
 from markerless_tracker.body.subject import complete_markers
 from markerless_tracker.errors import BodyModelError
@@ -100,7 +100,7 @@ def read_pose(path: Path, body: BodyModel) -> FloatArray:
     for name, value in data.items():
         if str(name) not in body.parameter_names:
             raise BodyModelError(f"{path}: body {body.name} has no parameter {name!r}")
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+        if not is_number(value):
             raise BodyModelError(f"{path}: parameter {name} is {value!r}, expected a finite number")
         pose[body.index(str(name))] = float(value)
     missing = [body.parameter_names[i] for i in body.root if body.parameter_names[i] not in data]

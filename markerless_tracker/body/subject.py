@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 
 from markerless_tracker.body.description import BodyDescription, shipped_lengths
-from markerless_tracker.body.files import read_yaml
+from markerless_tracker.body.files import is_number, read_yaml
 from markerless_tracker.errors import BodyModelError
 from markerless_tracker.geometry import FloatArray
 
@@ -36,8 +36,7 @@ class Subject:
 
     def __post_init__(self) -> None:
         for key, value in self.lengths_m.items():
-            number = isinstance(value, (int, float)) and not isinstance(value, bool)
-            if not (number and np.isfinite(value) and 0.0 < value < 3.0):
+            if not (is_number(value) and 0.0 < value < 3.0):
                 raise BodyModelError(
                     f"subject {self.name}: length {key} is {value!r}, "
                     "expected metres between 0 and 3"
@@ -213,7 +212,7 @@ def write_subject(path: Path, subject: Subject) -> None:
 def _shapes(data: dict[str, Any], path: Path) -> dict[str, FloatArray]:
     try:
         return {name: np.array(v, dtype=float) for name, v in (data.get("cones_m") or {}).items()}
-    except (TypeError, ValueError, AttributeError) as error:
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
         raise BodyModelError(
             f"{path}: cones_m must map cones to two rows of four numbers"
         ) from error

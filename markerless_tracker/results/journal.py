@@ -19,6 +19,8 @@ _FRAME = f'{{"{FRAME_KEY}": '
 _FRAMES = ' "frames": [\n'
 _END = "\n}"
 _LONGEST_HEAD = 10_000_000
+# The range of int64.
+_EARLIEST_NS, _LATEST_NS = -(2**63), 2**63 - 1
 
 
 class Journal:
@@ -75,8 +77,9 @@ class Journal:
             os.replace(summary, path)
             self._file.path.unlink()
         except OSError as error:
-            summary.unlink(missing_ok=True)
             raise not_written(path, error) from error
+        finally:
+            summary.unlink(missing_ok=True)
 
 
 def read_summary(name: Path) -> dict[str, Any]:
@@ -103,7 +106,7 @@ def open_summary(name: Path) -> tuple[dict[str, Any], Iterator[dict[str, Any]]]:
 
     Raises:
         DatasetError: there is neither NAME.json nor NAME.jsonl, or it is no result; or, raised by
-            the iterator, a frame has no stamp.
+            the iterator, a frame has no stamp or one outside int64.
     """
     path = name.with_name(name.name + ".json")
     journal = name.with_name(name.name + ".jsonl")
@@ -124,7 +127,7 @@ def open_summary(name: Path) -> tuple[dict[str, Any], Iterator[dict[str, Any]]]:
 def _no_result(path: Path) -> Iterator[None]:
     try:
         yield
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise DatasetError(f"{path}: no result of a tracker ({error})") from error
 
 
@@ -139,6 +142,11 @@ def _checked(path: Path, frames: Iterable[Any]) -> Iterator[dict[str, Any]]:
         if not isinstance(frame, dict) or not isinstance(frame.get(FRAME_KEY), int):
             raise DatasetError(
                 f"{path}: frame {number}: no `{FRAME_KEY}`, expected whole nanoseconds"
+            )
+        if not _EARLIEST_NS <= frame[FRAME_KEY] <= _LATEST_NS:
+            raise DatasetError(
+                f"{path}: frame {number}: `{FRAME_KEY}` is {frame[FRAME_KEY]}, expected "
+                f"{_EARLIEST_NS} to {_LATEST_NS}"
             )
         yield frame
 
@@ -160,7 +168,7 @@ def _composed_head(path: Path) -> dict[str, Any] | None:
         return None
     try:
         head = json.loads(text.rstrip().removesuffix(",") + "}")
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return head if isinstance(head, dict) else None
 

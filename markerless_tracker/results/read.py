@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from markerless_tracker.body import BodyModel
 from markerless_tracker.datasets.markers.trc import TrcRows
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import TrackState
 from markerless_tracker.results.journal import open_summary
 from markerless_tracker.results.stored import summary_of
-from markerless_tracker.results.stored_result import StoredResult
+from markerless_tracker.results.stored_result import StoredResult, stored_body
 
 CHUNK_FRAMES = 4096
 """Frames that `ResultReader.chunks` reads at a time."""
@@ -60,6 +61,7 @@ class ResultReader:
         if found is None:
             raise DatasetError(f"{self.name}.json: no such file, expected a result of `track`")
         self._summary_name, self._segment = found
+        self._where = f"{self._summary_name}.json"
         self._keep_lost = keep_lost
         self.summary, frames = open_summary(self._summary_name)
         with TrcRows(path) as rows:
@@ -69,25 +71,28 @@ class ResultReader:
         body = self.summary.get("body")
         names = body.get("parameters", []) if isinstance(body, dict) else []
         if not isinstance(names, list):
-            raise DatasetError(
-                f"{self._summary_name}.json: `body.parameters` is {names!r}, expected a list"
-            )
+            raise DatasetError(f"{self._where}: `body.parameters` is {names!r}, expected a list")
         self.parameter_names = tuple(str(parameter) for parameter in names)
         # All frames with a pose have the same angles, or none.
         posed = (frame for frame in frames if frame.get("parameters") is not None)
         first = next(posed, {})
-        angles = first.get("angles") or {}
-        if not isinstance(angles, dict):
-            raise DatasetError(
-                f"{self._summary_name}.json: `angles` of the frame at {first['stamp_ns']} ns is no "
-                "table of angles"
-            )
-        self.angle_names = tuple(angles)
+        self.angle_names = tuple(self._table(first, "angles"))
         # A camera may be missing in that frame; the verdict at the end of a run has all of them.
         verdict = self.summary.get("verdict")
-        overlap = verdict.get("overlap") if isinstance(verdict, dict) else None
-        cameras = (*(overlap or ()), *(first.get("iou") or ()))
-        self.camera_names = tuple(sorted(map(str, dict.fromkeys(cameras))))
+        overlap = (verdict.get("overlap") if isinstance(verdict, dict) else None) or {}
+        if not isinstance(overlap, dict):
+            raise DatasetError(
+                f"{self._where}: `verdict.overlap` is {overlap!r}, expected a mapping"
+            )
+        self.camera_names = tuple(sorted({*overlap, *self._table(first, "iou")}))
+
+    def body(self) -> BodyModel:
+        """The tracked body with the person's sizes.
+
+        Raises:
+            BodyModelError, DatasetError: the result's body is not described or cannot be loaded.
+        """
+        return stored_body(self.summary, self._where)
 
     def chunks(self, size: int = CHUNK_FRAMES) -> Iterator[StoredResult]:
         """Parts of at most `size` frames, in order; one without frames if there is none.
@@ -127,24 +132,23 @@ class ResultReader:
         fitness = np.full(n, np.nan)
         for row, frame in enumerate(frames):
             try:
-                deviations = frame.get("markers_sd_mm") or {}
+                deviations = self._table(frame, "markers_sd_mm")
                 for column, marker in enumerate(self.marker_names):
                     if marker in deviations:
                         sd[row, column] = deviations[marker]
-                found = frame.get("angles") or {}
+                found = self._table(frame, "angles")
                 if found:
                     angles[row] = [_number(found.get(name)) for name in self.angle_names]
-                    known = frame.get("angles_sd") or {}
+                    known = self._table(frame, "angles_sd")
                     angles_sd[row] = [_number(known.get(name)) for name in self.angle_names]
-                agreement = frame.get("iou") or {}
+                agreement = self._table(frame, "iou")
                 overlap[row] = [_number(agreement.get(name)) for name in self.camera_names]
                 self._take_parameters(frame, "parameters", parameters[row])
                 self._take_parameters(frame, "parameters_sd", parameters_sd[row])
                 fitness[row] = _number(frame.get("fitness"))
-            except (TypeError, ValueError, AttributeError) as error:
+            except (TypeError, ValueError, OverflowError) as error:
                 raise DatasetError(
-                    f"{self._summary_name}.json: the frame at {frame['stamp_ns']} ns is malformed: "
-                    f"{error}"
+                    f"{self._where}: the frame at {frame['stamp_ns']} ns is malformed: {error}"
                 ) from error
         for values in (positions, sd, angles, angles_sd, overlap, parameters, parameters_sd):
             values[blank] = np.nan
@@ -167,7 +171,18 @@ class ResultReader:
             angles_deg=angles,
             angles_sd_deg=angles_sd,
             overlap=overlap,
+            where=self._where,
         )
+
+    def _table(self, frame: dict[str, Any], key: str) -> dict[str, Any]:
+        """A frame's values by name; empty if it has none."""
+        values = frame.get(key) or {}
+        if not isinstance(values, dict):
+            raise DatasetError(
+                f"{self._where}: `{key}` of the frame at {frame['stamp_ns']} ns is {values!r}, "
+                "expected a mapping"
+            )
+        return values
 
     def _take_parameters(self, frame: dict[str, Any], key: str, out: FloatArray) -> None:
         """Fill out (p,) with a frame's values, if it has any."""

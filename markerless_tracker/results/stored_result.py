@@ -45,6 +45,7 @@ class StoredResult:
         angles_deg: (n, k) joint angles in degrees.
         angles_sd_deg: (n, k) their standard deviations.
         overlap: (n, c) overlap (IoU) of each camera's silhouette and the body, 0 to 1.
+        where: names the result in messages: the path of its JSON file.
     """
 
     source: str
@@ -65,6 +66,7 @@ class StoredResult:
     angles_deg: FloatArray
     angles_sd_deg: FloatArray
     overlap: FloatArray
+    where: str = "result"
 
     def __post_init__(self) -> None:
         for name in _PER_FRAME:
@@ -134,7 +136,7 @@ class StoredResult:
         Raises:
             BodyModelError, DatasetError: the result's body is not described or cannot be loaded.
         """
-        return stored_body(self.summary)
+        return stored_body(self.summary, self.where)
 
     def rows(self, rows: slice | NDArray[Any]) -> "StoredResult":
         """The result with those frames only."""
@@ -190,8 +192,12 @@ class StoredResult:
         )
 
 
-def stored_body(summary: Mapping[str, Any]) -> BodyModel:
+def stored_body(summary: Mapping[str, Any], where: str = "result") -> BodyModel:
     """The body that a result's JSON file describes.
+
+    Args:
+        summary: the entries of the file.
+        where: names the result in messages.
 
     Raises:
         BodyModelError: the body of its settings cannot be loaded or does not fit.
@@ -199,24 +205,29 @@ def stored_body(summary: Mapping[str, Any]) -> BodyModel:
     """
     entry = summary.get("body")
     if not isinstance(entry, Mapping) or "lengths_m" not in entry:
-        raise DatasetError("the result does not describe its body, expected `body` in its JSON")
+        raise DatasetError(f"{where}: no `body.lengths_m`, expected the sizes of the tracked body")
     lengths_m, cones_m = entry["lengths_m"], entry.get("cones_m", {})
-    if not isinstance(lengths_m, Mapping) or not isinstance(cones_m, Mapping):
-        raise DatasetError("`lengths_m` or `cones_m` of the result's `body` is no table of numbers")
     settings = summary.get("settings") or {}
+    tables = {"body.lengths_m": lengths_m, "body.cones_m": cones_m, "settings": settings}
+    for key, table in tables.items():
+        if not isinstance(table, Mapping):
+            raise DatasetError(f"{where}: `{key}` is {table!r}, expected a mapping")
     name = settings.get("body") or entry.get("name")
     try:
         cones = {cone: np.array(shape, dtype=np.float64) for cone, shape in cones_m.items()}
         stored = tuple(entry.get("parameters", ()))
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise DatasetError(
-            "`cones_m` or `parameters` of the result's `body` is not as the tracker writes it"
+            f"{where}: `body.cones_m` or `body.parameters` is not as the tracker writes it"
         ) from error
-    subject = Subject(str(summary.get("source") or "tracked"), lengths_m, cones)
-    body = build_body(load_description(str(name)), subject)
+    try:
+        subject = Subject(str(summary.get("source") or "tracked"), lengths_m, cones)
+        body = build_body(load_description(str(name)), subject)
+    except BodyModelError as error:
+        raise BodyModelError(f"{where}: {error}") from error
     if stored != body.parameter_names:
         raise BodyModelError(
-            f"the result's `body.parameters` has {len(stored)} names, expected the {body.size} of "
+            f"{where}: `body.parameters` has {len(stored)} names, expected the {body.size} of "
             f"the body {name}: was the body's file changed?"
         )
     return body

@@ -84,8 +84,9 @@ class TrcStream:
             os.replace(final, self.path)
             self._finished = True
         except OSError as error:
-            final.unlink(missing_ok=True)
             raise not_written(self.path, error) from error
+        finally:
+            final.unlink(missing_ok=True)
 
     def _fixed_header(self, fps: float) -> bytes:
         lines = format_header(self._names, self.rows, fps, self.path.name)

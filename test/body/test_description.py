@@ -73,6 +73,9 @@ def test_an_unknown_body_lists_the_shipped_ones() -> None:
         (("lengths", "torso"), GONE, "frame thorax: 'torso' is neither a parameter nor a length"),
         (("parameters", "l_knee", "sigma"), GONE, "parameters: l_knee: sigma missing"),
         (("parameters", "l_knee", "sigma"), 0.0, "l_knee: sigma is 0.0, expected a number above 0"),
+        pytest.param(
+            ("parameters", "l_knee", "sigma"), 10**400, "sigma is 10{400}, expected", id="too large"
+        ),
         (("parameters", "l_knee", "limits"), [5, -155], "l_knee: limits is .* lower one first"),
         (("parameters", "l_knee", "walking"), [1], "l_knee: walking is .* two numbers"),
         (("parameters", "l_knee", "free"), True, "l_knee: free unknown, expected sigma, neutral"),

@@ -150,10 +150,12 @@ ROOT = "\n".join(f"pelvis_{name}: 0.5" for name in ("rx", "ry", "rz", "tx", "ty"
 
 def test_parameters_that_are_not_named_are_neutral(tmp_path) -> None:
     file = tmp_path / "start.yaml"
-    file.write_text(ROOT + "\nl_knee: -10e-1\n")
+    # An integer may be larger than int64.
+    file.write_text(ROOT + "\nl_knee: -10e-1\nr_knee: 1" + "0" * 20)
     expected = BODY.neutral.copy()
     expected[BODY.root] = 0.5
     expected[BODY.index("l_knee")] = -1.0
+    expected[BODY.index("r_knee")] = 1e20
     np.testing.assert_array_equal(read_pose(file, BODY), expected)
 
 
@@ -166,6 +168,8 @@ def test_parameters_that_are_not_named_are_neutral(tmp_path) -> None:
         (ROOT + "\nl_toe: 1", "no parameter 'l_toe'"),
         (ROOT + "\nl_knee: bent", "l_knee is 'bent', expected a finite number"),
         (ROOT + "\nl_knee: .nan", "l_knee is nan"),
+        (ROOT + "\nl_knee: .inf", "l_knee is inf"),
+        (ROOT + "\nl_knee: 1" + "0" * 400, "l_knee is 10{400}, expected a finite number"),
         (ROOT + "\nl_knee: true", "l_knee is True"),
         (ROOT + "\nl_knee: [1]", r"l_knee is \[1\]"),
         (ROOT + "\n1: 1", "no parameter 1"),

@@ -150,17 +150,33 @@ def changed(name: Path, change) -> Path:
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (lambda c: c["frames"].insert(0, 1), "json: frame 0: no `stamp_ns`"),
+        (lambda c: c["frames"].insert(0, 1), "frame 0: no `stamp_ns`"),
         (
             lambda c: c["frames"][2].update(parameters=[1.0, 2.0]),
             "frame at 40000000 ns is malformed: `parameters` has 2 values, expected 31",
         ),
-        (lambda c: c["frames"][0].update(angles=3), "`angles` of the frame at 0 ns is no table"),
+        (lambda c: c["frames"][0].update(angles=3), "`angles` of the frame at 0 ns is 3, expected"),
+        (lambda c: c["frames"][0].update(iou=5), "`iou` of the frame at 0 ns is 5, expected a map"),
+        (lambda c: c["frames"][3].update(iou=[5]), r"`iou` of the frame at 60000000 ns is \[5\]"),
+        (lambda c: c["frames"][3].update(markers_sd_mm=[5]), "`markers_sd_mm` of the frame at 6"),
+        (lambda c: c["frames"][3].update(fitness=10**400), "frame at 60000000 ns is malformed: "),
+        (lambda c: c["frames"][7].update(stamp_ns=10**30), "frame 7: `stamp_ns` is 10{30}, expect"),
+        (lambda c: c.update(verdict={"overlap": 5}), "`verdict.overlap` is 5, expected a mapping"),
+        (lambda c: c.update(verdict={"overlap": [[1]]}), r"`verdict.overlap` is \[\[1\]\], expect"),
     ],
 )
-def test_a_malformed_frame_is_named(tmp_path: Path, change, expected: str) -> None:
+def test_a_malformed_entry_is_named(tmp_path: Path, change, expected: str) -> None:
+    expected = rf"out\.json: .*{expected}"
     with pytest.raises(DatasetError, match=expected):
         read_result(changed(write(tmp_path / "out"), change))
+
+
+@pytest.mark.parametrize(("suffix", "text"), [(".json", '{"frames": '), (".jsonl", "")])
+def test_a_file_nested_too_deep_is_named(tmp_path: Path, suffix: str, text: str) -> None:
+    path = tmp_path / f"out{suffix}"
+    path.write_text(text + "[" * 100_000 + "\n", encoding="utf-8")
+    with pytest.raises(DatasetError, match=rf"out\{suffix}: no result of a tracker"):
+        open_summary(tmp_path / "out")
 
 
 def test_a_malformed_journal_is_named(tmp_path: Path) -> None:
@@ -185,20 +201,35 @@ def test_a_marker_file_without_a_rate(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (lambda b: b["parameters"].pop(), "has 30 names, expected the 31 of the body person31"),
-        (lambda b: b.update(lengths_m=[1.0]), "`lengths_m` or `cones_m` of the result's `body`"),
-        (
-            lambda b: b.update(cones_m={"torso": "wide"}),
-            "`cones_m` or `parameters` of the",
-        ),
-        (lambda b: b.update(cones_m={"torso": [[1], [2, 3]]}), "`cones_m` or `parameters` of the"),
+        (lambda b: b["parameters"].pop(), "`body.parameters` has 30 names, expected the 31 of the"),
+        (lambda b: b.pop("lengths_m"), "no `body.lengths_m`, expected the sizes"),
+        (lambda b: b.update(lengths_m=[1.0]), r"`body.lengths_m` is \[1.0\], expected a mapping"),
+        (lambda b: b.update(cones_m=3), "`body.cones_m` is 3, expected a mapping"),
+        (lambda b: b.update(cones_m={"torso": "wide"}), "`body.cones_m` or `body.parameters` is"),
+        (lambda b: b.update(cones_m={"torso": [[1], [2, 3]]}), "`body.cones_m` or `body.param"),
+        (lambda b: b.update(cones_m={"torso": [[10**400] * 4] * 2}), "`body.cones_m` or `body."),
+        (lambda b: b["lengths_m"].update(l_thigh=10**20), "subject walk: length l_thigh is 10{20}"),
     ],
 )
 def test_a_body_that_is_not_the_results(tmp_path: Path, change, expected: str) -> None:
     name = changed(write(tmp_path / "out"), lambda c: change(c["body"]))
     summary, _ = open_summary(name)
-    with pytest.raises((BodyModelError, DatasetError), match=expected):
+    with pytest.raises((BodyModelError, DatasetError), match=f"^result: {expected}"):
         stored_body(summary)
+    with pytest.raises((BodyModelError, DatasetError), match=rf"^here: {expected}"):
+        stored_body(summary, "here")
+
+
+@pytest.mark.parametrize(
+    ("settings", "expected"),
+    [(5, "`settings` is 5, expected a mapping"), ({"body": "tail"}, "body 'tail' is unknown")],
+)
+def test_an_error_about_the_body_names_the_result(tmp_path: Path, settings, expected: str) -> None:
+    name = changed(write(tmp_path / "out"), lambda c: c.update(settings=settings))
+    expected = f"^{name.with_suffix('.json')}: {expected}"
+    for found in (ResultReader(name), read_result(name).rows(slice(2))):
+        with pytest.raises((BodyModelError, DatasetError), match=expected):
+            found.body()
 
 
 def test_closing_twice_leaves_the_files_as_they_are(tmp_path: Path) -> None:

@@ -156,6 +156,27 @@ def test_time_that_runs_backwards_begins_a_new_segment(tmp_path, body, config):
     assert [frame.get("segment", 1) for frame in frames] == [1, 1, 1, 2, 2, 3, 3]
 
 
+@pytest.mark.parametrize("suffix", [".trc", ".json"])
+def test_an_interrupted_end_leaves_the_frames_and_no_temporary_file(
+    tmp_path, body, config, monkeypatch, suffix
+):
+    replace = os.replace
+
+    def interrupted(source: Path, target: Path) -> None:
+        if Path(target).suffix == suffix:
+            raise KeyboardInterrupt
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", interrupted)
+    writer = ResultWriter(tmp_path / "out", body, config, fps=60.0)
+    writer.add(result(10))
+    with pytest.raises(KeyboardInterrupt):
+        writer.close()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.jsonl", "out.trc"]
+    assert len(read_trc(tmp_path / "out.trc")) == 1
+    assert len(read_summary(tmp_path / "out")["frames"]) == 1
+
+
 def test_an_earlier_result_stays_until_the_first_row(tmp_path, body, config):
     with ResultWriter(tmp_path / "out", body, config, fps=60.0) as writer:
         for stamp in (5, 1):

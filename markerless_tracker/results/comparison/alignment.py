@@ -15,6 +15,8 @@ MOST_OFFSET_S = 5.0
 """Largest time offset that is searched."""
 _LEAST_ROWS = 10
 _GAP_PERIODS = 1.5
+# Least distance of the markers from one line, m (root mean square over markers and rows).
+_LEAST_SPREAD_M = 1e-3
 # Fractions of the result's period at which the residual is compared about the coarse offset.
 _FINE = np.arange(-8, 9) / 4.0
 # Speeds that differ by less from their mean (m/s) show no time offset.
@@ -90,7 +92,8 @@ def align(result: MarkerTrack, reference: MarkerTrack) -> Alignment:
         reference: the track that it is to be compared with.
 
     Raises:
-        DatasetError: no common marker, fewer than 10 common rows, or markers on one line.
+        DatasetError: no common marker, fewer than 10 common rows, or all positions on one line,
+            about which the rotation is unknown.
     """
     result, reference = result.with_pelvis(), reference.with_pelvis()
     names = [name for name in reference.names if name in result.names]
@@ -107,7 +110,7 @@ def align(result: MarkerTrack, reference: MarkerTrack) -> Alignment:
     period = float(np.median(np.diff(result.stamps_ns))) / 1e9
     coarse = _coarse_offset(result, reference, period)
     offsets = coarse + _FINE * period
-    residuals = np.array([_rms(_rigid(result, reference, offset)) for offset in offsets])
+    residuals = np.array([_rms(result, reference, offset) for offset in offsets])
     if not np.isfinite(residuals).any():
         raise DatasetError("cannot align: the result and the reference share too few rows")
     best = int(np.nanargmin(residuals))
@@ -117,10 +120,15 @@ def align(result: MarkerTrack, reference: MarkerTrack) -> Alignment:
         bend = before - 2.0 * at + after
         if np.isfinite(bend) and bend > 0.0:
             offset += 0.5 * (before - after) / bend * period * float(_FINE[1] - _FINE[0])
-    found = _rigid(result, reference, offset)
-    if found is None:
+    common = _common_points(result, reference, offset)
+    if common is None:
         raise DatasetError("cannot align: the result and the reference share too few rows")
-    return found
+    if min(map(_spread_m, common)) < _LEAST_SPREAD_M:
+        raise DatasetError(
+            f"cannot align: all positions of {', '.join(names)} lie on one line, expected markers "
+            "or motion beside it"
+        )
+    return _rigid(*common, offset)
 
 
 def interpolated(track: MarkerTrack, times_s: FloatArray) -> FloatArray:
@@ -150,26 +158,39 @@ def _near(own: FloatArray, times_s: FloatArray) -> NDArray[np.bool_]:
     return np.asarray((gap < 1e-6)[:, None, None])
 
 
-def _rigid(result: MarkerTrack, reference: MarkerTrack, offset_s: float) -> Alignment | None:
+def _common_points(
+    result: MarkerTrack, reference: MarkerTrack, offset_s: float
+) -> tuple[FloatArray, FloatArray] | None:
+    """Positions (k, 3) of the result and of the reference at the same times; None for few rows."""
     targets = interpolated(reference, result.stamps_ns / 1e9 + offset_s)
     both = np.asarray(
         np.isfinite(result.positions_m).all(axis=2) & np.isfinite(targets).all(axis=2)
     )
     if both.any(axis=1).sum() < _LEAST_ROWS:
         return None
-    points, wanted = result.positions_m[both], targets[both]
+    return result.positions_m[both], targets[both]
+
+
+def _spread_m(points: FloatArray) -> float:
+    """Root mean square distance of points (k, 3) from one line, along its widest normal."""
+    singular = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return float(singular[1] / np.sqrt(len(points)))
+
+
+def _rigid(points: FloatArray, wanted: FloatArray, offset_s: float) -> Alignment:
     rotation, _ = rotation_onto(points, wanted)
     translation = wanted.mean(axis=0) - rotation @ points.mean(axis=0)
     errors = np.linalg.norm(points @ rotation.T + translation - wanted, axis=1)
     return Alignment(rotation, translation, offset_s, float(np.sqrt((errors**2).mean()) * 1000.0))
 
 
-def _rms(found: Alignment | None) -> float:
-    return float("nan") if found is None else found.rms_mm
+def _rms(result: MarkerTrack, reference: MarkerTrack, offset_s: float) -> float:
+    common = _common_points(result, reference, offset_s)
+    return float("nan") if common is None else _rigid(*common, offset_s).rms_mm
 
 
 def _coarse_offset(result: MarkerTrack, reference: MarkerTrack, period: float) -> float:
-    """Offset, a multiple of the period, at which the markers' speeds agree best.
+    """Offset at which the markers' speeds agree best: about 0 or about equal beginnings.
 
     0 where too little moves.
     """
@@ -179,16 +200,15 @@ def _coarse_offset(result: MarkerTrack, reference: MarkerTrack, period: float) -
         return 0.0
     steps = int(MOST_OFFSET_S / period)
     best, offset = -np.inf, 0.0
-    # Clocks may begin anywhere: the ranges' beginnings are a second guess.
-    for about in (0.0, float(reference.stamps_ns[0] - result.stamps_ns[0]) / 1e9):
+    # Clocks may begin anywhere: equal beginnings are a second guess.
+    guesses = (0.0, float(reference.stamps_ns[0] - result.stamps_ns[0]) / 1e9)
+    for about in dict.fromkeys(guesses):
         for step in sorted(range(-steps, steps + 1), key=abs):
             shift = about + step * period
             other = _speeds(interpolated(reference, times + shift), period)
             agreement = _correlation(own, other, 0.5 * own.size)
             if agreement > best + 1e-9:
                 best, offset = agreement, shift
-        if about == 0.0 and np.isfinite(best):
-            break
     return offset
 
 

@@ -15,7 +15,6 @@ from markerless_tracker.results.export.grid import Grid
 from markerless_tracker.results.export.new_file import new_file, number
 from markerless_tracker.results.export.skeleton import Skeleton, poses, skeleton
 from markerless_tracker.results.read import ResultReader
-from markerless_tracker.results.stored_result import stored_body
 
 JOINT_NAMES: Mapping[str, str] = MappingProxyType(
     {
@@ -55,7 +54,7 @@ def write_bvh(path: Path, reader: ResultReader, names: tuple[str, ...]) -> tuple
             body is unknown.
     """
     del names
-    body = stored_body(reader.summary)
+    body = reader.body()
     bones = skeleton(body)
     grid = Grid(reader)
     first = _first_pose(reader)

@@ -6,7 +6,6 @@ from markerless_tracker.datasets.markers.trc import seconds
 from markerless_tracker.results.export.coordinates import Coordinates, motion_columns
 from markerless_tracker.results.export.new_file import new_file, number
 from markerless_tracker.results.read import ResultReader
-from markerless_tracker.results.stored_result import stored_body
 
 
 def write_mot(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
@@ -24,7 +23,7 @@ def write_mot(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
     Raises:
         DatasetError, BodyModelError: the file cannot be written, or the result's body is unknown.
     """
-    body = stored_body(reader.summary)
+    body = reader.body()
     coordinates = Coordinates(body)
     frames = sum(len(part) for part in reader.chunks())
     begun = False

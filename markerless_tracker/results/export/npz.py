@@ -28,6 +28,7 @@ _ARRAYS: dict[str, Callable[[StoredResult], NDArray[Any]]] = {
     "parameters": lambda part: part.parameters,
     "parameters_sd": lambda part: part.parameters_sd,
     "angles_deg": lambda part: part.angles_deg,
+    "angles_sd_deg": lambda part: part.angles_sd_deg,
     "overlap": lambda part: part.overlap,
 }
 

@@ -18,7 +18,6 @@ from markerless_tracker.results.export.new_file import new_file
 from markerless_tracker.results.export.skeleton import MOST_ROTATIONS, Skeleton
 from markerless_tracker.results.export.trc import write_renamed_trc
 from markerless_tracker.results.read import ResultReader
-from markerless_tracker.results.stored_result import stored_body
 
 _VERSION = "40000"
 """Read by every OpenSim 4."""
@@ -49,7 +48,7 @@ def write_osim(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None
     Raises:
         DatasetError, BodyModelError: the files cannot be written, or the result's body is unknown.
     """
-    body = stored_body(reader.summary)
+    body = reader.body()
     extent = _extent(reader, body)
     _write(path, _model(body, extent.pose, names, path.stem))
     marker_file = path.with_suffix(".ik.trc")

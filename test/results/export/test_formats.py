@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -97,6 +98,10 @@ def test_npz_has_the_arrays_of_the_result(make_result, export, person, motion) -
     name = make_result(lost=[2])
     (path,), _ = export(name, "--to", "npz")
     found, result = np.load(path), read_result(name)
+    values = {entry.name: getattr(result, entry.name) for entry in fields(result)}
+    arrays = {key for key, value in values.items() if isinstance(value, np.ndarray)}
+    assert "angles_sd_deg" in arrays and arrays <= set(found)
+    np.testing.assert_array_equal(found["angles_sd_deg"], result.angles_sd_deg)
     truth = in_file_axes(person, motion)
     truth[2] = np.nan
     np.testing.assert_allclose(found["positions_m"], truth, atol=1e-6)
@@ -206,6 +211,16 @@ def test_what_cannot_be_exported_fails_in_one_line(tmp_path, make_result, capsys
     with pytest.raises(SystemExit):
         main(["export", str(name), "--to", "docx"])
     assert "format 'docx', expected some of bvh, c3d" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("form", ["bvh", "mot", "osim"])
+def test_a_result_without_a_body_is_named(make_result, capsys, form: str) -> None:
+    path = make_result(lost=range(12)).with_suffix(".json")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    del content["body"]["lengths_m"]
+    path.write_text(json.dumps(content), encoding="utf-8")
+    assert main(["export", str(path.with_suffix("")), "--to", form]) == 1
+    assert f"{path}: no `body.lengths_m`, expected the sizes" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
