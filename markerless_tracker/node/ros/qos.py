@@ -79,7 +79,7 @@ class FollowingSubscription:
         self._node, self._kind, self._topic, self._callback = node, kind, topic, callback
         self._depth, self._raw = depth, raw
         self._group = _NotExecuted() if polled else None
-        self._offered = self._offers() or (True, False)
+        self._offered = (True, False)
         self._subscription = self._subscribe()
 
     def follow(self) -> None:

@@ -8,6 +8,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.records import TrackResult
@@ -43,6 +44,11 @@ class SettableTracker:
     def body(self) -> BodyModel:
         """As `Tracker.body`."""
         return self._tracker.body
+
+    @property
+    def rig(self) -> CameraRig:
+        """As `Tracker.rig`."""
+        return self._tracker.rig
 
     def check(self, config: TrackerConfig) -> None:
         """Check that settings can be used.

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraRig
 from markerless_tracker.imaging import BackgroundModel
 from markerless_tracker.node.tracker.pace.waiting import AT_MOST
 from markerless_tracker.records import Observation, TrackResult
@@ -21,6 +22,10 @@ class Stepper(Protocol):
     @property
     def body(self) -> BodyModel:
         """The tracked body."""
+
+    @property
+    def rig(self) -> CameraRig:
+        """The cameras of the scaled images, as corrected so far."""
 
     def warm_up(self) -> None:
         """Compile all kernels of a step."""
@@ -44,11 +49,13 @@ class TrackedSet:
 
     Attributes:
         body: the estimate of the body at that time.
+        rig: the cameras as corrected at that time.
     """
 
     result: TrackResult
     images: Images
     body: BodyModel
+    rig: CameraRig
 
 
 @dataclass(frozen=True)

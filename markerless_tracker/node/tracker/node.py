@@ -139,16 +139,17 @@ class TrackerNode(GivenNode):
             DatasetError: the result files cannot be completed.
         """
         ended = self._worker.stop(timeout_s)
+        shifts = self._tracker.shifts if ended and self._tracker is not None else {}
         self._end_process()
         self._notices.flush(last=True)
         self._news.flush(last=True)
         counts = self._status.values(self._sets.counts, (), ())
         notes: dict[str, Any] = {"node": {key: counts[key] for key in NOTED}}
+        notes["cameras"] = {name: shift.as_mapping() for name, shift in shifts.items()}
+        notes["scale"] = self._settings.scale
         verdict = self._report.verdict()
         if verdict is not None:
-            self._inform(verdict.counts)
-            self._inform(sets_line(counts))
-            for line in verdict.lines():
+            for line in (verdict.counts, sets_line(counts), *verdict.lines()):
                 self._inform(line)
             notes["verdict"] = verdict.as_mapping()
         if self._live.record:
@@ -209,11 +210,12 @@ class TrackerNode(GivenNode):
             process = tracker = TrackerProcess(setup, self._warn)
             self._end_process = process.close
             self._status.add_cpu_of(lambda: process.cpu_s)
-        self._pictures = Pictures(self, scaled)
+        self._pictures = Pictures(self, scaled.names)
         self._results.describe(setup.tracker.body)
         self._tracker = tracker
-        step_px = self._settings.config.edges.step_px
-        self._time_offsets = TimeOffsetEstimate(setup.tracker.rig, step_px=step_px)
+        self._time_offsets = TimeOffsetEstimate(
+            setup.tracker.rig, step_px=self._settings.config.edges.step_px
+        )
         self._result_file.begin(setup.tracker)
         for doubt in self._report.begin(setup.tracker, rig):
             self._warn(doubt)

@@ -223,7 +223,7 @@ class TrackWorker:
             return None
         self._keep_for(result, handle.kept)
         self._status.tracked(result, arrived_s=matched.arrived_s, finished_s=finished_s)
-        tracked = TrackedSet(result, images, handle.tracker.body)
+        tracked = TrackedSet(result, images, handle.tracker.body, handle.tracker.rig)
         if learning is not None:
             learning.saw(result.state)
             self._learn(handle, learning, matched.stamp_ns)

@@ -8,10 +8,12 @@ from threading import Lock
 from typing import Any, BinaryIO, NamedTuple
 
 from markerless_tracker.body import BodyModel
+from markerless_tracker.camera import CameraRig
 from markerless_tracker.compiled import compiled_elsewhere
 from markerless_tracker.errors import ImageError, TrackerError
 from markerless_tracker.imaging import BackgroundModel, Image, Segmenter
 from markerless_tracker.records import Observation, TrackResult
+from markerless_tracker.tracking.cameras.check import Shift
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.processes.child import Child
 from markerless_tracker.tracking.processes.images import Place, put, set_bytes
@@ -36,7 +38,7 @@ class SetOfViews(NamedTuple):
 
 
 class Call(NamedTuple):
-    """A method of the tracker and its arguments."""
+    """A method of the tracker and its arguments, or an attribute."""
 
     method: str
     arguments: tuple[Any, ...] = ()
@@ -58,10 +60,11 @@ class Compiled(NamedTuple):
 
 
 class Tracked(NamedTuple):
-    """A result, and the body if it has changed."""
+    """A result, and the body and the cameras if they have changed."""
 
     result: TrackResult
     body: BodyModel | None
+    rig: CameraRig | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +94,14 @@ class TrackerProcess:
 
     Attributes:
         body: as `Tracker.body` after the last step.
+        rig: as `Tracker.rig` after the last step.
     """
 
     def __init__(self, setup: TrackerSetup, report: Callable[[str], None] = lambda _: None) -> None:
         self._local = setup.tracker
         self._report = report
         self.body: BodyModel = setup.tracker.body
+        self.rig: CameraRig = setup.tracker.rig
         self._set_bytes = set_bytes(setup.tracker.rig)
         self._number = 0
         self._cpu_s = 0.0
@@ -132,6 +137,18 @@ class TrackerProcess:
     def segmenter(self, camera: str) -> Segmenter | None:
         """As `Tracker.segmenter`, of the tracker in this process."""
         return self._local.segmenter(camera)
+
+    @property
+    def shifts(self) -> dict[str, Shift]:
+        """As `Tracker.shifts`; without those of a process that has ended."""
+        if self._ended:
+            return self._local.shifts
+        try:
+            self._child.send(Call("shifts"))
+            shifts, self._cpu_s = self._child.receive()
+        except (EOFError, OSError, ValueError):
+            return {}
+        return dict(shifts)
 
     def warm_up(self) -> None:
         """As `Tracker.warm_up`."""
@@ -173,10 +190,12 @@ class TrackerProcess:
             if isinstance(answer, Tracked):
                 if answer.body is not None:
                     self.body = answer.body
+                if answer.rig is not None:
+                    self.rig = answer.rig
                 return answer.result
         given = views.views if isinstance(views, Handed) else views
         result = self._local.step(given, stamp_ns, effort)
-        self.body = self._local.body
+        self.body, self.rig = self._local.body, self._local.rig
         return result
 
     def close(self) -> None:

@@ -56,6 +56,7 @@ class Service:
         self._shared = shared
         self._tracker: Tracker | None = None
         self._reported: Any = None
+        self._known: Any = None
         self._lock = Lock()
         self._prepared: dict[int, Any] = {}
 
@@ -87,7 +88,8 @@ class Service:
                     answer = self._step(request)
                 elif isinstance(request, Call):
                     with compilation(progress):
-                        getattr(self.tracker, request.method)(*request.arguments)
+                        found = getattr(self.tracker, request.method)
+                        answer = found(*request.arguments) if callable(found) else found
                     if request.method == "warm_up":
                         collect_for_good()
                 else:
@@ -139,7 +141,9 @@ class Service:
         result = self.tracker.step(views, asked.stamp_ns, step.effort)
         body = self.tracker.body
         reported, self._reported = self._reported, body
-        return Tracked(result, None if body is reported else body)
+        rig = self.tracker.rig
+        known, self._known = self._known, rig
+        return Tracked(result, None if body is reported else body, None if rig is known else rig)
 
     def _views(self, asked: "SetOfViews") -> "dict[str, Image | Observation]":
         from markerless_tracker.tracking.processes.images import Place, get

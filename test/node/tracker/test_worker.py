@@ -34,6 +34,7 @@ class FakeTracker:
         self.state = TrackState.TRACKING
         self.backgrounds: dict[str, Any] = {}
         self.body: Any = object()
+        self.rig: Any = object()
 
     def warm_up(self) -> None:
         self.threads.add(threading.get_ident())

@@ -1,6 +1,6 @@
 """Result files and debug images of the tracker node."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -8,7 +8,6 @@ from typing import Any
 from sensor_msgs.msg import Image
 
 from markerless_tracker.body import BodyModel
-from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.ros_fields import optical_frame
 from markerless_tracker.drawing import draw_overlay
 from markerless_tracker.drawing.evidence import class_picture
@@ -131,14 +130,13 @@ class Pictures:
 
     Args:
         node: creates the publishers.
-        rig: the cameras of the scaled images, which the tracker uses.
+        cameras: their names.
     """
 
-    def __init__(self, node: Any, rig: CameraRig) -> None:
-        self._rig = rig
+    def __init__(self, node: Any, cameras: Sequence[str]) -> None:
         self._publishers = {
             (name, kind): node.create_publisher(Image, f"debug/{name}/{kind}", output_qos())
-            for name in rig.names
+            for name in cameras
             for kind in ("overlay", "evidence")
         }
 
@@ -164,7 +162,7 @@ class Pictures:
         image = _picture(fitted.images[name])
         if fitted.result.pose is None:
             return image
-        return draw_overlay(image, self._rig[name], fitted.body, fitted.result.pose)
+        return draw_overlay(image, fitted.rig[name], fitted.body, fitted.result.pose)
 
     def _evidence(
         self, name: str, fitted: TrackedSet, segmenter: Segmenter | None
@@ -176,7 +174,7 @@ class Pictures:
         return draw_steps(
             _picture(fitted.images[name]),
             observation,
-            self._rig[name],
+            fitted.rig[name],
             fitted.body,
             fitted.result.pose,
             segmenter,

@@ -26,6 +26,7 @@ class SearchingTracker:
         self.state, self.settling = TrackState.TRACKING, False
         self.free = threading.Event()
         self.body: Any = object()
+        self.rig: Any = object()
 
     def warm_up(self) -> None:
         pass
