@@ -20,7 +20,7 @@ from markerless_tracker.datasets.target import new_folder
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.read import ResultReader
-from markerless_tracker.results.stored_result import StoredResult, stored_body
+from markerless_tracker.results.stored_result import StoredResult
 
 _NODE = "tracker"
 
