@@ -56,7 +56,7 @@ def measure_live(
         Per rate: `source`, `rate` (sets/s), `start` (`given` or `nothing given`), `sets` sent,
         `played_s` (time the player took), `tracked` (sets with a pose), `per_second` (of them),
         `skipped`, `lost`, `first_pose_s`, `latency_ms` {median, p95} from the arrival of a set's
-        last image to its result, `cpu_ms` {tracker, player} per tracked and per sent set,
+        last image to its publication, `cpu_ms` {tracker, player} per tracked and per sent set,
         `mean_mm`, the error of the tracked sets, and `reference_us` and `cores_at_once`, the speed
         of the cores just before (`CoreSpeed`). Unknown values are None.
 

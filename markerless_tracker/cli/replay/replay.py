@@ -37,7 +37,8 @@ class Replay:
         skipped: complete sets replaced by newer ones before they were tracked.
         lost: sets that were never complete.
         fps: frames tracked per second at this rate.
-        latency_median_ms, latency_p95_ms: from the arrival of a set's last image to its result.
+        latency_median_ms, latency_p95_ms: from the arrival of a set's last image to its
+            publication.
         first_pose_s: from the arrival of the first set that was tracked to the first pose; NaN
             without a pose.
         playing_s: time in which the player sent the sets.

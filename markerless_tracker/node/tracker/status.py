@@ -115,12 +115,16 @@ class TrackerStatus:
             self._tracked += 1
             self._result = result
             self._last_set_error = ""
-            self._latencies_s.append(finished_s - arrived_s)
             self._finished_s.append(finished_s)
             if self._first_arrived_s is None:
                 self._first_arrived_s = arrived_s
             if self._first_pose_s is None and result.pose is not None:
                 self._first_pose_s = finished_s - self._first_arrived_s
+
+    def published(self, latency_s: float) -> None:
+        """Record that a result was published so long after its set's last image had come."""
+        with self._lock:
+            self._latencies_s.append(latency_s)
 
     def dealt_with(self, stamp_ns: int) -> None:
         """Record that a complete set was tracked or dropped."""

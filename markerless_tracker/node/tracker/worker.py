@@ -248,6 +248,7 @@ class TrackWorker:
         try:
             if tracked is not None:
                 self._publish(tracked)
+                self._status.published(self._clock() - matched.arrived_s)
         except Exception as error:
             self._trouble(matched.stamp_ns, error)
         self._status.dealt_with(matched.stamp_ns)

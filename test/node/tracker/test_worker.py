@@ -74,6 +74,7 @@ class Bench:
         self.sets: Synchronizer[int] = Synchronizer(("a", "b"))
         self.status = TrackerStatus()
         self.published: list[TrackedSet] = []
+        self.publishing_s = 0.0
         self.reports: list[str] = []
         self.dealt: list[float] = []
         self.may_publish = threading.Event()
@@ -91,6 +92,7 @@ class Bench:
         )
 
     def publish(self, tracked: TrackedSet) -> None:
+        time.sleep(self.publishing_s)
         assert self.may_publish.wait(60)
         self.published.append(tracked)
 
@@ -128,11 +130,21 @@ def test_sets_are_decoded_and_tracked_in_one_thread_and_published(bench: Bench) 
     assert bench.published[0].images["b"].shape == (2, 2)
     assert len(bench.tracker.threads) == 1
     assert threading.get_ident() not in bench.tracker.threads
+    bench.until(lambda: bench.values()["latency_median_ms"] != "nan")
     values = bench.values()
     assert values["state"] == "TRACKING" and values["tracked"] == "1"
     assert values["iou/a"] == "0.5000" and values["iou/b"] == "nan"
     assert values["lost_limbs"] == "l_arm, l_leg"
     assert float(values["latency_median_ms"]) >= 0.0
+
+
+def test_the_latency_ends_with_the_publication(bench: Bench) -> None:
+    bench.publishing_s = 0.05
+    bench.worker.start()
+    bench.until(lambda: bench.status.ready)
+    bench.offer(5)
+    bench.until(lambda: bench.values()["latency_median_ms"] != "nan")
+    assert float(bench.values()["latency_median_ms"]) >= 50.0
 
 
 def test_images_before_it_is_ready_are_dropped_and_counted_apart(bench: Bench) -> None:
