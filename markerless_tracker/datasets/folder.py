@@ -3,21 +3,15 @@
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from markerless_tracker.camera import CameraRig, read_calibration
 from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.datasets.video.decode import read_together
-from markerless_tracker.datasets.video.images import (
-    find_stream,
-    numbered_files,
-    open_stream,
-    read_image,
-)
+from markerless_tracker.datasets.video.images import find_stream, open_stream
+from markerless_tracker.datasets.video.masks import masks_by_frame, read_mask
 from markerless_tracker.datasets.video.numbering import check_numbers
 from markerless_tracker.datasets.video.rates import stamp_of
 from markerless_tracker.errors import ConfigError, DatasetError, ImageError
-from markerless_tracker.imaging import Image, scale_image
+from markerless_tracker.imaging import Image
 
 CALIBRATION = "calibration.toml"
 
@@ -147,23 +141,11 @@ class FolderRecording(VideoRecording):
         super().__init__(path, found, rig, scale=scale, input_fps=input_fps)
 
     def masks(self, camera: str) -> dict[int, Image]:
-        """Frame index -> true silhouette (h, w) of a camera, 0 or 255, scaled: `masks/NAME/`."""
+        """As of every recording; from `masks/NAME/`."""
         folder = self.path / "masks" / camera
-        if not folder.is_dir():
-            return {}
+        files = masks_by_frame(folder) if folder.is_dir() else {}
         size_px = self.rig[camera].size_px
-        masks = {}
-        for file in numbered_files(folder):
-            if not file.stem.isdecimal():
-                raise DatasetError(
-                    f"{file}: expected a frame number as its name, such as 000050.png"
-                )
-            mask = read_image(file)
-            mask = mask if mask.ndim == 2 else mask[..., 0]
-            masks[int(file.stem)] = np.where(scale_image(mask, size_px) >= 128, 255, 0).astype(
-                np.uint8
-            )
-        return masks
+        return {index: read_mask(file, size_px) for index, file in files.items()}
 
 
 def _common_rate(path: Path, rates: Mapping[str, float | None]) -> float:

@@ -10,6 +10,7 @@ import yaml
 from markerless_tracker.datasets.recording import DerivedRecording, FrameSet, Recording
 from markerless_tracker.datasets.video.rates import stamp_of
 from markerless_tracker.errors import ConfigError
+from markerless_tracker.imaging import Image
 
 MOST_OFFSET_S = 60.0
 """Largest difference of two cameras' offsets: sets of that duration are held in memory."""
@@ -28,7 +29,9 @@ def read_time_offsets(text: str) -> dict[str, float]:
         else:
             loaded = dict(entry.split("=") for entry in text.split(",") if entry)
         return {str(name): float(value) for name, value in loaded.items()}
-    except (OSError, yaml.YAMLError, ValueError, TypeError, AttributeError) as error:
+    except (
+        OSError, yaml.YAMLError, RecursionError, ValueError, TypeError, AttributeError,
+    ) as error:  # fmt: skip
         raise ConfigError(
             f"time offsets {text!r}: expected cam01=SECONDS,... or a YAML file with lines "
             f"`cam01: SECONDS` ({error})"
@@ -82,6 +85,15 @@ class InStepRecording(DerivedRecording):
                 f"{self.name}: time offsets are met to whole frames only: up to "
                 f"{1000.0 * worst / self.fps:.1f} ms remain"
             )
+
+    def masks(self, camera: str) -> dict[int, Image]:
+        """As of the other recording, by the index of the set that shows the frame."""
+        shift = self._shifts[camera]
+        return {index + shift: mask for index, mask in self._inner.masks(camera).items()}
+
+    def stored_index(self, camera: str, index: int) -> int:
+        """Number of the stored frame that a camera shows in the set `index`."""
+        return self._inner.stored_index(camera, index - self._shifts[camera])
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
         index, nearest_ns = self._inner._nearest(stamp_ns)

@@ -141,6 +141,18 @@ class Recording(ABC):
         """Camera name -> still images (scaled) of the room, in which people may be visible."""
         return {}
 
+    def masks(self, camera: str) -> dict[int, Image]:
+        """Frame index -> true silhouette (h, w) of a camera, 0 or 255, scaled; {} without any.
+
+        Raises:
+            DatasetError: a silhouette cannot be read.
+        """
+        return {}
+
+    def stored_index(self, camera: str, index: int) -> int:
+        """Number of the stored frame that a camera shows in the set `index`."""
+        return index
+
     def ground_truth(self) -> MarkerTrack | None:
         """The reference markers, None without any; `ground_truth.trc` unless a format has others.
 
@@ -162,6 +174,11 @@ class Recording(ABC):
         self.rig = self.rig.moved(T_new_old)
         before = self._T_new_old
         self._T_new_old = T_new_old if before is None else T_new_old @ before
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether the reference markers differ from the stored ones."""
+        return self._T_new_old is not None
 
     @property
     def source(self) -> "Recording":
@@ -208,6 +225,19 @@ class DerivedRecording(Recording):
     def room_stills(self) -> dict[str, list[Image]]:
         """As of the other recording."""
         return self._inner.room_stills()
+
+    def masks(self, camera: str) -> dict[int, Image]:
+        """As of the other recording."""
+        return self._inner.masks(camera)
+
+    def stored_index(self, camera: str, index: int) -> int:
+        """As of the other recording."""
+        return self._inner.stored_index(camera, index)
+
+    @property
+    def is_moved(self) -> bool:
+        """As of the other recording."""
+        return self._inner.is_moved
 
     def ground_truth(self) -> MarkerTrack | None:
         """As of the other recording."""

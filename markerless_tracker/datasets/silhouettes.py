@@ -5,22 +5,19 @@ from pathlib import Path
 from typing import cast
 
 from markerless_tracker.datasets.recording import DerivedRecording, FrameSet, Recording
-from markerless_tracker.datasets.video.images import numbered_files, read_image
+from markerless_tracker.datasets.video.masks import masks_by_frame, read_mask
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image
-from markerless_tracker.imaging.images import scale_image
 from markerless_tracker.observation import Observation, no_edges
-
-_PERSON = 128
 
 
 class SilhouetteRecording(DerivedRecording):
     """A recording whose sets hold observations, which `Tracker.step` takes in place of images.
 
     A folder per camera has an image per frame: person from 128 on, background below. Files are
-    named by the number of their frame in the recording, such as 000050.png; images of another size
-    than the recording's are scaled. A camera without a file for a frame is missing in its set;
-    frames of which no camera has a file are left out, with a warning.
+    named by the number of their frame as the camera stored it, such as 000050.png; images of
+    another size than the recording's are scaled. A camera without a file for a frame is missing in
+    its set; frames of which no camera has a file are left out, with a warning.
 
     Args:
         recording: the recording, for its stamps.
@@ -41,17 +38,12 @@ class SilhouetteRecording(DerivedRecording):
             )
         self._files: dict[str, dict[int, Path]] = {}
         for name in rig.names:
-            files = numbered_files(folder / name)
-            for file in files:
-                if not file.stem.isdecimal():
-                    raise DatasetError(
-                        f"{file}: expected a frame number as its name, such as 000050.png"
-                    )
-            self._files[name] = {int(file.stem): file for file in files}
+            self._files[name] = masks_by_frame(folder / name)
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
-        left_out = read = 0
+        left_out = read = first = 0
         for frame in self._inner.frames(start=start, every=every):
+            first = frame.index if read == 0 else first
             views = self._views(frame.index, frame.stamp_ns)
             read += 1
             if views:
@@ -60,9 +52,10 @@ class SilhouetteRecording(DerivedRecording):
             else:
                 left_out += 1
         if read and left_out == read:
+            name = self.rig.names[0]
             raise DatasetError(
                 f"{self._folder}: no silhouette of any of the {read} frames read, expected files "
-                f"such as {self.rig.names[0]}/{start:06d}.png"
+                f"such as {name}/{self.stored_index(name, first):06d}.png"
             )
         if left_out:
             self.warn(
@@ -74,11 +67,9 @@ class SilhouetteRecording(DerivedRecording):
         """Observations of the cameras that have a silhouette of a frame, without edges."""
         found = {}
         for camera in self.rig:
-            file = self._files[camera.name].get(index)
+            file = self._files[camera.name].get(self.stored_index(camera.name, index))
             if file is not None:
-                image = read_image(file)
-                image = image if image.ndim == 2 else image[..., 0]
-                mask = scale_image(image, camera.size_px) >= _PERSON
+                mask = read_mask(file, camera.size_px) > 0
                 edges = no_edges((mask.shape[0], mask.shape[1]))
                 found[camera.name] = Observation.from_mask(camera.name, stamp_ns, mask, edges)
         return found

@@ -85,7 +85,7 @@ def open_recording(
         path: the folder or file.
         scale: factor for all images and cameras, in (0, 1].
         format: one of `FORMATS`; None detects it.
-        input_fps: rate of numbered images (and, if given, of videos), 1/s.
+        input_fps: rate of numbered images (and, if given, of videos), 1/s; a bag has its own.
         up: axis of the calibration's world that is up, such as `-y`; it becomes z. Reference
             markers, whose files have an axis that is up, stay as they are. `person` finds up from
             the cameras and the person, and moves the markers, too: see `stand_upright`.

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from markerless_tracker.datasets import open_recording
+from markerless_tracker.datasets import open_recording, write_image
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
 from markerless_tracker.datasets.part import PartRecording
@@ -39,6 +39,16 @@ def test_each_camera_shows_its_frame_of_that_time(make_recording, offsets, indic
     assert set(recording.background_frames()) == {"cam01", "cam02"}
 
 
+def test_masks_belong_to_the_sets_that_show_their_frames(make_recording) -> None:
+    folder = make_recording(frames=12)
+    mask = np.full((48, 64), 255, np.uint8)
+    for name in ("cam01", "cam02"):
+        write_image(folder / "masks" / name / "000004.png", mask)
+    recording = InStepRecording(open_recording(folder), {"cam02": 3 / 60})
+    assert [list(recording.masks(name)) for name in ("cam01", "cam02")] == [[4], [7]]
+    assert recording.stored_index("cam02", 7) == recording.stored_index("cam01", 4) == 4
+
+
 def test_a_start_before_the_late_camera_is_refused(make_recording) -> None:
     recording = InStepRecording(open_recording(make_recording(frames=12)), {"cam02": 3 / 60})
     with pytest.raises(DatasetError, match="no frame within half a frame"):
@@ -70,7 +80,9 @@ def test_impossible_offsets(make_recording, tmp_path: Path) -> None:
     path.write_text("cam01: 0.5\n", encoding="utf-8")
     assert read_time_offsets(str(path)) == {"cam01": 0.5}
     path.write_text("- 1\n", encoding="utf-8")
-    for text in ("cam01", "cam01=x", str(path), str(tmp_path / "none.yaml")):
+    deep = tmp_path / "deep.yaml"
+    deep.write_text("[" * 5000, encoding="utf-8")
+    for text in ("cam01", "cam01=x", str(path), str(deep), str(tmp_path / "none.yaml")):
         with pytest.raises(ConfigError, match="time offsets"):
             read_time_offsets(text)
 

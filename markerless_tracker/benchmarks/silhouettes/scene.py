@@ -17,13 +17,7 @@ from markerless_tracker.body import (
 from markerless_tracker.body.build import build_body
 from markerless_tracker.body.start import POSE_MARKERS
 from markerless_tracker.camera import CameraRig
-from markerless_tracker.datasets import (
-    FolderRecording,
-    Recording,
-    open_recording,
-    read_trc,
-    truth_path,
-)
+from markerless_tracker.datasets import Recording, open_recording, read_trc, truth_path
 from markerless_tracker.datasets.empty_scene import backgrounds_of
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.errors import DatasetError
@@ -108,9 +102,7 @@ def recorded_scene(
         TrackerError: it has neither, or cannot be read.
     """
     recording = open_recording(source, scale=scale)
-    exact: dict[str, dict[int, Image]] = {}
-    if isinstance(recording, FolderRecording):
-        exact = {name: found for name in recording.rig.names if (found := recording.masks(name))}
+    exact = {name: found for name in recording.rig.names if (found := recording.masks(name))}
     poses: dict[int, FloatArray] = {}
     truth = truth_path(source)
     if exact:

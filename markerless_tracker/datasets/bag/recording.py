@@ -308,7 +308,7 @@ def _mcap_files(path: Path) -> list[Path]:
             storage = information["storage_identifier"]
             files = [path / str(name) for name in information["relative_file_paths"]]
             packed = information.get("compression_mode") or "none"
-        except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
+        except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError, RecursionError) as error:
             raise DatasetError(f"{metadata}: not a rosbag2 description: {_line(error)}") from error
         if storage != "mcap":
             raise DatasetError(

@@ -6,16 +6,15 @@ Recordings of the Lee walk can be given in the same layout, with a `ground_truth
 import re
 from pathlib import Path
 
-import numpy as np
-
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.camera.cal_file import read_cal
 from markerless_tracker.datasets.folder import VideoRecording
 from markerless_tracker.datasets.formats.numbers import image_sizes, read_numbers
-from markerless_tracker.datasets.video.images import numbered_files, read_image
+from markerless_tracker.datasets.video.images import image_number, numbered_files
+from markerless_tracker.datasets.video.masks import read_mask
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.imaging import Image, scale_image
+from markerless_tracker.imaging import Image
 
 FPS = 60.0
 _CAMERA = re.compile(r"CAM(\d+)")
@@ -57,18 +56,17 @@ class BodytrackRecording(VideoRecording):
             self.warn(f"{self.name}: no file states the rate, it is taken as {FPS:g} fps")
 
     def masks(self, camera: str) -> dict[int, Image]:
-        """Frame index -> silhouette (h, w) of a camera, 0 or 255, scaled: `FG1/` for CAM1."""
+        """As of every recording; from `FG1/` for CAM1, whose images have the same numbers."""
         folder = self.path / f"FG{camera[3:]}"
-        if not folder.is_dir():
-            return {}
+        files = numbered_files(folder) if folder.is_dir() else []
+        images = numbered_files(self._sources[camera])
+        frames = {image_number(image): index for index, image in enumerate(images)}
         size_px = self.rig[camera].size_px
-        masks = {}
-        for index, file in enumerate(numbered_files(folder)):
-            mask = read_image(file)
-            mask = mask if mask.ndim == 2 else mask[..., 0]
-            person = scale_image(mask, size_px) >= 128
-            masks[index] = np.where(person, 255, 0).astype(np.uint8)
-        return masks
+        return {
+            frames[number]: read_mask(file, size_px)
+            for file in files
+            if (number := image_number(file)) in frames
+        }
 
     def initial_pose(self) -> FloatArray | None:
         """(31,) the start pose of `InitialPose.txt`, rad and m; None without that file.

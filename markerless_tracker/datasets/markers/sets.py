@@ -99,7 +99,7 @@ def read_marker_map(name_or_file: str) -> Mapping[str, Sources]:
         return _set(name_or_file)
     try:
         loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         first = str(error).splitlines()[0]
         raise DatasetError(f"{path}: cannot be read: {first}") from error
     if not isinstance(loaded, dict):

@@ -1,11 +1,13 @@
 """The layout of bodytrack: images, masks, `.cal` of 25 numbers, shape and start pose."""
 
+import json
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from markerless_tracker.cli.main import main
 from markerless_tracker.datasets import detect_format, open_recording
 from markerless_tracker.errors import CalibrationError, DatasetError
 
@@ -41,6 +43,21 @@ def test_masks(sequence: Path) -> None:
     (sequence / "FG2").mkdir()
     cv2.imwrite(str(sequence / "FG2" / "image0000.bmp"), mask)
     np.testing.assert_array_equal(recording.masks("CAM2")[0], mask)
+    for number in (2, 9):
+        cv2.imwrite(str(sequence / "FG2" / f"image{number:04d}.bmp"), mask)
+    assert list(recording.masks("CAM2")) == [0, 2]
+
+
+def test_the_benchmark_of_silhouettes_reads_the_masks(sequence: Path, capsys) -> None:
+    mask = np.zeros((SIZE[1], SIZE[0]), np.uint8)
+    mask[5:20, 8:18] = 255
+    for number in (1, 2):
+        (sequence / f"FG{number}").mkdir()
+        for frame in (0, 2):
+            cv2.imwrite(str(sequence / f"FG{number}" / f"image{frame:04d}.bmp"), mask)
+    assert main(["benchmark", "silhouettes", str(sequence), "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["exact"] and figures["frames"] == [0, 2] and set(figures["cameras"]) == {*NAMES}
 
 
 def test_start_pose_and_shape(sequence: Path) -> None:
