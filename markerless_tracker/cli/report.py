@@ -78,6 +78,8 @@ def run(args: argparse.Namespace) -> int:
         raise DatasetError(f"{args.out}: exists already, expected a new name or --force")
     if args.markers is not None and not args.reference:
         raise ConfigError("--markers is given without --reference, expected both")
+    if args.no_film and args.source:
+        raise ConfigError("--source is given with --no-film, expected one of them")
     names = args.names
     sources = _for_each(args.source, len(names), "--source")
     references = _for_each(args.reference, len(names), "--reference")

@@ -23,7 +23,7 @@ from markerless_tracker.cli.terminal.bars import tell, warn
 from markerless_tracker.cli.terminal.notices import COMPILING, Bars, Notices
 from markerless_tracker.cli.track_arguments import add_arguments, reading_options
 from markerless_tracker.compiled import compilation
-from markerless_tracker.datasets import Recording, open_recording
+from markerless_tracker.datasets import Recording, every_for_fps, open_recording
 from markerless_tracker.datasets.in_step import InStepRecording, read_time_offsets
 from markerless_tracker.datasets.silhouettes import SilhouetteRecording
 from markerless_tracker.errors import CalibrationError, ConfigError, DatasetError
@@ -139,13 +139,15 @@ def track_source(args: argparse.Namespace, notices: Notices) -> Finished:
         smoothing = Smoothing(args.smooth, args.fill_gaps or 0.0)
     recording = _opened(args, args.scale)
     if smoothing is not None:
-        smoothing.check_rate(args.fps or recording.fps)
+        smoothing.check_rate(recording.fps / every_for_fps(recording.fps, args.fps))
     offsets_s = None if args.time_offsets is None else read_time_offsets(args.time_offsets)
     if offsets_s is not None:
         recording = InStepRecording(recording, offsets_s)
     if args.masks is not None:
         if args.debug_images is not None:
             raise ConfigError("--debug-images shows the segmentation, which --masks replaces")
+        if args.background is not None:
+            raise ConfigError("--background is for the segmentation, which --masks replaces")
         recording = SilhouetteRecording(recording, args.masks)
     doubts = calibration_doubts(recording.rig)
     for doubt in doubts:
@@ -246,7 +248,7 @@ def _track(
         args.name,
         tracker.body,
         config,
-        fps=args.fps or recording.fps,
+        fps=recording.fps / every_for_fps(recording.fps, args.fps),
         source=str(args.source.resolve()),
         overwrite=args.force,
         keep_lost=args.keep_lost,
@@ -311,7 +313,7 @@ def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
     if path is not None:
         try:
             loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
             reason = " ".join(str(error).split())
             raise ConfigError(f"{path}: cannot read the settings: {reason}") from error
         if loaded is not None and not isinstance(loaded, dict):

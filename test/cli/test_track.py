@@ -133,6 +133,15 @@ def test_fps_scale_and_background(track, walk, tmp_path):
     assert (tmp_path / "out.trc").read_text(encoding="utf-8").splitlines()[2].startswith("30\t")
 
 
+def test_the_rate_of_the_result_is_that_of_its_frames(track, walk, tmp_path):
+    words = ("--start", walk / "ground_truth.trc", "--fps", 30.2)
+    assert track(*words)[0] == 0
+    np.testing.assert_array_equal(read_trc(tmp_path / "out.trc").stamps_ns, [0, 33_333_333])
+    assert (tmp_path / "out.trc").read_text(encoding="utf-8").splitlines()[2].startswith("30\t")
+    line = refusal(track(*words, "--smooth", 15.05, "--force"))
+    assert "smooth is 15.05 Hz, expected from 0.1 to 15, half the rate" in line
+
+
 def test_debug_images_for_every_frame_and_camera(track, walk, tmp_path):
     status, _, _ = track("--start", walk / "ground_truth.trc", "--debug-images", tmp_path / "see")
     assert status == 0
@@ -187,6 +196,7 @@ class TestRefusals:
             ("just words", "expected a mapping of settings, got str"),
             ("a: [1, 2", "cannot read the settings: "),
             ("a: b: c", "cannot read the settings: "),
+            pytest.param("[" * 5000, "cannot read the settings: maximum recursion", id="deep"),
         ],
     )
     def test_malformed_settings_files(self, track, walk, tmp_path, text, message):

@@ -85,6 +85,8 @@ def test_frames_without_any_silhouette_are_left_out(track, masks, tmp_path: Path
 def test_impossible_silhouettes_fail_in_one_line(track, masks, tmp_path: Path) -> None:
     status, _, err = track("--masks", masks, "--debug-images", tmp_path / "debug")
     assert status == 1 and "which --masks replaces" in err
+    status, _, err = track("--masks", masks, "--background", tmp_path / "none")
+    assert status == 1 and "--background is for the segmentation, which --masks replaces" in err
     (masks / "cam01" / "some.png").write_bytes(b"")
     status, _, err = track("--masks", masks)
     assert status == 1 and "some.png: expected a frame number" in err

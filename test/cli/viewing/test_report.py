@@ -49,6 +49,7 @@ def test_what_cannot_be_reported_fails_in_one_line(tracked, walk, tmp_path, caps
     for words, said in (
         ([str(tmp_path / "none")], "none.json"),
         ([str(tracked), "--source", str(tmp_path / "none")], "are not there"),
+        ([str(tracked), "--no-film", "--source", "none"], "--source is given with --no-film"),
         ([str(tracked), "--markers", "pig"], "--markers is given without --reference"),
         ([str(tracked), *["--reference", "a.trc"] * 2], "--reference: got 2, expected one for all"),
         ([str(tracked), "--no-film", "--reference", str(tmp_path / "no.trc")], "no.trc"),
