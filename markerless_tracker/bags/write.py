@@ -199,9 +199,9 @@ class _Topics:
 
 
 def _write_truth(path: Path, truth: MarkerTrack, recording: Recording) -> None:
-    """Write the reference markers into a bag's folder: their file, or those of another format."""
+    """Write the reference markers into a bag's folder: their file, unless they were moved."""
     file = truth_path(recording.path)
-    if file.is_file():
+    if file.is_file() and not recording.is_moved:
         shutil.copy(file, path)
     else:
         write_trc(path, truth, recording.fps)

@@ -184,7 +184,7 @@ def read_board(path: Path) -> dict[str, Any]:
     keys = ("type", "squares", "square_size", "marker_size", "dictionary")
     try:
         values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         first = str(error).splitlines()[0]
         raise ConfigError(f"{path}: cannot read the board: {first}") from error
     if not isinstance(values, dict) or set(values) - set(keys):

@@ -211,7 +211,7 @@ def _text(path: Path) -> str:
 def _loaded(path: Path) -> dict[str, Any]:
     try:
         loaded = yaml.safe_load(_text(path))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, RecursionError) as error:
         raise CalibrationError(f"{path}: not a YAML file: {str(error).splitlines()[0]}") from error
     if not isinstance(loaded, dict):
         raise CalibrationError(f"{path}: expected a mapping, got {type(loaded).__name__}")

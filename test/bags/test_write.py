@@ -15,7 +15,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from markerless_tracker.bags import write_bag
-from markerless_tracker.datasets import FrameSet, Recording, open_recording
+from markerless_tracker.body import MARKER_NAMES
+from markerless_tracker.datasets import FrameSet, MarkerTrack, Recording, open_recording, write_trc
+from markerless_tracker.datasets.part import PartRecording
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.geometry import inverse, rotation_from_quaternion, transform
 
@@ -72,6 +74,26 @@ def test_a_bag_of_a_bag(make_recording, tmp_path: Path) -> None:
     write_bag(source, tmp_path / "one")
     write_bag(open_recording(tmp_path / "one"), tmp_path / "two", compress="zstd")
     assert_same(open_recording(tmp_path / "two"), source)
+
+
+@pytest.mark.parametrize("part", [False, True])
+def test_reference_markers_move_with_the_world(make_recording, tmp_path: Path, part: bool) -> None:
+    folder = make_recording()
+    points = np.arange(90.0).reshape(2, 15, 3)
+    stored = MarkerTrack(MARKER_NAMES, np.array([0, 16_666_667]), points)
+    write_trc(folder / "ground_truth.trc", stored, 60.0)
+    still, moved = open_recording(folder), open_recording(folder)
+    moved.move(transform(np.eye(3), [0.0, 0.0, 5.0]))
+    for recording, name in ((still, "still"), (moved, "moved")):
+        write_bag(PartRecording(recording) if part else recording, tmp_path / name)
+    copied = tmp_path / "still" / "ground_truth.trc"
+    assert copied.read_bytes() == (folder / "ground_truth.trc").read_bytes()
+    bag = open_recording(tmp_path / "moved")
+    truth = bag.ground_truth()
+    assert truth is not None and truth.names == MARKER_NAMES
+    np.testing.assert_array_equal(truth.positions_m, points + [0.0, 0.0, 5.0])
+    np.testing.assert_array_equal(truth.stamps_ns, stored.stamps_ns)
+    np.testing.assert_array_equal(bag.rig["cam01"].T_cam_world, moved.rig["cam01"].T_cam_world)
 
 
 def test_jpeg_is_close_and_its_background_exact(make_recording, tmp_path: Path) -> None:

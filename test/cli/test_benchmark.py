@@ -227,6 +227,7 @@ def test_the_table_of_speed(capsys) -> None:
         (["tables", "x", "--start-noise", "nan"], "expected a number from 0", 2),
         (["tables", "x", "--vary", "partition"], "expected KEY=VALUE,VALUE...", 2),
         (["tables", "x", "--vary", "a={"], "a value cannot be read", 2),
+        (["tables", "x", "--vary", "a=" + "[" * 5000], "a value cannot be read", 2),
         (["tables", "x", "--vary", "partitions=soft"], "did you mean 'partition'?", 1),
         (["tables", "x", "--vary", "apf.layer=5"], "did you mean 'apf.layers'?", 1),
         (["tables", "x", "--vary", "body=a", "--vary", "body=b"], "body is given twice", 1),

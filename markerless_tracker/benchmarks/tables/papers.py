@@ -64,7 +64,7 @@ def read_papers(path: Path | None = None) -> Mapping[str, PaperTable]:
     path = path or config_file("papers.yaml")
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise ConfigError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
     try:
         return {name: _table(name, entry, data["papers"]) for name, entry in data["tables"].items()}

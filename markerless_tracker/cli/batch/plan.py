@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from markerless_tracker.benchmarks.tables.fingerprint import file_key, recording_key, run_key
+from markerless_tracker.cli.batch.table import JSON
 from markerless_tracker.cli.batch.trial import Trial
 from markerless_tracker.cli.track import given_settings, read_config
 from markerless_tracker.errors import ConfigError
@@ -26,8 +27,15 @@ def plan(args: argparse.Namespace, found: Mapping[str, Path], *, threads: int) -
         threads: threads of each trial, unless the arguments set them.
 
     Raises:
-        ConfigError: a setting is impossible, or an output of all trials would be one file.
+        ConfigError: a setting is impossible, an output of all trials would be one file, or a
+            result would have the name of the table.
     """
+    taken = Path(JSON).stem
+    if taken in found:
+        raise ConfigError(
+            f"{found[taken]}: a recording of the name {taken}, expected another name: {JSON} "
+            "in OUT is the table of the batch"
+        )
     config = read_config(args.config, given_settings(args))
     options = {key: value for key, value in vars(args).items() if key not in NOT_OF_TRACK}
     for key, option in _OUTPUTS.items():

@@ -48,7 +48,7 @@ def varied(text: str) -> tuple[str, tuple[Any, ...]]:
         raise argparse.ArgumentTypeError(f"{text!r}, expected KEY=VALUE,VALUE...")
     try:
         return key.strip(), tuple(yaml.safe_load(word) for word in words)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, RecursionError) as error:
         raise argparse.ArgumentTypeError(f"{text!r}: a value cannot be read") from error
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from markerless_tracker.cli.batch.plan import plan
 from markerless_tracker.cli.batch.verb import add_arguments
+from markerless_tracker.errors import ConfigError
 
 
 @pytest.fixture
@@ -48,6 +49,16 @@ def test_not_on_results_in_the_recordings_folder(walk, tmp_path: Path) -> None:
     (own / "out" / "own.trc").write_text("a result")
     (after,) = plan(arguments, {"own": own}, threads=1)
     assert after.key == before.key
+
+
+def test_a_result_named_like_the_table_is_refused(walk, tmp_path: Path) -> None:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    arguments = parser.parse_args([str(walk), "-o", str(tmp_path / "out")])
+    with pytest.raises(ConfigError, match="walk: a recording of the name summary, expected anoth"):
+        plan(arguments, {"summary": Path(walk)}, threads=1)
+    (trial,) = plan(arguments, {"a/summary": Path(walk)}, threads=1)
+    assert trial.name == "a/summary"
 
 
 def test_on_the_content_of_a_file_of_offsets(key, tmp_path: Path) -> None:

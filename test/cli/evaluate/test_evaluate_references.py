@@ -74,6 +74,7 @@ def test_a_map_of_ones_own(found, tmp_path: Path, capsys) -> None:
     for text, reported in (
         ("LWrist: 3\n", "map.yaml: LWrist: 3, expected a marker's name"),
         ("- a\n", "map.yaml: expected a mapping of markers, got list"),
+        ("[" * 5000, "map.yaml: cannot be read: maximum recursion"),
         ("LWrist: other\n", "lab.trc: no marker of the map: expected some of other"),
     ):
         table.write_text(text, encoding="utf-8")

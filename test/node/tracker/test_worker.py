@@ -73,8 +73,7 @@ class Bench:
         self.tracker = FakeTracker()
         self.sets: Synchronizer[int] = Synchronizer(("a", "b"))
         self.status = TrackerStatus()
-        self.published: list[TrackedSet] = []
-        self.publishing_s = 0.0
+        self.publishing_s, self.published = 0.0, list[TrackedSet]()
         self.reports: list[str] = []
         self.dealt: list[float] = []
         self.may_publish = threading.Event()
@@ -121,6 +120,7 @@ def bench() -> Any:
 
 
 def test_sets_are_decoded_and_tracked_in_one_thread_and_published(bench: Bench) -> None:
+    bench.publishing_s = 0.05
     bench.worker.start()
     bench.until(lambda: bench.status.ready)
     bench.offer(5)
@@ -135,16 +135,7 @@ def test_sets_are_decoded_and_tracked_in_one_thread_and_published(bench: Bench) 
     assert values["state"] == "TRACKING" and values["tracked"] == "1"
     assert values["iou/a"] == "0.5000" and values["iou/b"] == "nan"
     assert values["lost_limbs"] == "l_arm, l_leg"
-    assert float(values["latency_median_ms"]) >= 0.0
-
-
-def test_the_latency_ends_with_the_publication(bench: Bench) -> None:
-    bench.publishing_s = 0.05
-    bench.worker.start()
-    bench.until(lambda: bench.status.ready)
-    bench.offer(5)
-    bench.until(lambda: bench.values()["latency_median_ms"] != "nan")
-    assert float(bench.values()["latency_median_ms"]) >= 50.0
+    assert float(values["latency_median_ms"]) >= 50.0
 
 
 def test_images_before_it_is_ready_are_dropped_and_counted_apart(bench: Bench) -> None:
