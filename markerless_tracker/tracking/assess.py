@@ -35,7 +35,6 @@ class Found:
         rotated: whether another heading was found, so that the pose does not continue the last.
         jumped: indices of parameters that do not continue those of the last pose.
         recovered: whether a limb was found so far away that it was in a wrong place before.
-        limbs_searched: as in `Recovered`.
     """
 
     search: FrameSearch
@@ -47,7 +46,6 @@ class Found:
     rotated: bool = False
     jumped: IntArray | None = None
     recovered: bool = False
-    limbs_searched: bool = False
 
 
 class Assessor:

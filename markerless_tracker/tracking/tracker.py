@@ -308,7 +308,6 @@ class Tracker:
         return Found(
             search, stamp_ns, used, notes,
             rotated=recovered.rotated, jumped=jumped, recovered=recovered.moved_m > RECOVERED_M,
-            limbs_searched=recovered.limbs_searched,
         )  # fmt: skip
 
     def _learn(self, found: Found, result: TrackResult) -> tuple[str, ...]:
@@ -325,9 +324,8 @@ class Tracker:
             self._searcher = self._searchers.near(self.body)
             self._motion.shift(moved, self._body.limits)
         if corrected := self._correction.add(
-            result, self.body,
-            search=found.search, late=self._effort.late, busy=found.limbs_searched,
-        ):  # fmt: skip
+            result, self.body, search=found.search, late=self._effort.late
+        ):
             self._searchers.rig = self._correction.rig
             self._body.cameras_changed(self._searchers.near)
             self._use_cameras(self._correction.rig)

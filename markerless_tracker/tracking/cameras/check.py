@@ -29,8 +29,6 @@ EVERY_NS = (80_000_000, 400_000_000, 2_000_000_000)
 """Time between the first `FEW_CHECKS` checks, between those up to `MANY_CHECKS`, and later."""
 FEW_CHECKS, MANY_CHECKS = 3, 12
 """Least number of checks that tell whether a camera is wrong; number whose median is precise."""
-MOST_WAIT_NS = 100_000_000
-"""How long a camera waits at most because limbs are searched."""
 REMEMBERED = 30
 """Number of a camera's latest checks that count, so that a camera may be touched during a run."""
 LEAST_VIEWS = 3
@@ -110,7 +108,6 @@ class CameraCheck:
     def reset(self) -> None:
         """Forget all frames."""
         self._due_ns: int | None = None
-        self._since_ns: int | None = None
         self._compared = 0
         self.suspects: frozenset[str] = frozenset()
         self.shares: dict[str, float] = {}
@@ -132,7 +129,6 @@ class CameraCheck:
         *,
         search: FrameSearch | None = None,
         late: bool = False,
-        busy: bool = False,
     ) -> bool:
         """Take a tracked frame: compare the cameras whose turn has come; often there is none.
 
@@ -142,8 +138,6 @@ class CameraCheck:
             search: of the frame, whose contour evidence is used; None to make it anew.
             late: whether sets come faster than they are tracked. Then at most one camera is
                 compared, and after the first `FEW_CHECKS` checks they come as seldom as later ones.
-            busy: whether limbs were searched in the frame. Then the comparison waits, for
-                `MOST_WAIT_NS` at most, so that no frame takes much longer than others.
 
         Returns:
             Whether all have been compared once more, so that `shares` may have changed.
@@ -153,15 +147,11 @@ class CameraCheck:
         if self._due_ns is None or self._due_ns - result.stamp_ns > EVERY_NS[-1]:
             # The first frame, or time was set back.
             self._due_ns = result.stamp_ns
-        if busy and self._waits(result.stamp_ns, self._due_ns):
-            self._due_ns = result.stamp_ns
-            return False
         count, checks = len(self._rig), 0
         for _ in range(1 if late else count):
             if result.stamp_ns < self._due_ns:
                 return checks > 0
             search = search or self._search(result, result.pose, body)
-            self._since_ns = None
             self._compare(self._rig.names[self._compared], search.contours, result.pose, body)
             self._compared = (self._compared + 1) % count
             self._due_ns += self._every_ns(late) // count
@@ -173,14 +163,6 @@ class CameraCheck:
         # Frames come less often than checks are due.
         self._due_ns = max(self._due_ns, result.stamp_ns)
         return checks > 0
-
-    def _waits(self, stamp_ns: int, due_ns: int) -> bool:
-        """Whether the camera whose turn has come may wait."""
-        if stamp_ns < due_ns:
-            return False
-        if self._since_ns is None or stamp_ns < self._since_ns:
-            self._since_ns = stamp_ns
-        return stamp_ns < self._since_ns + MOST_WAIT_NS
 
     def _every_ns(self, late: bool) -> int:
         phase = (self._checks >= FEW_CHECKS) + (self._checks >= MANY_CHECKS)

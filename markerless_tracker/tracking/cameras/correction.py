@@ -63,13 +63,12 @@ class CameraCorrection:
         *,
         search: FrameSearch | None = None,
         late: bool = False,
-        busy: bool = False,
     ) -> tuple[str, ...]:
         """Take a frame; returns a line for each camera whose correction has changed in `rig`.
 
         Arguments as of `CameraCheck.add`.
         """
-        weighed = self._check.add(result, body, search=search, late=late, busy=busy)
+        weighed = self._check.add(result, body, search=search, late=late)
         if not weighed or not self._corrects:
             return ()
         shares, shifts = self._check.shares, self._check.shifts()

@@ -11,6 +11,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.model import IntArray
+from markerless_tracker.compiled import kernel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.tracking.candidates.postures import postures
 
@@ -32,31 +33,45 @@ def prior_costs(body: BodyModel, poses: FloatArray) -> FloatArray:
     the product of their densities, or a smaller one about both in a posture. The largest counts.
     """
     costs = np.zeros(len(poses))
-    for limbs in _pairs(body):
-        alone, together = np.zeros(len(poses)), np.full((len(poses), 1), POSTURE)
-        for limb, means in limbs:
-            apart = (poses[:, limb] / body.prior_sd[limb])[:, None] - means
-            energy = 0.5 * np.einsum("nkd,nkd->nk", apart, apart)
-            usual, known = energy[:, 0], energy[:, 1:]
-            alone += np.minimum(np.minimum(usual, POSTURE + known.min(axis=1)), MOST)
-            together = together + known
-        costs += COST * np.minimum(alone, together.min(axis=1))
+    for limbs, means, sd in _pairs(body):
+        _add_costs(poses, limbs, means, sd, costs)
     return costs
 
 
+@kernel
+def _add_costs(poses, limbs, means, sd, costs):  # type: ignore[no-untyped-def]
+    """Add the costs of a pair of limbs to costs (n,); other arguments as of `_pairs`."""
+    for n in range(costs.size):
+        pose, first, second, both = poses[n], np.inf, np.inf, np.inf
+        for k in range(1, means.shape[0]):
+            left = _energy(pose, limbs[0], means[k, 0], sd[0])
+            right = _energy(pose, limbs[1], means[k, 1], sd[1])
+            first, second, both = min(first, left), min(second, right), min(both, left + right)
+        alone = min(_energy(pose, limbs[0], means[0, 0], sd[0]), POSTURE + first, MOST)
+        alone += min(_energy(pose, limbs[1], means[0, 1], sd[1]), POSTURE + second, MOST)
+        costs[n] += COST * min(alone, POSTURE + both)
+
+
+@kernel
+def _energy(pose, limb, mean, sd):  # type: ignore[no-untyped-def]
+    """Negative log of a normal density of a limb (d,) about a mean (d,), without its constant."""
+    energy = 0.0
+    for j in range(limb.size):
+        energy += 0.5 * ((pose[limb[j]] - mean[j]) / sd[j]) ** 2
+    return energy
+
+
 @lru_cache(maxsize=16)
-def _pairs(body: BodyModel) -> list[list[tuple[IntArray, FloatArray]]]:
-    """Both arms and both legs: each limb's angles (d,), and their means (1 + k, d) in standard
-    deviations, usual and as in the known postures. Postures in which both limbs are the same are
-    one.
+def _pairs(body: BodyModel) -> list[tuple[IntArray, FloatArray, FloatArray]]:
+    """Both arms and both legs: the limbs' parameters (2, d), their means (1 + k, 2, d), usual and
+    as in the known postures, and standard deviations (2, d). Postures in which both limbs are the
+    same are one.
     """
     pairs = []
     for kind in dict.fromkeys(name[1:] for name in body.limbs):
-        limbs = [body.subspaces[name] for name in body.limbs if name[1:] == kind]
-        both = np.concatenate(limbs)
+        limbs = np.stack([body.subspaces[name] for name in body.limbs if name[1:] == kind])
         # (`np.unique` takes longer than all the rest.)
-        known = np.array(list(dict.fromkeys(map(tuple, postures(body)[:, both]))))
-        means = np.concatenate([body.prior_mean[None, both], known]) / body.prior_sd[both]
-        ends = np.cumsum([limb.size for limb in limbs])[:-1]
-        pairs.append(list(zip(limbs, np.split(means, ends, axis=1), strict=True)))
+        known = list(dict.fromkeys(map(tuple, postures(body)[:, limbs.ravel()])))
+        means = np.array([body.prior_mean[limbs.ravel()], *known]).reshape(-1, *limbs.shape)
+        pairs.append((limbs, means, body.prior_sd[limbs]))
     return pairs

@@ -21,14 +21,12 @@ class Recovered:
         names: of the limbs that were found elsewhere; `legs` or `arms` for an exchanged pair.
         rotated: whether another heading was found; no parameter continues its last value then.
         moved_m: largest distance by which the searches moved a marker; 0 if `rotated`.
-        limbs_searched: whether a limb was searched, wholly or one half of it.
     """
 
     pose: FloatArray
     names: tuple[str, ...] = ()
     rotated: bool = False
     moved_m: float = 0.0
-    limbs_searched: bool = False
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -160,8 +160,7 @@ class LimbWatch:
             # They explain at least a part of the silhouette; the next search finds the rest.
             self._areas_m2 = {}
         moved_m = distance_m(searcher.body, search.pose, pose)
-        limbs_searched = bool(begun or due.limbs or due.begun)
-        return Recovered(search.pose, tuple(found), moved_m=moved_m, limbs_searched=limbs_searched)
+        return Recovered(search.pose, tuple(found), moved_m=moved_m)
 
     def _compare_headings(self, search: LimbSearch, due: Due, searcher: Searcher) -> bool:
         """Compare the other headings that are due; whether one was taken."""

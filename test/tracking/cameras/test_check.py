@@ -13,7 +13,6 @@ from markerless_tracker.tracking.cameras.check import (
     EVERY_NS,
     FEW_CHECKS,
     MANY_CHECKS,
-    MOST_WAIT_NS,
     REMEMBERED,
     CameraCheck,
     Shift,
@@ -124,23 +123,6 @@ def test_a_late_tracker_compares_one_camera_a_frame_and_seldom(scene, tracked) -
     assert counts[:few] == [*range(1, few + 1)]
     later = (60 - few) * EVERY_NS[0] * cameras / EVERY_NS[2]
     assert counts[-1] - few == pytest.approx(later, abs=2)
-
-
-def test_a_camera_waits_while_limbs_are_searched(scene, tracked) -> None:
-    """But not for ever, and those after it do not catch up in one frame."""
-    frame_ns = 16_666_667
-    waits = 1 + MOST_WAIT_NS // frame_ns
-    check = CameraCheck(scene.rig, CONFIG)
-    standing, counts = tracked(0), [0]
-    for index in range(2 * waits + 8):
-        stamp_ns = index * frame_ns
-        check.add(replace(standing, stamp_ns=stamp_ns), scene.body, busy=index != waits + 3)
-        counts.append(sum(shift.checks for shift in check.shifts().values()))
-    compared = np.flatnonzero(np.diff(counts))
-    # After the longest wait; as soon as no limb is searched; and again after the longest wait.
-    assert compared[:2].tolist() == [waits, waits + 3]
-    assert compared[2] >= compared[1] + waits
-    assert np.diff(counts).max() == 1
 
 
 def test_a_camera_that_is_touched_during_a_long_run_is_found(scene, tracked) -> None:
