@@ -330,16 +330,7 @@ def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
 
 def _cameras(shifts: Mapping[str, Shift]) -> dict[str, Any]:
     """Offset of each camera's silhouettes from the body, for JSON."""
-    return {
-        name: {
-            "shift_px": [round(value, 2) for value in shift.px],
-            "shift_mm": round(1000.0 * shift.length_m, 1),
-            "checks": shift.checks,
-            "disagrees": shift.disagrees,
-            "corrected": shift.corrected,
-        }
-        for name, shift in shifts.items()
-    }
+    return {name: shift.as_mapping() for name, shift in shifts.items()}
 
 
 def given_settings(args: argparse.Namespace) -> dict[str, Any]:
