@@ -74,6 +74,16 @@ def test_manifest(project_root: Path) -> None:
     assert "END OF TERMS AND CONDITIONS" in licence
 
 
+def test_the_manifest_names_the_packages_of_the_launch_files(project_root: Path) -> None:
+    launched = {
+        node.get("pkg")
+        for file in (project_root / "launch").glob("*.launch.xml")
+        for node in ElementTree.parse(file).iter("node")
+    }
+    needed = {depend.text for depend in package_xml(project_root).iter("exec_depend")}
+    assert "rviz2" in launched and launched <= {NAME, *needed}
+
+
 def test_executables_are_in_the_folder_of_ros(project_root: Path) -> None:
     text = (project_root / "setup.cfg").read_text(encoding="utf-8")
     assert f"script_dir=$base/lib/{NAME}" in text

@@ -31,6 +31,14 @@ _ADVICE = "correct it, or make it anew with `calibrate`"
 MOST_SECONDS = 3600.0
 """Largest value of `--seconds`."""
 IMAGE_TOPIC = "NAME/image_raw"
+_NAMELESS = Finding(
+    "cameras", YELLOW, "", "/image_raw has no camera name, expected NAME/image_raw",
+    "give the driver a namespace",
+)  # fmt: skip
+_NONE_OFFERED = Finding(
+    "cameras", YELLOW, "", "no topic NAME/image_raw is offered",
+    "start the cameras, or name them (--cameras, --image-topic)",
+)  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -133,16 +141,13 @@ def _cameras(
 
         check_topics("--image-topic", args.image_topic, names)
         with StopSignals() as stop, bars:
-            names = names or image_topics(stop)
+            offered = names or image_topics(stop)
             if stop.received:
                 raise KeyboardInterrupt
+            names = [name for name in offered if name]
+            found = [_NAMELESS] if "" in offered else []
             if not names:
-                return [
-                    Finding(
-                        "cameras", YELLOW, "", "no topic NAME/image_raw is offered",
-                        "start the cameras, or name them (--cameras, --image-topic)",
-                    )
-                ]  # fmt: skip
+                return found or [_NONE_OFFERED]
             task = bars.add_task(f"listening to {', '.join(names)}", total=args.seconds)
             began_s = time.monotonic()
             heard = listen(
@@ -157,4 +162,5 @@ def _cameras(
         return [Finding("cameras", RED, "", str(error), "rename the camera, or the topic")]
     streams = {name: CameraStream(*received) for name, received in heard.items()}
     # It waits longer for a first image.
-    return check_streams(streams, backgrounds, listened_s=round(time.monotonic() - began_s, 1))
+    listened_s = round(time.monotonic() - began_s, 1)
+    return found + check_streams(streams, backgrounds, listened_s=listened_s)

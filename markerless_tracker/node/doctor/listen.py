@@ -1,6 +1,7 @@
 """Receives cameras' images for some seconds."""
 
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from functools import partial
@@ -14,10 +15,11 @@ from markerless_tracker.node.ros.profile import apply_profile
 KEPT = 9
 """Number of images of each camera that are decoded, evenly spaced in time."""
 PATIENCE_S = 10.0
-"""Longest wait for the first image, or the first topic: discovery takes a few seconds."""
+"""Longest wait for each camera's first image, or the first topic."""
 _TICK_S = 0.25
 _SPIN_S = 0.05
-_LOOK_S = 1.0
+_LOOK_S = 3.0
+"""Time from the first topic to the end of the search: the discovery of a publisher may take 3 s."""
 
 
 class Received(NamedTuple):
@@ -50,11 +52,11 @@ class _Sink:
         self.stamps_ns: list[int] = []
         self.arrivals_s: list[float] = []
         self.ages_s: list[float] = []
-        self.kept: list[Any] = []
+        self.kept: deque[Any] = deque(maxlen=KEPT)
         self.count, self.trouble = 0, ""
 
     def add(self, camera: str, stamp_ns: int, view: Any, *, now_s: float) -> bool:
-        """Note an image; keep some of them."""
+        """Note an image; keep some of the latest."""
         self.stamps_ns.append(stamp_ns)
         self.arrivals_s.append(now_s)
         self.ages_s.append((time.time_ns() - stamp_ns) / 1e9)
@@ -77,6 +79,8 @@ class _Sink:
 
 def image_topics(stop: StopSignals) -> tuple[str, ...]:
     """Names of cameras whose images are offered, raw or compressed, on ``NAME/image_raw``.
+
+    The name is empty for ``/image_raw``.
 
     Args:
         stop: ends the search earlier.
@@ -110,7 +114,8 @@ def listen(
 
     Args:
         cameras: their names.
-        seconds: duration from the first image on; without images at least `PATIENCE_S`.
+        seconds: duration, from the time at which every camera has sent an image; cameras are waited
+            for no longer than `PATIENCE_S`.
         image_topic: topic; NAME stands for the camera.
         stop: ends the reception earlier.
         progress: called with the number of seconds so far.
@@ -131,13 +136,14 @@ def listen(
             for name, sink in sinks.items()
         ]  # fmt: skip
         topics = CameraTopics(node, inputs, transport="auto", clock=time.monotonic)
-        begun_s = ticked_s = time.monotonic()
+        begun_s = ticked_s = complete_s = time.monotonic()
         while not stop.received:
             executor.spin_once(timeout_sec=_SPIN_S)
             now_s = time.monotonic()
-            first = [sink.arrivals_s[0] for sink in sinks.values() if sink.arrivals_s]
-            elapsed_s = now_s - min(first) if first else now_s - begun_s - PATIENCE_S
-            if elapsed_s >= seconds:
+            silent = any(not (sink.arrivals_s or sink.count) for sink in sinks.values())
+            if silent and now_s - begun_s < PATIENCE_S:
+                complete_s = now_s
+            if now_s - complete_s >= seconds:
                 break
             if now_s - ticked_s >= _TICK_S:
                 ticked_s = now_s

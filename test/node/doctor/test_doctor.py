@@ -156,6 +156,29 @@ def test_blanks_after_commas_are_no_part_of_names(
     assert asked == ["cam01", "cam02"] and "shared memory" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("names", [(), ("cam01",)])
+def test_a_topic_without_a_camera_name_is_a_yellow_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], names: tuple[str, ...]
+) -> None:
+    asked: list[str] = []
+
+    def listened(names: Any, **_: Any) -> dict[str, Any]:
+        asked.extend(names)
+        return {}
+
+    module = "markerless_tracker.node.doctor.listen"
+    monkeypatch.setattr(f"{module}.image_topics", lambda stop: ("", *names))
+    monkeypatch.setattr(f"{module}.listen", listened)
+    main(["doctor", "--json"])
+    found = json.loads(capsys.readouterr().out)["findings"]
+    (line,) = [line for line in found if line["check"] == "cameras"]
+    assert (line["state"], line["camera"], line["advice"]) == (
+        "yellow", "", "give the driver a namespace",
+    )  # fmt: skip
+    assert line["text"] == "/image_raw has no camera name, expected NAME/image_raw"
+    assert asked == list(names)
+
+
 def test_a_domain_that_ros_refuses_is_a_red_line_and_ends_the_check(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
