@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
 
 @contextmanager
 def _new_bag(folder: Path, calibration: Path | None) -> Iterator[BagWriter]:
-    """A bag in a new or empty folder; an error before the first message leaves no files.
+    """A bag in a new or empty folder; without a message no files are left.
 
     Raises:
         DatasetError: the folder is not empty.
@@ -106,10 +106,9 @@ def _new_bag(folder: Path, calibration: Path | None) -> Iterator[BagWriter]:
     try:
         with writer:
             yield writer
-    except Exception:
+    finally:
         if not writer.messages:
             for path in folder.iterdir():
                 path.unlink()
             if not existed:
                 folder.rmdir()
-        raise

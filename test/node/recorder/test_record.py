@@ -192,9 +192,13 @@ def test_topics_of_ros_itself_are_recorded_on_demand(peer: Any, ros_context: Any
 
 
 def test_mistakes_and_silence(recorder, tmp_path: Path) -> None:
-    process = recorder("--topics", "/nobody", "--seconds", "0.2")
-    out, _ = process.communicate(timeout=120)
-    assert process.returncode == 3 and json.loads(out)["messages"] == 0
+    for _ in range(2):
+        process = recorder("--topics", "/nobody", "--seconds", "0.2")
+        out, _ = process.communicate(timeout=120)
+        assert process.returncode == 3 and json.loads(out)["messages"] == 0
+        assert not (tmp_path / "bag").exists()
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "notes.txt").touch()
     process = recorder()
     assert process.wait(120) == 1
 
