@@ -104,8 +104,12 @@ class WaitingSets(Generic[View]):
         """Add the newest set; returns the number of sets that it replaced."""
         before = len(self._sets) + 1
         self._newest_ns = matched.stamp_ns
+        if matched.restarted:
+            # The stamps ran backwards: the new set does not continue the waiting sets.
+            self._taken_ns, self._spacing_ns = None, SPACING_NS
+            while self._sets:
+                matched = matched.replacing(self._sets.pop())
         if not self._keeping:
-            # After stamps ran backwards, the waiting sets are not continued.
             left = -(-(self._caught_up_ns - matched.stamp_ns) // PLACE_NS)
             self._places = 1 if matched.restarted else max(1, min(self._places, left))
         if self._sets and not self._spaced():

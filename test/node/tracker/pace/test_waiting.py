@@ -207,3 +207,29 @@ def test_sets_of_a_time_that_was_set_back_end_the_catching_up() -> None:
     matched = waiting.take()
     assert matched is not None and matched.stamp_ns == 200 * MS and matched.restarted
     assert len(waiting) == 0
+
+
+@pytest.mark.parametrize("taken", [0, 1, 3])
+def test_sets_of_a_time_that_was_set_back_are_kept_alone(taken: int) -> None:
+    waiting: WaitingSets[str] = WaitingSets()
+    waiting.keep(AT_MOST)
+    for stamp in (5000, 5100, 5200):
+        waiting.put(a_set(stamp))
+    for _ in range(taken):
+        waiting.take()
+    assert waiting.put(a_set(100, restarted=True)) == 3 - taken
+    assert [waiting.put(a_set(stamp)) for stamp in (200, 300)] == [0, 0]
+    matched = waiting.take()
+    assert matched is not None and matched.stamp_ns == 100 * MS
+    assert matched.restarted and matched.replaced == 3 - taken
+    assert drained(waiting) == [200, 300]
+
+
+def test_sets_of_a_time_that_was_set_back_lie_close() -> None:
+    waiting: WaitingSets[str] = WaitingSets()
+    waiting.keep(CLOSE + 1)
+    for stamp in range(5000, 7000, 100):
+        waiting.put(a_set(stamp))
+    waiting.put(a_set(100, restarted=True))
+    assert [waiting.put(a_set(stamp)) for stamp in (160, 220)] == [0, 0]
+    assert drained(waiting) == [100, 160, 220]
