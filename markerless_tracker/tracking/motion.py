@@ -12,6 +12,8 @@ LIMB_SPEED_M_S = 2.0
 LIMB_ACCELERATION_M_S2 = 60.0
 """Greatest speed and acceleration of a hand or foot relative to its prediction, which widen the
 image regions. For a faster hand or foot a second, wider region is segmented."""
+LEAST_NS = 4_000_000
+"""Frames closer than this leave the velocity: errors of the pose would give high speeds."""
 
 
 class MotionModel:
@@ -97,8 +99,12 @@ class MotionModel:
         """
         elapsed_ns = self._elapsed_ns(stamp_ns)
         change = pose - self.pose
-        moved = tracked and elapsed_ns > 0
-        self.velocity_per_ns = change / elapsed_ns if moved else np.zeros(change.size)
+        if not tracked or elapsed_ns == 0:
+            self.velocity_per_ns = np.zeros(change.size)
+        elif elapsed_ns >= LEAST_NS:
+            self.velocity_per_ns = change / elapsed_ns
+        else:
+            self.velocity_per_ns = self.velocity_per_ns.copy()
         if jumped is not None:
             self.velocity_per_ns[jumped] = 0.0
         self.pose = pose

@@ -1,6 +1,7 @@
 """The search of one frame: runs its stages, each from the estimate of the one before it."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -80,6 +81,11 @@ class Searcher:
         self.cameras: Mapping[str, CameraModel] = {camera.name: camera for camera in rig}
         self.feasible = Feasibility(body, limits, config.collision)
         self.fitness = make_fitness(body, rig, config, threads=threads)
+        # Starts and limbs' searches compare 1 - f_s, whatever the swarms minimise.
+        self.overlap_fitness = self.fitness
+        if config.cost != "overlap":
+            plain = replace(config, cost="overlap")
+            self.overlap_fitness = make_fitness(body, rig, plain, threads=threads)
         self.tracked_radius_m = RADIUS_FACTOR * max(config.refine.truncation_m, LIMB_TRUNCATION_M)
         self.particle_sets: dict[str, ParticleSet] = {}
         """By stage, the particles of the last frame, if its algorithm continues from them."""

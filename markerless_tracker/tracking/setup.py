@@ -9,7 +9,6 @@ import numpy as np
 
 from markerless_tracker.body import (
     MARKER_NAMES,
-    BodyModel,
     Subject,
     load_description,
     pose_from_markers,
@@ -31,6 +30,7 @@ from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.limits import joint_limits
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.person.first_frame import StartMarkers, start_noise_m
+from markerless_tracker.tracking.start.required import require_parts_of_a_start
 from markerless_tracker.tracking.tracker import Tracker
 
 _START_SUFFIXES = (".trc", ".yaml", ".yml")
@@ -121,7 +121,7 @@ def build_tracker(
     elif start_file is not None:
         pose = read_pose(start_file, body)
     if pose is None or config.search_again:
-        _require_parts_of_a_start(body)
+        require_parts_of_a_start(body)
     make = partial(
         Tracker,
         rig,
@@ -134,19 +134,6 @@ def build_tracker(
         person=person,
     )
     return TrackerSetup(make(), make, None if start is None else start.stamp_ns, person)
-
-
-def _require_parts_of_a_start(body: BodyModel) -> None:
-    """Refuse a body that the automatic start cannot place."""
-    rotations = ("pelvis_rx", "pelvis_ry", "pelvis_rz")
-    missing = [f"parameter {name}" for name in rotations if name not in body.parameter_names]
-    if body.hierarchies and "six" not in body.hierarchies:
-        missing.append("hierarchy six")
-    if missing:
-        raise ConfigError(
-            f"body {body.name} has no {', no '.join(missing)}, which finding a person takes: "
-            "add it, or give a start pose and set search_again to false"
-        )
 
 
 def _subject(

@@ -37,6 +37,7 @@ from markerless_tracker.tracking.person.resting import at_rest
 from markerless_tracker.tracking.searchers import Searchers
 from markerless_tracker.tracking.stages.effort import Effort
 from markerless_tracker.tracking.stages.frame import frame_stages, swarm_stages
+from markerless_tracker.tracking.start.required import missing_for_start, require_parts_of_a_start
 from markerless_tracker.tracking.start.starter import Starter
 from markerless_tracker.tracking.states import Phase, Track
 
@@ -134,9 +135,11 @@ class Tracker:
         that has begun.
 
         Raises:
-            ConfigError: the budget cannot be spent; nothing has changed then.
+            ConfigError: the budget cannot be spent, or the body lacks what `search_again` takes.
         """
         frame_stages(self.body, config, self._motion.pose, self.body.sigma)
+        if config.search_again:
+            require_parts_of_a_start(self.body)
         self.config = config
         for part in (self._motion, self._body, self._assessor, self._effort, self._correction):
             part.configure(config)
@@ -145,8 +148,7 @@ class Tracker:
 
     def warm_up(self) -> None:
         """Compile every kernel, so that no later step waits for it; then `reset`."""
-        # The segmenting process compiles the imaging meanwhile.
-        self.evidence.start_compiling()
+        self.evidence.start_compiling()  # in the segmenting process, meanwhile
         made_up, pose = self.evidence.made_up(), self._motion.pose
         seen = Seen(0, made_up, decide(made_up, self._searcher.cameras, self.body, pose), made_up)
         search = self._searcher.frame(seen.used, 0, pose)
@@ -155,7 +157,7 @@ class Tracker:
         self.evidence.finish_compiling()
         self._start, self._assessor.track = None, Track(Phase.TRACKING)
         self.step(made_up, 0)
-        if self.config.refinement != "none":
+        if self.config.refinement != "none" and not missing_for_start(self.body):
             self._assessor.limbs.recover(self._searcher, search.contours, seen, pose)
         self._assessor.warm_up(Found(search, 0, seen.used), self.body, self._body.limits)
         self.reset()
@@ -260,6 +262,9 @@ class Tracker:
 
     def _search_room(self, start: Starter, seen: Seen) -> Found | None:
         """Search for a person in the whole views; None if there is none."""
+        if self._body.may_be_anothers(self._motion.since_s(seen.stamp_ns)):
+            self._body.reset()
+            self._start = start = self._new_start()
         if not anybody(seen.used):
             start.reset()
             return None

@@ -5,6 +5,7 @@ import pytest
 
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.motion import (
+    LEAST_NS,
     LIMB_ACCELERATION_M_S2,
     LIMB_SPEED_M_S,
     MotionModel,
@@ -38,6 +39,17 @@ def test_the_prediction_moves_on_by_a_fraction_of_the_last_change(motion):
     moved(motion, 0.1, FRAME_NS)
     predicted = motion.predict(3 * FRAME_NS, FREE) - motion.pose
     np.testing.assert_allclose(predicted, 0.5 * 0.1 * 2, rtol=1e-12)
+
+
+def test_frames_that_are_very_close_keep_the_velocity(motion):
+    """Two buffered images: a millimetre of noise would be a speed of metres a second."""
+    moved(motion, 0.0, 0)
+    moved(motion, 0.02, FRAME_NS)
+    before = motion.velocity_per_ns.copy()
+    moved(motion, 0.001, FRAME_NS + LEAST_NS // 4)
+    np.testing.assert_array_equal(motion.velocity_per_ns, before)
+    moved(motion, 0.001, FRAME_NS + LEAST_NS // 2, jumped=np.array([1]))
+    assert motion.velocity_per_ns[1] == 0.0 and motion.velocity_per_ns[0] == before[0]
 
 
 def test_predictions_keep_the_limits(motion):

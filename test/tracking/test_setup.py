@@ -177,4 +177,9 @@ def test_a_body_that_cannot_be_found_is_refused_before_the_first_frame(
     start = files / "start.trc"
     with pytest.raises(ConfigError, match="search_again"):
         build_tracker(scene.rig, dataclasses.replace(config, search_again=True), start_file=start)
-    build_tracker(scene.rig, dataclasses.replace(config, search_again=False), start_file=start)
+    config = dataclasses.replace(config, search_again=False)
+    tracker = build_tracker(scene.rig, config, start_file=start).tracker
+    tracker.warm_up()
+    with pytest.raises(ConfigError, match=f"{named}.*search_again"):
+        tracker.configure(dataclasses.replace(config, search_again=True))
+    assert tracker.config is config

@@ -16,6 +16,7 @@ from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.config import live_settings
 from markerless_tracker.tracking.processes.tracker_process import TrackerProcess
 from markerless_tracker.tracking.stages.frame import frame_stages
+from markerless_tracker.tracking.start.required import require_parts_of_a_start
 
 LIVE = live_settings()
 """Parameters that may be set while the tracker runs."""
@@ -54,10 +55,12 @@ class SettableTracker:
         """Check that settings can be used.
 
         Raises:
-            ConfigError: their budget cannot be spent.
+            ConfigError: their budget cannot be spent, or the body lacks what `search_again` takes.
         """
         body = self._tracker.body
         frame_stages(body, config, body.neutral, body.sigma)
+        if config.search_again:
+            require_parts_of_a_start(body)
 
     def configure(self, config: TrackerConfig) -> None:
         """Use checked settings from the next step on."""

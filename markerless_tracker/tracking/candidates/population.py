@@ -114,7 +114,7 @@ class FramePopulation:
         if frame is None:
             frame = searcher.frame(observations, stamp_ns, near, radius_m=radius_m)
         self._frame = frame
-        self._costs = searcher.fitness.prepare(
+        self._costs = searcher.overlap_fitness.prepare(
             frame.views, Comparison.whole(near, len(searcher.body.cone_names))
         )
 
@@ -249,7 +249,9 @@ class FramePopulation:
         The rest of the body is rasterised once.
         """
         whole = Comparison.whole(pose, len(self._searcher.body.cone_names))
-        return self._searcher.fitness.prepare(self._frame.views, replace(whole, active=limb))
+        return self._searcher.overlap_fitness.prepare(
+            self._frame.views, replace(whole, active=limb)
+        )
 
     def refined(
         self, poses: FloatArray, iterations: int, truncation: tuple[float, float]

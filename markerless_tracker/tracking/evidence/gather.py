@@ -115,6 +115,8 @@ class EvidenceMaker:
                 or one that does not fit; names the camera.
         """
         self._check(views)
+        # Sums over the views must not depend on the caller's order.
+        views = {name: views[name] for name in self.rig.names if name in views}
         regions = self.regions(outlook, stamp_ns)
         made: dict[str, SeenView] = {}
         if ahead and self._process is not None:

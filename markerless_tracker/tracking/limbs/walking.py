@@ -16,8 +16,8 @@ from markerless_tracker.tracking.candidates.mirror import TRUNK, mirror_of, rota
 
 EVERY_NS = 100_000_000
 """Time between two comparisons, while heading and walking direction differ."""
-WALKED_NS, LEAST_WALKED_NS = 500_000_000, 300_000_000
-"""Usual and least time over which the trunk's displacement gives the walking direction."""
+WALKED_NS, LEAST_WALKED_NS, MOST_WALKED_NS = 500_000_000, 300_000_000, 2_000_000_000
+"""Usual, least and longest time over which the trunk's displacement gives the walking direction."""
 LEAST_SPEED_M_S = 0.3
 """A trunk slower than this sways and does not walk."""
 LEAST_ANGLE_RAD = 0.7
@@ -41,7 +41,10 @@ class WalkingWatch:
         if self._trunks and stamp_ns <= self._trunks[-1][0]:
             self._trunks.clear()
         self._trunks.append((stamp_ns, markers(body, pose)[TRUNK].mean(axis=0)))
-        while stamp_ns - self._trunks[0][0] > WALKED_NS:
+        # Two frames tell a direction, even if they are farther apart.
+        while len(self._trunks) > 2 and stamp_ns - self._trunks[0][0] > WALKED_NS:
+            self._trunks.popleft()
+        if stamp_ns - self._trunks[0][0] > MOST_WALKED_NS:
             self._trunks.popleft()
 
     def take_due(

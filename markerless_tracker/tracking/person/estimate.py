@@ -26,6 +26,8 @@ from markerless_tracker.tracking.refinement import floor_precision
 from markerless_tracker.tracking.search import FrameSearch, SearcherFor
 from markerless_tracker.tracking.stages.frame import frame_stages
 
+AWAY_S = 5.0
+"""After this time without a person another one may come, with a body of other sizes."""
 START_FRAMES = 30
 """Frames that may disagree with a given start pose before tracking begins without a fit."""
 REVISION_STEPS = 4
@@ -109,6 +111,15 @@ class BodyEstimate:
     def _fits_lengths(self) -> bool:
         """Whether lengths that were not measured are fitted to tracked frames."""
         return self._fits_sections and self._config.fit_lengths
+
+    def may_be_anothers(self, away_s: float) -> bool:
+        """Whether a body that was not measured has been fitted to a person who may not return.
+
+        Args:
+            away_s: time since the person was seen last.
+        """
+        fitted = self._person is not None and self._fits_sections and self.sections_fitted
+        return fitted and away_s > AWAY_S
 
     @property
     def unfitted(self) -> Unmeasured | None:

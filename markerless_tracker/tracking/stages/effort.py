@@ -51,6 +51,7 @@ class Effort:
     def reset(self) -> None:
         """Forget all frames."""
         self._usual_cost: float | None = None
+        self._left_cost = 0.0
         self._credit = 0.0
         self._granted = True
         self._reduced = False
@@ -146,6 +147,8 @@ class Effort:
             cost: of the pose after the first refinement.
         """
         usual = self._usual_cost
+        if usual is not None and self._very_dense:
+            usual = max(usual, self._left_cost)
         self._badly = usual is None or cost > usual + WORSE
         if self._badly and self._allowed:
             self._granted, self._reduced, self._credit = True, False, 0.0
@@ -160,11 +163,13 @@ class Effort:
     def tracked(self, cost: float) -> None:
         """Add the cost of a frame in which the person was tracked to the running mean.
 
-        What remains after all searches of a frame explained badly is usual from then on: the frames
-        that follow soon would be searched in vain.
+        What remains after all searches of a frame explained badly is usual for the frames that
+        follow within `VERY_DENSE_S`: they would be searched in vain. It fades like the mean.
         """
-        usual = self._usual_cost
-        if usual is None or (self._badly and self._very_dense and self._granted):
-            self._usual_cost = max(cost, usual or 0.0)
-        else:
-            self._usual_cost = usual + _MEMORY * (cost - usual)
+        left, usual = self._left_cost, self._usual_cost
+        if usual is None:
+            self._usual_cost = cost
+            return
+        searched = self._badly and self._granted
+        self._left_cost = max(cost, left, usual) if searched else left + _MEMORY * (cost - left)
+        self._usual_cost = usual + _MEMORY * (cost - usual)

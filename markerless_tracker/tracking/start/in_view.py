@@ -45,6 +45,7 @@ class InViewGate:
     def reset(self) -> None:
         """Forget which hulls are in view."""
         self._hulls: list[_InView] = []
+        self._frame_ns = self._before_ns = 0
 
     def enough(
         self, body: BodyModel, pose: FloatArray, cameras: Iterable[CameraModel], stamp_ns: int
@@ -68,7 +69,11 @@ class InViewGate:
 
     def _seen_since_ns(self, place_m: FloatArray, stamp_ns: int) -> int:
         """Time since which two cameras see the hull at a place (3,), which is noted."""
-        hulls = [v for v in self._hulls if 0 <= stamp_ns - v.last_ns <= GAP_NS]
+        if stamp_ns != self._frame_ns:
+            self._before_ns, self._frame_ns = self._frame_ns, stamp_ns
+        # Frames may come less often than that.
+        gap_ns = max(GAP_NS, min(stamp_ns - self._before_ns, PATIENCE_NS))
+        hulls = [v for v in self._hulls if 0 <= stamp_ns - v.last_ns <= gap_ns]
         away_m = [float(np.linalg.norm(hull.place_m - place_m)) for hull in hulls]
         since_ns = stamp_ns
         if away_m and min(away_m) <= NEAR_M:

@@ -160,7 +160,9 @@ class Starter:
         if self._headings.change():
             notes += ("start: the person has the opposite heading, turned round",)
         searcher, settled = self._searcher, self._headings.over
-        pose = self._best(population).poses[0]
+        leading = self._best(population)
+        self._headings.follow(float(leading.headings[0]))
+        pose = leading.poses[0]
         if settled and self._fit_shape:
             searcher, pose = with_fitted_body(
                 searcher, self._searcher_for, self._person, fits=self._headings.leading_fits,

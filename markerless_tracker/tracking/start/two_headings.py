@@ -28,6 +28,9 @@ _WALKED_M, _WALK_M_S, _WALK_BONUS = 0.05, 0.25, 0.01
 """People walk forwards. Beyond this distance and speed, the cost of the heading along the walking
 direction is lower by this bonus."""
 
+_TURNED_RAD = 0.5
+"""A leading pose that is turned farther than this shows that the person has turned."""
+
 
 @dataclass(frozen=True, eq=False)
 class HeadingFit:
@@ -104,6 +107,14 @@ class TwoHeadings:
         """
         self._fits.append(fits)
         self._stamps_ns.append(stamp_ns)
+
+    def follow(self, heading_rad: float) -> None:
+        """Take the heading of the leading pose for that of the person, who turns.
+
+        In frames that follow soon it is the same within what poses differ by.
+        """
+        if heading_difference(heading_rad, self.leading_rad) > _TURNED_RAD:
+            self._first_rad = heading_rad - self._leading * np.pi
 
     def change(self) -> bool:
         """Let the opposite heading lead if it explains the frames better.

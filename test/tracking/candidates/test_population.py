@@ -24,7 +24,11 @@ from markerless_tracker.tracking.search import make_searcher
 
 
 def made_up(
-    threads: int, *, blank: bool = False, change: Mapping[str, float] | None = None
+    threads: int,
+    *,
+    blank: bool = False,
+    change: Mapping[str, float] | None = None,
+    cost: str = "overlap",
 ) -> tuple[FramePopulation, np.ndarray]:
     """A frame of a made-up person, and the pose (p,) in it.
 
@@ -32,15 +36,15 @@ def made_up(
         threads: of the searcher.
         blank: whether the silhouettes are left out.
         change: rad, added to parameters of the pose.
+        cost: what swarms minimise.
     """
     scene = SyntheticScene(body="person31", size_px=(256, 192), seed=2)
     pose = scene.motion.pose(0.0)
     for name, angle_rad in (change or {}).items():
         pose[scene.body.index(name)] += angle_rad
     views = scene_views(scene, pose, blank=blank)
-    searcher = make_searcher(
-        scene.body, rig=scene.rig, config=TrackerConfig(threads=threads), threads=threads
-    )
+    config = TrackerConfig(threads=threads, cost=cost)
+    searcher = make_searcher(scene.body, rig=scene.rig, config=config, threads=threads)
     return FramePopulation(searcher, views, 0, pose), pose
 
 
@@ -120,6 +124,17 @@ def test_limbs_in_their_own_places_stay() -> None:
     population = frame.selected(frame.refined(pose[None], 5, (0.15, 0.05)))
     kept = frame.with_exchanged_pairs(population, 7)
     np.testing.assert_array_equal(kept.poses[0], population.poses[0])
+
+
+@pytest.mark.parametrize("cost", ["bidirectional", "one_sided"])
+def test_costs_are_those_of_f_s_whatever_swarms_minimise(cost: str) -> None:
+    (plain, pose), (frame, _) = made_up(1), made_up(1, cost=cost)
+    poses = np.stack([pose, pose + 0.05])
+    np.testing.assert_array_equal(frame.costs(poses), plain.costs(poses))
+    limb = load_body("person31", 1.72).subspaces["l_arm"]
+    np.testing.assert_array_equal(
+        frame.limb_costs(pose, limb)(poses[:, limb]), plain.limb_costs(pose, limb)(poses[:, limb])
+    )
 
 
 def test_what_another_search_found_with_another_size_is_compared() -> None:

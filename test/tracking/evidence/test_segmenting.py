@@ -15,8 +15,10 @@ from markerless_tracker.imaging import BackgroundModel, Region, learn_background
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
 from markerless_tracker.tracking.evidence.observer import Observer
+from markerless_tracker.tracking.evidence.prepared import Outlook
 from markerless_tracker.tracking.evidence.segmenting import SegmentingProcess
 from markerless_tracker.tracking.evidence.views import ViewWatch
+from markerless_tracker.tracking.motion import MotionModel
 
 WIDTH, HEIGHT = 96, 80
 CONFIG = TrackerConfig.from_mapping({"threads": 2})
@@ -124,6 +126,15 @@ def test_its_end_is_told_once_with_a_frame(here, backgrounds, images) -> None:
     assert observer.whole(segmented, 1, body).notes == (told,)
     assert observer.whole(segmented, 2, body).notes == ()
     maker.close()
+
+
+def test_views_are_in_the_order_of_the_cameras(here, images) -> None:
+    """Sums over them are the same whatever the caller's order is."""
+    backwards = dict(reversed(images.items()))
+    body = load_body("person32")
+    motion = MotionModel(body.neutral, CONFIG)
+    outlook = Outlook(0, RIG, body, motion, body.limits, searching=True)
+    assert list(here.segment(backwards, 0, outlook)) == list(RIG.names)
 
 
 def test_it_starts_when_the_backgrounds_come(backgrounds, images) -> None:

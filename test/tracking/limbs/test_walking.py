@@ -77,6 +77,18 @@ def test_an_earlier_walk_is_forgotten() -> None:
     assert first == LEAST_WALKED_NS // STEP_NS
 
 
+@pytest.mark.parametrize("step_s, proposes", [(0.53, True), (1.0, True), (2.5, False)])
+def test_frames_that_come_seldom_tell_the_direction(step_s: float, proposes: bool) -> None:
+    watch, found = WalkingWatch(), []
+    for k in range(4):
+        pose, stamp_ns = BODY.neutral.copy(), round(k * step_s * 1e9)
+        pose[BODY.index("pelvis_rz")] = np.pi
+        pose[BODY.index("pelvis_tx")] += k * step_s
+        watch.note(BODY, pose, stamp_ns)
+        found.append(bool(watch.take_due(BODY, pose, BODY.limits, stamp_ns)))
+    assert found == [False, *[proposes] * 3]
+
+
 def test_a_walker_who_is_tracked_sideways_is_turned() -> None:
     scene = SyntheticScene(body="person31", motion="walk", size_px=(328, 245), seed=3)
     body, config = scene.body, TrackerConfig(threads=1)

@@ -72,6 +72,15 @@ def test_what_all_searches_left_is_usual_for_the_frames_that_follow_soon(since_s
         effort.tracked(0.05 + 1.5 * WORSE)
 
 
+def test_what_one_searched_frame_left_is_not_usual_later() -> None:
+    effort, cost = _settled(), 0.05 + 1.5 * WORSE
+    for since_s, wants in ((0.02, True), (0.033, True), (0.02, False), (0.033, True)):
+        effort.begin(1.0, doubt=False, since_s=since_s)
+        assert _wants_swarms(effort, cost) == wants
+        if wants and since_s == 0.02:
+            effort.tracked(cost)
+
+
 def test_reset_forgets_the_usual_cost() -> None:
     effort = _settled()
     effort.reset()

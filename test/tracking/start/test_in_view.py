@@ -64,6 +64,13 @@ def test_a_third_camera_is_waited_for_a_while(body) -> None:
     assert not gate.enough(body, standing(body, 9.0), rig, 9 * PATIENCE_NS)
 
 
+@pytest.mark.parametrize("fps", [1.0, 1.9, 2.0, 30.0])
+def test_a_third_camera_is_waited_for_as_long_at_any_rate(body, fps: float) -> None:
+    gate, rig, aside = InViewGate(), ring_rig(4), standing(body, 2.6)
+    frame = next(k for k in range(100) if gate.enough(body, aside, rig, round(k / fps * 1e9)))
+    assert PATIENCE_NS <= frame / fps * 1e9 + 1 < PATIENCE_NS + 1e9 / fps + 1
+
+
 def test_the_next_person_is_waited_for_as_the_first_was(body) -> None:
     """The first leaves without an empty frame in between: things stay in view."""
     rig, away, aside = ring_rig(4), standing(body, 9.0), standing(body, 2.6)

@@ -44,6 +44,25 @@ def test_the_heading_that_explains_the_frames_better_leads() -> None:
     assert changes([(0.1, 0.08)] * SETTLING_FRAMES) == [SIZED_FROM]
 
 
+def test_a_person_who_turns_keeps_the_heading() -> None:
+    both = TwoHeadings(0.0)
+    for number in range(SETTLING_FRAMES):
+        # 25 degrees a frame: a quick turn at 5 frames/s.
+        heading_rad = math.radians(25.0) * number
+        near = [math.cos(rad - heading_rad) > 0.0 for rad in both.both_rad]
+        assert near == [True, False]
+        both.note(number * FRAME_NS, (fit(0.1), fit(0.13)))
+        assert not both.change()
+        both.follow(heading_rad)
+    assert abs(both.leading_rad - heading_rad) < 0.51
+
+
+def test_poses_that_differ_a_little_do_not_move_the_heading() -> None:
+    both = TwoHeadings(0.3)
+    both.follow(0.6)
+    assert both.leading_rad == 0.3
+
+
 def test_a_small_gain_counts_in_the_end_alone() -> None:
     assert changes([(0.1, 0.095)] * (SETTLING_FRAMES - 1)) == []
     assert changes([(0.1, 0.095)] * SETTLING_FRAMES) == [SETTLING_FRAMES - 1]
