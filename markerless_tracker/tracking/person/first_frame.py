@@ -127,7 +127,7 @@ def _settled(
         np.concatenate([pose, begin]),
         priors=(
             Prior(
-                np.concatenate([body.neutral, begin]),
+                np.concatenate([body.prior_mean, begin]),
                 np.concatenate([1.0 / body.prior_sd**2, 1.0 / (_LENGTH_SD * begin) ** 2]),
             ),
         ),
