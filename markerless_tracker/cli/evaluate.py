@@ -142,8 +142,19 @@ def _lines(found: _Figures) -> list[str]:
         f"MPJPE {_text(more.mpjpe_mm)} mm, PA-MPJPE {_text(more.pa_mpjpe_mm)} mm, PCK "
         f"{_share(more.pck)}",
         f"inside 1, 2, 3 sd: {_shares(figures)}",
-        f"{figures.frames} of {figures.reference_frames} reference frames compared",
+        _compared(found),
     ]
+
+
+def _compared(found: _Figures) -> str:
+    """The numbers of frames; aligned tracks are compared at the result's times."""
+    figures = found.score
+    if found.alignment is None:
+        return f"{figures.frames} of {figures.reference_frames} reference frames compared"
+    return (
+        f"{figures.frames} frames of the result compared; the reference has "
+        f"{figures.reference_frames}"
+    )
 
 
 def _remarks(found: _Figures) -> list[str]:
@@ -162,7 +173,8 @@ def _remarks(found: _Figures) -> list[str]:
         x, y, z = (1000.0 * value for value in moved.translation_m.tolist())
         lines.append(
             f"aligned: rotation {moved.angle_deg:.2f} degrees, translation {x:.1f} {y:.1f} "
-            f"{z:.1f} mm, the reference's clock {1000.0 * moved.offset_s:+.1f} ms"
+            f"{z:.1f} mm, the reference's clock {1000.0 * moved.offset_s:+.1f} ms, rms distance "
+            f"{moved.rms_mm:.1f} mm"
         )
     return lines
 
@@ -196,15 +208,24 @@ def _figures(
         result = _renamed(path, result, names)
     else:
         result, deviations = _stored(path, result)
-    alignment = None
+    alignment = rows = None
     try:
         if args.align:
             alignment = align(result, reference)
+            rows = len(reference)
+            if 0 < args.skip < len(result):
+                rows = alignment.rows_from(int(result.stamps_ns[args.skip]), reference)
             # This tracker's world has a vertical z axis; that of others may lie on its side.
             ours = deviations is not None
             result, reference = alignment.apply(result, reference, into_result=ours)
         return _Figures(
-            score(result, reference, markers_sd_mm=deviations, skip=args.skip),
+            score(
+                result,
+                reference,
+                markers_sd_mm=deviations,
+                skip=args.skip,
+                reference_frames=rows,
+            ),
             measures(result, reference, skip=args.skip),
             alignment,
         )

@@ -93,6 +93,7 @@ def score(
     *,
     markers_sd_mm: FloatArray | None = None,
     skip: int = 0,
+    reference_frames: int | None = None,
 ) -> Score:
     """Compare two tracks, rows by time (within half a frame of the finer one), markers by name.
 
@@ -106,6 +107,8 @@ def score(
             of the world, mm; NaN = unknown.
         skip: number of rows of the result to leave out at its beginning, blank ones included; the
             reference's rows before the first one that is left are left out, too.
+        reference_frames: `Score.reference_frames` of a reference that was interpolated at the
+            result's times; None counts its rows.
 
     Raises:
         DatasetError: no common marker, or no common frame; lists those of each.
@@ -136,7 +139,8 @@ def score(
             f"no common frame: the result covers {_range(result)}, the reference "
             f"{_range(reference)}"
         )
-    first = int(reference_rows[0]) if skip else 0
+    if reference_frames is None:
+        reference_frames = len(reference) - (int(reference_rows[0]) if skip else 0)
     sd_mm = sd_mm[rows][:, [result.names.index(name) for name in names]][compared]
     joint_mm, offset_m = joint_mm[compared], offset_m[compared]
     reference_rows = reference_rows[compared]
@@ -152,7 +156,7 @@ def score(
         max_mm=float(frame_mm.max()),
         worst_joint_mm=float(np.nanmax(joint_mm)),
         frames=len(frame_mm),
-        reference_frames=len(reference) - first,
+        reference_frames=reference_frames,
         frame_mm=frame_mm,
         joints=joints,
         limbs_mm=_mean_of_frames(joint_mm[:, limbs]),

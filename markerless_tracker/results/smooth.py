@@ -38,6 +38,8 @@ _VARIANCE_RATIO = 10.0
 _UNKNOWN_SD = 0.02
 _TURN_RAD, _TURN_DEG = 2.0 * np.pi, 360.0
 _STEP = 1e-6
+# Stamps are rounded: gaps longer by less than that count as equally long.
+_TIME_TOLERANCE_S = 1e-6
 
 
 @dataclass(frozen=True)
@@ -239,7 +241,7 @@ def _runs(times_s: FloatArray, known: NDArray[np.bool_], gap_s: float) -> Iterat
     rows = np.flatnonzero(known)
     if not rows.size:
         return
-    breaks = np.flatnonzero(np.diff(times_s[rows]) > gap_s)
+    breaks = np.flatnonzero(np.diff(times_s[rows]) > gap_s + _TIME_TOLERANCE_S)
     firsts = rows[np.concatenate([[0], breaks + 1])]
     lasts = rows[np.concatenate([breaks, [rows.size - 1]])]
     for first, last in zip(firsts.tolist(), lasts.tolist(), strict=True):
@@ -253,7 +255,7 @@ def _short_gaps(times_s: FloatArray, known: NDArray[np.bool_], fill_s: float) ->
     if rows.size < 2:
         return np.zeros_like(known)
     duration = times_s[rows[after]] - times_s[rows[after - 1]]
-    return np.asarray(~known & (duration <= fill_s + 1e-9))
+    return np.asarray(~known & (duration <= fill_s + _TIME_TOLERANCE_S))
 
 
 def _smoothed_columns(

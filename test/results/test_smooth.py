@@ -143,6 +143,14 @@ def test_gaps_are_filled_on_request_only_and_marked(tmp_path: Path) -> None:
     assert not stored.track.tracked[lost].any(), "evaluate compares no filled frame"
 
 
+@pytest.mark.parametrize("first", (20, 33))
+def test_a_gap_of_exactly_the_longest_duration_is_filled(tmp_path: Path, first: int) -> None:
+    """Between the tracked frames beside 29 lost ones lies half a second, but for rounding."""
+    name = write(tmp_path / "out", true_poses(), range(first, first + 29))
+    assert smooth_result(name, Smoothing(None, 0.5)) == 29
+    assert smooth_result(name, Smoothing(None, 0.49)) == 0
+
+
 def test_nothing_is_smoothed_across_a_long_gap(tmp_path: Path, noisy) -> None:
     noisy[45:, ELBOW] += 1.0
     name = write(tmp_path / "out", noisy, range(20, 45))

@@ -19,6 +19,8 @@ _GAP_PERIODS = 1.5
 _LEAST_SPREAD_M = 1e-3
 # Fractions of the result's period at which the residual is compared about the coarse offset.
 _FINE = np.arange(-8, 9) / 4.0
+# Times that differ by less are the same, s.
+_SAME_S = 1e-6
 # Speeds that differ by less from their mean (m/s) show no time offset.
 _LEAST_SPEED_SD = 0.02
 
@@ -79,6 +81,11 @@ class Alignment:
             MarkerTrack(reference.names, stamps_ns, at),
         )
 
+    def rows_from(self, result_ns: int, reference: MarkerTrack) -> int:
+        """Number of the reference's rows from a stamp of the result's clock on."""
+        from_s = result_ns / 1e9 + self.offset_s
+        return int((reference.stamps_ns / 1e9 >= from_s - _SAME_S).sum())
+
 
 def align(result: MarkerTrack, reference: MarkerTrack) -> Alignment:
     """Find the rigid transform between the worlds' axes and the offset between the clocks.
@@ -92,8 +99,8 @@ def align(result: MarkerTrack, reference: MarkerTrack) -> Alignment:
         reference: the track that it is to be compared with.
 
     Raises:
-        DatasetError: no common marker, fewer than 10 common rows, or all positions on one line,
-            about which the rotation is unknown.
+        DatasetError: no common marker, fewer than 10 common rows, too few rows in common at every
+            offset, or all positions on one line, about which the rotation is unknown.
     """
     result, reference = result.with_pelvis(), reference.with_pelvis()
     names = [name for name in reference.names if name in result.names]
@@ -155,7 +162,7 @@ def _near(own: FloatArray, times_s: FloatArray) -> NDArray[np.bool_]:
     """(k, 1, 1) whether a time is that of a row, to the microsecond."""
     after = np.searchsorted(own, times_s).clip(1, len(own) - 1)
     gap = np.minimum(np.abs(own[after] - times_s), np.abs(own[after - 1] - times_s))
-    return np.asarray((gap < 1e-6)[:, None, None])
+    return np.asarray((gap < _SAME_S)[:, None, None])
 
 
 def _common_points(
@@ -192,12 +199,19 @@ def _rms(result: MarkerTrack, reference: MarkerTrack, offset_s: float) -> float:
 def _coarse_offset(result: MarkerTrack, reference: MarkerTrack, period: float) -> float:
     """Offset at which the markers' speeds agree best: about 0 or about equal beginnings.
 
-    0 where too little moves.
+    An offset is possible if half of the speeds of the shorter track are compared there. 0 where too
+    little moves.
+
+    Raises:
+        DatasetError: something moves, but no offset is possible.
     """
     times = result.stamps_ns / 1e9
     own = _speeds(result.positions_m, period)
     if not np.nanstd(own) > _LEAST_SPEED_SD:
         return 0.0
+    first_s, last_s = reference.stamps_ns[[0, -1]] / 1e9
+    whole = _speeds(interpolated(reference, np.arange(first_s, last_s, period)), period)
+    least = 0.5 * min(np.isfinite(own).sum(), np.isfinite(whole).sum())
     steps = int(MOST_OFFSET_S / period)
     best, offset = -np.inf, 0.0
     # Clocks may begin anywhere: equal beginnings are a second guess.
@@ -206,9 +220,14 @@ def _coarse_offset(result: MarkerTrack, reference: MarkerTrack, period: float) -
         for step in sorted(range(-steps, steps + 1), key=abs):
             shift = about + step * period
             other = _speeds(interpolated(reference, times + shift), period)
-            agreement = _correlation(own, other, 0.5 * own.size)
+            agreement = _correlation(own, other, least)
             if agreement > best + 1e-9:
                 best, offset = agreement, shift
+    if not np.isfinite(best):
+        raise DatasetError(
+            "cannot align: at no time offset is half of the result's or the reference's motion in "
+            f"common, expected one within {MOST_OFFSET_S:g} s of equal clocks or equal beginnings"
+        )
     return offset
 
 

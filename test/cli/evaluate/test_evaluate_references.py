@@ -96,12 +96,19 @@ def test_worlds_and_clocks_are_aligned(found, tmp_path, capsys, offset_s, rate) 
     summary = figures(capsys, found, other, "--align")
     aligned = summary["alignment"]
     assert summary["mean_mm"] < 1.0 and summary["frames"] == 120
+    assert summary["reference_frames"] == len(stamps)
     expected = offset_s + 2.0 * (offset_s < 0)
+    skipped = figures(capsys, found, other, "--align", "--skip", "60")
+    rest = np.count_nonzero(stamps / 1e9 > 1.0 + expected - 0.002)
+    assert skipped["frames"] == 60 and abs(skipped["reference_frames"] - rest) <= 1
     assert aligned["time_offset_s"] == pytest.approx(expected, abs=0.001)
     np.testing.assert_allclose(aligned["rotation"], ROTATION, atol=0.001)
     np.testing.assert_allclose(aligned["translation_mm"], 1000.0 * SHIFT_M, atol=1.0)
     assert main(["evaluate", found, other, "--align"]) == 0
-    assert "aligned: rotation 68.03 degrees" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "aligned: rotation 68.03 degrees" in out
+    assert f"rms distance {aligned['rms_mm']:.1f} mm" in out
+    assert f"120 frames of the result compared; the reference has {len(stamps)}" in out
 
 
 def test_alignment_removes_no_error_of_single_frames(found, tmp_path: Path, capsys) -> None:

@@ -40,6 +40,29 @@ def test_one_clock_needs_no_equal_beginnings() -> None:
     assert found.rms_mm < 1.0
 
 
+@pytest.mark.parametrize("shown", [slice(300, 700), slice(800, 1200)])
+def test_less_than_half_of_the_result_may_be_compared(shown: slice) -> None:
+    """The result has blank rows, or the reference is shorter."""
+    whole = motion()
+    blank = np.full_like(whole, np.nan)
+    blank[shown] = whole[shown]
+    for pair in (
+        (track(blank), track(whole, 0.35)),
+        (track(whole), track(whole, 0.35).rows(shown)),
+    ):
+        found = align(*pair)
+        assert found.offset_s == pytest.approx(0.35, abs=1e-3)
+        assert found.rms_mm < 1.0
+
+
+def test_motion_without_enough_rows_in_common_is_refused() -> None:
+    one, other = motion(), motion()
+    one[400:1100], other[:400] = np.nan, np.nan
+    other[1150:] = np.nan
+    with pytest.raises(DatasetError, match="at no time offset is half of the result's or the ref"):
+        align(track(one), track(other))
+
+
 @pytest.mark.parametrize("flat", ["result", "reference"])
 def test_positions_on_one_line_show_no_rotation_about_it(flat: str) -> None:
     walk = np.zeros((1200, 1, 3))
