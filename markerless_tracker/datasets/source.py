@@ -137,10 +137,18 @@ def trials_at(path: Path) -> list[Path]:
     return found if len(found) > 1 else [path]
 
 
+def session_folder(path: Path) -> Path:
+    """The folder with the files of a trial that is named by one of them, else the path itself."""
+    kind = detect_format(path)
+    if kind == "humaneva":
+        return humaneva.subject_folder(path)
+    return path.parent.parent if kind in _TRIALS and path.is_file() else path
+
+
 def calibration_beside(path: Path) -> Path | None:
     """A calibration outside of a recording's folder that it uses, file or folder; None without."""
     kind = detect_format(path)
-    session = path.parent.parent if path.is_file() else path
+    session = session_folder(path)
     if kind == "anipose":
         return anipose.calibration_file(session)
     if kind == "humaneva":

@@ -24,8 +24,8 @@ from markerless_tracker.errors import DatasetError
 from markerless_tracker.records import TrackResult, TrackState
 from markerless_tracker.results.appended import not_written
 from markerless_tracker.results.journal import Journal
+from markerless_tracker.results.target import SUBJECT, earlier_files, path_of, segments
 from markerless_tracker.results.target import check_target as check_target
-from markerless_tracker.results.target import earlier_files, path_of, segments
 from markerless_tracker.results.trc_stream import TrcStream
 from markerless_tracker.tracking import TrackerConfig
 
@@ -63,8 +63,8 @@ class ResultWriter:
         not_written: frames that the disk had no room for.
 
     Raises:
-        DatasetError: the files cannot be written, or there is an earlier result and `overwrite` is
-            not set; found out at once.
+        DatasetError: the files cannot be written, or there is an earlier result or subject file and
+            `overwrite` is not set; found out at once.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class ResultWriter:
         self.trc_path = path_of(name, ".trc")
         self.json_path = path_of(name, ".json")
         self.journal_path = path_of(name, ".jsonl")
-        self.subject_path = path_of(name, ".subject.yaml")
+        self.subject_path = path_of(name, SUBJECT)
         self._earlier = earlier_files(name)
         check_target(name, overwrite=overwrite)
         self.body = body

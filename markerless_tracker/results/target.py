@@ -5,6 +5,8 @@ from pathlib import Path
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.results.appended import make_folder_of
 
+SUBJECT = ".subject.yaml"
+"""Suffix of the file with the sizes of the tracked body."""
 _SUFFIXES = (".trc", ".json", ".jsonl")
 _HEADER_LINES = 5
 
@@ -22,7 +24,7 @@ def result_name(text: str) -> Path:
 
 
 def earlier_files(name: Path) -> list[Path]:
-    """Files of an earlier result of that name."""
+    """Files of an earlier result of that name, without NAME.subject.yaml."""
     paths = (path_of(name, suffix) for suffix in _SUFFIXES)
     return [path for path in paths if path.exists()]
 
@@ -36,11 +38,13 @@ def check_target(name: Path, *, overwrite: bool, allow: str = "`overwrite`") -> 
         allow: what allows it, for the message.
 
     Raises:
-        DatasetError: it cannot, or there is an earlier result with frames and `overwrite` is not
-            set.
+        DatasetError: it cannot, or there is an earlier result with frames or a subject file, and
+            `overwrite` is not set.
     """
-    earlier = earlier_files(name)
-    if earlier and not overwrite and not _without_frames(path_of(name, ".trc")):
+    earlier = [] if _without_frames(path_of(name, ".trc")) else earlier_files(name)
+    if (subject := path_of(name, SUBJECT)).exists():
+        earlier.append(subject)
+    if earlier and not overwrite:
         raise DatasetError(f"{earlier[0]}: exists already, expected a new name or {allow}")
     for suffix in _SUFFIXES:
         make_folder_of(path_of(name, suffix))

@@ -193,7 +193,7 @@ def test_an_earlier_result_stays_until_the_first_row(tmp_path, body, config):
     assert not (tmp_path / "out.2.trc").exists()
 
 
-@pytest.mark.parametrize("suffix", ["trc", "json", "jsonl"])
+@pytest.mark.parametrize("suffix", ["trc", "json", "jsonl", "subject.yaml"])
 def test_an_earlier_result_is_not_replaced_unasked(tmp_path, body, config, suffix):
     (tmp_path / f"out.{suffix}").write_text("earlier")
     with pytest.raises(DatasetError, match=rf"out.{suffix}: exists already"):
@@ -304,6 +304,14 @@ def test_a_marker_file_that_is_no_part_of_a_result_is_kept(tmp_path, body, confi
     with ResultWriter(tmp_path / "walk", body, config, fps=60.0) as writer:
         writer.add(result(10))
     assert (tmp_path / "walk.2.trc").read_text() == "reference"
+
+
+def test_a_subject_file_beside_a_result_without_frames_is_kept(tmp_path, body, config):
+    ResultWriter(tmp_path / "out", body, config, fps=60.0).close()
+    (tmp_path / "out.subject.yaml").write_text("mine")
+    with pytest.raises(DatasetError, match=r"out\.subject\.yaml: exists already"):
+        ResultWriter(tmp_path / "out", body, config, fps=60.0, overwrite=False)
+    assert (tmp_path / "out.subject.yaml").read_text() == "mine"
 
 
 def test_a_result_without_frames_does_not_block_the_next_run(tmp_path, body, config):

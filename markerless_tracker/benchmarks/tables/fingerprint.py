@@ -14,7 +14,8 @@ from typing import Any
 import markerless_tracker
 from markerless_tracker.datasets.folder import CALIBRATION
 from markerless_tracker.datasets.recording import BACKGROUND
-from markerless_tracker.datasets.source import calibration_beside
+from markerless_tracker.datasets.source import calibration_beside, session_folder
+from markerless_tracker.datasets.truth import truth_path
 from markerless_tracker.resources import config_dir
 from markerless_tracker.results.result import versions
 
@@ -31,24 +32,27 @@ def recording_key(path: Path, *, without: Path | None = None) -> str:
     """Key of a recording: names, sizes and modification times of its files.
 
     Args:
-        path: the folder, links in it included, or a file: the calibration and the background
-            beside it belong to it. A calibration elsewhere that it uses counts as well.
+        path: the folder, links in it included, or a bag's file: the calibration, the background
+            and the reference markers beside it belong to it. To a trial that is named by one of
+            its files belongs the whole session. A calibration elsewhere that it uses counts as
+            well.
         without: a folder in it that is left out, such as that of the results; not the recording
             itself.
 
     Raises:
         OSError: there is no such file, or it cannot be read.
     """
-    if path.is_dir():
-        files = list(_files(path, without))
+    session = session_folder(path)
+    if session.is_dir():
+        files = list(_files(session, without))
     else:
-        beside = path.parent / CALIBRATION
-        files = [path, *([beside] if beside.is_file() else [])]
+        beside = (path.parent / CALIBRATION, truth_path(path))
+        files = [path, *(file for file in beside if file.is_file())]
         files += _files(path.parent / BACKGROUND, without)
     shared = calibration_beside(path)
     if shared is not None:
         files += [shared] if shared.is_file() else _files(shared, without)
-    stated = []
+    stated: list[Any] = [os.path.relpath(path, session)]
     for file in files:
         status = file.stat()
         place = Path(os.path.relpath(file, path.parent)).as_posix()

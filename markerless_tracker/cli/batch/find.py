@@ -9,7 +9,7 @@ from markerless_tracker.datasets.source import trials_at
 from markerless_tracker.errors import DatasetError
 
 
-def find_recordings(source: Path) -> dict[str, Path]:
+def find_recordings(source: Path, *, without: Path | None = None) -> dict[str, Path]:
     """Name -> absolute path of every recording, in order of the names (of the lines of a list).
 
     A folder is searched recursively, except hidden folders and the content of recordings. Each
@@ -18,12 +18,17 @@ def find_recordings(source: Path) -> dict[str, Path]:
     out; the other paths are recordings, whether they exist or not. A name is the path relative to
     the folder (to the longest common folder of a list), without the suffix of a file.
 
+    Args:
+        source: the folder or list.
+        without: a folder that is not searched, such as that of the results; not the source itself.
+
     Raises:
         DatasetError: there is no such folder or list, or no recording in it.
     """
     if source.is_dir():
         base = Path(os.path.abspath(source))
-        found = sorted(_below(base, set()))
+        left_out = set() if without is None else {os.path.realpath(without)}
+        found = sorted(_below(base, left_out - {os.path.realpath(base)}))
         base = base.parent if found == [base] else base
     elif source.suffix == ".mcap" and source.is_file():
         found = [Path(os.path.abspath(source))]

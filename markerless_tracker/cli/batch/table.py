@@ -14,7 +14,7 @@ Row = Mapping[str, Any]
 
 COLUMNS = (
     "name", "status", "found", "frames", "tracked", "overlap", "mean_mm", "disagree", "warnings",
-    "seconds", "error", "reference_problem", "source",
+    "seconds", "error", "reference_problem", "calibration_problem", "source",
 )  # fmt: skip
 CSV = "summary.csv"
 JSON = "summary.json"

@@ -21,7 +21,7 @@ import cv2
 from markerless_tracker.cli.terminal.notices import COMPILING, Notices
 from markerless_tracker.cli.track import Finished, track_source
 from markerless_tracker.datasets import read_trc
-from markerless_tracker.errors import TrackerError, one_line
+from markerless_tracker.errors import CalibrationError, TrackerError, one_line
 from markerless_tracker.results.score import score
 from markerless_tracker.results.stored import stored_frames
 from markerless_tracker.results.target import earlier_files
@@ -59,10 +59,17 @@ class Trial:
         """The record of this name; None without a readable one."""
         try:
             found = json.loads(self.record.read_text(encoding="utf-8"))
-            files = tuple(str(name) for name in found["files"])
-            return Record(str(found["key"]), dict(found["row"]), files)
+            return Record(str(found["key"]), dict(found["row"]), self.written())
         except (OSError, ValueError, KeyError, TypeError):
             return None
+
+    def written(self) -> tuple[str, ...]:
+        """Names of the files that the record lists, of an incomplete result as well."""
+        try:
+            found = json.loads(self.record.read_text(encoding="utf-8"))
+            return tuple(str(name) for name in found["files"])
+        except (OSError, ValueError, KeyError, TypeError):
+            return ()
 
     def done(self) -> "Record | None":
         """The record of this very trial, if it is done and its files are there."""
@@ -87,7 +94,9 @@ def do_trial(trial: Trial) -> dict[str, Any]:
     A trial that is done already is not repeated. Keys: `name`, `source`, `status` (done or failed),
     `found`, `frames`, `tracked`, `overlap` (mean over the cameras of the median overlap), `mean_mm`
     (error against the recording's reference markers, None without any), `reference_problem` (why it
-    is None in spite of markers), `disagree` (names of cameras), `warnings`, `seconds`, `error`.
+    is None in spite of markers), `calibration_problem` (why a requested refinement of the
+    calibration was refused, None if none was), `disagree` (names of cameras), `warnings`,
+    `seconds`, `error`.
     """
     clock = _Clock()
     stored = trial.stored()
@@ -111,6 +120,7 @@ def do_trial(trial: Trial) -> dict[str, Any]:
         "overlap": round(fmean(overlap), 3) if overlap else None,
         "mean_mm": mean_mm,
         "reference_problem": problem,
+        "calibration_problem": _calibration_problem(finished),
         "disagree": [name for name, one in summary["cameras"].items() if one["disagrees"]],
         "warnings": len(summary["warnings"]) + len(summary["frame_warnings"]),
         "seconds": round(seconds, 2),
@@ -126,8 +136,9 @@ def do_trial(trial: Trial) -> dict[str, Any]:
 def failed(trial: Trial, error: str, seconds: float | None = None) -> dict[str, Any]:
     """Row of a trial that failed after some seconds with an error of one line."""
     nothing = dict.fromkeys(
-        ("found", "frames", "tracked", "overlap", "mean_mm", "reference_problem")
-    )
+        ("found", "frames", "tracked", "overlap", "mean_mm", "reference_problem",
+         "calibration_problem")
+    )  # fmt: skip
     return {
         "name": trial.name, "source": str(trial.source), "status": "failed", **nothing,
         "disagree": [], "warnings": 0,
@@ -193,6 +204,13 @@ def _mean_error(trial: Trial, finished: Finished) -> tuple[float | None, str | N
         # The result itself is complete.
         return None, one_line(error)
     return round(found.mean_mm, 2), None
+
+
+def _calibration_problem(finished: Finished) -> str | None:
+    """Why the refinement of the calibration was refused; None without a tracked person."""
+    if isinstance(finished.refined, CalibrationError) and finished.summary["tracked"]:
+        return one_line(finished.refined)
+    return None
 
 
 def _write(path: Path, content: Mapping[str, Any]) -> None:

@@ -24,7 +24,7 @@ from markerless_tracker.cli.track import NO_PERSON_FOUND
 from markerless_tracker.cli.track_arguments import add_options
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.libraries import usable_cores
-from markerless_tracker.results.target import earlier_files, path_of
+from markerless_tracker.results.target import SUBJECT, earlier_files, path_of
 
 HELP = (
     "Track the person in every recording of a folder (at any depth) or of a list (a text file with "
@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track; returns 0, 1 if recordings failed, or 3 if no person was found in all of them."""
-    found = find_recordings(args.source)
+    found = find_recordings(args.source, without=args.out)
     cores = usable_cores()
     jobs = min(args.jobs or cores, len(found))
     trials = plan(args, found, threads=1 if args.scheduler else max(1, cores // jobs))
@@ -125,6 +125,9 @@ def _done(
                 warn(bars.console, f"{trial.name} failed: {row['error']}")
             elif row["reference_problem"] is not None:
                 warn(bars.console, f"{trial.name}: no error in mm: {row['reference_problem']}")
+            if row["calibration_problem"] is not None:
+                refined = trial.arguments["refine_calibration"]
+                warn(bars.console, f"{refined}: not written: {row['calibration_problem']}")
             if row["overlap"] is not None:
                 bars.update(task, note=f"overlap {row['overlap']:.2f}")
             bars.advance(task)
@@ -132,7 +135,10 @@ def _done(
 
 
 def _check_targets(missing: Sequence[Trial]) -> None:
-    """Check that no result of other settings, and no other calibration, would be replaced."""
+    """Check that nothing would be replaced that is not of this batch.
+
+    That is a result of other settings, a calibration or a subject file.
+    """
     for trial in missing:
         refined = trial.arguments["refine_calibration"]
         if refined is not None and refined.exists() and not trial.record.exists():
@@ -140,6 +146,12 @@ def _check_targets(missing: Sequence[Trial]) -> None:
         target = trial.out / trial.name
         there, stored = earlier_files(target), trial.stored()
         other = stored is not None and stored.key != trial.key
+        subject = path_of(target, SUBJECT)
+        if subject.exists() and subject.name not in trial.written():
+            raise DatasetError(
+                f"{subject}: exists already and is of no result of this batch, expected another "
+                "OUT or --force"
+            )
         if other or (there and not trial.record.exists()):
             path = there[0] if there else path_of(target, ".json")
             raise DatasetError(

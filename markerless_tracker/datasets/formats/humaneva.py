@@ -150,9 +150,14 @@ class HumanEvaRecording(VideoRecording):
 
 def is_humaneva(path: Path) -> bool:
     """Whether a path is a subject's folder, or the images of a camera in it."""
-    if path.parent.name == _IMAGES and _NAME.fullmatch(_stem(path)):
-        path = path.parent.parent
-    return (path / _IMAGES).is_dir() and (path / CALIBRATION).is_dir()
+    subject = subject_folder(path)
+    return (subject / _IMAGES).is_dir() and (subject / CALIBRATION).is_dir()
+
+
+def subject_folder(path: Path) -> Path:
+    """The folder above the images of a camera; the path itself if it names no such images."""
+    of_camera = path.parent.name == _IMAGES and _NAME.fullmatch(_stem(path))
+    return path.parent.parent if of_camera else path
 
 
 def trials(path: Path) -> list[Path]:

@@ -62,12 +62,44 @@ def test_a_link_to_the_folder_around_it_is_followed_once(walk: Path) -> None:
     assert recording_key(walk) == recording_key(walk)
 
 
-@pytest.mark.parametrize("name", ["calibration.toml", "background/cam01.png"])
+@pytest.mark.parametrize("name", ["calibration.toml", "background/cam01.png", "ground_truth.trc"])
 def test_the_key_of_a_bags_file_depends_on_what_is_read_beside_it(walk: Path, name) -> None:
     key = recording_key(walk / "bag.mcap")
     assert recording_key(walk / "bag.mcap") == key
     (walk / name).write_text("another one")
     assert recording_key(walk / "bag.mcap") != key
+
+
+TRIALS = {
+    "anipose": ("calibration/calibration.toml", "videos-raw/a_cam1.mp4", "videos-raw/a_cam2.mp4"),
+    "human36m": ("metadata.xml", "Videos/Eat.54138969.mp4", "Videos/Eat.55011271.mp4"),
+    "humaneva": ("Calibration_Data/C1.cal", "Image_Data/Walk_(C1).avi", "Mocap_Data/Walk.c3d"),
+    "images": ("Calibration_Data/C1.cal", "Image_Data/Walk_(C1)/1.png", "Sync_Data/Walk_(C2).ofs"),
+}
+"""Calibration, images that name the trial and another file of it; in a session's folder."""
+
+
+@pytest.mark.parametrize("names", TRIALS.values(), ids=TRIALS)
+def test_the_key_of_a_trial_depends_on_the_whole_session(tmp_path: Path, names) -> None:
+    session = tmp_path / "S1"
+    for name in names:
+        (session / name).parent.mkdir(parents=True, exist_ok=True)
+        (session / name).write_text("before")
+    named = session.joinpath(*Path(names[1]).parts[:2])
+    key = recording_key(named)
+    assert recording_key(named) == key
+    for name in names[::2]:
+        (session / name).write_text("afterwards")
+        assert recording_key(named) != key
+        key = recording_key(named)
+
+
+def test_trials_of_a_session_have_keys_of_their_own(tmp_path: Path) -> None:
+    for name in ("calibration/calibration.toml", "videos-raw/a_cam1.mp4", "videos-raw/b_cam1.mp4"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("content")
+    one, other = (recording_key(tmp_path / "videos-raw" / f"{name}_cam1.mp4") for name in "ab")
+    assert one != other
 
 
 def test_a_recording_key_leaves_out_a_folder(walk: Path) -> None:

@@ -35,6 +35,14 @@ def test_a_folder_is_searched_to_any_depth(tmp_path: Path) -> None:
     assert find_recordings(walk) == {"walk": walk}
 
 
+def test_the_folder_of_the_results_is_not_searched(tmp_path: Path) -> None:
+    walk = folder(tmp_path / "walk")
+    other = folder(tmp_path / "out" / "walk")
+    assert find_recordings(tmp_path, without=tmp_path / "out") == {"walk": walk}
+    found = find_recordings(tmp_path / "out", without=tmp_path / "out")
+    assert found == {"walk": other}
+
+
 def test_loose_bag_files_are_recordings_of_their_own(tmp_path: Path) -> None:
     loose = bag(tmp_path / "day", "one.mcap", "two.mcap", described=False)
     one, two = loose / "one.mcap", loose / "two.mcap"

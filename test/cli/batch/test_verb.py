@@ -168,7 +168,7 @@ def test_mistakes_cost_no_time(trials, options, tmp_path, capsys, extra, message
     assert message in err and err.splitlines()[-1].startswith("markerless_tracker: error: ")
 
 
-@pytest.mark.parametrize("ending", ["trc", "json", "jsonl"])
+@pytest.mark.parametrize("ending", ["trc", "json", "jsonl", "subject.yaml"])
 def test_a_result_of_somebody_else_is_not_replaced(
     trials, options, tmp_path, capsys, ending: str
 ) -> None:
@@ -192,3 +192,18 @@ def test_a_calibration_of_somebody_else_is_not_replaced(trials, options, tmp_pat
     assert call(trials, *words) == 1
     assert "one.toml: exists already, expected a new name or --force" in capsys.readouterr().err
     assert mine.read_text(encoding="utf-8") == "# mine"
+
+
+def test_a_refused_refinement_of_the_calibration_is_reported(
+    trials, options, tmp_path, capsys
+) -> None:
+    shutil.rmtree(trials / "b")
+    shutil.rmtree(trials / "a" / "two")
+    shutil.move(trials / "a" / "one", trials / "one")
+    words = [*options, "--refine-calibration", tmp_path / "{name}.toml", "--json"]
+    assert call(trials, "-o", trials / "out", *words) == 0
+    out, err = capsys.readouterr()
+    (row,) = json.loads(out)["trials"]
+    assert row["status"] == "done" and row["calibration_problem"].startswith("the person hardly")
+    assert "one.toml: not written: the person hardly moves" in err
+    assert not (tmp_path / "one.toml").exists()
