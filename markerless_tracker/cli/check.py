@@ -13,6 +13,7 @@ from rich.markup import escape
 from markerless_tracker.checks.finding import GREEN, RED, YELLOW, Finding
 from markerless_tracker.checks.recording import check_recording
 from markerless_tracker.cli.terminal.bars import progress_bars
+from markerless_tracker.cli.track_arguments import add_format, add_world, reading_options
 from markerless_tracker.datasets import open_recording
 
 HELP = (
@@ -30,15 +31,16 @@ _MARKS = {GREEN: "[green]ok  [/green]", YELLOW: "[yellow]look[/yellow]", RED: "[
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "source", metavar="SOURCE", type=Path, help="recording folder, Pose2Sim project or bag"
+        "source", metavar="SOURCE", type=Path, help="recording folder, bag or other recording"
     )
-    parser.add_argument("--input-fps", type=float, metavar="N", help="rate of numbered images, 1/s")
+    add_format(parser)
+    add_world(parser)
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Check; returns 0, or 3 if a finding is red."""
-    recording = open_recording(args.source, input_fps=args.input_fps)
+    recording = open_recording(args.source, **reading_options(args))
     with progress_bars() as bars:
         task = bars.add_task(f"reading {recording.name}", total=None)
         found = check_recording(

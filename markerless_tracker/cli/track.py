@@ -279,6 +279,7 @@ def _track(
             start_given=args.start is not None,
         )
         writer.note({"cameras": _cameras(shifts), "verdict": verdict.as_mapping()})
+        writer.note({"recording": recording.name})
         writer.note({"scale": args.scale, "reading": reading_options(args)})
         if offsets_s is not None:
             writer.note({"time_offsets_s": dict(offsets_s)})

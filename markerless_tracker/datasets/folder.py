@@ -6,7 +6,7 @@ from pathlib import Path
 from markerless_tracker.camera import CameraRig, read_calibration
 from markerless_tracker.datasets.recording import FrameSet, Recording
 from markerless_tracker.datasets.video.decode import read_together
-from markerless_tracker.datasets.video.images import find_stream, open_stream
+from markerless_tracker.datasets.video.images import ImageStream, find_stream, open_stream
 from markerless_tracker.datasets.video.masks import masks_by_frame, read_mask
 from markerless_tracker.datasets.video.numbering import check_numbers
 from markerless_tracker.datasets.video.rates import stamp_of
@@ -99,6 +99,7 @@ class VideoRecording(Recording):
                     )
                 self._warn_of_end(ended, max(index - every, 0))
                 return
+            self._warn_of_pace(streams)
             yield FrameSet(
                 index,
                 stamp_of(index, self.fps),
@@ -117,6 +118,16 @@ class VideoRecording(Recording):
                 f"{self.name}: {', '.join(ended)} ends after frame {last}, before the other "
                 "cameras; the recording ends there"
             )
+
+    def _warn_of_pace(self, streams: Mapping[str, ImageStream]) -> None:
+        """Warn once of each camera whose video has no constant rate."""
+        for name, stream in streams.items():
+            if stream.uneven is not None:
+                self.warn(
+                    f"{self.name}: {name}: variable frame rate: frame {stream.uneven.frame} is "
+                    f"{1000.0 * stream.uneven.late_s:+.0f} ms beside the constant rate of its "
+                    "file, expected a video of constant rate: stamps are wrong from there on"
+                )
 
     def _nearest(self, stamp_ns: int) -> tuple[int, int]:
         index = max(round(stamp_ns * self.fps / 1e9), 0)

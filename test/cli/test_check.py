@@ -123,6 +123,25 @@ def test_cameras_that_see_the_floor_too_near_and_other_units(
     assert "translation" in capsys.readouterr().err
 
 
+def test_a_calibration_in_other_axes_and_units_is_read_as_track_reads_it(
+    tmp_path: Path, scene, frames, capsys
+) -> None:
+    path = written(tmp_path / "mm", scene, frames[:12], {})
+    status, expected = checked(path, capsys)
+    calibration = path / "calibration.toml"
+    text = calibration.read_text(encoding="utf-8")
+    lines = [
+        f"translation = {[1000.0 * float(x) for x in line.split('=')[1].strip(' []').split(',')]}"
+        if line.startswith("translation")
+        else line
+        for line in text.splitlines()
+    ]
+    calibration.write_text("\n".join(lines), encoding="utf-8")
+    words = ["check", str(path), "--json", "--units", "mm", "--format", "folder", "--up=z"]
+    assert main(words) == status
+    assert json.loads(capsys.readouterr().out)["findings"] == expected
+
+
 def test_the_middle_of_the_floor_is_what_all_cameras_look_at() -> None:
     rig = ring_rig(4, target_m=(0.7, -0.4, 0.9))
     np.testing.assert_allclose(floor_middle(rig), [0.7, -0.4, 0.0], atol=0.05)

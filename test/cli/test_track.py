@@ -84,6 +84,7 @@ def test_a_recording_becomes_markers_and_a_summary(track, walk, tmp_path):
     used = TrackerConfig.from_mapping(data["settings"])
     assert used == TrackerConfig.from_mapping(SEARCH)
     assert data["source"] == str(walk.resolve()) and data["scale"] == 1.0
+    assert data["recording"] == walk.name
     assert data["reading"] == {"format": None, "input_fps": None, "up": "z", "units": "m"}
     assert [frame["evaluations"] for frame in data["frames"]] == [200] * FRAMES
 

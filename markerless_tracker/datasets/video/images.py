@@ -6,6 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from markerless_tracker.datasets.video.pace import Pace, Uneven
 from markerless_tracker.datasets.video.rates import tidy_fps
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image
@@ -38,6 +39,11 @@ class ImageStream(ABC):
     def skip(self) -> bool:
         """Pass over the next image; False at the end."""
 
+    @property
+    def uneven(self) -> Uneven | None:
+        """The first image found beside a constant rate; None without, or if no times are stored."""
+        return None
+
     def close(self) -> None:
         """Release the source."""
         return
@@ -66,6 +72,8 @@ class VideoStream(ImageStream):
         self.size_px = (int(first.shape[1]), int(first.shape[0]))
         rate = float(self._capture.get(cv2.CAP_PROP_FPS))
         self.fps = tidy_fps(rate) if 0.0 < rate < 1e5 else None
+        self._pace = Pace(rate if self.fps is not None else None)
+        self._timed()
         # OpenCV gives 0, a negative number or NaN where the container holds no duration.
         count = float(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
         self.frame_count = int(count) if 1.0 <= count < 2**62 else None
@@ -76,18 +84,32 @@ class VideoStream(ImageStream):
         if image is not None:
             return image
         got, decoded = self._capture.read()
-        return np.asarray(decoded, dtype=np.uint8) if got and decoded is not None else None
+        if not got or decoded is None:
+            return None
+        self._timed()
+        return np.asarray(decoded, dtype=np.uint8)
 
     def skip(self) -> bool:
         """Pass over the next image; False at the end."""
         if self._first is not None:
             self._first = None
             return True
-        return bool(self._capture.grab())
+        grabbed = bool(self._capture.grab())
+        if grabbed:
+            self._timed()
+        return grabbed
+
+    @property
+    def uneven(self) -> Uneven | None:
+        """As of every stream."""
+        return self._pace.uneven
 
     def close(self) -> None:
         """Release the decoder."""
         self._capture.release()
+
+    def _timed(self) -> None:
+        self._pace.add(float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) / 1000.0)
 
 
 class NumberedImages(ImageStream):

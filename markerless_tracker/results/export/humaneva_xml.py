@@ -35,7 +35,8 @@ _FRAMES = {("S2", "Combo", "1"): (1, 1202), ("S4", "Combo", "4"): (2, 1258)}
 def write_humaneva(path: Path, reader: ResultReader, names: tuple[str, ...]) -> None:
     """Write the frames with a pose: the twenty points in mm, world frame with z up.
 
-    The subject, action and trial are read from the name of the result's source, such as S2_Combo_1.
+    The subject, action and trial are read from the name of the result's recording, or from its
+    source, such as S2_Combo_1. The first image of the recording counts as the sequence's first.
 
     Args:
         path: the file.
@@ -45,7 +46,8 @@ def write_humaneva(path: Path, reader: ResultReader, names: tuple[str, ...]) -> 
     Raises:
         DatasetError: it cannot be written.
     """
-    match = _SEQUENCE.search(str(reader.summary.get("source", "")))
+    stated = (str(reader.summary.get(key, "")) for key in ("recording", "source"))
+    match = next(filter(None, map(_SEQUENCE.search, stated)), None)
     subject, action, trial = match.groups() if match else ("N/A", "N/A", "N/A")
     first, last = _FRAMES.get((subject, action, trial), (0, 0))
     about = {

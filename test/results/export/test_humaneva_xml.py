@@ -4,16 +4,24 @@ import json
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
+import pytest
 
 from markerless_tracker.body import markers
 from markerless_tracker.cli.main import main
 
 
-def test_points_of_every_frame_in_mm(make_result, person, motion) -> None:
+@pytest.mark.parametrize(
+    "stated",
+    [
+        {"source": "/data/S4_Combo_4"},
+        {"source": "/data/S4/Image_Data/Combo_4_(C1)", "recording": "S4_Combo_4"},
+    ],
+)
+def test_points_of_every_frame_in_mm(make_result, person, motion, stated) -> None:
     name = make_result(lost=[2])
     summary = name.with_name(name.name + ".json")
     text = json.loads(summary.read_text(encoding="utf-8"))
-    summary.write_text(json.dumps({**text, "source": "S4_Combo_4"}), encoding="utf-8")
+    summary.write_text(json.dumps({**text, **stated}), encoding="utf-8")
     assert main(["export", str(name), "--to", "humaneva.xml"]) == 0
     root = ElementTree.parse(name.with_name(name.name + ".humaneva.xml")).getroot()
     assert root.tag == "SEQUENCE" and root.findtext("Camera") == "N/A"
