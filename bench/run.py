@@ -1,6 +1,7 @@
 """Measure the published figures: `make bench`; `bench/run.py PART...` for some of them."""
 
 import argparse
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -57,8 +58,9 @@ def bench(parts: list[str], data: Path, out: Path, seeds: int) -> None:
             run(["benchmark", "recovery", str(data / name), *person])
     if "jitter" in parts:
         stand = out / "stand"
-        if not stand.exists():
-            run(["synthesize", str(stand), *STAND])
+        # Made anew: what makes it may have changed.
+        shutil.rmtree(stand, ignore_errors=True)
+        run(["synthesize", str(stand), *STAND])
         walks = [str(data / name) for name in found if name == "render_walk"]
         run(["benchmark", "jitter", str(stand), *walks])
     if "speed" in parts:

@@ -26,7 +26,7 @@ TOLERANCE_MM = 20.0
 """A run is back if its error exceeds that of the undisturbed run by at most this."""
 SETTLED_S = 0.5
 """Time at the beginning of the undisturbed run that its mean error leaves out."""
-_STABLE_FRAMES = 5
+STABLE_FRAMES = 5
 """The error must stay low for this many frames with a reference."""
 _FIRST_S, _LATER_S = 0.6, 0.15
 """Start of the disturbance with the first seed, and the delay from one seed to the next."""
@@ -88,10 +88,10 @@ def measure_recovery(
     Returns:
         `recording`, `scale`, `undisturbed_mm` (mean error of the undisturbed run per seed), and
         `runs`: one entry per disturbance and seed with `frames_until_back` (frames after the
-        disturbance until the error is at most the undisturbed one + `TOLERANCE_MM` and stays so;
-        None if it never is), `back` (whether that is within `WITHIN_FRAMES`), `meanwhile_mm` (mean
-        error of the disturbed frames with a pose, None without any) and `worst_mm` (largest frame
-        error afterwards).
+        disturbance until the error is at most the undisturbed one + `TOLERANCE_MM` for
+        `STABLE_FRAMES` frames; None if it never is), `back` (whether that is within
+        `WITHIN_FRAMES`), `meanwhile_mm` (mean error of the disturbed frames with a pose, None
+        without any) and `worst_mm` (largest frame error afterwards).
 
     Raises:
         DatasetError: the recording is too short for every disturbance.
@@ -108,7 +108,7 @@ def measure_recovery(
         if all(_last(known, _times(one, fps, 0)[1]) is None for one in chosen):
             needed = min(_times(one, fps, 0)[1] for one in chosen) + WITHIN_FRAMES
             raise DatasetError(
-                f"{source}: {len(frames)} frames, expected {_STABLE_FRAMES} or more with a truth "
+                f"{source}: {len(frames)} frames, expected {STABLE_FRAMES} or more with a truth "
                 f"after the first {needed}, for the shortest disturbance"
             )
         per_seed = 1 + len(chosen)
@@ -171,7 +171,7 @@ def _last(known: NDArray[np.bool_], ends: int) -> int | None:
         The number; None if too few frames with a reference follow.
     """
     after = ends + WITHIN_FRAMES + np.flatnonzero(known[ends + WITHIN_FRAMES :])
-    return int(after[_STABLE_FRAMES - 1]) + 1 if len(after) >= _STABLE_FRAMES else None
+    return int(after[STABLE_FRAMES - 1]) + 1 if len(after) >= STABLE_FRAMES else None
 
 
 def disturbed(
@@ -207,14 +207,15 @@ def _arrived(count: int, share: float) -> int:
 
 
 def frames_until(errors_mm: NDArray[np.float64], limit_mm: float) -> int | None:
-    """Number (from 1) of the frame from which the errors (n,) stay within a limit, or None.
+    """Number (from 1) of the first of `STABLE_FRAMES` frames in a row with errors (n,) within a
+    limit; None if there is none.
 
     Frames without a reference (NaN) are skipped; those without a pose (inf) exceed every limit.
     """
     rows = np.flatnonzero(~np.isnan(errors_mm))
     good = errors_mm[rows] <= limit_mm
-    for first in range(len(good) - _STABLE_FRAMES + 1):
-        if good[first : first + _STABLE_FRAMES].all():
+    for first in range(len(good) - STABLE_FRAMES + 1):
+        if good[first : first + STABLE_FRAMES].all():
             return int(rows[first]) + 1
     return None
 
