@@ -14,6 +14,8 @@ from markerless_tracker.geometry import FloatArray, rotation_from_quaternion, tr
 
 LENS_MODEL = "plumb_bob"
 """ROS' name of the radial-tangential model with k1 k2 p1 p2 k3."""
+FISHEYE_MODELS = ("equidistant", "fisheye")
+"""ROS' names of lenses whose images are distorted even if all coefficients are 0."""
 WORLD_FRAME = "map"
 """Frame of everything in world coordinates (REP-105)."""
 
@@ -72,10 +74,11 @@ def lens_of(info: CameraInfoFields, where: str) -> tuple[FloatArray, FloatArray]
         raise CalibrationError(f"{where}: K is zero (uncalibrated), expected a calibrated camera")
     if not (np.isfinite(matrix).all() and np.isfinite(distortion).all()):
         raise CalibrationError(f"{where}: K or D is not finite, expected numbers")
-    if distortion.any() and info.distortion_model not in (LENS_MODEL, ""):
+    # Polynomials without coefficients are no distortion; a fisheye lens is one.
+    model = info.distortion_model
+    if model in FISHEYE_MODELS or (distortion.any() and model not in (LENS_MODEL, "")):
         raise CalibrationError(
-            f"{where}: distortion model {info.distortion_model[:80]!r} is not supported, expected "
-            f"{LENS_MODEL}"
+            f"{where}: distortion model {model[:80]!r} is not supported, expected {LENS_MODEL}"
         )
     if distortion.size not in (0, 4, 5) and distortion.any():
         raise CalibrationError(

@@ -168,7 +168,10 @@ def _write(
         if film is not None:
             begin(film)
             rows = list(range(len(result)))
-            shown = (picture for _, picture in overlays.sheets(rows, width_px=width_px))
+            shown = (
+                (float(result.times_s[row]), picture)
+                for row, picture in overlays.sheets(rows, width_px=width_px)
+            )
             write_film(film, shown, fps=result.fps, container=film.suffix[1:].lower())
         if sheet is not None:
             begin(sheet)

@@ -18,11 +18,15 @@ FORMATS = ("webm", "mp4")
 _CODECS: dict[str, tuple[str, dict[str, str], dict[str, str]]] = {
     "webm": (
         "libvpx-vp9",
-        {"deadline": "realtime", "cpu-used": "8", "row-mt": "1", "crf": "32", "b": "0"},
+        {"deadline": "realtime", "cpu-used": "8", "row-mt": "1", "crf": "32"},
         {},
     ),
-    "mp4": ("libx264", {"preset": "veryfast", "crf": "25"}, {"movflags": "faststart"}),
+    # With B-frames the muxer of MP4 states too short a duration if a gap is near the end.
+    "mp4": ("libx264", {"preset": "veryfast", "crf": "25", "bf": "0"}, {"movflags": "faststart"}),
 }
+
+_TICKS_PER_S = 1000
+"""Least resolution of the times of pictures, that of WebM."""
 
 
 def require_av() -> Any:
@@ -40,7 +44,7 @@ def require_av() -> Any:
 
 def write_film(
     target: Path | IO[bytes],
-    pictures: Iterable[Image],
+    pictures: Iterable[tuple[float, Image]],
     *,
     fps: float,
     container: str = "webm",
@@ -50,10 +54,11 @@ def write_film(
 
     Args:
         target: path of a file, or a binary file open for writing.
-        pictures: (h, w, 3) BGR, all of one size; an odd last row or column is left out.
-        fps: pictures per second.
+        pictures: time in s and (h, w, 3) BGR; times increase, and pictures are all of one size. An
+            odd last row or column is left out. A picture is shown until the time of the next one.
+        fps: usual number of pictures per second; the last picture is shown for 1 / fps.
         container: one of `FORMATS`.
-        bit_rate: largest rate in bit/s; None = unlimited, at constant quality.
+        bit_rate: largest mean rate in bit/s; None = unlimited, at constant quality.
 
     Raises:
         ConfigError: PyAV is not installed, or there is no such container.
@@ -80,27 +85,33 @@ def _encode(
     av: Any,
     sink: str | IO[bytes],
     where: str,
-    pictures: Iterable[Image],
+    pictures: Iterable[tuple[float, Image]],
     fps: float,
     container: str,
     bit_rate: int | None,
 ) -> int:
     codec, options, muxer = _CODECS[container]
-    count = 0
+    rate = Fraction(fps).limit_denominator(1000)
+    # A whole number of ticks per period, so that evenly spaced pictures stay evenly spaced.
+    period = max(1, round(_TICKS_PER_S / rate))
+    count, pts, start_s = 0, 0, 0.0
     try:
         with av.open(sink, "w", format=container, options=muxer) as film:
             stream = film.add_stream(
-                codec, rate=Fraction(fps).limit_denominator(1000), options=options
+                codec, rate=rate, options={**options, **_rate_options(container, bit_rate)}
             )
             stream.pix_fmt = "yuv420p"
-            if bit_rate is not None:
-                stream.bit_rate = bit_rate
-            for picture in pictures:
+            stream.codec_context.time_base = 1 / (rate * period)
+            for time_s, picture in pictures:
                 height, width = (side // 2 * 2 for side in picture.shape[:2])
                 if not count:
-                    stream.width, stream.height = width, height
+                    stream.width, stream.height, start_s = width, height, time_s
                 even = np.ascontiguousarray(picture[:height, :width])
-                film.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="bgr24")))
+                frame = av.VideoFrame.from_ndarray(even, format="bgr24")
+                pts = max(pts + 1 if count else 0, round((time_s - start_s) * rate * period))
+                frame.pts, frame.time_base = pts, stream.codec_context.time_base
+                frame.duration = period
+                film.mux(stream.encode(frame))
                 count += 1
             if count:
                 film.mux(stream.encode())
@@ -109,3 +120,10 @@ def _encode(
     if not count:
         raise DatasetError(f"{where}: no image of the result, expected some of its source")
     return count
+
+
+def _rate_options(container: str, bit_rate: int | None) -> dict[str, str]:
+    """Options of the codec that limit the bit rate."""
+    if container == "webm":
+        return {"b": str(bit_rate or 0)}
+    return {} if bit_rate is None else {"maxrate": str(bit_rate), "bufsize": str(bit_rate)}

@@ -221,14 +221,18 @@ def log_body(
 
 
 def _curves(rr: Any, stream: Any, result: StoredResult, row: int) -> None:
+    """Log the known values; a curve is cleared in the first row without one, which breaks it."""
+    before = max(row - 1, 0)
     for folder, names, values in (
-        ("angles", result.angle_names, result.angles_deg[row]),
-        ("overlap", result.camera_names, result.overlap[row]),
-        ("sd_mm", result.marker_names, 1000.0 * _length(result.positions_sd_m[row])),
+        ("angles", result.angle_names, result.angles_deg[[before, row]]),
+        ("overlap", result.camera_names, result.overlap[[before, row]]),
+        ("sd_mm", result.marker_names, 1000.0 * _length(result.positions_sd_m[[before, row]])),
     ):
-        for name, value in zip(names, values.tolist(), strict=True):
+        for name, last, value in zip(names, *values.tolist(), strict=True):
             if np.isfinite(value):
                 stream.log(f"{folder}/{name}", rr.Scalars(value))
+            elif np.isfinite(last):
+                stream.log(f"{folder}/{name}", rr.Clear(recursive=False))
 
 
 def _length(deviations: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from markerless_tracker.bags import write_bag
 from markerless_tracker.bags.mcap_bag import BagWriter
 from markerless_tracker.bags.messages import message_type
 from markerless_tracker.datasets import open_recording, read_trc
+from markerless_tracker.datasets.bag.stream import McapFiles
 from markerless_tracker.errors import DatasetError
 
 
@@ -103,6 +104,14 @@ def test_a_bag_in_the_working_folder_has_its_name(tmp_path: Path, monkeypatch) -
     with BagWriter(Path(".")):
         pass
     assert (tmp_path / f"{tmp_path.name}.mcap").is_file()
+
+
+def test_latched_topics_are_known_to_be_so(tmp_path: Path) -> None:
+    text = message_type("std_msgs/msg/String")(data="hello")
+    with BagWriter(tmp_path) as writer:
+        for name, latched in (("/state", True), ("/chatter", False)):
+            writer.write(writer.topic(name, "std_msgs/msg/String", latched=latched), 5, text)
+    assert McapFiles([tmp_path / f"{tmp_path.name}.mcap"]).latched == {"/state"}
 
 
 def test_a_writer_that_fails_leaves_readable_chunks(tmp_path: Path) -> None:

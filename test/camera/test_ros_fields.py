@@ -63,6 +63,7 @@ def test_a_region_of_the_whole_image_is_none(camera: CameraModel) -> None:
         ({"k": np.zeros(9)}, "topic: K is zero"),
         ({"k": np.full(9, np.nan)}, "topic: K or D is not finite"),
         ({"distortion_model": "equidistant"}, "topic: distortion model 'equidistant'"),
+        ({"distortion_model": "equidistant", "d": np.zeros(4)}, "topic: distortion model 'equi"),
         ({"d": np.full(8, 0.1)}, "topic: 8 distortion coefficients"),
         ({"binning_y": 2}, "topic: binning"),
         ({"roi": SimpleNamespace(width=320, height=480)}, "topic: .*region of interest"),

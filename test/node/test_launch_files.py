@@ -13,6 +13,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 from markerless_tracker.errors import ConfigError
 from markerless_tracker.node.inputs.wire import settings_digest
 from markerless_tracker.node.player.parameters import descriptions as player_parameters
+from markerless_tracker.node.ros.declared import launched
 from markerless_tracker.node.segmenter.parameters import (
     known_parameters,
     read_segmenter_settings,
@@ -27,6 +28,7 @@ KNOWN = {
     "player": set(player_parameters()),
     "segmenter": set(known_parameters()),
 }
+LAUNCHED = "launch."
 SHARE = "$(find-pkg-share markerless_tracker)/"
 
 
@@ -46,7 +48,11 @@ def test_nodes_have_the_parameters_that_are_given(path: Path) -> None:
     ours = [node for node in nodes if node.get("pkg") == "markerless_tracker"]
     assert ours and {node.get("pkg") for node in nodes} <= {"markerless_tracker", "rviz2"}
     for node in ours:
-        names = {param.get("name") for param in node.findall("param")} - {None}
+        names = {
+            str(param.get("name")).removeprefix(LAUNCHED)
+            for param in node.findall("param")
+            if param.get("name")
+        }
         assert names and names <= KNOWN[str(node.get("exec"))]
 
 
@@ -65,18 +71,30 @@ def test_arguments_and_files_exist(path: Path) -> None:
         assert required <= given
 
 
-@pytest.mark.parametrize("path", LAUNCH, ids=lambda path: path.name)
-def test_an_argument_left_out_is_a_parameter_left_out(path: Path) -> None:
-    declared = arguments(path)
-    for node in elements(path, "node"):
-        if node.get("exec") != "tracker":
-            continue
-        given = {}
-        for param in node.findall("param"):
-            found = re.fullmatch(r"\$\(var (\w+)\)", param.get("value", ""))
-            if found:
-                given[str(param.get("name"))] = yaml.safe_load(declared[found[1]] or "''")
-        assert read_settings(given) == read_settings({})
+def as_launched(path: Path, words: dict[str, str]) -> dict[str, Any]:
+    """The tracker's parameters that a launch file gives after those of `params_file`."""
+    declared, given = {**arguments(path), **words}, {}
+    (node,) = (node for node in elements(path, "node") if node.get("exec") == "tracker")
+    for param in node.findall("param"):
+        found = re.fullmatch(r"\$\(var (\w+)\)", param.get("value", ""))
+        if found:
+            # As launch_ros does, which writes an empty text for an empty argument.
+            given[str(param.get("name"))] = yaml.safe_load(declared[found[1]] or "''")
+    return given
+
+
+def test_an_argument_left_out_is_a_parameter_left_out() -> None:
+    launch = as_launched(ROOT / "launch" / "tracker.launch.xml", {})
+    assert read_settings(launched(launch)) == read_settings({})
+
+
+def test_arguments_replace_what_the_file_of_parameters_says_and_no_more() -> None:
+    file = {"stature": 1.9, "tf": "root", "image_transport": "compressed", "start_file": "a.trc"}
+    launch = as_launched(
+        ROOT / "launch" / "tracker.launch.xml", {"stature": "1.75", "calibration_file": "c.toml"}
+    )
+    expected = {**file, "stature": 1.75, "calibration_file": "c.toml"}
+    assert read_settings(launched({**file, **launch})) == read_settings(expected)
 
 
 def test_one_file_of_parameters_serves_both_nodes_of_the_split_graph() -> None:

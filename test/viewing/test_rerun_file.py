@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from markerless_tracker.errors import ConfigError
 from markerless_tracker.results.read import read_result
 from markerless_tracker.viewing.images import ResultImages
 from markerless_tracker.viewing.overlays import Overlays
-from markerless_tracker.viewing.rerun_file import write_rrd
+from markerless_tracker.viewing.rerun_file import _curves, write_rrd
 
 
 def test_the_sdk_is_named_where_it_is_missing(
@@ -19,6 +20,18 @@ def test_the_sdk_is_named_where_it_is_missing(
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(ConfigError, match="pip install rerun-sdk"):
         write_rrd(tmp_path / "a.rrd", read_result(make_result()))
+
+
+def test_a_loss_breaks_the_curves_once(make_result) -> None:
+    logged: list[tuple[str, str]] = []
+    sdk = SimpleNamespace(Scalars=lambda value: "value", Clear=lambda recursive: "clear")
+    stream = SimpleNamespace(log=lambda path, what: logged.append((path, what)))
+    result = read_result(make_result(frames=8, lost=(0, 3, 4)))
+    for row in range(len(result)):
+        _curves(sdk, stream, result, row)
+    for name in ("angles/knee_angle_l", "overlap/cam01", "sd_mm/LKnee"):
+        found = [what for path, what in logged if path == name]
+        assert found == ["value", "value", "clear", "value", "value", "value"]
 
 
 def test_body_cameras_pictures_and_curves(make_result, walk: Path, tmp_path: Path) -> None:

@@ -126,6 +126,11 @@ class BagRecording(Recording):
         """Topic -> message type of all topics of the bag."""
         return self._files.types
 
+    @property
+    def latched(self) -> Collection[str]:
+        """Names of the topics that were recorded latched."""
+        return self._files.latched
+
     def messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """The messages of some topics in file order, up to the first damage."""
         return (message for message in self._files if message.topic in topics)

@@ -1,5 +1,6 @@
 """Messages of MCAP files in file order, up to the first damage; seeking by their chunk index."""
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -18,6 +19,9 @@ MAGIC = b"\x89MCAP0\r\n"
 HEAD_BYTES = 12
 # Bytes before the messages of an uncompressed chunk: opcode, length, and the fields of the record.
 _CHUNK_HEAD = 1 + 8 + 8 + 8 + 8 + 4 + 4 + 8
+_DURABILITY = re.compile(r"durability:\s*(\w+)")
+# In words, and as older versions of rosbag2 number it.
+_TRANSIENT_LOCAL = ("transient_local", "1")
 # Bytes before the data of a message: opcode, length, channel, sequence and two times.
 _MESSAGE_HEAD = 1 + 8 + 2 + 4 + 8 + 8
 
@@ -62,6 +66,7 @@ class McapFiles:
         paths: the files.
         counts: topic -> number of messages, None for a damaged bag (known only after reading it).
         types: topic -> message type, of a whole bag; filled while reading a damaged one.
+        latched: likewise, topics that were recorded latched: late subscribers got the last message.
         damage: where and why reading stopped early, None so far.
 
     Raises:
@@ -72,6 +77,7 @@ class McapFiles:
         self.paths = tuple(paths)
         self._checked = checked
         self.types: dict[str, str] = {}
+        self.latched: set[str] = set()
         self.damage: str | None = None
         self.counts: dict[str, int] | None = {}
         self._summaries: list[Summary | None] = []
@@ -201,6 +207,9 @@ class McapFiles:
         self._channels[number][channel.id] = channel
         schema = self._schemas[number].get(channel.schema_id)
         self.types[channel.topic] = schema.name if schema else ""
+        offered = _DURABILITY.findall(channel.metadata.get("offered_qos_profiles", ""))
+        if offered and all(each in _TRANSIENT_LOCAL for each in offered):
+            self.latched.add(channel.topic)
 
 
 def _summary(path: Path) -> Summary | None:

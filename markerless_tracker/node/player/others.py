@@ -3,16 +3,21 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from rclpy.qos import QoSProfile
+
 from markerless_tracker.datasets.bag.recording import BagRecording
 from markerless_tracker.datasets.bag.stream import RawMessage
 from markerless_tracker.errors import ConfigError, DatasetError
 from markerless_tracker.node.ros.messages import message_class
-from markerless_tracker.node.ros.qos import latched_qos, output_qos
+from markerless_tracker.node.ros.qos import image_qos, latched_qos, output_qos
 
 END_NS = 2**63 - 1
 """A time after all messages."""
 LATCHED = ("tf_static", "robot_description")
-"""Last parts of the names of latched topics, whose last message late subscribers receive."""
+"""Last parts of the names of latched topics, whose last message late subscribers receive, in bags
+that do not say which topics are."""
+_TRANSFORMS = 100
+"""Messages of `tf_static` that late subscribers receive: each has one publisher's transforms."""
 
 
 class OtherTopics:
@@ -37,8 +42,9 @@ class OtherTopics:
                 raise ConfigError(
                     f"topics: {name} is not in the bag, expected some of {', '.join(sorted(types))}"
                 )
-            qos = latched_qos() if _is_latched(name) else output_qos()
-            self._publishers[name] = node.create_publisher(_type(name, types[name]), name, qos)
+            self._publishers[name] = node.create_publisher(
+                _type(name, types[name]), name, self._qos(name)
+            )
 
     def up_to(self, *, later: bool) -> Callable[[int, int], list[RawMessage]]:
         """A function that gives the messages up to a set of images, each once, in order.
@@ -69,20 +75,24 @@ class OtherTopics:
                     break
                 due.append(message)
             if left_out:
-                due = [m for m in due if m.log_ns >= first_ns or _is_latched(m.topic)]
+                due = [m for m in due if m.log_ns >= first_ns or self._is_latched(m.topic)]
                 left_out = False
             return due
 
         return take
 
+    def _is_latched(self, topic: str) -> bool:
+        return topic in self._recording.latched or topic.rsplit("/", 1)[-1] in LATCHED
+
+    def _qos(self, topic: str) -> QoSProfile:
+        if topic.endswith("tf_static"):
+            return image_qos(latched=True, depth=_TRANSFORMS)
+        return latched_qos() if self._is_latched(topic) else output_qos()
+
     def publish(self, messages: Sequence[RawMessage]) -> None:
         """Publish stored messages unchanged."""
         for message in messages:
             self._publishers[message.topic].publish(bytes(message.data))
-
-
-def _is_latched(topic: str) -> bool:
-    return topic.rsplit("/", 1)[-1] in LATCHED
 
 
 def _type(topic: str, kind: str) -> Any:

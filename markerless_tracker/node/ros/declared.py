@@ -17,6 +17,8 @@ from markerless_tracker.settings import Setting, similar
 
 ROS_OWN = ("use_sim_time", "start_type_description_service")
 """Parameters that every ROS node has."""
+LAUNCH = "launch."
+"""Beginning of the names of parameters that are arguments of a launch file."""
 FIXED = "fixed while the node runs"
 """Constraint of parameters that cannot be set later, in their descriptors."""
 
@@ -63,7 +65,25 @@ class GivenNode(Node):
 
 
 def given_parameters(node: Node) -> dict[str, Any]:
-    """The parameters given to a node that declares them from overrides, by name."""
+    """The parameters given to a node that declares them from overrides, by name; see `launched`."""
+    return launched(_declared(node))
+
+
+def launched(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters by name, with the arguments of a launch file in their places.
+
+    A launch file cannot leave out a parameter whose argument is empty, and an empty value would
+    replace that of a file of parameters. So it gives arguments as parameters `launch.NAME`, which
+    replace those called NAME unless they are empty.
+    """
+    own = {name: value for name, value in given.items() if not name.startswith(LAUNCH)}
+    arguments = {
+        name.removeprefix(LAUNCH): value for name, value in given.items() if name.startswith(LAUNCH)
+    }
+    return own | present(arguments)
+
+
+def _declared(node: Node) -> dict[str, Any]:
     return {
         name: parameter.value
         for name, parameter in node.get_parameters_by_prefix("").items()
@@ -89,7 +109,7 @@ def declare_effective(
         live: names of parameters that may be set; the others are read-only.
     """
     held = {setting.name: setting for setting in settings}
-    for name in given_parameters(node):
+    for name in _declared(node):
         node.undeclare_parameter(name)
     for name, value in values.items():
         descriptor = ParameterDescriptor(

@@ -68,7 +68,7 @@ def line_chart(
         unit: of y, beside the heading.
         curves: the curves.
         levels: horizontal lines.
-        marks: vertical lines.
+        marks: vertical lines; more than `MOST_POINTS` are not drawn.
         low: lower end of y; None = from the values.
     """
     heading = f'{escape(title)} <span class="unit">{escape(unit)}</span>'
@@ -92,11 +92,8 @@ def line_chart(
 
     lines = [_horizontal("grid", down(tick)) for tick in y_ticks]
     lines += [_horizontal("level", down(level.value)) for level in levels]
-    lines += [
-        _path(f"mark {mark.style}", f"M{_at(across(mark.x))} 0V{_SIDE:g}")
-        for mark in marks
-        if x0 <= mark.x <= x1
-    ]
+    if len(marks) <= MOST_POINTS:
+        lines += _verticals([mark for mark in marks if x0 <= mark.x <= x1], across)
     for curve in known:
         shown = thinned(curve.x, curve.y)
         lines.append(_path(f"line {curve.style}", _points(shown, across, down)))
@@ -134,7 +131,10 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A curve with at most about 2 `MOST_POINTS` points that looks the same."""
+    """A curve with at most about 2 `MOST_POINTS` points that looks the same.
+
+    A NaN in a gap of x that is wider than a column is kept.
+    """
     if x.size <= 2 * MOST_POINTS:
         return x, y
     rows: list[int] = []
@@ -144,6 +144,8 @@ def thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
             rows += sorted({int(part[np.nanargmin(values)]), int(part[np.nanargmax(values)])})
         else:
             rows.append(int(part[0]))
+    gaps = np.isnan(y[1:-1]) & (x[2:] - x[:-2] > (x[-1] - x[0]) / MOST_POINTS)
+    rows = sorted({*rows, *(np.flatnonzero(gaps) + 1).tolist()})
     return x[rows], y[rows]
 
 
@@ -174,6 +176,14 @@ def _at(fraction: float) -> str:
 
 def _horizontal(style: str, fraction: float) -> str:
     return _path(style, f"M0 {_at(fraction)}H{_SIDE:g}")
+
+
+def _verticals(marks: Sequence[Mark], across: Callable[[float], float]) -> list[str]:
+    """Vertical lines, one path for each style."""
+    drawn: dict[str, str] = {}
+    for mark in marks:
+        drawn[mark.style] = drawn.get(mark.style, "") + f"M{_at(across(mark.x))} 0V{_SIDE:g}"
+    return [_path(f"mark {style}", d) for style, d in drawn.items()]
 
 
 def _path(style: str, d: str) -> str:

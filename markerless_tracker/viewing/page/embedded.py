@@ -12,7 +12,7 @@ from markerless_tracker.results.stored_result import StoredResult
 from markerless_tracker.viewing.film import write_film
 from markerless_tracker.viewing.images import ResultImages
 from markerless_tracker.viewing.overlays import Overlays, spread_rows
-from markerless_tracker.viewing.page.report import Film
+from markerless_tracker.viewing.page.report import Film, duration_s
 
 WIDTH_PX, IMAGE_PX = 960, 476
 """Width of the pictures, and of the images in them. Two images side by side need no rescaling."""
@@ -49,16 +49,16 @@ def embedded_film(
     step = max(math.ceil(result.fps / MOST_FPS - 1e-6), math.ceil(len(result) / MOST_FRAMES))
     rows = list(range(0, len(result), step))
     fps = result.fps / step
-    seconds = max(len(rows) / fps, 0.1)
+    seconds = max(duration_s(result), 0.1)
     stills = {rows[i] for i in spread_rows(len(rows), _STILLS)}
     kept: list[Image] = []
 
-    def pictures() -> Iterator[Image]:
+    def pictures() -> Iterator[tuple[float, Image]]:
         for number, (row, sheet) in enumerate(overlays.sheets(rows, width_px=WIDTH_PX)):
             if row in stills or not kept:
                 kept.append(sheet)
             progress(number + 1, len(rows))
-            yield sheet
+            yield float(result.times_s[row]), sheet
 
     buffer = io.BytesIO()
     bit_rate = min(MOST_BIT_RATE, int(8 * MOST_BYTES / films / seconds))

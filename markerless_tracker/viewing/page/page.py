@@ -12,7 +12,7 @@ from markerless_tracker.errors import DatasetError
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.results.export.new_file import new_file
 from markerless_tracker.results.gait import METHOD
-from markerless_tracker.viewing.page.charts import Curve, Level, Mark, line_chart
+from markerless_tracker.viewing.page.charts import MOST_POINTS, Curve, Level, Mark, line_chart
 from markerless_tracker.viewing.page.report import Report
 from markerless_tracker.viewing.page.style import STYLE
 from markerless_tracker.viewing.page.tables import (
@@ -34,6 +34,8 @@ _LONG = {
 """Abbreviations in the angles' names, and their words."""
 _SIDES = (("_l", "left"), ("_r", "right"))
 _STYLES = 8
+_MOST_EVENTS = 50
+"""Events of a foot that are listed."""
 
 
 def write_page(path: Path, reports: Sequence[Report], *, levels: Sequence[Level] = ()) -> None:
@@ -165,11 +167,14 @@ def _errors(reports: Sequence[Report], levels: Sequence[Level]) -> str:
 
 
 def _with_breaks(times_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Times and values (n,) with a NaN where frames are missing, so that no line crosses a gap."""
+    """Times and values (n,) with a NaN where frames are missing, so that no line crosses a gap.
+
+    A live result skips sets, so that its usual steps differ; a gap exceeds nine tenths of them.
+    """
     if len(times_s) < 2:
         return times_s, values
     steps = np.diff(times_s)
-    gaps = np.flatnonzero(steps > 1.5 * np.median(steps)) + 1
+    gaps = np.flatnonzero(steps > 1.5 * np.quantile(steps, 0.9, method="lower")) + 1
     return np.insert(times_s, gaps, times_s[gaps]), np.insert(values, gaps, np.nan)
 
 
@@ -182,7 +187,9 @@ def _angles(report: Report) -> str:
         for ending, side in _SIDES:
             if name.endswith(ending):
                 base, label, style = name.removesuffix(ending), side, side
-        groups.setdefault(base, []).append(Curve(label, style, result.times_s, _cut(values)))
+        groups.setdefault(base, []).append(
+            Curve(label, style, *_with_breaks(result.times_s, _cut(values)))
+        )
     if not groups:
         return ""
     marks = _strikes(report)
@@ -202,9 +209,8 @@ def _angles(report: Report) -> str:
         f"<details><summary>{len(rest)} more angles</summary>"
         f'<div class="charts">{"".join(rest)}</div></details>'
     )
-    told = '<p class="dim">Dotted: foot strikes, left and right.</p>' if marks else ""
     return (
-        f'<h3>Joint angles</h3>{told}<div class="charts">{"".join(first)}</div>'
+        f'<h3>Joint angles</h3>{_strikes_words(marks)}<div class="charts">{"".join(first)}</div>'
         f"{folded if rest else ''}"
     )
 
@@ -226,13 +232,22 @@ def _strikes(report: Report) -> list[Mark]:
     return [Mark(event.side, event.time_s) for event in report.gait.events if event.strike]
 
 
+def _strikes_words(marks: Sequence[Mark]) -> str:
+    """Explains the marks of the charts."""
+    if not marks:
+        return ""
+    if len(marks) > MOST_POINTS:
+        return f'<p class="dim">The {len(marks)} foot strikes are too many to be drawn.</p>'
+    return '<p class="dim">Dotted: foot strikes, left and right.</p>'
+
+
 def _gait(report: Report) -> str:
     if report.gait is None:
         return '<p class="dim">Gait: nobody walks for a complete stride.</p>'
     events = report.gait.events
     listed = "; ".join(
         f"{side} foot {'strike' if strike else 'off'}: "
-        + ", ".join(f"{e.time_s:.2f}" for e in events if e.side == side and e.strike == strike)
+        + _times([e.time_s for e in events if e.side == side and e.strike == strike])
         for side in ("left", "right")
         for strike in (True, False)
         if any(e.side == side and e.strike == strike for e in events)
@@ -245,6 +260,14 @@ def _gait(report: Report) -> str:
     )
 
 
+def _times(times_s: Sequence[float]) -> str:
+    """The first times in words, and the number of those left out."""
+    words = [f"{time_s:.2f}" for time_s in times_s[:_MOST_EVENTS]]
+    if more := len(times_s) - len(words):
+        words.append(f"and {more} more")
+    return ", ".join(words)
+
+
 def _overlap(report: Report) -> str:
     result = report.result
     if not report.overlap:
@@ -253,8 +276,7 @@ def _overlap(report: Report) -> str:
         Curve(
             f"{name}: {report.overlap[name]:.2f}",
             f"s{number % _STYLES}",
-            result.times_s,
-            result.overlap[:, result.camera_names.index(name)],
+            *_with_breaks(result.times_s, result.overlap[:, result.camera_names.index(name)]),
         )
         for number, name in enumerate(report.overlap)
     ]

@@ -85,7 +85,7 @@ class Report:
         result, frames = self.result, len(self.result)
         if not frames:
             return "The result has no frame."
-        seconds = frames / result.fps
+        seconds = duration_s(result)
         if not self.tracked:
             return f"No person was found in {frames} frames ({seconds:.1f} s)."
         words = [
@@ -120,6 +120,13 @@ class Report:
         if most - least < CLEARLY:
             return f"all cameras fit alike (overlap {least:.2f})"
         return f"the overlap of the cameras is {least:.2f} to {most:.2f}"
+
+
+def duration_s(result: StoredResult) -> float:
+    """Time from the first frame to the end of the last, s; 0 without frames."""
+    if not len(result):
+        return 0.0
+    return float(result.times_s[-1] - result.times_s[0]) + 1.0 / result.fps
 
 
 def make_report(

@@ -1,6 +1,7 @@
 """Verb `view`."""
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
@@ -15,13 +16,18 @@ from markerless_tracker.tracking import TrackerConfig
 
 @pytest.fixture
 def result(walk: Path, tmp_path: Path) -> str:
-    """NAME of a result on the recording `walk`: a person who stands."""
+    """NAME of a result on the recording `walk`."""
+    return write_result(tmp_path / "out", walk, range(6))
+
+
+def write_result(name: Path, walk: Path, sets: Iterable[int]) -> str:
+    """Write a result on those sets of the recording `walk`: a person who stands."""
     body = load_body("balan31", 1.7)
     pose = body.neutral.copy()
     pose[body.index("pelvis_tz")] = 0.9
     config = TrackerConfig.from_mapping({"body": "balan31"})
-    with ResultWriter(tmp_path / "out", body, config, fps=30.0, source=str(walk)) as writer:
-        for index in range(6):
+    with ResultWriter(name, body, config, fps=30.0, source=str(walk)) as writer:
+        for index in sets:
             writer.add(
                 TrackResult(
                     stamp_ns=round(index * 1e9 / 30.0),
@@ -33,7 +39,7 @@ def result(walk: Path, tmp_path: Path) -> str:
                     evaluations=0,
                 )
             )
-    return str(tmp_path / "out")
+    return str(name)
 
 
 def test_film_and_picture(result: str, tmp_path: Path, capsys) -> None:
@@ -50,6 +56,16 @@ def test_film_and_picture(result: str, tmp_path: Path, capsys) -> None:
     assert picture.shape[1] <= 320 and 0.3 < picture.shape[0] / picture.shape[1] < 1.1
     assert main(words) == 1
     assert "exists already, expected a new name or --force" in capsys.readouterr().err
+
+
+def test_a_film_is_in_the_time_of_the_result(walk: Path, tmp_path: Path) -> None:
+    av = pytest.importorskip("av", reason="PyAV is not installed: pip install av")
+    sets, film = (0, 1, 3, 5), tmp_path / "a.webm"
+    result = write_result(tmp_path / "live", walk, sets)
+    assert main(["view", result, "--film", str(film), "--width", "320"]) == 0
+    with av.open(str(film)) as opened:
+        times_s = [frame.time for frame in opened.decode(video=0)]
+    assert times_s == pytest.approx([number / 30 for number in sets], abs=1e-3)
 
 
 def test_a_file_for_the_rerun_viewer(result: str, walk: Path, tmp_path: Path, capsys) -> None:

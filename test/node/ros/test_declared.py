@@ -11,7 +11,7 @@ from markerless_tracker.tracking import TrackerConfig
 PARAMETERS = """
 tracker:
   ros__parameters:
-    seed: 7
+    seed: 5
     refine: {truncation_m: 0.08}
     shadow.value_min: 0.25
 """
@@ -27,6 +27,8 @@ def node(tmp_path: Path) -> Iterator[Any]:
     path.write_text(PARAMETERS, encoding="utf-8")
     context = rclpy.Context()
     words = ["--ros-args", "--params-file", str(path), "-p", "apf.layers:=4"]
+    # As a launch file gives them; an empty one is none.
+    words += ["-p", "launch.seed:=7", "-p", "launch.refine.truncation_m:=''"]
     rclpy.init(context=context, args=words)
     node = Node("tracker", context=context, automatically_declare_parameters_from_overrides=True)
     yield node
@@ -52,6 +54,7 @@ def test_settings_in_groups_are_parameters_with_ranges_and_choices(node: Any) ->
     declare_effective(node, effective_values(settings), descriptions(), TrackerConfig.settings())
 
     assert {name: node.get_parameter(name).value for name in expected} == expected
+    assert not node.has_parameter("launch.seed")
     (layers,) = node.describe_parameter("apf.layers").integer_range
     assert (layers.from_value, layers.to_value, layers.step) == (0, 100, 1)
     (seed,) = node.describe_parameter("seed").integer_range

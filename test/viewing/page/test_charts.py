@@ -63,6 +63,16 @@ def test_gaps_interrupt_the_curve_and_marks_stand() -> None:
     assert paths(chart, "mark right") == ["M500.0 0V1000"], "marks beyond the curve are left out"
 
 
+def test_marks_of_a_style_are_one_path_and_too_many_are_not_drawn() -> None:
+    marks = [Mark(side, x) for x in X for side in ("left", "right")]
+    chart = figure("a", "m", [Curve("", "s0", X, X)], marks=marks)
+    (left,) = paths(chart, "mark left")
+    assert left.startswith("M0.0 0V1000M33.3 0V1000") and left.count("M") == X.size
+    assert len(paths(chart, "mark right")) == 1
+    crowd = [Mark("left", 1.5)] * (MOST_POINTS + 1)
+    assert not paths(figure("a", "m", [Curve("", "s0", X, X)], marks=crowd), "mark left")
+
+
 def test_texts_are_escaped_and_empty_charts_say_so() -> None:
     chart = figure("<b>&", "m", [Curve("a<b", "s0", X, X)])
     assert chart.find("figcaption").text.startswith("<b>&")
@@ -96,3 +106,10 @@ def test_long_curves_keep_their_extremes() -> None:
     assert short_x.size <= 2 * MOST_POINTS and (np.diff(short_x) > 0).all()
     assert np.nanmax(short_y) == 5.0 and np.isnan(short_y).any()
     assert thinned(X, X)[0] is X
+
+
+def test_long_curves_keep_their_gaps() -> None:
+    x = np.concatenate([np.arange(5000.0), 7000.0 + np.arange(5001.0)])
+    y = np.where(np.arange(x.size) == 5000, np.nan, 1.0)
+    (line,) = paths(figure("a", "m", [Curve("", "s0", x, y)]), "line s0")
+    assert line.count("M") == 2

@@ -1,6 +1,7 @@
 """The page: self-contained, whole, and true to the result."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from markerless_tracker.datasets import read_trc
+from markerless_tracker.results.gait import Event, Gait
 from markerless_tracker.results.read import read_result
 from markerless_tracker.viewing.images import ResultImages
 from markerless_tracker.viewing.page.charts import Level
@@ -124,3 +126,30 @@ def test_cameras_fit_alike_only_where_their_overlap_is_alike(
     same = np.tile(overlap, (len(result), 1))
     report = make_report("a", result.with_arrays(overlap=same, camera_names=named))
     assert words in report.sentence()
+
+
+def test_lines_break_where_rows_are_missing(make_result) -> None:
+    rows = np.array([0, 1, 3, 4, 6, 7, 20, 21])
+    result = read_result(make_result(frames=22)).rows(rows)
+    text = page([make_report("a", result)])
+    lines = re.findall(r'class="line [^"]*" d="([^"]*)"', text)
+    assert len(lines) > 20
+    for line in lines:
+        # Single sets that the node skips break no line.
+        assert line.count("M") == 2 and line.count("L") == len(rows) - 2
+
+
+def test_the_duration_is_that_of_the_stamps(make_result) -> None:
+    result = read_result(make_result(frames=22)).rows(np.array([0, 1, 2, 20]))
+    assert "tracked in 4 of 4 frames (0.7 s at 30/s)" in make_report("a", result).sentence()
+
+
+@pytest.mark.parametrize(("strikes", "said"), [(60, "Dotted: foot"), (700, "700 foot strikes")])
+def test_a_long_walk_keeps_the_page_small(make_result, strikes: int, said: str) -> None:
+    events = tuple(Event("left", True, k / 1e4, (0.0, 0.0, 0.0)) for k in range(strikes))
+    report = make_report("a", read_result(make_result()))
+    text = page([replace(report, gait=Gait(events, (), ()))])
+    # One path in each chart of an angle, none in that of the overlap.
+    charts = text.count("<svg") - 1
+    assert said in text and text.count('class="mark left"') == (charts if strikes == 60 else 0)
+    assert f"0.00, and {strikes - 50} more." in text
