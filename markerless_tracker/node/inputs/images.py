@@ -100,6 +100,7 @@ class CameraInput:
         self._refusal = ""
         self._refused_s = 0.0
         self._sequence: int | None = None
+        self._rising = True
         self._info_bytes = b""
         self._reference = "the calibration file" if camera is not None else FIRST_INFO
         self._info_reported = False
@@ -249,9 +250,10 @@ class CameraInput:
         before, self._sequence = self._sequence, sequence
         if sequence is not None and before is not None:
             gap = sequence - before - 1
-            # A restarted publisher counts from the beginning.
-            if 0 < gap < _GAP_MAX:
+            # A restarted publisher counts from the beginning. Numbers of two publishers alternate.
+            if self._rising and 0 < gap < _GAP_MAX:
                 self._status.lost(self.name, gap)
+            self._rising = sequence > before
 
     def _say(self, message: str) -> None:
         self._status.failed(message)

@@ -1,7 +1,9 @@
 """The executable `segmenter`."""
 
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from threading import Thread
 
 from markerless_tracker.node.ros.process import (
     NOTICE_S,
@@ -42,12 +44,37 @@ def _run(argv: list[str], stop: StopSignals) -> int:
     if stop.received:
         return 0
     with running(SegmenterNode, argv) as (node, executor):
-        node.begin()
-        collect_for_good()
+        compiled = _finished(node.warm_up, stop)
+        if compiled:
+            node.begin()
+            collect_for_good()
         while not stop.received:
             executor.spin_once(timeout_sec=NOTICE_S)
         node.close()
+    if not compiled:
+        # A compilation cannot be interrupted, and Python would wait for its end.
+        sys.stdout.flush()
+        os._exit(0)
     return 0
+
+
+def _finished(work: Callable[[], None], stop: StopSignals) -> bool:
+    """Whether work in a thread of its own has ended before a signal came; raises its error."""
+    failed: list[Exception] = []
+
+    def run() -> None:
+        try:
+            work()
+        except Exception as error:
+            failed.append(error)
+
+    thread = Thread(target=run, daemon=True)
+    thread.start()
+    while thread.is_alive() and not stop.received:
+        thread.join(NOTICE_S)
+    if failed:
+        raise failed[0]
+    return not thread.is_alive()
 
 
 if __name__ == "__main__":

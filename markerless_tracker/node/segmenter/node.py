@@ -104,9 +104,13 @@ class SegmenterNode(GivenNode):
         )
         self._subscription: ImageSubscription | None = None
 
-    def begin(self) -> None:
-        """Compile, then receive images."""
+    def warm_up(self) -> None:
+        """Compile; before `begin`."""
+        self.get_logger().info("compiling")
         self._segmenter.warm_up()
+
+    def begin(self) -> None:
+        """Receive images."""
         self._worker.start()
         self._subscription = ImageSubscription(
             self, self._input, self._settings.image_transport, lambda: None

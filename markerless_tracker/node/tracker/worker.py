@@ -212,7 +212,15 @@ class TrackWorker:
                 self._status.doing(PROCESSING)
             age_s = max(0.0, self._clock() - matched.arrived_s)
             lateness = Lateness(matched.replaced, waited_s, age_s, matched.period_s)
-            result = handle.tracker.step(views, matched.stamp_ns, self._effort.take(lateness))
+            try:
+                result = handle.tracker.step(views, matched.stamp_ns, self._effort.take(lateness))
+            except ImageError:
+                # A background of another kind, grey or in colour, is learned anew because of that.
+                if learning is None:
+                    raise
+                self._status.dropped("while_learning")
+                self._learn(handle, learning, matched.stamp_ns)
+                return None
             finished_s = self._clock()
         except Exception as error:
             # The next set may be usable.

@@ -188,6 +188,14 @@ def test_gaps_in_the_publishers_numbers_are_lost_images(bench: Bench) -> None:
     assert values["lost/cam02"] == "3"
 
 
+def test_numbers_of_two_publishers_are_no_lost_images(bench: Bench) -> None:
+    for number in range(10):
+        bench.input.on_image(image(stamp=2 * number), 500 + number)
+        bench.input.on_image(image(stamp=2 * number + 1), 1 + number)
+    values = bench.status.values(bench.sets.counts, ("cam02",), ())
+    assert values["lost/cam02"] == "0"
+
+
 def test_a_camera_info_that_is_cut_is_reported_and_changes_nothing(bench: Bench) -> None:
     good = bytes(serialize_message(info_of(bench.camera, 0)))
     bench.input.on_info_bytes(good)

@@ -323,7 +323,7 @@ def test_a_tracked_person_is_not_learned(bench: Bench) -> None:
 def test_an_error_answers_a_request(bench: Bench) -> None:
     bench.worker.start()
     bench.until(lambda: bench.status.ready)
-    bench.tracker.error = ImageError("a: too dark")
+    bench.tracker.error = ConfigError("a: too dark")
     learning = learn(bench)
     bench.offer(1)
     bench.until(lambda: learning.answered)
