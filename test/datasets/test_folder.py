@@ -17,6 +17,7 @@ from markerless_tracker.datasets import (
     write_image,
 )
 from markerless_tracker.datasets.empty_scene import FRAMES, backgrounds_of
+from markerless_tracker.datasets.video.images import VIDEO_SUFFIXES
 from markerless_tracker.errors import CalibrationError, ConfigError, DatasetError, ImageError
 from markerless_tracker.imaging import scale_image
 from markerless_tracker.imaging.background.plate import background_plate
@@ -31,6 +32,14 @@ def test_sets_carry_index_stamp_and_every_camera(make_recording) -> None:
     assert [s.stamp_ns for s in sets] == [0, 33366667, 66733333, 100100000, 133466667]
     assert all(list(s.images) == ["cam01", "cam02"] for s in sets)
     assert sets[0].images["cam01"].shape == (48, 64, 3) and recording.warnings == ()
+
+
+def test_names_in_capitals_are_videos_as_well(make_recording) -> None:
+    folder = make_recording()
+    videos = [file for file in folder.iterdir() if file.suffix in VIDEO_SUFFIXES]
+    for video in videos:
+        video.rename(video.with_suffix(video.suffix.upper()))
+    assert videos and len(list(open_recording(folder).frames())) > 0
 
 
 def test_start_and_every_select_the_same_images(make_recording) -> None:

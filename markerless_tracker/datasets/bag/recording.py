@@ -1,5 +1,6 @@
 """Bags (rosbag2, MCAP): images as topics, `calibration.toml` and `background/` in the folder."""
 
+import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -60,7 +61,7 @@ class BagRecording(Recording):
         if self._files.counts is None:
             for _ in self._files:  # the topics of a damaged bag are known only after reading it
                 pass
-        self._namespaces = _namespaces(self._files.types)
+        self._namespaces = _namespaces(self._with_messages())
         calibration = folder / "calibration.toml"
         if nominal:
             names = self._cameras_with_images(path)
@@ -211,12 +212,17 @@ class BagRecording(Recording):
             where = f"{self._files.paths[message.place.file]}: {message.topic}"
             raise DatasetError(f"{where}: a message cannot be decoded as {message.type}") from error
 
+    def _with_messages(self) -> dict[str, str]:
+        """Type of each topic that has messages, as far as the bag states their number."""
+        counts = self._files.counts or {}
+        return {name: kind for name, kind in self._files.types.items() if counts.get(name, 1)}
+
     def _image_topic(self, path: Path, name: str) -> str:
         namespace = self._namespaces.get(name, name)
         for suffix, kind in (("image_raw", RAW_TYPE), ("image_raw/compressed", COMPRESSED_TYPE)):
             topics = [
                 topic
-                for topic, found in self._files.types.items()
+                for topic, found in self._with_messages().items()
                 if found == kind and f"/{topic.strip('/')}".endswith(f"/{namespace}/{suffix}")
             ]
             if len(topics) > 1:
@@ -326,10 +332,16 @@ def _mcap_files(path: Path) -> list[Path]:
         if not files:
             raise DatasetError(f"{metadata}: names no file")
         return files
-    files = sorted(path.glob("*.mcap"))
+    # The parts of a recording are numbered: name_9.mcap comes before name_10.mcap.
+    files = sorted(path.glob("*.mcap"), key=_in_order)
     if not files:
         raise DatasetError(f"{path}: no bag, expected a metadata.yaml or a .mcap file")
     return files
+
+
+def _in_order(file: Path) -> list[str | int]:
+    """Texts and numbers of a name, in turn."""
+    return [int(x) if x.isdecimal() else x for x in re.split("([0-9]+)", file.name)]
 
 
 def _counts(counter: Counter[str]) -> str:

@@ -123,13 +123,13 @@ class McapFiles:
     def heads(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """The messages of some topics with the first `HEAD_BYTES` of their data, in file order.
 
-        Uses the chunk index: of uncompressed files only the bytes asked for are read. A bag
-        without an index is read forward.
+        Uses the indexes of chunks and messages: of uncompressed files only the bytes asked for are
+        read. A bag without them is read forward.
 
         Raises:
             IndexDamaged: the index contradicts the file; messages yielded before are correct.
         """
-        if self.counts is None or not all(s and s.chunk_indexes for s in self._summaries):
+        if self.counts is None or not all(map(_is_indexed, self._summaries)):
             yield from (message for message in self if message.topic in topics)
             return
         for number, (path, summary) in enumerate(zip(self.paths, self._summaries, strict=True)):
@@ -210,6 +210,12 @@ class McapFiles:
         offered = _DURABILITY.findall(channel.metadata.get("offered_qos_profiles", ""))
         if offered and all(each in _TRANSIENT_LOCAL for each in offered):
             self.latched.add(channel.topic)
+
+
+def _is_indexed(summary: Summary | None) -> bool:
+    """Whether a file has indexes of its chunks, and of the messages in them."""
+    chunks = summary.chunk_indexes if summary else []
+    return bool(chunks) and all(chunk.message_index_offsets for chunk in chunks)
 
 
 def _summary(path: Path) -> Summary | None:

@@ -175,9 +175,11 @@ def read_image(path: Path) -> Image:
 def find_stream(folder: Path, name: str) -> Path | None:
     """The video `name.mp4` (.mkv, .avi, .mov) or the folder of images `name` in a folder."""
     for suffix in VIDEO_SUFFIXES:
-        path = folder / f"{name}{suffix}"
-        if path.is_file():
-            return path
+        # Cameras write .MP4 as well.
+        for ending in (suffix, suffix.upper()):
+            path = folder / f"{name}{ending}"
+            if path.is_file():
+                return path
     path = folder / name
     return path if path.is_dir() and numbered_files(path) else None
 

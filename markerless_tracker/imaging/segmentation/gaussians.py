@@ -50,7 +50,8 @@ class BackgroundGaussians:
         spread = background.mean.max(axis=2) - background.mean.min(axis=2)
         self.is_grey = background.channels == 1 or bool(spread.max() <= _GREY_TOLERANCE)
         sigma = float(np.sqrt(np.median(background.variance)))
-        self.smooths = sigma > settings.background.denoise_sigma
+        # Not a mixture: many pixels have no second Gaussian, and a blur would mix them in.
+        self.smooths = sigma > settings.background.denoise_sigma and not background.modes
         self.mean, self.scale = self._learned()
         mean, variance = self._smoothed(background.mean, background.variance)
         if self.is_grey:
@@ -62,8 +63,18 @@ class BackgroundGaussians:
         self.size_px = background.size_px
 
     def reset(self) -> None:
-        """Restore `mean` as learned, in place."""
+        """Restore `mean` as learned, in place, and `grey_mean`."""
         self.mean[...] = self._learned()[0]
+        self.grey_changed()
+
+    def grey_changed(self) -> None:
+        """Compute `grey_mean` from `mean`, which has changed."""
+        first = self.mean[0]
+        grey = first[0].copy() if self.is_grey else np.tensordot(_LUMA, first, 1)
+        # All images are as writable as at first, so that kernels are compiled once.
+        grey = np.ascontiguousarray(grey, dtype=np.float32)
+        grey.flags.writeable = self.grey_mean.flags.writeable
+        self.grey_mean = grey
 
     def pixels(self, image: Image, region: Region) -> Image:
         """Pixels (h, w, c) of a region for comparison: smoothed if noisy, one channel if grey.

@@ -251,5 +251,6 @@ class PixelLabeller:
             self._whole(image), mask, stamp_ns, self.gain,
             self._means_channels_last, self._scales_channels_last,
         )  # fmt: skip
+        self.background.grey_changed()
         self._first = kernels.coarse(self.background.mean[0], self.background.scale[0])
         self._patches = self._patches_of_background()

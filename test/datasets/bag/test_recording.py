@@ -1,5 +1,7 @@
 """Bags of other tools, and bags that are cut, damaged or incomplete."""
 
+import io
+import shutil
 from pathlib import Path
 
 import cv2
@@ -7,6 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.writer import IndexType
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag2 import StoragePlugin, Writer
 
 from markerless_tracker.camera import read_calibration
 from markerless_tracker.datasets import open_recording
@@ -17,6 +23,7 @@ from .conftest import (
     FRAME,
     IMAGE,
     STEP_NS,
+    STORE,
     both,
     frames_message,
     header,
@@ -38,6 +45,61 @@ def test_sets_are_grouped_by_header_stamp_not_by_order(bag) -> None:
     with pytest.raises(DatasetError, match="no frame within half a frame"):
         recording.start_index(0)
     assert [s.index for s in recording.frames(start=1, every=2)] == [1, 3]
+
+
+def test_numbered_parts_are_read_in_the_order_of_their_numbers(bag, tmp_path: Path) -> None:
+    """As a killed recorder leaves them, without metadata.yaml."""
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    for number in range(12):
+        part = bag([*both(2 * number * STEP_NS), *both((2 * number + 1) * STEP_NS)])
+        shutil.copy(next(part.glob("*.mcap")), parts / f"rec_{number}.mcap")
+        shutil.copy(part / "calibration.toml", parts)
+        shutil.rmtree(part)
+    stamps = [frame.stamp_ns for frame in open_recording(parts).frames()]
+    assert stamps == [index * STEP_NS for index in range(24)]
+
+
+def test_topics_without_messages_are_no_images(make_recording, tmp_path: Path) -> None:
+    """A recorder keeps a channel of every topic that it subscribed to."""
+    path = tmp_path / "silent"
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for name in ("cam01", "cam03"):
+            writer.add_connection(f"/{name}/image_raw", IMAGE, typestore=STORE)
+        for name in ("cam01", "cam02"):
+            topic = f"/{name}/image_raw/compressed"
+            connection = writer.add_connection(topic, COMPRESSED, typestore=STORE)
+            for stamp_ns in (0, STEP_NS):
+                data = cv2.imencode(".png", FRAME)[1].reshape(-1)
+                message = make(COMPRESSED, header=header(stamp_ns), format="png", data=data)
+                writer.write(connection, stamp_ns, STORE.serialize_cdr(message, COMPRESSED))
+    shutil.copy(make_recording() / "calibration.toml", path)
+    recording = open_recording(path)
+    assert set(recording._namespaces) == {"cam01", "cam02"}
+    frames = list(recording.frames())
+    assert len(frames) == 2
+    np.testing.assert_array_equal(frames[1].images["cam01"], FRAME)
+
+
+def test_a_bag_without_an_index_of_messages_is_read_forward(bag) -> None:
+    """Which the format allows: rosbag2 writes it with `noMessageIndex`."""
+    path = bag([m for index in range(3) for m in both(index * STEP_NS)])
+    (file,) = path.glob("*.mcap")
+    whole = file.read_bytes()
+    kinds = IndexType.ATTACHMENT | IndexType.CHUNK | IndexType.METADATA
+    with file.open("wb") as out:
+        writer = McapWriter(out, index_types=kinds)
+        writer.start("ros2")
+        channels: dict[int, int] = {}
+        for schema, channel, message in make_reader(io.BytesIO(whole)).iter_messages():
+            if channel.id not in channels:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.id] = writer.register_channel(channel.topic, "cdr", number)
+            writer.add_message(
+                channels[channel.id], message.log_time, message.data, message.publish_time
+            )
+        writer.finish()
+    assert [frame.stamp_ns for frame in open_recording(path).frames()] == [0, STEP_NS, 2 * STEP_NS]
 
 
 def test_incomplete_sets_are_skipped_and_counted(bag) -> None:

@@ -52,6 +52,39 @@ def test_the_brightness_of_a_noisy_patterned_scene_is_measured_as_it_is_compared
     assert undecided is not None and ((mask | undecided) > 0).mean() < 0.02
 
 
+def test_a_pattern_that_fades_in_is_followed_by_the_texture_test_too() -> None:
+    """Sun through blinds on a wall that a grey camera sees."""
+    settings = ImagingSettings.from_mapping(
+        {"background.follow_s": 0.3, "background.follow_margin_px": 0}
+    )
+    empty = wall(120.0, 12.0)
+    segmenter = Segmenter(
+        "cam", learn_background([noisy(empty, s, 2.0) for s in range(12)], settings), settings
+    )
+    columns = np.arange(SHAPE[1])
+    stripes = 1.0 + 0.22 * np.sign(np.sin(1.05 * columns)) * (columns >= 80)
+    for t in range(30):
+        light = 1.0 + (stripes - 1.0) * min(1.0, t / 22.0)
+        observed = segmenter.observe(noisy(empty * light, 100 + t, 2.0), t * 500_000_000)
+    assert observed.mask.mean() < 0.02
+
+
+def test_a_mixture_is_not_blurred() -> None:
+    """Pixels beside those with a second Gaussian have none, which a blur would mix in."""
+    images = []
+    for number in range(20):
+        image = np.full(SHAPE, 60.0)
+        image[:, 60:65] += 120.0 * (number % 2)
+        images.append(noisy(image, number, 8.0))
+    settings = ImagingSettings.from_mapping(
+        {"background.modes": 2, "background.exposure_compensation": False}
+    )
+    segmenter = Segmenter("cam", learn_background(images, settings), settings)
+    for image in images[:2]:
+        mask, undecided = segmenter.classes(image)
+        assert not mask.any() and (undecided is None or not undecided.any())
+
+
 def test_a_background_that_follows_noisy_images_stays() -> None:
     empty = stripes()
     settings = ImagingSettings.from_mapping(
