@@ -53,7 +53,11 @@ def _person(group: argparse._ArgumentGroup) -> None:
         help="start pose: first row of a marker file, or named parameters (default: search)",
     )
     group.add_argument(
-        "--stature", type=float, metavar="M", help="body height in metres; scales the generic body"
+        "--stature",
+        type=float,
+        metavar="M",
+        help="body height in metres; scales the generic body; "
+        "without it and other sizes that of an adult is estimated",
     )
     group.add_argument(
         "--subject",

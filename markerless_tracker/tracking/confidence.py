@@ -52,7 +52,7 @@ LIMB_FITTING_M, TRUNK_FITTING_M = 0.009, 0.008
 """Root mean square of the residuals of a limb that fits, and of a trunk that fits."""
 LIMB_ERROR_FACTOR = 25.0
 """Error of a limb's end relative to the excess of its residuals over those of a limb that fits."""
-SUSPECTED_FACTOR = 0.25
+SUSPECTED_FACTOR = 0.5
 """Error of a limb's end relative to the size of unexplained silhouette that it may belong to."""
 MOST_LIMB_M = 0.30
 """Largest error that is inferred from either: about the length of a segment."""

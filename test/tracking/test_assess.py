@@ -41,7 +41,7 @@ def test_a_suspected_limb_is_less_sure_in_the_result(
     frames, make_tracker, refined_settings, monkeypatch
 ) -> None:
     wrist, deviations = MARKER_NAMES.index("LWrist"), []
-    for suspected_m in ({}, {"l_arm": 0.3}):
+    for suspected_m in ({}, {"l_arm": 0.15}):
         monkeypatch.setattr(LimbWatch, "suspected_m", suspected_m)
         result = make_tracker(refined_settings).step(frames[0].observations, frames[0].stamp_ns)
         assert result.confidence is not None

@@ -52,6 +52,7 @@ class LimbWatch:
         self._tracks: dict[str, LimbTrack] = {}
         self._schedule = LimbSchedule()
         self._areas_m2: dict[str, float] = {}
+        self._views = 1
         self._rivals: dict[str, Rival] = {}
         self._begun: dict[str, FloatArray] = {}
 
@@ -64,10 +65,10 @@ class LimbWatch:
     def suspected_m(self) -> dict[str, float]:
         """Size of the unexplained silhouette that a limb may belong to, of the likeliest limbs.
 
-        It is the root of the area that was found when limbs were searched last.
+        It is the root of the mean area in a view that was found when limbs were searched last.
         """
         likeliest = tuple(self._areas_m2.items())[:SUSPECTED]
-        return {name: float(np.sqrt(area_m2)) for name, area_m2 in likeliest}
+        return {name: float(np.sqrt(area_m2 / self._views)) for name, area_m2 in likeliest}
 
     @property
     def rivals(self) -> dict[str, Rival]:
@@ -129,7 +130,7 @@ class LimbWatch:
         if not searcher.body.limbs:
             return Recovered(pose)
         unexplained = find_unexplained(searcher.body, pose, seen.used, self.rig)
-        self._areas_m2 = dict(unexplained.areas_m2)
+        self._areas_m2, self._views = dict(unexplained.areas_m2), len(seen.used)
         begun, self._begun = self._begun, {}
         due = self._schedule.take(
             searcher.body, pose, searcher.limits, seen.stamp_ns, lost=self.lost,
@@ -140,7 +141,7 @@ class LimbWatch:
         search = _search(searcher, contours, seen, pose, thorough=not late)
         if self._compare_headings(search, due, searcher):
             # Rivals, and sums of earlier comparisons, were those of the former heading.
-            self._rivals = {}
+            self._rivals, self._areas_m2 = {}, {}
             self._schedule.exchange.forget_gains()
             return Recovered(search.pose, rotated=True)
         found = []

@@ -113,13 +113,16 @@ class BodyEstimate:
         return self._fits_sections and self._config.fit_lengths
 
     def may_be_anothers(self, away_s: float) -> bool:
-        """Whether a body that was not measured has been fitted to a person who may not return.
+        """Whether a body that was not measured was found for a person who may not return.
 
         Args:
             away_s: time since the person was seen last.
         """
-        fitted = self._person is not None and self._fits_sections and self.sections_fitted
-        return fitted and away_s > AWAY_S
+        person = self._person
+        if person is None or away_s <= AWAY_S:
+            return False
+        fitted = self._fits_sections and self.sections_fitted
+        return fitted or (person.sized is not None and self.sized is None)
 
     @property
     def unfitted(self) -> Unmeasured | None:

@@ -23,10 +23,14 @@ def leg_m(body: BodyModel) -> float:
     return body.lengths_m["l_thigh"] + body.lengths_m["l_calf"]
 
 
-@pytest.mark.parametrize("away_s, anew", [(0.5 * AWAY_S, False), (1.5 * AWAY_S, True)])
-def test_who_comes_long_after_has_an_own_body(away_s: float, anew: bool) -> None:
+@pytest.mark.parametrize(
+    "away_s, fit_shape, anew",
+    [(0.5 * AWAY_S, True, False), (1.5 * AWAY_S, True, True), (1.5 * AWAY_S, False, True)],
+)
+def test_who_comes_long_after_has_an_own_body(away_s: float, fit_shape: bool, anew: bool) -> None:
     tall, short = scene_of(TALL_M), scene_of(SHORT_M)
-    tracker = build_tracker(tall.rig, TrackerConfig(threads=1)).tracker
+    config = TrackerConfig(threads=1, fit_shape=fit_shape, fit_lengths=fit_shape)
+    tracker = build_tracker(tall.rig, config).tracker
 
     def step(scene: SyntheticScene, index: int | None, stamp_ns: int) -> TrackState:
         seen = {}
