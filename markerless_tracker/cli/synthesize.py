@@ -37,7 +37,8 @@ from markerless_tracker.synthesis.scenes import GeneratedScene
 
 HELP = (
     "Render a synthetic person (shaded cones in a textured room) as a recording folder: "
-    "calibration, videos, empty-scene images, exact masks and markers, subject and start pose. "
+    "calibration, videos, empty-scene images, exact markers and masks (of every 50th frame), "
+    "subject and start pose. "
     "Errors on it test the software; they do not measure the accuracy on real images. --scene "
     "SEED renders a sampled room and a clothed person with other shapes than the tracker's cones; "
     "--checkerboard renders a moving calibration board for `calibrate`, seen by the same cameras."

@@ -315,7 +315,8 @@ def read_config(path: Path | None, flags: dict[str, Any]) -> TrackerConfig:
         try:
             loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-            reason = " ".join(str(error).split())
+            stated = error.strerror if isinstance(error, OSError) else None
+            reason = stated or " ".join(str(error).split())
             raise ConfigError(f"{path}: cannot read the settings: {reason}") from error
         if loaded is not None and not isinstance(loaded, dict):
             raise ConfigError(

@@ -9,7 +9,7 @@ import yaml
 
 from markerless_tracker.datasets.recording import DerivedRecording, FrameSet, Recording
 from markerless_tracker.datasets.video.rates import stamp_of
-from markerless_tracker.errors import ConfigError
+from markerless_tracker.errors import ConfigError, one_line
 from markerless_tracker.imaging import Image
 
 MOST_OFFSET_S = 60.0
@@ -32,9 +32,10 @@ def read_time_offsets(text: str) -> dict[str, float]:
     except (
         OSError, yaml.YAMLError, RecursionError, ValueError, TypeError, AttributeError,
     ) as error:  # fmt: skip
+        reason = f": {one_line(error)}" if isinstance(error, (OSError, yaml.YAMLError)) else ""
         raise ConfigError(
             f"time offsets {text!r}: expected cam01=SECONDS,... or a YAML file with lines "
-            f"`cam01: SECONDS` ({error})"
+            f"`cam01: SECONDS`{reason}"
         ) from error
 
 

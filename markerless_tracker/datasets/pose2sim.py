@@ -3,7 +3,6 @@
 In a batch session the trials, each with its own `videos/`, share the calibration beside them.
 """
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from markerless_tracker.datasets.video.images import (
     open_stream,
     read_image,
 )
+from markerless_tracker.datasets.video.numbering import in_order
 from markerless_tracker.errors import DatasetError
 from markerless_tracker.imaging import Image, scale_image
 
@@ -112,7 +112,7 @@ def match_videos(folder: Path, rig: CameraRig) -> tuple[Mapping[str, Path], list
             for entry in (folder.iterdir() if folder.is_dir() else ())
             if entry.suffix.lower() in VIDEO_SUFFIXES or (entry.is_dir() and numbered_files(entry))
         ),
-        key=_in_order,
+        key=in_order,
     )
     by_stem = {video.stem: video for video in videos}
     if set(rig.names) <= set(by_stem):
@@ -126,12 +126,6 @@ def match_videos(folder: Path, rig: CameraRig) -> tuple[Mapping[str, Path], list
     pairs = dict(zip(rig.names, videos, strict=True))
     listed = ", ".join(f"{name} = {video.name}" for name, video in pairs.items())
     return pairs, [f"{folder}: names of videos and cameras differ, paired in order: {listed}"]
-
-
-def _in_order(path: Path) -> tuple[list[tuple[bool, int, str]], str]:
-    """Sorts names by their texts and numbers."""
-    parts = re.split("([0-9]+)", path.name)
-    return [(p.isdecimal(), int(p) if p.isdecimal() else 0, p) for p in parts], path.name
 
 
 def _stretched(camera: CameraModel, size_px: tuple[int, int]) -> CameraModel:

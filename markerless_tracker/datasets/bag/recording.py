@@ -1,6 +1,5 @@
 """Bags (rosbag2, MCAP): images as topics, `calibration.toml` and `background/` in the folder."""
 
-import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -9,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from rosbags.typesys import Stores, get_typestore
 
 from markerless_tracker.camera import CameraModel, CameraRig, read_calibration
 from markerless_tracker.camera.model import nominal_camera
 from markerless_tracker.datasets.bag.calibration import rig_from_messages
 from markerless_tracker.datasets.bag.encodings import decode_compressed, decode_raw
+from markerless_tracker.datasets.bag.files import mcap_files
 from markerless_tracker.datasets.bag.sets import SetGrouping, StampedSet
 from markerless_tracker.datasets.bag.stream import FIRST, IndexDamaged, McapFiles, Place, RawMessage
 from markerless_tracker.datasets.recording import FrameSet, Recording
@@ -56,7 +55,7 @@ class BagRecording(Recording):
     ) -> None:
         folder = path if path.is_dir() else path.parent
         names: tuple[str, ...]
-        self._files = McapFiles(_mcap_files(path), checked=checked)
+        self._files = McapFiles(mcap_files(path), checked=checked)
         self._store = get_typestore(Stores.ROS2_JAZZY)
         if self._files.counts is None:
             for _ in self._files:  # the topics of a damaged bag are known only after reading it
@@ -308,48 +307,8 @@ def _namespaces(types: Mapping[str, str]) -> dict[str, str]:
     return {space.replace("/", "__"): space for space in found}
 
 
-def _mcap_files(path: Path) -> list[Path]:
-    if path.is_file():
-        return [path]
-    metadata = path / "metadata.yaml"
-    if metadata.is_file():
-        try:
-            content = yaml.safe_load(metadata.read_text(encoding="utf-8"))
-            information = content["rosbag2_bagfile_information"]
-            storage = information["storage_identifier"]
-            files = [path / str(name) for name in information["relative_file_paths"]]
-            packed = information.get("compression_mode") or "none"
-        except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError, RecursionError) as error:
-            raise DatasetError(f"{metadata}: not a rosbag2 description: {_line(error)}") from error
-        if storage != "mcap":
-            raise DatasetError(
-                f"{path}: stored as {storage}, expected mcap (`ros2 bag convert` makes one)"
-            )
-        if str(packed).lower() in ("file", "message"):
-            raise DatasetError(
-                f"{path}: compressed by {packed}, expected none or compression inside the MCAP"
-            )
-        if not files:
-            raise DatasetError(f"{metadata}: names no file")
-        return files
-    # The parts of a recording are numbered: name_9.mcap comes before name_10.mcap.
-    files = sorted(path.glob("*.mcap"), key=_in_order)
-    if not files:
-        raise DatasetError(f"{path}: no bag, expected a metadata.yaml or a .mcap file")
-    return files
-
-
-def _in_order(file: Path) -> list[str | int]:
-    """Texts and numbers of a name, in turn."""
-    return [int(x) if x.isdecimal() else x for x in re.split("([0-9]+)", file.name)]
-
-
 def _counts(counter: Counter[str]) -> str:
     return ", ".join(f"{name} {count}" for name, count in sorted(counter.items()))
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _rate(stamps: list[int]) -> float:

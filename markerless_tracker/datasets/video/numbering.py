@@ -1,10 +1,17 @@
-"""Numbers in the names of images: whether folders of several cameras hold the same ones."""
+"""Numbers in the names of files: their order, and whether folders of cameras hold the same ones."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from markerless_tracker.datasets.video.images import image_number, numbered_files
 from markerless_tracker.errors import DatasetError
+
+
+def in_order(path: Path) -> tuple[list[tuple[bool, int, str]], str]:
+    """Sorts names by their texts and numbers: part_9 comes before part_10."""
+    parts = re.split("([0-9]+)", path.name)
+    return [(p.isdecimal(), int(p) if p.isdecimal() else 0, p) for p in parts], path.name
 
 
 def check_numbers(folders: Mapping[str, Path]) -> list[str]:
