@@ -28,7 +28,7 @@ def mcap_files(path: Path) -> list[Path]:
             files = [path / str(name) for name in information["relative_file_paths"]]
             packed = information.get("compression_mode") or "none"
         except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError, RecursionError) as error:
-            what = one_line(error) or type(error).__name__
+            what = one_line(error)
             raise DatasetError(f"{metadata}: not a rosbag2 description: {what}") from error
         if storage != "mcap":
             raise DatasetError(

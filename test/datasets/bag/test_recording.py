@@ -303,7 +303,7 @@ def test_other_files_and_storages_are_refused_by_name(tmp_path: Path, bag) -> No
     for text, reported in (
         ("a: [", "not a rosbag2 description"),
         ("[]", "not a rosbag2 description"),
-        ("[" * 5000, "not a rosbag2 description: maximum recursion depth"),
+        ("[" * 5000, "not a rosbag2 description: RecursionError: maximum recursion depth"),
         (described.replace("storage_identifier: mcap", "storage_identifier: sqlite3"), "sqlite3"),
         (described.replace("bag.mcap", "gone.mcap"), "gone.mcap: cannot be read"),
         (described.replace("compression_mode: ''", "compression_mode: FILE"), "compressed by FILE"),
