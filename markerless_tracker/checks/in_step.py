@@ -18,11 +18,12 @@ MOST_LAG_S = 1.5
 """Largest offset that is searched."""
 LEAST_CORRELATION = 0.45
 """Pairs whose best correlation is lower are not used."""
-LEAST_EVIDENCE = 5.0
-"""Pairs whose best correlation times the root of the number of common frames is lower are not used
-either."""
+LEAST_EVIDENCE, LEAST_STILL = 4.5, 1.5
+"""Nor are pairs whose best correlation times the root of the number of independent common frames is
+lower; the second, if they correlate almost as well without an offset. Many offsets are tried, and
+motion is smooth: signals of a few strides correlate well at a wrong offset, too."""
 LEAST_FRAMES = 40
-_SMOOTH_S = 1.0
+_SMOOTH_S, _STRIDE_S = 1.0, 0.33
 _LEAST_MOTION = 0.02
 _ROUNDS = 6
 _LAG_PENALTY = 0.25
@@ -60,11 +61,11 @@ def find_offsets(motion: Mapping[str, FloatArray], fps: float) -> Offsets:
     most = int(min(MOST_LAG_S * fps, 0.4 * min((len(s) for s in signals.values()), default=0)))
     pairs: dict[tuple[str, str], FloatArray] = {}
     for a, b in combinations(names, 2):
-        values = [_correlation(signals[a], signals[b], lag) for lag in range(-most, most + 1)]
-        common = min(len(signals[a]), len(signals[b])) - abs(int(np.argmax(values)) - most)
-        if max(values) >= max(LEAST_CORRELATION, LEAST_EVIDENCE / np.sqrt(common)):
-            pairs[a, b] = np.array(values)
-            pairs[b, a] = pairs[a, b][::-1]
+        values = np.array(
+            [_correlation(signals[a], signals[b], lag) for lag in range(-most, most + 1)]
+        )
+        if _is_evident(signals[a], signals[b], values, fps):
+            pairs[a, b], pairs[b, a] = values, values[::-1]
     names = [n for n in names if any(n in pair for pair in pairs)]
     offsets = dict.fromkeys(names, 0)
     lags = np.arange(-most, most + 1)
@@ -87,6 +88,30 @@ def find_offsets(motion: Mapping[str, FloatArray], fps: float) -> Offsets:
         {n: float(np.mean(there[n]) - np.mean(still[n])) for n in sure},
         {n: _similar(_totals(n, offsets, pairs, lags), lags - round(middle)) for n in sure},
     )
+
+
+def _is_evident(a: FloatArray, b: FloatArray, correlations: FloatArray, fps: float) -> bool:
+    """Whether two signals share so much motion that their correlations by lag tell the offset."""
+    most = len(correlations) // 2
+    best = int(np.argmax(correlations))
+    if correlations[most] >= correlations[best] - _SIMILAR:
+        best, least = most, LEAST_STILL
+    else:
+        least = LEAST_EVIDENCE
+    common = min(len(a), len(b)) - abs(best - most)
+    evidence = correlations[best] * np.sqrt(common * _independent_share(a, b, fps))
+    return bool(correlations[best] >= LEAST_CORRELATION and evidence >= least)
+
+
+def _independent_share(a: FloatArray, b: FloatArray, fps: float) -> float:
+    """Share of the frames of two smooth signals that are independent (Bartlett's formula).
+
+    Frames farther apart than `_STRIDE_S` count as independent, so that strides that look alike do.
+    """
+    count = min(len(a), len(b))
+    lags = np.arange(1, max(2, min(round(_STRIDE_S * fps), count // 3)))
+    product = np.array([_correlation(a, a, lag) * _correlation(b, b, lag) for lag in lags])
+    return float(1.0 / max(1.0, 1.0 + 2.0 * np.sum((1.0 - lags / count) * product)))
 
 
 def _totals(
@@ -132,8 +157,8 @@ def _peak(totals: FloatArray, lags: NDArray[np.int_]) -> float:
 def _varying(motion: FloatArray, fps: float) -> FloatArray:
     """The signal without its slow trend, which would hide the lag."""
     signal = np.sqrt(np.maximum(motion[1:], 0.0))
-    # Compression causes a peak at every key frame: peaks are clipped.
-    signal = np.minimum(signal, np.quantile(signal, 0.98))
+    # Compression causes a peak at every key frame: peaks are clipped, and dips.
+    signal = np.clip(signal, *np.quantile(signal, (0.02, 0.98)))
     width = max(3, round(_SMOOTH_S * fps) | 1)
     padded = np.pad(signal, width // 2, mode="edge")
     slow = np.convolve(padded, np.full(width, 1.0 / width), mode="valid")

@@ -107,6 +107,8 @@ def _signals(
         gain[number] = float(np.median(now[usable] / base[usable])) if usable.any() else 1.0
         differs = np.abs(now - gain[number] * base) > DIFFERENCE
         height[number] = _blob_height(differs) * width_px / image.shape[1]
+    # Zeros in the first frames of every camera would look like common motion.
+    motion[:apart] = motion[apart : apart + 1] if len(images) > apart else 0.0
     return CameraSignals(motion, gain, height, scene, background, kinds)
 
 

@@ -43,3 +43,14 @@ def test_a_camera_without_the_motion_is_left_out() -> None:
     signals["cam02"] = np.zeros(200)
     assert "cam02" not in find_offsets(signals, FPS).frames
     assert find_offsets({n: s[:10] for n, s in signals.items()}, FPS).frames == {}
+
+
+def test_a_common_beginning_without_motion_does_not_hide_an_offset() -> None:
+    """Signals of few strides that correlate a little at a wrong offset are not decided."""
+    rng = np.random.default_rng(4)
+    smooth = np.hanning(31)
+    unlike = {
+        name: 1.0 + np.convolve(rng.standard_normal(230), smooth / smooth.sum(), mode="valid")
+        for name in ("a", "b", "c")
+    }
+    assert find_offsets(unlike, 60.0).frames == {}
