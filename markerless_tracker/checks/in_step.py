@@ -109,9 +109,9 @@ def _independent_share(a: FloatArray, b: FloatArray, fps: float) -> float:
     Frames farther apart than `_STRIDE_S` count as independent, so that strides that look alike do.
     """
     count = min(len(a), len(b))
-    lags = np.arange(1, max(2, min(round(_STRIDE_S * fps), count // 3)))
+    lags = range(1, max(2, min(round(_STRIDE_S * fps), count // 3)))
     product = np.array([_correlation(a, a, lag) * _correlation(b, b, lag) for lag in lags])
-    return float(1.0 / max(1.0, 1.0 + 2.0 * np.sum((1.0 - lags / count) * product)))
+    return float(1.0 / max(1.0, 1.0 + 2.0 * np.sum((1.0 - np.array(lags) / count) * product)))
 
 
 def _totals(

@@ -45,12 +45,14 @@ def test_a_camera_without_the_motion_is_left_out() -> None:
     assert find_offsets({n: s[:10] for n, s in signals.items()}, FPS).frames == {}
 
 
-def test_a_common_beginning_without_motion_does_not_hide_an_offset() -> None:
-    """Signals of few strides that correlate a little at a wrong offset are not decided."""
-    rng = np.random.default_rng(4)
-    smooth = np.hanning(31)
-    unlike = {
-        name: 1.0 + np.convolve(rng.standard_normal(230), smooth / smooth.sum(), mode="valid")
-        for name in ("a", "b", "c")
-    }
-    assert find_offsets(unlike, 60.0).frames == {}
+def test_signals_of_different_motions_give_no_offset() -> None:
+    """Smooth ones correlate by chance at one of many offsets."""
+    smooth = np.hanning(31) / np.hanning(31).sum()
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        unlike = {
+            name: 1.0 + np.convolve(rng.standard_normal(230), smooth, mode="valid")
+            for name in "abc"
+        }
+        late = find_offsets(unlike, 60.0).frames
+        assert all(abs(frames) < 5.0 for frames in late.values())
