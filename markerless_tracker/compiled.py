@@ -18,13 +18,16 @@ from weakref import WeakSet
 
 from numba import __version__ as numba_version
 from numba import njit
-from numba.core import event
+from numba.core import config, event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
 from markerless_tracker.libraries import collect_new_objects
 
 PACKAGE = Path(__file__).resolve().parent
 _COMPILE = "numba:compile"
+_MOST_OPTIMISED = 2
+"""LLVM's level. numba's default of 3 takes longer to compile, and sampled edges and outlines take a
+fifth longer in its code. A lower level asked for by `NUMBA_OPT` stays."""
 _IMPORT = r"^\s*from {}\.([\w.]+) import (?:(\w.*)|\(([^)]*)\))"
 
 Decorator = Callable[[Callable[..., Any]], Any]
@@ -46,10 +49,30 @@ def compiled(**options: Any) -> Decorator:
         # Nothing calls kernels from C; their wrappers for it would take a seventh of the time.
         dispatcher = njit(nogil=True, no_cfunc_wrapper=True, **options)(function)
         dispatcher._cache = _Cache(function)
+        _limit_optimisation(dispatcher._compiler)
         _dispatchers.add(dispatcher)
         return dispatcher
 
     return decorate
+
+
+def _limit_optimisation(compiler: Any) -> None:
+    """Make the compiler of one dispatcher use at most `_MOST_OPTIMISED`.
+
+    numba has one level for a process. It is changed only while this compiler works, which holds
+    numba's lock, so kernels of other packages keep theirs.
+    """
+    compile_as_configured = compiler.compile
+
+    def compile_limited(*args: Any) -> Any:
+        configured = config.OPT
+        config.OPT = type(configured)(min(configured, _MOST_OPTIMISED))
+        try:
+            return compile_as_configured(*args)
+        finally:
+            config.OPT = configured
+
+    compiler.compile = compile_limited
 
 
 kernel: Decorator = compiled(error_model="numpy", _nrt=False)
@@ -66,7 +89,8 @@ inlined: Decorator = compiled(error_model="numpy", inline="always")
 @cache
 def source_digest(file: Path, package: Path = PACKAGE) -> str:
     """Digest of what compiles the kernels of a file and from what, part of stored files' names."""
-    parts = [numba_version.encode(), *(_text(s).encode() for s in kernel_sources(file, package))]
+    made_by = f"{numba_version} {min(config.OPT, _MOST_OPTIMISED)}"
+    parts = [made_by.encode(), *(_text(s).encode() for s in kernel_sources(file, package))]
     return hashlib.sha256(b"\0".join(parts)).hexdigest()[:12]
 
 
