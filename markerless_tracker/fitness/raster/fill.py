@@ -5,9 +5,17 @@ Columns of words, and unsigned rows, let the compiler vectorise loops over rows.
 
 import numpy as np
 
-from markerless_tracker.compiled import kernel
+from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.raster.bits import ALL, popcount
-from markerless_tracker.fitness.raster.outline_arrays import LANES
+from markerless_tracker.fitness.raster.outline_arrays import BLOCK_ROWS, LANES
+
+_BLOCK = np.uint64(BLOCK_ROWS)
+
+
+@inlined
+def _whole_blocks(rows):  # type: ignore[no-untyped-def]
+    """A number of rows, rounded up to blocks."""
+    return (rows + _BLOCK - np.uint64(1)) // _BLOCK * _BLOCK
 
 
 @kernel
@@ -29,21 +37,26 @@ def fill_outline(c, count, out, width, height, bits, used):  # type: ignore[no-u
     if top >= bottom:
         return
     left, right = out.left, out.right
-    before = (count - 1) * LANES + c
-    for i in range(count):
-        at = i * LANES + c
+    # From its topmost point on the polygon goes down one side and up the other.
+    at, closing = np.uint64(c), np.uint64((count - 1) * LANES + c)
+    while at != closing and out.first[at] != top:
+        at += np.uint64(LANES)
+    for _ in range(count):
+        before = at
+        at = np.uint64(c) if at == closing else at + np.uint64(LANES)
         # Rows in [lower, upper) cross this edge: half-open, so that a vertex counts once per side.
         start, stop = np.uint64(out.first[before]), np.uint64(out.first[at])
         if start != stop:
             slope = out.slope[at]
             u0 = out.u[at] - slope * out.v[at]
+            # Whole blocks: what they have too much is filled by the side's next edge, or not read.
             if start < stop:
-                for v in range(start, stop):
-                    left[v] = u0 + slope * v
+                for v in range(start + _BLOCK, start + _BLOCK + _whole_blocks(stop - start)):
+                    left[v] = u0 + slope * np.int64(v - _BLOCK)
             else:
-                for v in range(stop, start):
-                    right[v] = u0 + slope * v
-        before = at
+                begin = start + _BLOCK - _whole_blocks(start - stop)
+                for v in range(begin, start + _BLOCK):
+                    right[v] = u0 + slope * np.int64(v - _BLOCK)
     edge = width - 1.0
     first = np.int64(max(out.box[c], 0.0)) >> 6
     last = np.int64(min(out.box[LANES + c], edge)) >> 6
@@ -52,7 +65,7 @@ def fill_outline(c, count, out, width, height, bits, used):  # type: ignore[no-u
         base, offset = np.uint64(w * height), 64.0 * w
         final = min(63.0, edge - offset)
         for v in range(begin, end):
-            one, other = left[v] - offset, right[v] - offset
+            one, other = left[v + _BLOCK] - offset, right[v + _BLOCK] - offset
             a, b = (one, other) if one < other else (other, one)
             a = a if a > 0.0 else 0.0
             a = a if a < 64.0 else 64.0

@@ -77,12 +77,19 @@ def find_outlines(cones, views, view, world, out):  # type: ignore[no-untyped-de
     between = SIDE_POINTS if distorted else 0
     count = 2 * (ARC_POINTS + between)
     near = ARC_POINTS + between
-    # With literals numba compiles a copy for each end, which takes an eighth less of an evaluation.
-    place_arc(cones, 1, 0, out.ends, out.flat, out.arcs, out.u, out.v)
-    place_arc(cones, 0, near, out.ends, out.flat, out.arcs, out.u, out.v)
+    ends, flat, arcs, u, v = out.ends, out.flat, out.arcs, out.u, out.v
+    end, far = 9 * LANES, near * LANES
+    place_arc(cones, ends[end:], flat[6 * LANES :], arcs[4 * LANES :], u, v)
+    place_arc(cones, ends, flat, arcs, u[far:], v[far:])
     if distorted:
-        place_side(cones, 1, ARC_POINTS, out.ends, out.arcs, out.u, out.v)
-        place_side(cones, 0, near + ARC_POINTS, out.ends, out.arcs, out.u, out.v)
+        last = (ARC_POINTS - 1) * LANES
+        place_side(
+            cones, ends[end:], arcs[6 * LANES :], ends, arcs, u[last:], v[last:], u[far:], v[far:]
+        )
+        last += far
+        place_side(
+            cones, ends, arcs[2 * LANES :], ends[end:], arcs[4 * LANES :], u[last:], v[last:], u, v
+        )
     for c in range(cones):
         if out.form[c] >= ONLY_END:
             circle = _CIRCLES[1] if distorted else _CIRCLES[0]

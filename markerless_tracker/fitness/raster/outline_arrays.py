@@ -26,6 +26,8 @@ HIDDEN, TAPERED, ONLY_END = 0, 1, 2
 
 VECTOR_LANES = 8
 """Loops run over a multiple of this number of lanes, without a remainder."""
+BLOCK_ROWS = 8
+"""Loops along the edges of a polygon run over a multiple of this number of rows."""
 TINY = 1e-300
 
 
@@ -44,7 +46,8 @@ class Outlines(NamedTuple):
         first: MAX_POINTS rows, the first pixel row at or below each point, 0 .. height.
         slope: MAX_POINTS rows, du/dv of the edge that leads to each point.
         box: 4 rows, least and largest u (px), least and largest `first`.
-        left, right: begin and end, in each row of the frame, of the polygon being filled, px.
+        left, right: begin and end, in each row of the frame, of the polygon being filled, px; row
+            0 of the frame lies at BLOCK_ROWS.
     """
 
     ends: FloatArray
@@ -70,11 +73,12 @@ def make_outlines(threads: int, height: int) -> Outlines:
         # Lanes without a cone are computed, too; ones keep their values finite.
         return np.ones((threads, count * LANES))
 
+    rows_in_all = height + 2 * BLOCK_ROWS
     return Outlines(
         rows(18), rows(12), rows(8), np.zeros((threads, LANES), dtype=np.int64),
         rows(MAX_POINTS), rows(MAX_POINTS),
         np.zeros((threads, MAX_POINTS * LANES), dtype=np.int32), rows(MAX_POINTS), rows(4),
-        np.zeros((threads, height)), np.zeros((threads, height)),
+        np.zeros((threads, rows_in_all)), np.zeros((threads, rows_in_all)),
     )  # fmt: skip
 
 

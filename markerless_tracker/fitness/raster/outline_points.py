@@ -9,7 +9,6 @@ from markerless_tracker.camera.lens import lens
 from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.raster.outline_arrays import (
     LANES,
-    MAX_POINTS,
     SIDE_POINTS,
     TINY,
     VECTOR_LANES,
@@ -29,14 +28,17 @@ def place_point(cos, sin, at, to, ends, u, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def place_arc(cones, e, row, ends, flat, arcs, u, v):  # type: ignore[no-untyped-def]
-    """Fill the points of end e's arc, from a row on: ends, middle, and thirds of both halves."""
+def place_arc(cones, ends, flat, arcs, u, v):  # type: ignore[no-untyped-def]
+    """Fill the points of one end's arc: ends, middle, and thirds of both halves.
+
+    Each array begins with that end's first row: with an offset that is not known when the loop is
+    compiled it would not be vectorised.
+    """
     n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
-    at, row_of_arc, to = 9 * e * LANES, 4 * e * LANES, row * LANES
     for c in range(n):
-        ca, sa = arcs[row_of_arc + c], arcs[row_of_arc + LANES + c]
-        cb, sb = arcs[row_of_arc + 2 * LANES + c], arcs[row_of_arc + 3 * LANES + c]
-        sense = -1.0 if clockwise(6 * e * LANES + c, flat) else 1.0
+        ca, sa = arcs[c], arcs[LANES + c]
+        cb, sb = arcs[2 * LANES + c], arcs[3 * LANES + c]
+        sense = -1.0 if clockwise(c, flat) else 1.0
         # The middle is normal to the chord and along the sum; the longer one is well-conditioned.
         hc, hs = cb - ca, sb - sa
         mc, ms = ca + cb, sa + sb
@@ -45,45 +47,48 @@ def place_arc(cones, e, row, ends, flat, arcs, u, v):  # type: ignore[no-untyped
         mc, ms = (sense * hs if across else flip * mc), (-sense * hc if across else flip * ms)
         scale = 1.0 / np.sqrt(mc * mc + ms * ms + TINY)
         mc, ms = mc * scale, ms * scale
-        w = _THIRD_0 + _THIRD_1 * (ca * mc + sa * ms)
-        place_point(ca, sa, at + c, to + c, ends, u, v)
-        pc, ps = w * ca + mc, w * sa + ms
-        scale = 1.0 / np.sqrt(pc * pc + ps * ps + TINY)
-        place_point(pc * scale, ps * scale, at + c, to + LANES + c, ends, u, v)
-        pc, ps = ca + w * mc, sa + w * ms
-        scale = 1.0 / np.sqrt(pc * pc + ps * ps + TINY)
-        place_point(pc * scale, ps * scale, at + c, to + 2 * LANES + c, ends, u, v)
-        place_point(mc, ms, at + c, to + 3 * LANES + c, ends, u, v)
-        pc, ps = cb + w * mc, sb + w * ms
-        scale = 1.0 / np.sqrt(pc * pc + ps * ps + TINY)
-        place_point(pc * scale, ps * scale, at + c, to + 4 * LANES + c, ends, u, v)
-        pc, ps = w * cb + mc, w * sb + ms
-        scale = 1.0 / np.sqrt(pc * pc + ps * ps + TINY)
-        place_point(pc * scale, ps * scale, at + c, to + 5 * LANES + c, ends, u, v)
-        place_point(cb, sb, at + c, to + 6 * LANES + c, ends, u, v)
+        # All four sums have the same length.
+        half = ca * mc + sa * ms
+        w = _THIRD_0 + _THIRD_1 * half
+        short = 1.0 / np.sqrt(1.0 + w * (w + 2.0 * half))
+        long = w * short
+        place_point(ca, sa, c, c, ends, u, v)
+        place_point(long * ca + short * mc, long * sa + short * ms, c, LANES + c, ends, u, v)
+        place_point(short * ca + long * mc, short * sa + long * ms, c, 2 * LANES + c, ends, u, v)
+        place_point(mc, ms, c, 3 * LANES + c, ends, u, v)
+        place_point(short * cb + long * mc, short * sb + long * ms, c, 4 * LANES + c, ends, u, v)
+        place_point(long * cb + short * mc, long * sb + short * ms, c, 5 * LANES + c, ends, u, v)
+        place_point(cb, sb, c, 6 * LANES + c, ends, u, v)
 
 
 @kernel
-def place_side(cones, e, row, ends, arcs, u, v):  # type: ignore[no-untyped-def]
-    """Fill the inner points of the side that begins at end e, from a row on."""
-    o = 1 - e
-    at, to = (4 * e + 2) * LANES, 4 * o * LANES
-    for c in range(cones):
-        z0 = _depth(e, c, arcs[at + c], arcs[at + LANES + c], ends)
-        z1 = _depth(o, c, arcs[to + c], arcs[to + LANES + c], ends)
-        begin, end = (row - 1) * LANES + c, ((row + SIDE_POINTS) % MAX_POINTS) * LANES + c
-        for i in range(SIDE_POINTS):
-            t = (i + 1.0) / (SIDE_POINTS + 1.0)
+def place_side(  # type: ignore[no-untyped-def]
+    cones, ends, arcs, other_ends, other_arcs, u, v, other_u, other_v
+):
+    """Fill the inner points of the side from one end to the other.
+
+    Args:
+        ends, other_ends: from the first row of each end on.
+        arcs, other_arcs: from the rows of the angles at which the side touches each end on.
+        u, v, other_u, other_v: from the rows of the side's first and last point on. The inner
+            points are put into the rows after the first.
+    """
+    n = (cones + VECTOR_LANES - 1) // VECTOR_LANES * VECTOR_LANES
+    for c in range(n):
+        z0 = _depth(c, arcs[c], arcs[LANES + c], ends)
+        z1 = _depth(c, other_arcs[c], other_arcs[LANES + c], other_ends)
+        u0, v0, u1, v1 = u[c], v[c], other_u[c], other_v[c]
+        for i in range(1, SIDE_POINTS + 1):
+            t = i / (SIDE_POINTS + 1.0)
             w0, w1 = (1.0 - t) * z0, t * z1
             inverse = 1.0 / (w0 + w1)
-            u[(row + i) * LANES + c] = (w0 * u[begin] + w1 * u[end]) * inverse
-            v[(row + i) * LANES + c] = (w0 * v[begin] + w1 * v[end]) * inverse
+            u[i * LANES + c] = (w0 * u0 + w1 * u1) * inverse
+            v[i * LANES + c] = (w0 * v0 + w1 * v1) * inverse
 
 
 @inlined
-def _depth(e, c, cos, sin, ends):  # type: ignore[no-untyped-def]
-    at = 9 * e * LANES + c
-    return ends[at + 2 * LANES] + cos * ends[at + 5 * LANES] + sin * ends[at + 8 * LANES]
+def _depth(c, cos, sin, ends):  # type: ignore[no-untyped-def]
+    return ends[2 * LANES + c] + cos * ends[5 * LANES + c] + sin * ends[8 * LANES + c]
 
 
 @kernel
