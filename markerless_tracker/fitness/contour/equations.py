@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from markerless_tracker.compiled import compiled, inlined, kernel
 from markerless_tracker.fitness.contour.chain_kernels import SUMS, add_wrench, sum_chain
 from markerless_tracker.fitness.contour.floor import add_floor
-from markerless_tracker.fitness.contour.nearest import BAND_PX
-from markerless_tracker.fitness.contour.outline_samples import MAX_SAMPLES, sample_outline
+from markerless_tracker.fitness.contour.nearest import Bands, make_bands
+from markerless_tracker.fitness.contour.outline_samples import sample_outline
 from markerless_tracker.fitness.contour.residuals import collect_residuals
 from markerless_tracker.fitness.raster.kernels import cone_ends
 from markerless_tracker.fitness.raster.outline_arrays import LANES
@@ -30,8 +30,7 @@ class ContourScratch(NamedTuple):
     world: FloatArray  # (18 * LANES,), rows as of Outlines.ends
     bits: NDArray[np.uint64]  # (v, w * h), zero between calls
     used: NDArray[np.int64]  # (v, w, 2)
-    start: NDArray[np.int64]  # (v, h / BAND_PX + 2)
-    order: NDArray[np.int64]  # (v, MAX_SAMPLES)
+    bands: Bands
     sums: FloatArray  # (v, m, SUMS)
     twists: FloatArray  # (m + 1, 6)
     hessian: FloatArray  # (p, p)
@@ -48,8 +47,7 @@ def make_contour_scratch(
         np.ones(18 * LANES),
         np.zeros((views, words * height), dtype=np.uint64),
         np.empty((views, words, 2), dtype=np.int64),
-        np.empty((views, height // BAND_PX + 2), dtype=np.int64),
-        np.empty((views, MAX_SAMPLES), dtype=np.int64),
+        make_bands(views, height),
         np.empty((views, nodes, SUMS)),
         np.empty((nodes + 1, 6)),
         np.empty((parameters, parameters)),
@@ -134,9 +132,8 @@ def descend(  # type: ignore[no-untyped-def]
                 view, views, body.cone_node.size, spacing_px, step_px, scratch, outlines, samples
             )
             collect_residuals(
-                view, views, contours, truncations[i], samples, scratch.start[view],
-                scratch.order[view], residuals,
-            )  # fmt: skip
+                view, views, contours, truncations[i], samples, scratch.bands, residuals
+            )
             _accumulate(view, body.cone_node, samples, residuals, scratch.sums[view])
         # The views' sums are added in their order.
         for view in range(1, count):

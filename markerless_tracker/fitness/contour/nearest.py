@@ -1,18 +1,76 @@
-"""Search of the model's outline point nearest to a pixel; points are sorted into bands of rows."""
+"""Search of the model's outline point nearest to a pixel; points are sorted into bands of rows.
+
+The points of neighbouring bands lie side by side, so the compiler vectorises the search of them. A
+squared distance and the point's place among the sorted ones are one integer, a key: the bits of a
+positive double grow with its value, and the place takes the lowest of them.
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
 
-from markerless_tracker.compiled import kernel
+from markerless_tracker.compiled import inlined, kernel
+from markerless_tracker.fitness.contour.outline_samples import MAX_SAMPLES
+from markerless_tracker.geometry import FloatArray
 
 BAND_PX = 8
 """Height of a band of rows, px."""
+_BLOCK = 8
+"""Points are searched in a multiple of this number, without a remainder."""
+_PLACE = np.uint64(MAX_SAMPLES - 1)
+_NOT_FACING = np.uint64(0xFFFFFFFFFFFFFFFF)
+_COS_60 = 0.5
+
+
+class Bands(NamedTuple):
+    """Outline points of v views, sorted into b bands.
+
+    Attributes:
+        start: (v, b + 1) band i holds the sorted points from start[i] to start[i + 1].
+        order: (v, s) index of each sorted point in its view.
+        points: (v, 4, s + _BLOCK) u, v (px) and the normal of the sorted points, a row each; after
+            the last one _BLOCK points infinitely far away.
+    """
+
+    start: NDArray[np.int64]
+    order: NDArray[np.int64]
+    points: FloatArray
+
+
+def make_bands(views: int, height: int) -> Bands:
+    """Allocate the arrays for frames of at most that height."""
+    return Bands(
+        np.empty((views, height // BAND_PX + 2), dtype=np.int64),
+        np.empty((views, MAX_SAMPLES), dtype=np.int64),
+        np.empty((views, 4, MAX_SAMPLES + _BLOCK)),
+    )
+
+
+@intrinsic  # type: ignore[misc]
+def _bits(typingctx: Any, value: Any) -> Any:
+    """The bits of a float64 as a uint64."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.bitcast(args[0], context.get_value_type(types.uint64))
+
+    return types.uint64(types.float64), codegen
+
+
+@inlined
+def _key(gap_px2):  # type: ignore[no-untyped-def]
+    """The key of place 0 at a squared distance."""
+    return _bits(gap_px2) & ~_PLACE
 
 
 @kernel
-def sort_into_bands(count, height, pixel, start, order):  # type: ignore[no-untyped-def]
-    """Sort outline points, pixel (s, 2), into bands of BAND_PX rows; returns the number of bands.
+def sort_into_bands(count, height, pixel, normal, start, order, points):  # type: ignore[no-untyped-def]
+    """Sort one view's outline points, pixel and normal (s, 2), into `Bands`.
 
-    Band b holds the points order[start[b] : start[b + 1]].
+    Returns:
+        The number of bands.
     """
     bands = height // BAND_PX + 1
     for b in range(bands + 1):
@@ -24,38 +82,57 @@ def sort_into_bands(count, height, pixel, start, order):  # type: ignore[no-unty
     for s in range(count - 1, -1, -1):
         b = int(pixel[s, 1]) // BAND_PX + 1
         start[b] -= 1
-        order[start[b]] = s
+        at = start[b]
+        order[at] = s
+        points[0, at], points[1, at] = pixel[s, 0], pixel[s, 1]
+        points[2, at], points[3, at] = normal[s, 0], normal[s, 1]
     # start[b + 1] now holds the start of band b.
     for b in range(bands):
         start[b] = start[b + 1]
     start[bands] = count
+    for at in range(count, count + _BLOCK):
+        points[0, at], points[1, at], points[2, at], points[3, at] = np.inf, np.inf, 0.0, 0.0
     return bands
 
 
 @kernel
-def nearest_facing(u, v, nu, nv, most_px2, bands, pixel, normal, start, order):  # type: ignore[no-untyped-def]
+def _least_key(begin, end, best, u, v, nu, nv, points):  # type: ignore[no-untyped-def]
+    """The least of `best` and the keys of sorted points, of at least those from begin to end."""
+    us, vs, along, across = points[0], points[1], points[2], points[3]
+    first = np.uint64(begin)
+    size = np.uint64((end - begin + _BLOCK - 1) // _BLOCK * _BLOCK)
+    for at in range(first, first + size):
+        du, dv = us[at] - u, vs[at] - v
+        key = _key(du * du + dv * dv) | at
+        key = key if along[at] * nu + across[at] * nv > _COS_60 else _NOT_FACING
+        best = min(best, key)
+    return best
+
+
+@kernel
+def nearest_facing(u, v, nu, nv, most_px2, bands, start, order, points):  # type: ignore[no-untyped-def]
     """Index of the nearest outline point whose normal is within 60° of (nu, nv); -1: none.
 
     Only points at less than a squared distance of `most_px2` are found.
+
+    Args:
+        u, v, nu, nv: the pixel and the direction.
+        bands: their number.
+        start, order, points: one view's part of `Bands`.
     """
-    best = most_px2
-    nearest = -1
+    none = _key(most_px2)
     home = min(max(np.int64(v) // BAND_PX, 0), bands - 1)
-    for away in range(bands):
-        # Least vertical distance of points in the bands that are `away` bands off.
-        if away > 0:
-            rows = min(v - (home - away + 1) * BAND_PX, (home + away) * BAND_PX - v)
-            if rows > 0 and rows * rows >= best:
-                break
-        for side in range(2 if away > 0 else 1):
-            band = home - away if side == 0 else home + away
-            if band < 0 or band >= bands:
-                continue
-            for i in range(start[band], start[band + 1]):
-                s = np.uint64(order[i])
-                du, dv = pixel[s, 0] - u, pixel[s, 1] - v
-                gap = du * du + dv * dv
-                if gap < best and normal[s, 0] * nu + normal[s, 1] * nv > 0.5:
-                    best = gap
-                    nearest = order[i]
-    return nearest
+    above, below = max(home - 1, 0), min(home + 1, bands - 1)
+    best = _least_key(start[above], start[below + 1], none, u, v, nu, nv, points)
+    while above > 0 or below < bands - 1:
+        # Least vertical distance of points in the bands beyond.
+        rows = min(v - above * BAND_PX, (below + 1) * BAND_PX - v)
+        if rows > 0.0 and _key(rows * rows) >= best:
+            break
+        if above > 0:
+            above -= 1
+            best = _least_key(start[above], start[above + 1], best, u, v, nu, nv, points)
+        if below < bands - 1:
+            below += 1
+            best = _least_key(start[below], start[below + 1], best, u, v, nu, nv, points)
+    return order[best & _PLACE] if best != none else np.int64(-1)

@@ -92,7 +92,7 @@ def _world_gradient(r, t, k, d, point, s, du, dv, out, n):  # type: ignore[no-un
 
 
 @kernel
-def collect_residuals(view, views, contours, truncation_m, samples, start, order, residuals):  # type: ignore[no-untyped-def]
+def collect_residuals(view, views, contours, truncation_m, samples, ordered, residuals):  # type: ignore[no-untyped-def]
     """Fill the residuals of one view, in both directions.
 
     With the truncation c, robust weights are Tukey's, (1 - (r / c)²)², and the cost is
@@ -137,14 +137,15 @@ def collect_residuals(view, views, contours, truncation_m, samples, start, order
         n += 1
     # No point farther off than this radius lies within the truncation.
     radius_px = truncation_m / (least_depth * inverse_focal)
-    bands = sort_into_bands(count, views.size[view, 1], pixel, start, order)
+    start, order, sorted_points = ordered.start[view], ordered.order[view], ordered.points[view]
+    bands = sort_into_bands(count, views.size[view, 1], pixel, normal, start, order, sorted_points)
     points, normals, spacing = contours.points, contours.normals, contours.spacing
     first_m = depth[0] * inverse_focal if count > 0 else 0.0
     for m in range(contours.point_start[view], contours.point_start[view + 1]):
         u, v = points[m, 0], points[m, 1]
         nu, nv = normals[m, 0], normals[m, 1]
         nearest = nearest_facing(
-            u, v, nu, nv, radius_px * radius_px, bands, pixel, normal, start, order
+            u, v, nu, nv, radius_px * radius_px, bands, start, order, sorted_points
         )
         m_per_px, gap = 0.0, np.inf
         if nearest >= 0:
