@@ -11,6 +11,7 @@ from markerless_tracker.errors import ImageError
 
 MaskWords = NDArray[np.uint64]
 """A mask packed by `pack_mask`: (h, ceil(w / 64))."""
+_ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 
 
 def locked(array: Any, dtype: Any) -> NDArray[Any]:
@@ -38,6 +39,23 @@ def unpack_mask(words: MaskWords, width: int) -> NDArray[np.bool_]:
     """The mask (h, width) that `pack_mask` packed."""
     raw = np.ascontiguousarray(words, dtype="<u8").view(np.uint8)
     return np.unpackbits(raw, axis=1, count=width, bitorder="little").view(np.bool_)
+
+
+def cut_mask(words: MaskWords, left: int, top: int, width: int, height: int) -> MaskWords:
+    """The part (height, ceil(width / 64)) of a packed mask, from the pixel (left, top) on.
+
+    The part must lie in the mask. It is packed as `pack_mask` does.
+    """
+    first, shift = left // 64, left % 64
+    count = (width + 63) // 64
+    rows = words[top : top + height]
+    part = rows[:, first : first + count] >> np.uint64(shift)
+    if shift:
+        # A word of the part begins in one word of the mask and ends in the next one.
+        following = rows[:, first + 1 : first + 1 + count]
+        part[:, : following.shape[1]] |= following << np.uint64(64 - shift)
+    part[:, -1] &= _ALL >> np.uint64(-width % 64)
+    return part
 
 
 def no_edges(shape: tuple[int, int]) -> NDArray[np.uint8]:
@@ -197,14 +215,15 @@ class Observation:
         left, top, right, bottom = box
         if box == (u, v, u + self.width, v + self.height):
             return self
+        place = (left - u, top - v, right - left, bottom - top)
         inside = np.s_[top - v : bottom - v, left - u : right - u]
-        undecided = self.undecided
+        undecided = self.undecided_words
         return replace(
             self,
             offset_px=(left, top),
-            mask_words=pack_mask(self.mask[inside]),
+            mask_words=cut_mask(self.mask_words, *place),
             edges=self.edges[inside] if self.has_edges else no_edges((bottom - top, right - left)),
-            undecided_words=None if undecided is None else pack_mask(undecided[inside]),
+            undecided_words=None if undecided is None else cut_mask(undecided, *place),
         )
 
     def with_masks(self, mask: NDArray[Any], undecided: NDArray[Any] | None) -> "Observation":

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from markerless_tracker.errors import ImageError, SearchError
-from markerless_tracker.observation import no_edges
+from markerless_tracker.observation import cut_mask, no_edges
 from markerless_tracker.records import (
     Comparison,
     Observation,
@@ -31,6 +31,16 @@ def test_masks_come_back(mask: np.ndarray) -> None:
     words = pack_mask(mask)
     assert words.dtype == np.uint64 and words.shape == (len(mask), -(-mask.shape[1] // 64))
     np.testing.assert_array_equal(unpack_mask(words, mask.shape[1]), mask)
+
+
+@given(masks, st.data())
+def test_a_part_of_a_packed_mask_is_that_part_packed(mask: np.ndarray, data: st.DataObject) -> None:
+    (top, bottom), (left, right) = (
+        sorted(data.draw(st.lists(st.integers(0, n), min_size=2, max_size=2, unique=True)))
+        for n in mask.shape
+    )
+    part = cut_mask(pack_mask(mask), left, top, right - left, bottom - top)
+    np.testing.assert_array_equal(part, pack_mask(mask[top:bottom, left:right]))
 
 
 @given(masks)
