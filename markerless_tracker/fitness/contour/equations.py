@@ -68,7 +68,7 @@ def _accumulate(view, cone_node, samples, residuals, sums):  # type: ignore[no-u
     for n in range(residuals.count[view]):
         s = sample[n]
         add_wrench(
-            world[s, 0], world[s, 1], world[s, 2], gradient[n, 0], gradient[n, 1], gradient[n, 2],
+            world[s, 0], world[s, 1], world[s, 2], gradient[0, n], gradient[1, n], gradient[2, n],
             weight[n], value[n], sums, cone_node[cone[s]],
         )  # fmt: skip
 

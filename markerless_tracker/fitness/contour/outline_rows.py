@@ -49,7 +49,9 @@ def outline_rows(frame: ContourFrame) -> OutlineRows:
         view=np.repeat(np.arange(len(r.count)), r.count),
         cone=np.concatenate([samples.cone[v, s] for v, s in enumerate(sample)]),
         place=np.concatenate([samples.place[v, s] for v, s in enumerate(sample)]),
-        gradient=np.concatenate([r.gradient[v, rows] for v, rows in enumerate(used)]),
+        gradient=np.concatenate(
+            [r.gradient[v, :, rows] for v, rows in enumerate(used)], axis=1
+        ).T.copy(),
         value=np.concatenate([r.value[v, rows] for v, rows in enumerate(used)]),
         weight=np.concatenate([r.weight[v, rows] for v, rows in enumerate(used)]),
     )

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import kernel
+from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.contour.nearest import nearest_facing, sort_into_bands
 from markerless_tracker.fitness.contour.outline_samples import MAX_SAMPLES
 from markerless_tracker.geometry import FloatArray
@@ -23,8 +23,9 @@ class Residuals(NamedTuple):
     Attributes:
         value: (v, s) m.
         weight: (v, s) represented length of outline (m) times the robust weight.
-        gradient: (v, s, 3) with respect to the sample's world point.
+        gradient: (v, 3, s) with respect to the sample's world point.
         sample: (v, s) index of that sample among the view's.
+        along: (v, 5, s) that world point (m), and the gradient with respect to its pixel.
         count: (v,).
         cost: (v,) sum of length times the robust cost, m³.
     """
@@ -33,6 +34,7 @@ class Residuals(NamedTuple):
     weight: FloatArray
     gradient: FloatArray
     sample: NDArray[np.int64]
+    along: FloatArray
     count: NDArray[np.int64]  # type: ignore[assignment]
     cost: FloatArray
 
@@ -41,8 +43,8 @@ def make_residuals(views: int, points: int) -> Residuals:
     """Allocate the arrays for residuals: one per outline point and one per edge point."""
     s = (views, MAX_SAMPLES + points)
     return Residuals(
-        np.empty(s), np.empty(s), np.empty((*s, 3)), np.empty(s, dtype=np.int64),
-        np.zeros(views, dtype=np.int64), np.zeros(views),
+        np.empty(s), np.empty(s), np.empty((views, 3, s[1])), np.empty(s, dtype=np.int64),
+        np.empty((views, 5, s[1])), np.zeros(views, dtype=np.int64), np.zeros(views),
     )  # fmt: skip
 
 
@@ -66,29 +68,46 @@ def _distance_at(distance, start, left, top, width, height, u, v):  # type: igno
 
 
 @kernel
-def _world_gradient(r, t, k, d, point, s, du, dv, out, n):  # type: ignore[no-untyped-def]
-    """Fill out[n] (3,) with the gradient of du * u + dv * v with respect to world point[s].
+def _world_gradients(count, r, t, k, d, along, out):  # type: ignore[no-untyped-def]
+    """Fill out (3, s) with the gradients of du * u + dv * v with respect to world points.
 
     r, t, k, d: rotation, translation, intrinsics and lens of the view.
+    along: (5, s) the world points, du and dv.
     """
-    px, py, pz = point[s, 0], point[s, 1], point[s, 2]
-    x = r[0, 0] * px + r[0, 1] * py + r[0, 2] * pz + t[0]
-    y = r[1, 0] * px + r[1, 1] * py + r[1, 2] * pz + t[1]
-    inverse_depth = 1.0 / (r[2, 0] * px + r[2, 1] * py + r[2, 2] * pz + t[2])
-    a, b = x * inverse_depth, y * inverse_depth
-    r2 = a * a + b * b
-    radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]))
-    rate = 2.0 * (d[0] + r2 * (2.0 * d[1] + 3.0 * r2 * d[4]))
-    aa = radial + a * a * rate + 2.0 * d[2] * b + 6.0 * d[3] * a
-    ab = a * b * rate + 2.0 * d[2] * a + 2.0 * d[3] * b
-    bb = radial + b * b * rate + 6.0 * d[2] * b + 2.0 * d[3] * a
-    # d(u, v)/d(a, b), then d(a, b)/d(camera point), then in the world's axes.
-    ga = du * (k[0] * aa + k[1] * ab) + dv * k[3] * ab
-    gb = du * (k[0] * ab + k[1] * bb) + dv * k[3] * bb
-    gx, gy = ga * inverse_depth, gb * inverse_depth
-    gz = -(ga * a + gb * b) * inverse_depth
-    for i in range(3):
-        out[n, i] = gx * r[0, i] + gy * r[1, i] + gz * r[2, i]
+    r00, r01, r02 = r[0, 0], r[0, 1], r[0, 2]
+    r10, r11, r12 = r[1, 0], r[1, 1], r[1, 2]
+    r20, r21, r22 = r[2, 0], r[2, 1], r[2, 2]
+    t0, t1, t2 = t[0], t[1], t[2]
+    k0, k1, k3 = k[0], k[1], k[3]
+    d0, d1, d2, d3, d4 = d[0], d[1], d[2], d[3], d[4]
+    xs, ys, zs, dus, dvs = along[0], along[1], along[2], along[3], along[4]
+    for n in range(count):
+        px, py, pz, du, dv = xs[n], ys[n], zs[n], dus[n], dvs[n]
+        x = r00 * px + r01 * py + r02 * pz + t0
+        y = r10 * px + r11 * py + r12 * pz + t1
+        inverse_depth = 1.0 / (r20 * px + r21 * py + r22 * pz + t2)
+        a, b = x * inverse_depth, y * inverse_depth
+        r2 = a * a + b * b
+        radial = 1.0 + r2 * (d0 + r2 * (d1 + r2 * d4))
+        rate = 2.0 * (d0 + r2 * (2.0 * d1 + 3.0 * r2 * d4))
+        aa = radial + a * a * rate + 2.0 * d2 * b + 6.0 * d3 * a
+        ab = a * b * rate + 2.0 * d2 * a + 2.0 * d3 * b
+        bb = radial + b * b * rate + 6.0 * d2 * b + 2.0 * d3 * a
+        # d(u, v)/d(a, b), then d(a, b)/d(camera point), then in the world's axes.
+        ga = du * (k0 * aa + k1 * ab) + dv * k3 * ab
+        gb = du * (k0 * ab + k1 * bb) + dv * k3 * bb
+        gx, gy = ga * inverse_depth, gb * inverse_depth
+        gz = -(ga * a + gb * b) * inverse_depth
+        out[0, n] = gx * r00 + gy * r10 + gz * r20
+        out[1, n] = gx * r01 + gy * r11 + gz * r21
+        out[2, n] = gx * r02 + gy * r12 + gz * r22
+
+
+@inlined
+def _add(n, world, s, du, dv, along):  # type: ignore[no-untyped-def]
+    """Put residual n's sample and its gradient with respect to the pixel into `along`."""
+    along[0, n], along[1, n], along[2, n] = world[s, 0], world[s, 1], world[s, 2]
+    along[3, n], along[4, n] = du, dv
 
 
 @kernel
@@ -104,7 +123,7 @@ def collect_residuals(view, views, contours, truncation_m, samples, ordered, res
     pixel, normal, world = samples.pixel[view], samples.normal[view], samples.world[view]
     depth, lengths, count = samples.depth[view], samples.length[view], samples.count[view]
     values, weights = residuals.value[view], residuals.weight[view]
-    gradient, sample = residuals.gradient[view], residuals.sample[view]
+    sample, along = residuals.sample[view], residuals.along[view]
     distance, distance_start = contours.distance, contours.distance_start[view]
     left, top = contours.window[view, 0], contours.window[view, 1]
     width, height = contours.window[view, 2], contours.window[view, 3]
@@ -133,7 +152,7 @@ def collect_residuals(view, views, contours, truncation_m, samples, ordered, res
         values[n] = value
         weights[n] = length * share * share
         sample[n] = s
-        _world_gradient(r, t, k, d, world, s, m_per_px * along_u, m_per_px * along_v, gradient, n)
+        _add(n, world, s, m_per_px * along_u, m_per_px * along_v, along)
         n += 1
     # No point farther off than this radius lies within the truncation.
     radius_px = truncation_m / (least_depth * inverse_focal)
@@ -163,7 +182,8 @@ def collect_residuals(view, views, contours, truncation_m, samples, ordered, res
         values[n] = (du * nu + dv * nv) * m_per_px
         weights[n] = length * share * share
         sample[n] = nearest
-        _world_gradient(r, t, k, d, world, nearest, m_per_px * nu, m_per_px * nv, gradient, n)
+        _add(n, world, nearest, m_per_px * nu, m_per_px * nv, along)
         n += 1
+    _world_gradients(n, r, t, k, d, along, residuals.gradient[view])
     residuals.count[view] = n
     residuals.cost[view] = cost

@@ -321,7 +321,7 @@ def _shift(
         frame.collect(pose, _SHIFT_TRUNCATION_M)
         rows = slice(int(residuals.count[0]))
         value, weight = residuals.value[0, rows], residuals.weight[0, rows]
-        jacobian = residuals.gradient[0, rows] @ to_camera[:2, :3].T * (depth / focal)
+        jacobian = residuals.gradient[0].T[rows] @ to_camera[:2, :3].T * (depth / focal)
         normal = jacobian.T @ (weight[:, None] * jacobian)
         if np.linalg.matrix_rank(normal) < 2:
             return None

@@ -42,7 +42,7 @@ def test_gradients_by_the_world_point(posed, slow_residuals, disturbed) -> None:
     h = 1e-5
     for v, camera in enumerate(posed.rig):
         slow = slow_residuals(posed, v, 0.1)
-        fast = posed.frame.residuals.gradient[v, : len(slow.value)]
+        fast = posed.frame.residuals.gradient[v, :, : len(slow.value)].T
         world = posed.frame.samples.world[v, slow.sample]
         numeric = np.empty_like(fast)
         for axis in range(3):
