@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import compiled, kernel
 from markerless_tracker.imaging.images import Image, grey_of
 from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.settings import ImagingSettings
@@ -67,7 +67,7 @@ def _gradient_strength(grey: Image, settings: ImagingSettings) -> Image:
     return strength
 
 
-@compiled()
+@kernel
 def _weighted(above, here, below, smooth, slope):  # type: ignore[no-untyped-def]
     """Three rows (w,) into smooth, slope (w + 2,), the last values repeated at both ends."""
     n = here.size
@@ -81,7 +81,7 @@ def _weighted(above, here, below, smooth, slope):  # type: ignore[no-untyped-def
     slope[n + 1] = slope[n]
 
 
-@compiled()
+@kernel
 def _steep(smooth, slope, low, gain, out):  # type: ignore[no-untyped-def]
     full = np.float32(255.0)
     for j in range(out.size):

@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.masks import Mask, disc
 
 # Nothing is learned from the first image after a longer gap or a step back in time.
@@ -14,7 +14,7 @@ GAP_NS = 1_000_000_000
 STRIDE = 4
 
 
-@compiled()
+@kernel
 def adapt_means(image, gain, keep_out, mean, scale, share, first, stride):  # type: ignore[no-untyped-def]
     """Move the mean of a pixel's Gaussian towards the pixel: mean += share (image / gain - mean).
 

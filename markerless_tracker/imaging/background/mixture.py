@@ -5,7 +5,7 @@ from itertools import chain
 
 import numpy as np
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.images import FloatImage, Image
 
 MEDIAN_TO_SD = 1.4826
@@ -20,7 +20,7 @@ _LEAST_SHARE = 0.05
 _LEAST_FRAMES = 2
 
 
-@compiled()
+@kernel
 def add_frame(image, tolerance, count, mean, moment):  # type: ignore[no-untyped-def]
     """Assign every pixel (h, w, c) to its nearest mode within ``tolerance`` in each channel.
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import compiled, kernel
 from markerless_tracker.imaging.images import Image
 
 
@@ -104,7 +104,7 @@ def steady_image(
     return steady, variance
 
 
-@compiled()
+@kernel
 def match_kernel(stack, target, tolerance, matches, total):  # type: ignore[no-untyped-def]
     """Count and sum the frames within ``tolerance`` of ``target`` in every channel."""
     count, height, width, channels = stack.shape
@@ -138,7 +138,7 @@ def matching_frames(
     return matches, np.where(matches[:, :, None] > 0, mean, target).astype(np.float32)
 
 
-@compiled()
+@kernel
 def motion_kernel(stack, steady, tolerance, share, jump):  # type: ignore[no-untyped-def]
     """Fraction of the frames that differ from the steady value, and the largest single change."""
     count, height, width, channels = stack.shape

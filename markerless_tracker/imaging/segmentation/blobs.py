@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import compiled, kernel
 from markerless_tracker.imaging.region import Region
 
 LEFT, TOP, RIGHT, BOTTOM = 1, 2, 4, 8
@@ -15,7 +15,7 @@ LEFT, TOP, RIGHT, BOTTOM = 1, 2, 4, 8
 EVERY = LEFT | TOP | RIGHT | BOTTOM
 
 
-@compiled()
+@kernel
 def _root(parent, i):  # type: ignore[no-untyped-def]
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -23,7 +23,7 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
     return i
 
 
-@compiled()
+@kernel
 def _count_runs(mask, part, target):  # type: ignore[no-untyped-def]
     """Runs of ``target`` in a part (left, top, right, bottom) of a mask."""
     count = 0
@@ -37,7 +37,7 @@ def _count_runs(mask, part, target):  # type: ignore[no-untyped-def]
     return count
 
 
-@compiled()
+@kernel
 def _same_until(values, words, u, value):  # type: ignore[no-untyped-def]
     """First index from u on whose value differs from ``value`` (0 or 255); eight at a time."""
     n = values.size
@@ -52,21 +52,21 @@ def _same_until(values, words, u, value):  # type: ignore[no-untyped-def]
     return n
 
 
-@compiled()
-def _join_runs(mask, part, target, touch, begin, end, parent, first):  # type: ignore[no-untyped-def]
+@kernel
+def _join_runs(mask, part, target, touch, values, begin, end, parent, first):  # type: ignore[no-untyped-def]
     """Fill the runs of ``target`` and join those that belong to one patch.
 
     Args:
         mask, part, target: as for `flip_small`.
         touch: 1 if runs of neighbouring rows also join at corners, else 0.
+        values: a row of the part, padded to a multiple of 8 with the other value, so that every run
+            ends before or at the padding; written.
         begin, end: (n,) first column of each run, and the column after its last one; written.
         parent: (n,) union-find forest of the runs, one tree a patch; written.
         first: (rows + 1,) index of each row's first run; written.
     """
     rows, columns = part[3] - part[1], part[2] - part[0]
     n = 0
-    # Padded with the other value, so that every run ends before or at the padding.
-    values = np.full((columns + 7) // 8 * 8, 255 - target, dtype=np.uint8)
     words = values.view(np.uint64)
     for i in range(rows):
         first[i] = n
@@ -98,7 +98,7 @@ def _join_runs(mask, part, target, touch, begin, end, parent, first):  # type: i
     first[rows] = n
 
 
-@compiled()
+@kernel
 def _measure_patches(part, need, begin, end, parent, first, area, sides, needed):  # type: ignore[no-untyped-def]
     """Sum area and sides of each patch at its root run.
 
@@ -152,9 +152,11 @@ def flip_small(mask, part, need, target, least, connectivity, spared, unknown): 
     begin = np.empty(count, dtype=np.int32)
     end = np.empty(count, dtype=np.int32)
     parent = np.empty(count, dtype=np.int32)
-    rows = part[3] - part[1]
+    rows, columns = part[3] - part[1], part[2] - part[0]
     first = np.empty(rows + 1, dtype=np.int32)
-    _join_runs(mask, part, target, 1 if connectivity == 8 else 0, begin, end, parent, first)
+    values = np.full((columns + 7) // 8 * 8, 255 - target, dtype=np.uint8)
+    touch = 1 if connectivity == 8 else 0
+    _join_runs(mask, part, target, touch, values, begin, end, parent, first)
     area = np.zeros(count, dtype=np.int64)
     sides = np.zeros(count, dtype=np.uint8)
     needed = np.zeros(count, dtype=np.bool_)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.observation import locked
 
@@ -29,7 +29,7 @@ _LEAST_SHARE = 0.2
 _LEAST_SAMPLES = 200
 
 
-@compiled()
+@kernel
 def _mode(counts, weights, sums):  # type: ignore[no-untyped-def]
     """Weighted mean ratio in the window of bins with the most samples; 1 if it has too few."""
     inside = 0
@@ -64,19 +64,20 @@ def _mode(counts, weights, sums):  # type: ignore[no-untyped-def]
     return math.exp(total / weight)
 
 
-@compiled()
-def modal_ratio(image, where, base_logs, base_weights, value_logs, gain):  # type: ignore[no-untyped-def]
+@kernel
+def modal_ratio(  # type: ignore[no-untyped-def]
+    image, where, base_logs, base_weights, value_logs, counts, sums, gain
+):
     """Fill gain (c,) from the pixels where (n, 2) = (v, u) of an image (h, w, c).
 
     base_logs: (n, c) log of the background at these pixels; value_logs: (256,) log of each grey
     level; NaN if not usable. base_weights: (n, c) inverse variance of a ratio to the background,
-    whose error is the same in grey levels.
+    whose error is the same in grey levels. counts (c, bins) and sums (2, c, bins): working memory,
+    all 0.
     """
     per_log = _BINS / (2.0 * _LOG_RANGE)
     channels = gain.size
-    counts = np.zeros((channels, _BINS), dtype=np.int64)
-    weights = np.zeros((channels, _BINS), dtype=np.float64)
-    sums = np.zeros((channels, _BINS), dtype=np.float64)
+    weights, products = sums[0], sums[1]
     # The channels of a pixel are adjacent in memory.
     for i in range(where.shape[0]):
         pixel = image[where[i, 0], where[i, 1]]
@@ -87,9 +88,9 @@ def modal_ratio(image, where, base_logs, base_weights, value_logs, gain):  # typ
                 weight = base_weights[i, c]
                 counts[c, place] += 1
                 weights[c, place] += weight
-                sums[c, place] += weight * ratio
+                products[c, place] += weight * ratio
     for c in range(channels):
-        gain[c] = _mode(counts[c], weights[c], sums[c])
+        gain[c] = _mode(counts[c], weights[c], products[c])
 
 
 class ExposureMeter:
@@ -114,7 +115,8 @@ class ExposureMeter:
         gain = np.empty(self._channels, dtype=np.float32)
         modal_ratio(
             locked(image, np.uint8), self._where, self._base_logs, self._base_weights,
-            self._value_logs, gain,
+            self._value_logs, np.zeros((self._channels, _BINS), dtype=np.int64),
+            np.zeros((2, self._channels, _BINS)), gain,
         )  # fmt: skip
         return gain
 

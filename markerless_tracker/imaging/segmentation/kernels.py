@@ -7,7 +7,7 @@ once. They are not `parallel=True`: numba's own threads allow one caller at a ti
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import inlined, kernel
 
 FOREGROUND = 255
 SHADOW = 127
@@ -32,7 +32,7 @@ def coarse(
     return np.rint(steps).astype(np.uint16), unit
 
 
-@compiled(inline="always")
+@inlined
 def hue_deg(blue, green, red, value, chroma):  # type: ignore[no-untyped-def]
     """Hue in degrees, [0, 360), as OpenCV defines it; ``chroma`` = max - min > 0.
 
@@ -48,7 +48,7 @@ def hue_deg(blue, green, red, value, chroma):  # type: ignore[no-untyped-def]
     return turned if hue < np.float32(0.0) else hue
 
 
-@compiled(inline="always")
+@inlined
 def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped-def]
     """Eq 12 for a colour pixel (float32 BGR) and its background; ``rule``: `shadow.shadow_rule`."""
     value = max(b, g, r)
@@ -74,7 +74,7 @@ def is_shadow(b, g, r, mean_b, mean_g, mean_r, rule):  # type: ignore[no-untyped
 
 
 # Loops over one row with few arrays each, which the compiler vectorises.
-@compiled()
+@kernel
 def _add_square(value, mean, scale, gain, distance):  # type: ignore[no-untyped-def]
     """Add ((value - gain mean) scale)^2 of one row; mean and scale are integers."""
     white = np.float32(255.0)
@@ -83,7 +83,7 @@ def _add_square(value, mean, scale, gain, distance):  # type: ignore[no-untyped-
         distance[j] += x * x
 
 
-@compiled()
+@kernel
 def _beyond(distance, limit, row, marks):  # type: ignore[no-untyped-def]
     for j in range(distance.size):
         marks[j] = np.uint8(255) if distance[j] > limit else np.uint8(0)
@@ -93,7 +93,7 @@ def _beyond(distance, limit, row, marks):  # type: ignore[no-untyped-def]
 
 # `is_shadow` of many pixels, with selections of values instead of branches, which the compiler
 # vectorises. If half of the pixels are marked, this takes a quarter of the time of branches.
-@compiled(error_model="numpy")
+@kernel
 def _split_marked(blue, green, red, first_b, first_g, first_r, gain, rule, marks, row):  # type: ignore[no-untyped-def]
     """Fill a part of a row: shadow or foreground at marked pixels, else 0.
 
@@ -149,8 +149,16 @@ def _split_marked(blue, green, red, first_b, first_g, first_r, gain, rule, marks
         row[j] = label if mark != 0 else background
 
 
-@compiled()
-def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
+def make_row(columns: int) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Working memory for labels of parts of so many columns: distances, and marks in words."""
+    words = (columns + 7) // 8
+    return np.empty(columns, dtype=np.float32), np.zeros(8 * words, dtype=np.uint8)
+
+
+@kernel
+def label_colour(  # type: ignore[no-untyped-def]
+    planes, first, unit, mean, scale, gain, rule, left, top, distance, marks, labels
+):
     """Label a part of a colour image: 0 background, 127 shadow, 255 foreground.
 
     Args:
@@ -161,6 +169,7 @@ def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels
         gain: (3,) float32, brightness of the image relative to the background's.
         rule: of `shadow.shadow_rule`.
         left, top: the part's first column and row in the image.
+        distance, marks: of `make_row`, working memory.
         labels: (a, b) uint8, written.
     """
     one, white = np.float32(1.0), np.float32(255.0)
@@ -168,9 +177,7 @@ def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels
     modes = mean.shape[0]
     rows, columns = labels.shape
     steps = (gain[0] * level, gain[1] * level, gain[2] * level)
-    distance = np.empty(columns, dtype=np.float32)
     # Groups of eight background pixels are skipped at once.
-    marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
     words = marks.view(np.uint64)
     for i in range(rows):
         v = top + i
@@ -222,8 +229,10 @@ def label_colour(planes, first, unit, mean, scale, gain, rule, left, top, labels
                 row[j] = label
 
 
-@compiled()
-def label_grey(image, first, unit, mean, scale, gain, rule, left, top, labels):  # type: ignore[no-untyped-def]
+@kernel
+def label_grey(  # type: ignore[no-untyped-def]
+    image, first, unit, mean, scale, gain, rule, left, top, distance, marks, labels
+):
     """As `label_colour` with one channel: image (a, b), mean and scale (k, 1, h, w), gain (1,).
 
     Only the ratio of brightness decides on shadow.
@@ -234,9 +243,7 @@ def label_grey(image, first, unit, mean, scale, gain, rule, left, top, labels): 
     modes = mean.shape[0]
     rows, columns = labels.shape
     gain_v = gain[0]
-    distance = np.empty(columns, dtype=np.float32)
     # Groups of eight background pixels are skipped at once.
-    marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
     words = marks.view(np.uint64)
     for i in range(rows):
         v = top + i

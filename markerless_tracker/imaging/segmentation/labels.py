@@ -146,7 +146,7 @@ class PixelLabeller:
         is_grey = self.background.is_grey
         known = (
             *self._first, self.background.mean, self.background.scale, self.gain, self._rule,
-            window.left, window.top,
+            window.left, window.top, *kernels.make_row(window.width),
         )  # fmt: skip
         if is_grey:
             planes = part.transpose(2, 0, 1)

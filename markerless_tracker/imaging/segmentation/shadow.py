@@ -19,7 +19,7 @@ from typing import TypeVar, cast
 import cv2
 import numpy as np
 
-from markerless_tracker.compiled import compiled, kernel
+from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.images import FloatImage, Image
 from markerless_tracker.imaging.masks import Mask
 from markerless_tracker.imaging.segmentation.kernels import FOREGROUND, LEVELS, SHADOW
@@ -131,7 +131,7 @@ def even_patches(patch, inverse, gain, spread, noise, left, top, labels, even): 
         )  # fmt: skip
 
 
-@compiled()
+@kernel
 def label_by_patch(image, first, gain, rule, near, even, left, top, labels):  # type: ignore[no-untyped-def]
     """Label pixels that differ from the background as shadow or foreground, by their patches.
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import compiled
+from markerless_tracker.compiled import compiled, kernel
 from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.kernels import FOREGROUND, SHADOW
@@ -36,14 +36,14 @@ _AGREE = 3.5
 
 
 # Loops over one row with few arrays each, which the compiler vectorises.
-@compiled()
+@kernel
 def _slide(total, came, gone):  # type: ignore[no-untyped-def]
     """Column sums of a window that moves down by a row: one row enters, one leaves."""
     for j in range(came.size):
         total[j] += came[j] - gone[j]
 
 
-@compiled()
+@kernel
 def _slide_product(total, came_x, came_y, gone_x, gone_y):  # type: ignore[no-untyped-def]
     """As `_slide`, for products of two images."""
     for j in range(came_x.size):
@@ -51,7 +51,7 @@ def _slide_product(total, came_x, came_y, gone_x, gone_y):  # type: ignore[no-un
 
 
 # With NumPy's error model the loop has no branch to test for division by zero.
-@compiled(error_model="numpy")
+@kernel
 def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[no-untyped-def]
     """Fill out (w,) with the light of a row of windows, as `window_light` describes it.
 
@@ -84,7 +84,7 @@ def _light_of_sums(a, b, aa, ab, bb, across, down, noise, out):  # type: ignore[
         out[j] = found if (a[j] > 0) & (b[j] > 0) else np.float32(0.0)
 
 
-@compiled()
+@kernel
 def _whole_levels(image, mean, gain, most, a, b):  # type: ignore[no-untyped-def]
     """Fill a with a row of the image and b with that of the background, in whole grey levels.
 
@@ -123,6 +123,18 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
     grey = np.zeros((side + 1, columns), dtype=np.int32)
     base = np.zeros((side + 1, columns), dtype=np.int32)
     across = np.empty(columns, dtype=np.int32)
+    _light_of_rows(
+        image, mean, gain, noise, radius, left, top, most, sums, window, grey, base, across, light
+    )
+
+
+@kernel
+def _light_of_rows(  # type: ignore[no-untyped-def]
+    image, mean, gain, noise, radius, left, top, most, sums, window, grey, base, across, light
+):
+    """The loop of `window_light`, with its working memory."""
+    rows, columns = light.shape
+    side = 2 * radius + 1
     for j in range(columns):
         across[j] = min(j + radius, columns - 1) - max(j - radius, 0) + 1
     for v in range(rows + radius):
@@ -152,7 +164,7 @@ def window_light(image, mean, gain, noise, radius, left, top, light):  # type: i
         )
 
 
-@compiled()
+@kernel
 def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
     """Spread light from the row before to windows of a row without a pattern, if it is similar.
 
@@ -180,12 +192,12 @@ def _spread_row(row, near, steps, out):  # type: ignore[no-untyped-def]
         steps[j] = passed + one if taken > zero else zero
 
 
-@compiled()
-def _spread_down_and_up(light, spread):  # type: ignore[no-untyped-def]
-    """Spread light along columns; see `spread_light`."""
-    rows, columns = light.shape
-    near = np.zeros(columns, dtype=np.float32)
-    steps = np.zeros(columns, dtype=np.float32)
+@kernel
+def _spread_down_and_up(light, near, steps, spread):  # type: ignore[no-untyped-def]
+    """Spread light (a, b) along columns; see `spread_light`. near, steps: (b,), working memory."""
+    rows = light.shape[0]
+    near[:] = 0.0
+    steps[:] = 0.0
     for i in range(rows):
         _spread_row(light[i], near, steps, spread[i])
     near[:] = 0.0
@@ -203,13 +215,15 @@ def spread_light(light: NDArray[np.float32], spread: NDArray[np.float32]) -> Non
     # Along rows each step needs the one before; along columns many steps are made at once.
     transposed = np.asarray(cv2.transpose(light), dtype=np.float32)
     found = transposed.copy()
-    _spread_down_and_up(transposed, found)
+    near, steps = np.empty((2, max(light.shape)), dtype=np.float32)
+    _spread_down_and_up(transposed, near[: len(light)], steps[: len(light)], found)
     light[...] = cv2.transpose(found)
     spread[...] = light
-    _spread_down_and_up(light, spread)
+    columns = light.shape[1]
+    _spread_down_and_up(light, near[:columns], steps[:columns], spread)
 
 
-@compiled()
+@kernel
 def lit(light, least, most, valid):  # type: ignore[no-untyped-def]
     """Set light outside of [least, most] to 0 or less; valid (a, b) uint8 is 1 inside."""
     for i in range(light.shape[0]):
@@ -222,7 +236,7 @@ def lit(light, least, most, valid):  # type: ignore[no-untyped-def]
             row[j] = p if good else min(p, np.float32(0.0))
 
 
-@compiled()
+@kernel
 def apply_light(  # type: ignore[no-untyped-def]
     image, mean, gain, agree, radius, protect, reveal, left, top, light, near_valid, part, corner,
     examined, labels,

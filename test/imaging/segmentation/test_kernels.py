@@ -8,7 +8,12 @@ from hypothesis import strategies as st
 
 from markerless_tracker.imaging import ImagingSettings
 from markerless_tracker.imaging.segmentation import kernels
-from markerless_tracker.imaging.segmentation.kernels import coarse, label_colour, label_grey
+from markerless_tracker.imaging.segmentation.kernels import (
+    coarse,
+    label_colour,
+    label_grey,
+    make_row,
+)
 from markerless_tracker.imaging.segmentation.shadow import shadow_rule
 
 SAME = np.ones(3, np.float32)
@@ -97,6 +102,7 @@ def test_colour_agrees_with_the_twin(removal: bool, seed: int) -> None:
         shadow_rule(options),
         0,
         0,
+        *make_row(labels.shape[1]),
         labels,
     )
     twin = twin_colour(image, mean, scale, options)
@@ -123,6 +129,7 @@ def test_grey_is_the_ratio_alone(seed: int) -> None:
         rule,
         0,
         0,
+        *make_row(labels.shape[1]),
         labels,
     )
     value = image.astype(float)
@@ -159,6 +166,7 @@ def test_shadows_of_a_red_wall(pixel: tuple[int, int, int], shadow: bool) -> Non
         rule,
         0,
         0,
+        *make_row(labels.shape[1]),
         labels,
     )
     assert labels[0, 0] == (127 if shadow else 255)
@@ -179,6 +187,7 @@ def test_black_is_defined() -> None:
             rule,
             0,
             0,
+            *make_row(labels.shape[1]),
             labels,
         )
         assert (labels == (0 if level == 0.0 else 255)).all()
