@@ -1,5 +1,7 @@
 """Forward kinematics of a `BodyModel`: transforms, markers and cones at a pose."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -262,10 +264,17 @@ def cone_transforms(body: BodyModel, pose: FloatArray) -> FloatArray:
 
 def carried(body: BodyModel, nodes: IntArray) -> FloatArray:
     """(m, k): 1 where node m is node k or a descendant of it, else 0."""
+    return np.asarray(_descent(body)[:, nodes])
+
+
+@lru_cache(maxsize=64)
+def _descent(body: BodyModel) -> FloatArray:
+    """As `carried`, of all nodes (m, m); read-only."""
     count = body.node_parent.size
     above = np.zeros((count, count))
     for node, parent in enumerate(body.node_parent.tolist()):
         if parent >= 0:
             above[node] = above[parent]
         above[node, node] = 1.0
-    return above[:, nodes]
+    above.flags.writeable = False
+    return above

@@ -108,7 +108,7 @@ def confidence_of(
     between = DISAGREEMENT_FACTOR * disagreement_m(contours, rows)
     common_sd = float(np.linalg.norm([unseen, between, TRUNK_ERROR_FACTOR * of_trunk]))
     by_marker, by_root = jacobians(body, pose)
-    of_markers = np.einsum("ij,jk,ik->i", by_marker, covariance, by_marker)
+    of_markers = ((by_marker @ covariance) * by_marker).sum(axis=1)
     limbs_m = {
         name: min(
             max(LIMB_ERROR_FACTOR * excess, SUSPECTED_FACTOR * suspected_m.get(name, 0.0)),
