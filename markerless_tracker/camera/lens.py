@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from markerless_tracker.compiled import kernel
+from markerless_tracker.compiled import inlined, kernel
 
 _NEAREST_M = 1e-6
 _OUTSIDE = 1e3
@@ -27,6 +27,22 @@ def _falls(r2, k1, k2, k3):  # type: ignore[no-untyped-def]
     return 1.0 + least * (3.0 * k1 + least * (5.0 * k2 + least * 7.0 * k3)) <= 0.0
 
 
+@inlined
+def _may_fall(r2, k1, k2, k3):  # type: ignore[no-untyped-def]
+    """False where `_falls` is: the absolute terms' sum tells it cheaply of most points."""
+    return r2 * (3.0 * abs(k1) + r2 * (5.0 * abs(k2) + r2 * 7.0 * abs(k3))) >= 1.0
+
+
+@inlined
+def _displaced(a, b, r2, radial, p1, p2):  # type: ignore[no-untyped-def]
+    """A point at a squared distance r2 from the axis, with its radial factor."""
+    ab = a * b
+    return (
+        a * radial + 2.0 * p1 * ab + p2 * (r2 + 2.0 * a * a),
+        b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * ab,
+    )
+
+
 @kernel
 def lens(a, b, distortion):  # type: ignore[no-untyped-def]
     """Distorted position of a point of the plane at focal length 1, lens (5,) k1 k2 p1 p2 k3.
@@ -36,18 +52,37 @@ def lens(a, b, distortion):  # type: ignore[no-untyped-def]
     instead.
     """
     k1, k2, k3 = distortion[0], distortion[1], distortion[4]
-    p1, p2 = distortion[2], distortion[3]
     r2 = a * a + b * b
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    # (The sum of the absolute terms tells cheaply of most points that it does not fall.)
-    terms = r2 * (3.0 * abs(k1) + r2 * (5.0 * abs(k2) + r2 * 7.0 * abs(k3)))
-    if terms >= 1.0 and _falls(r2, k1, k2, k3):
+    if _may_fall(r2, k1, k2, k3) and _falls(r2, k1, k2, k3):
         radial = _OUTSIDE
-    ab = a * b
-    return (
-        a * radial + 2.0 * p1 * ab + p2 * (r2 + 2.0 * a * a),
-        b * radial + p1 * (r2 + 2.0 * b * b) + 2.0 * p2 * ab,
-    )
+    return _displaced(a, b, r2, radial, distortion[2], distortion[3])
+
+
+@kernel
+def distort(count, lanes, a, b, distortion):  # type: ignore[no-untyped-def]
+    """As `lens`, for the first points of a and b, in place.
+
+    Args:
+        count: number of points.
+        lanes: number of values that may be changed, `count` at least; the compiler's loop has no
+            remainder if it is a multiple of its vectors.
+    """
+    k1, k2, k3 = distortion[0], distortion[1], distortion[4]
+    p1, p2 = distortion[2], distortion[3]
+    doubtful = 0
+    for i in range(count):
+        doubtful += _may_fall(a[i] * a[i] + b[i] * b[i], k1, k2, k3)
+    if doubtful > 0:
+        for i in range(count):
+            a[i], b[i] = lens(a[i], b[i], distortion)
+        return
+    # Without a branch the loop is vectorised.
+    for i in range(lanes):
+        x, y = a[i], b[i]
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        a[i], b[i] = _displaced(x, y, r2, radial, p1, p2)
 
 
 @kernel

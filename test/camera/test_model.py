@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from markerless_tracker.body import load_body
 from markerless_tracker.camera import CameraModel, CameraRig, project, project_camera, scaled_size
-from markerless_tracker.camera.lens import lens
+from markerless_tracker.camera.lens import distort, lens
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.errors import CalibrationError
 from markerless_tracker.geometry import apply, rotation_from_rodrigues, transform
@@ -88,6 +88,17 @@ def test_points_beyond_a_fall_of_the_lens_are_outside(k1, k2, k3, beside) -> Non
     expected = tangent * (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)))
     assert u == (pytest.approx(expected) if slope.min() > 0.0 else 1e3 * tangent)
     assert v == 0.0
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 12), st.sampled_from([0.4, 20.0]))
+def test_many_points_are_distorted_like_each_of_them(seed, count, farthest) -> None:
+    rng = np.random.default_rng(seed)
+    k = rng.uniform((-0.4, -0.2, -0.01, -0.01, -0.1), (0.2, 0.3, 0.01, 0.01, 0.1))
+    points = rng.uniform(-farthest, farthest, (2, 16))
+    u, v = points.copy()
+    distort(count, 16, u, v, k)
+    expected = [lens(a, b, k) for a, b in points[:, :count].T]
+    np.testing.assert_array_equal(np.stack([u, v], axis=1)[:count], np.reshape(expected, (-1, 2)))
 
 
 def test_a_body_far_beside_a_camera_is_not_drawn_into_its_image() -> None:

@@ -5,7 +5,7 @@ Derivation: docs/outlines-of-cones.md.
 
 import numpy as np
 
-from markerless_tracker.camera.lens import lens
+from markerless_tracker.camera.lens import distort
 from markerless_tracker.compiled import inlined, kernel
 from markerless_tracker.fitness.raster.outline_arrays import (
     LANES,
@@ -98,10 +98,7 @@ def to_pixels(cones, count, k, distortion, distorted, u, v):  # type: ignore[no-
     fx, skew, cx, fy, cy = k[0], k[1], k[2], k[3], k[4]
     for i in range(count):
         if distorted:
-            for c in range(n):
-                u[i * LANES + c], v[i * LANES + c] = lens(
-                    u[i * LANES + c], v[i * LANES + c], distortion
-                )
+            distort(cones, n, u[i * LANES :], v[i * LANES :], distortion)
         for c in range(n):
             b = v[i * LANES + c]
             u[i * LANES + c] = fx * u[i * LANES + c] + skew * b + cx
