@@ -2,8 +2,9 @@
 
 numba looks at the date of a kernel's own file only. A kernel that calls one in another file would
 keep the old one compiled into it after an edit there. So the names of the stored files hold a
-digest of all sources that they are compiled from, and of numba's version: two environments that
-share the package's folder would replace each other's. `make clean` removes old ones.
+digest of all sources that they are compiled from, of numba's version and of LLVM's level: two
+environments that share the package's folder would replace each other's. `make clean` removes old
+ones.
 """
 
 import hashlib

@@ -1,5 +1,6 @@
 """Stored kernels: named after all sources that they are compiled from, and after numba."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -88,6 +89,40 @@ def test_the_progress_of_a_compilation(tmp_path: Path) -> None:
     assert told() == ["quarter 0 2", "half 0 2", "half 1 2", "quarter 2 2", "done 2"]
     # What is stored is not compiled again.
     assert told() == ["done 0"]
+
+
+LEVELS = """
+import numpy as np
+from numba import njit
+from numba.core import config, event
+from markerless_tracker.fitness.raster.bits import count_bits
+levels = set()
+class Passes(event.Listener):
+    def on_start(self, event):
+        levels.add(int(config.OPT))
+    def on_end(self, event):
+        pass
+def half(x):
+    return 0.5 * x
+event.register("numba:run_pass", Passes())
+count_bits(np.zeros((2, 3), np.uint64))
+ours = set(levels)
+levels.clear()
+njit(half)(8.0)
+print(ours, levels, int(config.OPT))
+"""
+
+
+@pytest.mark.parametrize(("level", "told"), [(None, "{2} {3} 3"), ("1", "{1} {1} 1")])
+def test_only_our_kernels_have_a_lower_level(level: str | None, told: str, tmp_path: Path) -> None:
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_OPT"}
+    environment["NUMBA_CACHE_DIR"] = str(tmp_path)
+    if level is not None:
+        environment["NUMBA_OPT"] = level
+    done = subprocess.run(
+        [sys.executable, "-c", LEVELS], capture_output=True, text=True, check=True, env=environment
+    )
+    assert done.stdout.strip() == told
 
 
 def test_a_kernel_depends_on_kernels_constants_and_named_tuples_that_it_imports() -> None:
