@@ -24,7 +24,8 @@ from markerless_tracker.fitness.raster.tangents import arc_sweep
 from markerless_tracker.geometry import FloatArray
 
 MAX_SAMPLES = 2048
-"""Largest number of the model's outline points in one view; further points are dropped."""
+"""Largest number of the model's outline points in one view, a power of 2 (`nearest`); further
+points are dropped."""
 
 
 class Samples(NamedTuple):
