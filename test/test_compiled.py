@@ -113,8 +113,10 @@ print(ours, levels, int(config.OPT))
 """
 
 
-@pytest.mark.parametrize(("level", "told"), [(None, "{2} {3} 3"), ("1", "{1} {1} 1")])
-def test_only_our_kernels_have_a_lower_level(level: str | None, told: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("level", "expected"), [(None, "{2} {3} 3"), ("1", "{1} {1} 1")])
+def test_only_our_kernels_have_a_lower_level(
+    level: str | None, expected: str, tmp_path: Path
+) -> None:
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_OPT"}
     environment["NUMBA_CACHE_DIR"] = str(tmp_path)
     if level is not None:
@@ -122,7 +124,7 @@ def test_only_our_kernels_have_a_lower_level(level: str | None, told: str, tmp_p
     done = subprocess.run(
         [sys.executable, "-c", LEVELS], capture_output=True, text=True, check=True, env=environment
     )
-    assert done.stdout.strip() == told
+    assert done.stdout.strip() == expected
 
 
 def test_a_kernel_depends_on_kernels_constants_and_named_tuples_that_it_imports() -> None:

@@ -5,11 +5,9 @@ squared distance and the point's place among the sorted ones are one integer, a 
 positive double grow with its value, and the place takes the lowest of them.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from markerless_tracker.compiled import inlined, kernel
@@ -49,20 +47,10 @@ def make_bands(views: int, height: int) -> Bands:
     )
 
 
-@intrinsic  # type: ignore[misc]
-def _bits(typingctx: Any, value: Any) -> Any:
-    """The bits of a float64 as a uint64."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(args[0], context.get_value_type(types.uint64))
-
-    return types.uint64(types.float64), codegen
-
-
 @inlined
 def _key(gap_px2):  # type: ignore[no-untyped-def]
     """The key of place 0 at a squared distance."""
-    return _bits(gap_px2) & ~_PLACE
+    return np.float64(gap_px2).view(np.uint64) & ~_PLACE
 
 
 @kernel

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from markerless_tracker.compiled import inlined, kernel
+from markerless_tracker.compiled import kernel
 from markerless_tracker.fitness.contour.nearest import nearest_facing, sort_into_bands
 from markerless_tracker.fitness.contour.outline_samples import MAX_SAMPLES
 from markerless_tracker.geometry import FloatArray
@@ -23,28 +23,32 @@ class Residuals(NamedTuple):
     Attributes:
         value: (v, s) m.
         weight: (v, s) represented length of outline (m) times the robust weight.
-        gradient: (v, 3, s) with respect to the sample's world point.
-        sample: (v, s) index of that sample among the view's.
-        along: (v, 5, s) that world point (m), and the gradient with respect to its pixel.
+        sample: (v, s) index of the outline point among the view's.
+        world: (v, 3, s) that point, m.
+        pixel_gradient: (v, 2, s) with respect to its pixel, m / px.
+        gradient: (v, 3, s) with respect to the point.
         count: (v,).
         cost: (v,) sum of length times the robust cost, m³.
     """
 
     value: FloatArray
     weight: FloatArray
-    gradient: FloatArray
     sample: NDArray[np.int64]
-    along: FloatArray
+    world: FloatArray
+    pixel_gradient: FloatArray
+    gradient: FloatArray
     count: NDArray[np.int64]  # type: ignore[assignment]
     cost: FloatArray
 
 
 def make_residuals(views: int, points: int) -> Residuals:
     """Allocate the arrays for residuals: one per outline point and one per edge point."""
-    s = (views, MAX_SAMPLES + points)
+    most = MAX_SAMPLES + points
+    s = (views, most)
     return Residuals(
-        np.empty(s), np.empty(s), np.empty((views, 3, s[1])), np.empty(s, dtype=np.int64),
-        np.empty((views, 5, s[1])), np.zeros(views, dtype=np.int64), np.zeros(views),
+        np.empty(s), np.empty(s), np.empty(s, dtype=np.int64), np.empty((views, 3, most)),
+        np.empty((views, 2, most)), np.empty((views, 3, most)), np.zeros(views, dtype=np.int64),
+        np.zeros(views),
     )  # fmt: skip
 
 
@@ -68,11 +72,14 @@ def _distance_at(distance, start, left, top, width, height, u, v):  # type: igno
 
 
 @kernel
-def _world_gradients(count, r, t, k, d, along, out):  # type: ignore[no-untyped-def]
-    """Fill out (3, s) with the gradients of du * u + dv * v with respect to world points.
+def _world_gradients(count, r, t, k, d, world, pixel_gradient, out):  # type: ignore[no-untyped-def]
+    """Fill out (3, s) with gradients with respect to world points.
 
-    r, t, k, d: rotation, translation, intrinsics and lens of the view.
-    along: (5, s) the world points, du and dv.
+    Args:
+        count: number of residuals.
+        r, t, k, d: rotation, translation, intrinsics and lens of the view.
+        world: (3, s) the points.
+        pixel_gradient: (2, s) the gradients with respect to their pixels.
     """
     r00, r01, r02 = r[0, 0], r[0, 1], r[0, 2]
     r10, r11, r12 = r[1, 0], r[1, 1], r[1, 2]
@@ -80,9 +87,11 @@ def _world_gradients(count, r, t, k, d, along, out):  # type: ignore[no-untyped-
     t0, t1, t2 = t[0], t[1], t[2]
     k0, k1, k3 = k[0], k[1], k[3]
     d0, d1, d2, d3, d4 = d[0], d[1], d[2], d[3], d[4]
-    xs, ys, zs, dus, dvs = along[0], along[1], along[2], along[3], along[4]
+    # Rows of their own, whose elements the compiler knows to be adjacent.
+    xs, ys, zs = world[0], world[1], world[2]
+    by_u, by_v = pixel_gradient[0], pixel_gradient[1]
     for n in range(count):
-        px, py, pz, du, dv = xs[n], ys[n], zs[n], dus[n], dvs[n]
+        px, py, pz, du, dv = xs[n], ys[n], zs[n], by_u[n], by_v[n]
         x = r00 * px + r01 * py + r02 * pz + t0
         y = r10 * px + r11 * py + r12 * pz + t1
         inverse_depth = 1.0 / (r20 * px + r21 * py + r22 * pz + t2)
@@ -103,15 +112,8 @@ def _world_gradients(count, r, t, k, d, along, out):  # type: ignore[no-untyped-
         out[2, n] = gx * r02 + gy * r12 + gz * r22
 
 
-@inlined
-def _add(n, world, s, du, dv, along):  # type: ignore[no-untyped-def]
-    """Put residual n's sample and its gradient with respect to the pixel into `along`."""
-    along[0, n], along[1, n], along[2, n] = world[s, 0], world[s, 1], world[s, 2]
-    along[3, n], along[4, n] = du, dv
-
-
 @kernel
-def collect_residuals(view, views, contours, truncation_m, samples, ordered, residuals):  # type: ignore[no-untyped-def]
+def collect_residuals(view, views, contours, truncation_m, samples, bands, residuals):  # type: ignore[no-untyped-def]
     """Fill the residuals of one view, in both directions.
 
     With the truncation c, robust weights are Tukey's, (1 - (r / c)²)², and the cost is
@@ -120,10 +122,11 @@ def collect_residuals(view, views, contours, truncation_m, samples, ordered, res
     """
     r, t = views.rotation[view], views.translation[view]
     k, d = views.intrinsics[view], views.distortion[view]
-    pixel, normal, world = samples.pixel[view], samples.normal[view], samples.world[view]
+    pixel, normal, point = samples.pixel[view], samples.normal[view], samples.world[view]
     depth, lengths, count = samples.depth[view], samples.length[view], samples.count[view]
     values, weights = residuals.value[view], residuals.weight[view]
-    sample, along = residuals.sample[view], residuals.along[view]
+    sample, world = residuals.sample[view], residuals.world[view]
+    pixel_gradient = residuals.pixel_gradient[view]
     distance, distance_start = contours.distance, contours.distance_start[view]
     left, top = contours.window[view, 0], contours.window[view, 1]
     width, height = contours.window[view, 2], contours.window[view, 3]
@@ -152,19 +155,21 @@ def collect_residuals(view, views, contours, truncation_m, samples, ordered, res
         values[n] = value
         weights[n] = length * share * share
         sample[n] = s
-        _add(n, world, s, m_per_px * along_u, m_per_px * along_v, along)
+        for i in range(3):
+            world[i, n] = point[s, i]
+        pixel_gradient[0, n], pixel_gradient[1, n] = m_per_px * along_u, m_per_px * along_v
         n += 1
     # No point farther off than this radius lies within the truncation.
     radius_px = truncation_m / (least_depth * inverse_focal)
-    start, order, sorted_points = ordered.start[view], ordered.order[view], ordered.points[view]
-    bands = sort_into_bands(count, views.size[view, 1], pixel, normal, start, order, sorted_points)
+    start, order, sorted_points = bands.start[view], bands.order[view], bands.points[view]
+    number = sort_into_bands(count, views.size[view, 1], pixel, normal, start, order, sorted_points)
     points, normals, spacing = contours.points, contours.normals, contours.spacing
     first_m = depth[0] * inverse_focal if count > 0 else 0.0
     for m in range(contours.point_start[view], contours.point_start[view + 1]):
         u, v = points[m, 0], points[m, 1]
         nu, nv = normals[m, 0], normals[m, 1]
         nearest = nearest_facing(
-            u, v, nu, nv, radius_px * radius_px, bands, start, order, sorted_points
+            u, v, nu, nv, radius_px * radius_px, number, start, order, sorted_points
         )
         m_per_px, gap = 0.0, np.inf
         if nearest >= 0:
@@ -182,8 +187,10 @@ def collect_residuals(view, views, contours, truncation_m, samples, ordered, res
         values[n] = (du * nu + dv * nv) * m_per_px
         weights[n] = length * share * share
         sample[n] = nearest
-        _add(n, world, nearest, m_per_px * nu, m_per_px * nv, along)
+        for i in range(3):
+            world[i, n] = point[nearest, i]
+        pixel_gradient[0, n], pixel_gradient[1, n] = m_per_px * nu, m_per_px * nv
         n += 1
-    _world_gradients(n, r, t, k, d, along, residuals.gradient[view])
+    _world_gradients(n, r, t, k, d, world, pixel_gradient, residuals.gradient[view])
     residuals.count[view] = n
     residuals.cost[view] = cost
